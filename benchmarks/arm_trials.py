@@ -20,7 +20,7 @@ import numpy as np
 from mixed_grasps import SLIPPERY, sampled_set
 
 import burg_drake as burg
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.motion.planner import Planner
 from burg_drake.motion.plans.grasp_plan import Plan
 from burg_drake.motion.reach.arm_reach import ArmReach

@@ -32,7 +32,7 @@ from scipy.stats import rankdata
 
 import burg_drake as burg
 from burg_drake.apps.cli import main as burg_drake
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.candidates.candidates import INSTANCE
 from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings

@@ -14,6 +14,7 @@ import os
 import time
 from dataclasses import replace
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.workers.processes import ONE_THREAD
 
 os.environ.update(ONE_THREAD)
@@ -25,7 +26,7 @@ from pydrake.systems.framework import Context
 import burg_drake as burg
 from burg_drake.cameras.systems.board_loop import BoardLoop, LoopCamera, build_board_loop
 from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import Array, inverse, make_pose, rotation_angle
+from burg_drake.core.frames import inverse, make_pose, rotation_angle
 from burg_drake.station.document.station_document import Camera
 
 CAMERAS = {

@@ -32,10 +32,11 @@ from scipy.spatial.transform import Rotation
 
 from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.cameras.pose.estimator import BoardPose
-from burg_drake.core.frames import Array, inverse
+from burg_drake.core.arrays import Array
+from burg_drake.core.frames import inverse
 from burg_drake.scene.document.markers import MarkerLayout, Markers, marker_dictionary
 from burg_drake.scene.document.scene import Board
-from tests.cameras.synthetic import ImageDegradation, board_image, covers_of, degraded
+from tests.cameras.synthetic import FINE, ImageDegradation, board_image, covers_of, degraded
 
 SMALL = Intrinsics(width=640, height=480, focal=(615.0, 615.0), center=(319.5, 239.5))
 LARGE = Intrinsics(width=1280, height=720, focal=(920.0, 920.0), center=(639.5, 359.5))
@@ -229,7 +230,7 @@ def seen(
     rng = np.random.default_rng([seed, k])
     truth = random_view(rng, board, tilt)
     covers, _ = covers_of(board.layout, hidden, rng, partial=partial)
-    return truth, board_image(board, intrinsics, truth, covers=covers)
+    return truth, board_image(board, intrinsics, truth, covers=covers, samples=FINE)
 
 
 def best_time(run: Callable[[], object]) -> float:

@@ -22,8 +22,9 @@ from burg_drake.cameras.calibration.estimation import Calibration, calibrate_vie
 from burg_drake.cameras.calibration.lens_uncertainty import image_grid, uncertainty
 from burg_drake.cameras.calibration.target import CharucoTarget, CharucoView, find_target
 from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array, make_pose
+from burg_drake.core.frames import make_pose
 from tests.cameras.charuco_image import target_image
 
 CAMERAS = {

@@ -4,7 +4,7 @@
 
 `rows`: judges a small set with one, two and N processes of this machine and on a cluster of N
 workers, and compares the rows but for CPU times. `kills`: judges it on a cluster while the driver,
-a worker or the scheduler is killed by SIGKILL after a random time; the same command goes on, on a
+a worker or the scheduler is killed by SIGKILL after a random time; the same command continues, on a
 new cluster where that is needed, until all kills are done; then it compares again. `overhead`:
 trials that sleep for the time of real ones, so that a busy machine does not blur it: the time on N
 workers against what the trials take, for the cluster and for the local pool.

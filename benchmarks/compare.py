@@ -27,7 +27,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.core.statistics import wilson_interval
 from burg_drake.experiment.comparison.comparing import compare
 from burg_drake.experiment.comparison.judge_assessment import judgement
@@ -38,7 +38,7 @@ from burg_drake.experiment.pairing.result_table import ResultTable
 from burg_drake.experiment.statistics import ordered
 from burg_drake.experiment.statistics.confusion import _all_measures, agreement
 from burg_drake.experiment.statistics.estimates import MEASURES
-from burg_drake.experiment.statistics.margin_calibration import MARGINS
+from burg_drake.experiment.statistics.margin_calibration import PREDICTORS
 from burg_drake.experiment.statistics.ordered import Ordered
 from burg_drake.experiment.statistics.rank_statistics import ranking
 from burg_drake.experiment.statistics.resampling import bounds
@@ -235,7 +235,7 @@ def _made_up(rows: int, seed: int) -> dict[str, Array]:
     }
     for name in ("x", "y", "z", "qw", "qx", "qy", "qz", "width"):
         columns[name] = rng.normal(size=rows)
-    for name in MARGINS:
+    for name in PREDICTORS:
         values = rng.normal(size=rows)
         values[ended > 1] = np.nan  # what is stopped before its trial has no such margin
         columns[name] = values if name not in ("clearance", "score") else rng.normal(size=rows)

@@ -23,10 +23,11 @@ from pathlib import Path
 import numpy as np
 
 import burg_drake as burg
+from burg_drake.core.arrays import Array
 from burg_drake.core.content import rng_from
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import MeshError
-from burg_drake.core.frames import Array, make_pose
+from burg_drake.core.frames import make_pose
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.objects.collision.contact import contact_geometry
 from burg_drake.objects.library.document import ObjectLibrary, load_library

@@ -29,8 +29,9 @@ from convergence_plot import Panel, plot
 from scipy.optimize import brentq
 
 import burg_drake as burg
+from burg_drake.core.arrays import Array
 from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import Array, grasp_from_axes
+from burg_drake.core.frames import grasp_from_axes
 from burg_drake.core.paths.resources import resolve
 from burg_drake.objects.library.entry import ContactKind
 from burg_drake.pipeline.source import ObjectSource

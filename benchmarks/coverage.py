@@ -22,7 +22,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import burg_drake as burg
-from burg_drake.core.frames import Array, make_pose
+from burg_drake.core.arrays import Array
+from burg_drake.core.frames import make_pose
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.grasping.comparison.matching import coverage, nearest_grasps
 from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal

@@ -27,8 +27,9 @@ import numpy as np
 from mixed_grasps import clear_grasps, frictions, hand_only
 
 import burg_drake as burg
+from burg_drake.core.arrays import Array
 from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import Array, make_pose
+from burg_drake.core.frames import make_pose
 from burg_drake.core.grasps.outcome import Stage
 from burg_drake.scene.document.scene import Instance, Scene
 from burg_drake.simulation.trials.result import TrialResult

@@ -30,7 +30,7 @@ from burg_drake.evaluation.stages.scene_acceptance import clear_grasp_counts, wi
 from burg_drake.motion.workspace.reach_layer import reach_from_above, reach_without_objects
 from burg_drake.scene.document.scene import Board, Scene
 from burg_drake.station.document.station_document import Station
-from tests.cameras.synthetic import board_image
+from tests.cameras.synthetic import FINE, board_image
 
 SHEETS = {"A3": (0.420, 0.297), "A2": (0.594, 0.420), "A0": (1.189, 0.841)}
 STEP = 0.002
@@ -96,7 +96,7 @@ def rules(scene: Scene, station: Station) -> None:
 def photograph(board: Board) -> None:
     """The top view of a photo, with and without intrinsics."""
     down = np.diag([1.0, -1.0, -1.0])
-    image = board_image(board, PHOTO, make_pose(down, (0.3, 0.2, 0.7)))
+    image = board_image(board, PHOTO, make_pose(down, (0.3, 0.2, 0.7)), samples=FINE)
     for name, intrinsics in (("with", PHOTO), ("without", None)):
         picture = timed(f"top view, {name} intrinsics", board_picture, image, board, intrinsics)
         print(f"    markers off by {1e3 * picture.error:.3f} mm")

@@ -15,7 +15,7 @@ import time
 
 import numpy as np
 
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.motion.ik.numeric import solve_ik
 from burg_drake.motion.ik.panda import PandaIk, panda_forward
 from burg_drake.motion.reach.arm_reach import ArmReach

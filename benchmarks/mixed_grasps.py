@@ -7,9 +7,10 @@ import dataclasses
 import numpy as np
 
 import burg_drake as burg
+from burg_drake.core.arrays import Array
 from burg_drake.core.content import rng_from
 from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import Array, make_pose, rot_z
+from burg_drake.core.frames import make_pose, rot_z
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.document.station_document import Station, Table
 

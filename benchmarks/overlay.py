@@ -18,6 +18,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+from burg_drake.core.arrays import Array, Bytes
 from burg_drake.core.workers.processes import ONE_THREAD
 
 os.environ.update(ONE_THREAD)
@@ -31,13 +32,12 @@ from scipy.ndimage import map_coordinates
 import burg_drake as burg
 from burg_drake.cameras.optics.field_of_view import FieldOfView
 from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.overlay.painting import Bytes
 from burg_drake.cameras.overlay.renderer import Overlay, instance_labels
 from burg_drake.cameras.overlay.style import OverlayStyle
 from burg_drake.cameras.projection.line_drawing import OUTLINE, visible_lines
 from burg_drake.cameras.projection.scene_mesh import SceneMesh, build_scene_mesh
 from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import Array, make_pose
+from burg_drake.core.frames import make_pose
 from burg_drake.pipeline.source import ObjectSource
 from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
 

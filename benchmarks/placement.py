@@ -25,7 +25,8 @@ from burg_drake.cameras.placement.alignment.pinhole import PinholeView
 from burg_drake.cameras.placement.alignment.shape import TargetShape, target_shapes
 from burg_drake.cameras.placement.check import check_placement
 from burg_drake.cameras.placement.document import Placement
-from burg_drake.core.frames import Array, make_pose
+from burg_drake.core.arrays import Array
+from burg_drake.core.frames import make_pose
 from burg_drake.scene.document.scene import load_scene
 from tests.cameras.placement_photo import ScenePhotographer
 

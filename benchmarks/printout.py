@@ -20,7 +20,7 @@ import numpy as np
 import pypdfium2
 from numpy.typing import NDArray
 
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.printout.board_printout import Printout, PrintSettings, print_board
 from burg_drake.printout.relief import height_map
 from burg_drake.scene.document.markers import MarkerLayout, Markers, marker_dictionary

@@ -18,7 +18,7 @@ import numpy as np
 import trimesh
 from scipy.spatial import ConvexHull
 
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.geometry.surface import Surface
 from burg_drake.grasping.quality.contacts import friction_needed, grasp_contacts
 from burg_drake.grasping.quality.metrics import Payload, grasp_quality

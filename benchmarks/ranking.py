@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.stats import rankdata
 
 import burg_drake as burg
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.candidates.candidates import INSTANCE

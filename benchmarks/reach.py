@@ -25,8 +25,8 @@ from reach_audit import Audit
 from reach_judges import Exhaustive, Plain, PlainWorld, World
 from reach_recall import Recall, recall
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.content import rng_from
-from burg_drake.core.frames import Array
 from burg_drake.core.statistics import wilson_interval
 from burg_drake.grasping.clearance.hand_clearance import HandClearance
 from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal

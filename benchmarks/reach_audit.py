@@ -15,7 +15,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import BodyIndex
 
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.motion.reach.witness import Witness
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.diagram.builder import build_station_diagram

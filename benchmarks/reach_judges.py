@@ -25,8 +25,9 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 from pydrake.solvers import SnoptSolver
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.content import rng_from
-from burg_drake.core.frames import Array, inverse, swap_fingers
+from burg_drake.core.frames import inverse, swap_fingers
 from burg_drake.motion.collision.checker import ArmCollision
 from burg_drake.motion.ik.numeric import ArmKinematics
 from burg_drake.motion.ik.panda import PandaIk

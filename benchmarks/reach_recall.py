@@ -16,7 +16,7 @@ import numpy as np
 from reach_audit import Audit
 from reach_prover import Prover
 
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.core.statistics import wilson_interval
 from burg_drake.motion.lines.reach_settings import ReachSettings
 from burg_drake.motion.reach.arm_reach import ArmReach

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal
 from burg_drake.grasping.sampling.approach import ApproachCone
 from burg_drake.objects.library.document import load_library

@@ -23,7 +23,7 @@ from burg_drake.generation.many import sample_scenes
 from burg_drake.generation.sample import SampledScene, SceneSampler
 from burg_drake.objects.library.document import load_library
 from burg_drake.scene.document.board import Board
-from burg_drake.scene.document.layout import LAYOUTS, Layout
+from burg_drake.scene.document.layout import LAYOUTS, LayoutName
 from burg_drake.scene.document.recipe import SceneRecipe
 from burg_drake.simulation.rest.still_check import is_still, stillness
 from burg_drake.station.document.station_document import Station, load_station
@@ -31,7 +31,7 @@ from burg_drake.station.document.station_document import Station, load_station
 A2, A3 = Board(), Board(size=(0.42, 0.297))
 
 
-def recipe_of(layout: Layout) -> SceneRecipe:
+def recipe_of(layout: LayoutName) -> SceneRecipe:
     """Six objects on A3; what needs more room gets it."""
     heap, wide = layout == "heap", layout == "wide"
     return SceneRecipe(

@@ -27,8 +27,8 @@ import numpy as np
 from pydrake.geometry import HydroelasticContactRepresentation
 
 import burg_drake as burg
+from burg_drake.core.arrays import Array
 from burg_drake.core.content import rng_from
-from burg_drake.core.frames import Array
 from burg_drake.grasping.clearance.hand_clearance import HandClearance
 from burg_drake.grasping.clearance.verdict import ClearanceBatch
 from burg_drake.simulation.trials.hand_trial import HandTrial

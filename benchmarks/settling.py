@@ -23,7 +23,7 @@ from burg_drake.generation import heap as piling
 from burg_drake.objects.library.document import ObjectLibrary, load_library
 from burg_drake.scene.arrangement.arranging import arrange, choose
 from burg_drake.scene.arrangement.object_shapes import ObjectShapes
-from burg_drake.scene.document.layout import Layout
+from burg_drake.scene.document.layout import LayoutName
 from burg_drake.scene.document.scene import Board, Scene, SceneDocument
 from burg_drake.simulation.rest.still_check import stillness
 from burg_drake.simulation.settling import settled_scene as settling
@@ -31,7 +31,7 @@ from burg_drake.station.checks.scene_check import SceneCheck
 from burg_drake.station.document.station_document import Station, load_station
 
 A2, A3 = Board(size=(0.594, 0.420)), Board(size=(0.420, 0.297))
-KINDS: tuple[tuple[str, str, Layout, int, Board], ...] = (
+KINDS: tuple[tuple[str, str, LayoutName, int, Board], ...] = (
     ("six on A3", "panda_tabletop", "random", 6, A3),
     ("pile of ten", "panda_tabletop", "heap", 10, A2),
     ("bin of ten", "panda_bin", "heap", 10, A2),
@@ -83,7 +83,7 @@ def lay_out(
     library: ObjectLibrary,
     shapes: ObjectShapes,
     station: Station,
-    layout: Layout,
+    layout: LayoutName,
     count: int,
     board: Board,
     seed: int,
@@ -108,7 +108,7 @@ def lay_out(
 
 
 def settle(
-    kind: str, seed: int, layout: Layout, scene: Scene, station: Station, shapes: ObjectShapes
+    kind: str, seed: int, layout: LayoutName, scene: Scene, station: Station, shapes: ObjectShapes
 ) -> tuple[Scene, bool, float]:
     """Settles a scene and prints what came of it; whether it rests, and the CPU time [s]."""
     check = SceneCheck(station, scene.library)

@@ -25,7 +25,8 @@ import numpy as np
 from mixed_grasps import clear_grasps, frictions, hand_only
 
 import burg_drake as burg
-from burg_drake.core.frames import Array, swap_fingers
+from burg_drake.core.arrays import Array
+from burg_drake.core.frames import swap_fingers
 from burg_drake.simulation.trials.result import TrialResult
 from burg_drake.station.document.engine import engine_preset
 

@@ -21,7 +21,7 @@ from pydrake.multibody.tree import MultibodyForces
 from pydrake.trajectories import PiecewisePolynomial
 from reach import Grasps, clear_grasps
 
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.core.paths.resources import data_root
 from burg_drake.motion.ik.limits import ArmLimits
 from burg_drake.motion.ik.numeric import ArmKinematics
@@ -189,7 +189,7 @@ def torques(part: Trajectory, planner: Planner) -> tuple[float, float]:
 
 def collides(planner: Planner, instance: str, plan: Plan) -> bool:
     """Whether Drake's checker finds a collision at a sample."""
-    collision, arm = planner.reach.collision, planner.reach.kinematics
+    collision, arm = planner.reach._tree.edges.collision, planner.reach.kinematics
     for part in (plan.transfer, plan.approach):
         if not all(collision.is_free(q) for q in part.q[::EVERY]):
             return True

@@ -1,7 +1,11 @@
 """Runs and campaigns: their documents and rows, judging on other machines, robustness of grasps."""
 
-from burg_drake.core.grasps import Verdict as Verdict
+from burg_drake.core.grasps import (
+    Mode as Mode,
+    Verdict as Verdict,
+)
 from burg_drake.core.terminal import (
+    Listener as Listener,
     Progress as Progress,
 )
 from burg_drake.core.workers import TimeLimit as TimeLimit
@@ -40,6 +44,9 @@ from burg_drake.evaluation.robustness import (
     RobustnessSettings as RobustnessSettings,
     assess_robustness as assess_robustness,
 )
+from burg_drake.evaluation.run import (
+    GraspsLike as GraspsLike,
+)
 from burg_drake.evaluation.stages import (
     Decision as Decision,
     Judge as Judge,
@@ -55,5 +62,6 @@ from burg_drake.evaluation.workers import (
     Job as Job,
     JobFailed as JobFailed,
     LocalExecutor as LocalExecutor,
+    OnFailure as OnFailure,
     WorkerLimits as WorkerLimits,
 )

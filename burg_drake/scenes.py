@@ -28,13 +28,13 @@ from burg_drake.printout import (
     Tiling as Tiling,
     height_map as height_map,
 )
-from burg_drake.scene.arrangement import ObjectShapes as ObjectShapes
 from burg_drake.scene.document import (
     Board as Board,
     Extent as Extent,
     Instance as Instance,
     MarkerLayout as MarkerLayout,
     Markers as Markers,
+    SamplingProvenance as SamplingProvenance,
     SceneDocument as SceneDocument,
     SceneIssue as SceneIssue,
     SceneOrigin as SceneOrigin,

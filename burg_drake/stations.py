@@ -12,7 +12,9 @@ from burg_drake.motion.workspace import (
     inspect_station as inspect_station,
 )
 from burg_drake.station.diagram import (
+    FloatingHand as FloatingHand,
     HandHandle as HandHandle,
+    MountedHand as MountedHand,
 )
 from burg_drake.station.document import (
     Arm as Arm,

@@ -54,6 +54,7 @@ from burg_drake.experiment.trials import (
     Selection as Selection,
     SourceRun as SourceRun,
     Stratum as Stratum,
+    Success as Success,
     TrialBook as TrialBook,
     TrialSheet as TrialSheet,
     export_trials as export_trials,

@@ -11,6 +11,7 @@ shadow the wheel; therefore the package `tools`, and nothing else, is announced 
 from __future__ import annotations
 
 import atexit
+import functools
 import gc
 import hashlib
 import os
@@ -63,6 +64,7 @@ PHYSICS = tuple(
 WITHOUT_PHYSICS = "not physics"
 
 
+@functools.cache
 def _is_physics(path: Path) -> bool:
     return any(path == physics or physics in path.parents for physics in PHYSICS)
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import ast
+import gc
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+
+import burg_drake
 
 
 @dataclass(frozen=True)
@@ -66,14 +69,20 @@ class Package:
 
     @cached_property
     def trees(self) -> dict[str, ast.Module]:
-        """What is written in them."""
-        return {name: ast.parse(path.read_text("utf-8")) for name, path in self.files.items()}
+        """What is written in them. To look for garbage among all that, again and again, takes three
+        times as long as to read it."""
+        gc.disable()
+        try:
+            return {name: ast.parse(path.read_text("utf-8")) for name, path in self.files.items()}
+        finally:
+            gc.freeze()
+            gc.enable()
 
     @cached_property
     def statements(self) -> dict[str, list[ast.Import | ast.ImportFrom]]:
         """Their imports, those within functions, too."""
         return {
-            name: [x for x in ast.walk(tree) if isinstance(x, (ast.Import, ast.ImportFrom))]
+            name: [x for x in all_statements(tree) if isinstance(x, (ast.Import, ast.ImportFrom))]
             for name, tree in self.trees.items()
         }
 
@@ -141,6 +150,16 @@ class Package:
                         yield Import(module, str(node.module), alias.name, node.lineno)
 
 
+def all_statements(node: ast.AST) -> Iterator[ast.AST]:
+    """What is in a module or a statement, without what statements are made of: in a tenth of the
+    time of `ast.walk`."""
+    for field in ("body", "orelse", "finalbody", "handlers", "cases"):
+        children = getattr(node, field, ())
+        for child in children if isinstance(children, list) else ():
+            yield child
+            yield from all_statements(child)
+
+
 def _reached(start: str, following, seen: set[str]) -> list[str]:
     """What can be reached of what was not seen before, the farthest first."""
     if start in seen:
@@ -155,3 +174,7 @@ def _reached(start: str, following, seen: set[str]) -> list[str]:
             seen.add(step)
             path.append((step, iter(following(step))))
     return found
+
+
+HOUSE = Package(Path(burg_drake.__file__).parent)
+"""Read once for all tests of a process."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterator
@@ -13,6 +14,8 @@ MOST = 15
 """Modules in a folder."""
 MOST_PARAMETERS = 9
 """Of a function; what takes more takes a settings object."""
+CAMEL_CASE = re.compile(r"[A-Z][a-z]\w*")
+VARIABLES = ("TypeVar(", "ParamSpec(", "TypeVarTuple(")
 EXTRAS = {
     "pandas": (),
     "pyarrow": (),
@@ -88,14 +91,43 @@ def wrong_faces(house: Package) -> list[str]:
     return found
 
 
+def unasked(house: Package) -> list[str]:
+    """Names of faces that nothing outside of the package imports; public faces are for users."""
+    top = house.faces[house.name]
+    public = {house.name, *(f"{house.name}.{n}" for n, (at, _) in top.items() if at == house.name)}
+    taken = {(x.source, x.name) for x in house.imports if not x.module.startswith(f"{x.source}.")}
+    taken |= {place for names in house.faces.values() for place in names.values()}
+    whole = {f"{x.source}.{x.name}" for x in house.imports}
+    return [
+        f"{package} shows {name}, which nobody imports"
+        for package, names in house.faces.items()
+        if package not in public | whole
+        for name in names
+        if (package, name) not in taken
+    ]
+
+
 def defined_twice(house: Package) -> list[str]:
-    """Names of classes that mean several things."""
+    """Names of classes and types that are defined in several places. Private ones may be, and so
+    may type variables, which stand for nothing of their own."""
     places = defaultdict(list)
+    variables = set()
     for module, tree in house.trees.items():
         for node in tree.body:
             if isinstance(node, ast.ClassDef):
                 places[node.name].append(module)
-    return [f"{name}: {', '.join(where)}" for name, where in places.items() if len(where) > 1]
+            elif (alias := _alias(node)) is not None:
+                name, value = alias
+                places[name].append(module)
+                if value.startswith(VARIABLES):
+                    variables.add((name, module))
+    return [
+        f"{name}: {', '.join(where)}"
+        for name, where in places.items()
+        if len(where) > 1
+        and not name.startswith("_")
+        and not all((name, module) in variables for module in where)
+    ]
 
 
 def crowded(house: Package) -> list[str]:
@@ -190,6 +222,23 @@ def _bound(house: Package, module: str) -> set[str]:
         elif isinstance(node, (ast.Import, ast.ImportFrom)):
             found |= {alias.asname or alias.name for alias in node.names}
     return found
+
+
+def _alias(node: ast.stmt) -> tuple[str, str] | None:
+    """Name and text of what names a type. Names of types are in CamelCase, `Rgb`, `Rgb8`."""
+    if type(node).__name__ == "TypeAlias":
+        return node.name.id, ast.unparse(node.value)
+    if isinstance(node, ast.Assign):
+        target, declared = node.targets[0], False
+    elif isinstance(node, ast.AnnAssign) and node.value is not None:
+        target, declared = node.target, ast.unparse(node.annotation).endswith("TypeAlias")
+        if not declared:
+            return None
+    else:
+        return None
+    if not isinstance(target, ast.Name) or not (declared or CAMEL_CASE.fullmatch(target.id)):
+        return None
+    return target.id, ast.unparse(node.value)
 
 
 def _names(node: ast.AST) -> list[str]:

@@ -16,7 +16,7 @@ import pytest
 import burg_drake as burg
 from burg_drake.cameras.live import FrameProcessor
 from burg_drake.cameras.optics import Intrinsics
-from burg_drake.cameras.overlay import Overlay
+from burg_drake.cameras.overlay.renderer import Overlay, instance_labels
 from burg_drake.cameras.placement import check_placement
 from burg_drake.cameras.pose import BoardEstimate, locate_camera
 from burg_drake.cameras.projection import visible_from
@@ -35,10 +35,13 @@ from burg_drake.formats.grasp_files import write_grasp_file
 from burg_drake.generation import sample_scenes
 from burg_drake.generation.sample import sample_scene
 from burg_drake.grasping.clearance import hand_clearance_alone
+from burg_drake.motion.ik import ArmKinematics
 from burg_drake.motion.planner import plan
-from burg_drake.motion.plans import Plan, load_plan
+from burg_drake.motion.plans import Plan
+from burg_drake.motion.plans.grasp_plan import load_plan
 from burg_drake.motion.reach import ArmReach
 from burg_drake.motion.workspace import (
+    ArmSpan,
     ReachabilitySettings,
     inspect_station,
     map_reachability,
@@ -197,6 +200,12 @@ def located(station: StationLike) -> Any:
     return locate_camera(station, [SEEN], INTRINSICS).X_WC.tolist()
 
 
+def spanned(station: StationLike) -> Any:
+    diagram = build_station_diagram("tabletop_six", station, robot="arm", weld_objects=True)
+    span = ArmSpan.of(ArmKinematics.of(diagram), station)
+    return span.p_WJ.tolist(), span.radius
+
+
 def mapped(scene: SceneLike, station: StationLike) -> Any:
     settings = ReachabilitySettings(spacing=0.1, heights=(0.1,), tilts_deg=(0.0,), headings=(1,))
     reached = map_reachability(scene, station, settings=settings).reached.tolist()
@@ -247,8 +256,12 @@ ANSWERS: dict[str, Answer] = {
     "locate_camera": lambda scene, station, folder: located(station),
     "open_source": lambda scene, station, folder: simulated_camera(scene),
     "check_placement": lambda scene, station, folder: placement(scene),
+    "instance_labels": lambda scene, station, folder: instance_labels(
+        scene, INTRINSICS, SEEN.X_SC
+    ).tobytes(),
     "Overlay": lambda scene, station, folder: drawn(Overlay)(scene),
     "SceneOverlay": lambda scene, station, folder: overlaid(scene),
+    "ArmSpan": lambda scene, station, folder: spanned(station),
     "map_reachability": lambda scene, station, folder: mapped(scene, station),
     "reach_from_above": lambda scene, station, folder: reach_from_above(
         station, spacing=0.1
@@ -295,7 +308,10 @@ def signatures() -> Iterator[tuple[str, Any]]:
         if inspect.isfunction(one):
             yield name, one
         elif inspect.isclass(one):
-            for method, function in inspect.getmembers(one, inspect.isfunction):
+            for method, function in inspect.getmembers(one, inspect.isroutine):
+                function = getattr(function, "__func__", function)
+                if not inspect.isfunction(function):
+                    continue
                 made = method == "__init__" and dataclasses.is_dataclass(one)
                 if not made and (method == "__init__" or not method.startswith("_")):
                     yield f"{name}.{method}", function

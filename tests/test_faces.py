@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 import burg_drake as burg
+from burg_drake.scene.arrangement import ObjectShapes
 from tests.pages import PAGES, ROOT, blocks
 from tests.public_types import project_types
 
@@ -57,6 +58,23 @@ def test_types_in_public_signatures_are_public(face: str) -> None:
         if id(found) not in public
     }
     assert missing == {}
+
+
+@pytest.mark.parametrize(
+    ("value", "where", "found"),
+    [
+        (burg.ArmTrial, "ArmTrial.hand", "MountedHand"),  # annotation of a plain class
+        (burg.ArmTrial, "ArmTrial.contacts", "ContactReader"),  # inherited, and made in __init__
+        (burg.cameras.LiveSession, "LiveSession.picture", "Picture"),
+        (burg.scenes.SceneOrigin, "SceneOrigin.differences", "SamplingProvenance"),
+        (burg.compose.ComposeSession, "ComposeSession.settle", "BackgroundJob"),  # generic
+        (burg.arm.ArmSpan, "ArmSpan.of", "ArmKinematics"),
+        (ObjectShapes, "ObjectShapes.__getitem__", "ObjectShape"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_all_that_a_class_says_is_seen(value: type, where: str, found: str) -> None:
+    assert (where, found) in {(place, one.__name__) for place, one in project_types(value)}
 
 
 def test_one_page_lists_all_public_names() -> None:

@@ -18,6 +18,7 @@ import pytest
 
 import burg_drake
 from burg_drake.core.paths.resources import data_root
+from tests.imports import HOUSE
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 PACKAGE = Path(burg_drake.__file__).parent
@@ -110,20 +111,16 @@ def test_every_import_is_a_declared_dependency() -> None:
         name = re.match(r"[A-Za-z0-9_.-]+", requirement)[0].lower()
         if "extra == 'dev'" not in requirement:
             declared.add(IMPORT_NAMES.get(name, name))
-    for path in PACKAGE.rglob("*.py"):
-        imported = top_level_imports(path)
+    for module, statements in HOUSE.statements.items():
+        imported = {name for node in statements for name in top_level(node)}
         foreign = imported - set(sys.stdlib_module_names) - {"burg_drake"}
-        assert foreign <= declared | FROM_ROS, path
+        assert foreign <= declared | FROM_ROS, module
 
 
-def top_level_imports(path: Path) -> set[str]:
-    names = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            names |= {alias.name.partition(".")[0] for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
-            names.add(node.module.partition(".")[0])
-    return names
+def top_level(node: ast.Import | ast.ImportFrom) -> set[str]:
+    if isinstance(node, ast.Import):
+        return {alias.name.partition(".")[0] for alias in node.names}
+    return {node.module.partition(".")[0]} if node.module and node.level == 0 else set()
 
 
 def test_every_module_can_be_imported() -> None:

@@ -6,12 +6,12 @@ What a rule finds is shown on small packages that break it.
 from __future__ import annotations
 
 import re
+import sys
 from pathlib import Path
 
 import pytest
 
-import burg_drake
-from tests.imports import Import, Package
+from tests.imports import HOUSE, Import, Package
 from tests.rules import (
     beside_faces,
     crowded,
@@ -21,12 +21,12 @@ from tests.rules import (
     loaded_with,
     many_parameters,
     orders,
+    unasked,
     unplaced,
     upward,
     wrong_faces,
 )
 
-HOUSE = Package(Path(burg_drake.__file__).parent)
 ARCHITECTURE = Path(__file__).parents[1] / "ARCHITECTURE.md"
 ROOMS = {
     "core": "files documents paths grasps terminal workers",
@@ -93,6 +93,10 @@ def test_imports_from_elsewhere_go_through_faces() -> None:
 
 def test_faces_show_what_there_is() -> None:
     assert wrong_faces(HOUSE) == []
+
+
+def test_faces_show_what_others_use() -> None:
+    assert unasked(HOUSE) == []
 
 
 def test_one_name_means_one_thing() -> None:
@@ -216,9 +220,49 @@ def test_a_face_that_shows_what_there_is_not_is_found(tmp_path: Path) -> None:
     ]
 
 
+def test_a_name_that_nobody_imports_is_found(tmp_path: Path) -> None:
+    house = built(
+        tmp_path,
+        a_in_low="f = g = 1",
+        b_in_low="from house.low import g",
+        c_in_high="from house.low import f\nfrom house import whole",
+        d_in_whole="f = 1",
+        e_in_for_users="f = 1",
+    )
+    face(house, "low", "from .a import f as f, g as g")
+    face(house, "whole", "from .d import f as f")
+    face(house, "for_users", "from .e import f as f")
+    (house.folder / "__init__.pyi").write_text("from . import for_users as for_users")
+    assert unasked(Package(house.folder)) == ["house.low shows g, which nobody imports"]
+
+
 def test_a_class_of_two_meanings_is_found(tmp_path: Path) -> None:
     house = built(tmp_path, a_in_low="class Ball: ...", b_in_high="class Ball: ...")
     assert defined_twice(house) == ["Ball: house.high.b, house.low.a"]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ['Ball = Literal["round"]', "Ball = Callable[[int], str]", "Ball = int | None", "Ball = Any",
+     "Ball: TypeAlias = int", "Ball: typing.TypeAlias = int", "Ball = Round",
+     'Ball = TypeVar("Ball")',
+     pytest.param("type Ball = int", marks=pytest.mark.skipif(
+         sys.version_info < (3, 12), reason="no such statement"))],
+)  # fmt: skip
+def test_a_type_of_two_meanings_is_found(tmp_path: Path, text: str) -> None:
+    house = built(tmp_path, a_in_low="class Ball: ...", b_in_high=text)
+    assert defined_twice(house) == ["Ball: house.high.b, house.low.a"]
+
+
+def test_a_type_that_is_repeated_is_found(tmp_path: Path) -> None:
+    text = "Ball = tuple[int, ...]"
+    house = built(tmp_path, a_in_low=text, b_in_high=text)
+    assert defined_twice(house) == ["Ball: house.high.b, house.low.a"]
+
+
+@pytest.mark.parametrize("text", ["_Ball = int | None", "BALL = 1", 'Ball = TypeVar("Ball")'])
+def test_what_is_private_or_stands_for_any_type_may_be_repeated(tmp_path: Path, text: str) -> None:
+    assert defined_twice(built(tmp_path, a_in_low=text, b_in_high=text)) == []
 
 
 def test_a_crowded_folder_is_found(tmp_path: Path) -> None:

@@ -33,7 +33,7 @@ from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import rot_z
 from burg_drake.evaluation.store.run_folder import load_run
 from burg_drake.generation.sample import sample_scene
-from burg_drake.scene.document.layout import Layout
+from burg_drake.scene.document.layout import LayoutName
 from burg_drake.scene.document.recipe import SceneRecipe
 from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
 from burg_drake.station.document.station_document import Camera, Station
@@ -53,7 +53,7 @@ PLACES = {
 }
 """Where the built-in objects stand for their portrait: x, y [m] and yaw [degrees] in S."""
 
-SAMPLED: dict[Layout, int] = {
+SAMPLED: dict[LayoutName, int] = {
     "random": 6,
     "wide": 5,
     "close": 6,

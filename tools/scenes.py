@@ -11,15 +11,9 @@ import dataclasses
 import numpy as np
 from pydrake.systems.analysis import Simulator
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.documents.schema import Pose, save_document
-from burg_drake.core.frames import (
-    Array,
-    inverse,
-    make_pose,
-    rot_z,
-    rotation_angle,
-    transform_points,
-)
+from burg_drake.core.frames import inverse, make_pose, rot_z, rotation_angle, transform_points
 from burg_drake.core.paths.resources import data_root
 from burg_drake.objects.library.document import ObjectLibrary, load_library
 from burg_drake.scene.document.scene import Instance, Scene, SceneDocument

@@ -15,6 +15,7 @@ import select
 import signal
 import sys
 from collections.abc import Sequence
+from functools import cache
 
 from burg_drake import __version__
 from burg_drake.apps import ar, camera, grasps, hand, library, ros, scene, station, trials
@@ -65,8 +66,9 @@ VERBS = (
 )
 
 
+@cache
 def build_parser() -> Parser:
-    """The parser of the whole command."""
+    """The parser of the whole command, of which a process needs one."""
     parser = Parser(
         prog="burg-drake",
         description="Reproducible robot-grasping scenes and grasp evaluation on Drake.",

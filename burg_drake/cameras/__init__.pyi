@@ -17,16 +17,26 @@ from .live.frame_processing import (
     ViewSettings as ViewSettings,
 )
 from .live.picture import Picture as Picture
-from .live.session import LiveSession as LiveSession
+from .live.session import (
+    FrameCounts as FrameCounts,
+    LiveSession as LiveSession,
+)
 from .live.snapshot import (
     SeenBoard as SeenBoard,
     Snapshot as Snapshot,
     SnapshotDocument as SnapshotDocument,
     load_snapshot as load_snapshot,
 )
-from .optics.intrinsics import Intrinsics as Intrinsics
+from .optics.intrinsics import (
+    Intrinsics as Intrinsics,
+    camera_info as camera_info,
+    of_camera_info as of_camera_info,
+)
 from .optics.intrinsics_file import load_intrinsics as load_intrinsics
-from .overlay.renderer import Overlay as Overlay
+from .overlay.renderer import (
+    Overlay as Overlay,
+    instance_labels as instance_labels,
+)
 from .overlay.style import OverlayStyle as OverlayStyle
 from .placement.check import check_placement as check_placement
 from .placement.document import (
@@ -67,6 +77,7 @@ from .systems.board_loop import (
     LoopCamera as LoopCamera,
     build_board_loop as build_board_loop,
 )
+from .systems.camera_source import CameraSource as CameraSource
 from .systems.pose_estimator import BoardPoseEstimator as BoardPoseEstimator
 from .systems.pose_filter import (
     PoseFilter as PoseFilter,

@@ -1,3 +1,4 @@
+from .background.process import BackgroundJob as BackgroundJob
 from .background.settling import SettlingProposal as SettlingProposal
 from .commands.arranging import (
     Align as Align,

@@ -1,3 +1,10 @@
+from .arrays import (
+    Array as Array,
+    Booleans as Booleans,
+    Bytes as Bytes,
+    Indices as Indices,
+    Single as Single,
+)
 from .cache import (
     Arrays as Arrays,
     cache_folder as cache_folder,
@@ -22,16 +29,17 @@ from .errors import (
     did_you_mean as did_you_mean,
     listing as listing,
     nearest as nearest,
+    one_line as one_line,
     quoted as quoted,
     shown as shown,
 )
 from .frames import (
-    Array as Array,
     canonical_fingers as canonical_fingers,
     check_pose as check_pose,
     grasp_from_axes as grasp_from_axes,
     inverse as inverse,
     make_pose as make_pose,
+    perpendicular as perpendicular,
     pregrasp as pregrasp,
     quaternion_from_rotation as quaternion_from_rotation,
     rot_z as rot_z,

@@ -95,6 +95,12 @@ class ClusterError(BurgError, RuntimeError):
     """A cluster that cannot be reached, is lost, or has workers that must not be used."""
 
 
+def one_line(error: BaseException) -> str:
+    """An error as one line: its type and message."""
+    message = " ".join(str(error).split())
+    return f"{type(error).__name__}: {message}" if message else type(error).__name__
+
+
 def quoted(value: object) -> str:
     """A value from outside as a message repeats it: in quotes if it is a text, never long.
 

@@ -19,9 +19,8 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError
-
-Array = NDArray[np.float64]
 
 POSE_TOLERANCE = 1e-6
 """Largest deviation from orthonormality that `check_pose` accepts."""
@@ -218,3 +217,17 @@ def _batch_matrix(R_AB: ArrayLike, convert, size: int) -> Array:  # type: ignore
     R = np.asarray(R_AB, dtype=float)
     rotations = scipy.spatial.transform.Rotation.from_matrix(R.reshape(-1, 3, 3))
     return np.asarray(convert(rotations)).reshape(*R.shape[:-2], size)
+
+
+def perpendicular(axis: Array) -> tuple[Array, Array]:
+    """Two unit vectors (..., 3) that make a right-handed frame with the unit vectors `axis`.
+
+    Without branch or pole (Duff et al., "Building an orthonormal basis, revisited", JCGT 2017).
+    """
+    x, y, z = np.moveaxis(axis, -1, 0)
+    sign = np.copysign(1.0, z)
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    u = np.stack([1.0 + sign * x * x * a, sign * b, -sign * x], axis=-1)
+    v = np.stack([b, sign + y * y * a, -y], axis=-1)
+    return u, v

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 
 Z_95 = 1.959963984540054
 """Quantile of the normal distribution that leaves 2.5 % on either side."""

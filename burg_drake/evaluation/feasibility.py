@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from burg_drake.core import InvalidInputError, quaternion_from_rotation
+from burg_drake.core import InvalidInputError, one_line, quaternion_from_rotation
 from burg_drake.core.grasps import (
+    ARM_SCREEN_MARGINS,
     LIFT_HEIGHT,
     GraspSet,
     Outcome,
@@ -39,7 +40,6 @@ from burg_drake.evaluation.stages import (
     arm_settings,
     hand_alone,
     hand_screen,
-    one_line,
 )
 from burg_drake.evaluation.store import PlanFolder, PlanOutput, plans_document
 from burg_drake.evaluation.workers import judge_all
@@ -52,7 +52,11 @@ from burg_drake.station.document import GraspMotion, Station, StationLike, as_st
 YES = Outcome.REACHABLE
 ANSWERS = tuple(outcome for outcome in Outcome if outcome is not Outcome.SIMULATION_FAILED)
 """What becomes of a grasp, unless the computation itself fails."""
-MARGIN_COLUMNS = ("clearance", "arm_clearance", "joint_excess", LIFT_HEIGHT)
+MARGIN_COLUMNS = (
+    "clearance",
+    *(name for name in ARM_SCREEN_MARGINS if name != LIFT_HEIGHT),
+    LIFT_HEIGHT,
+)
 """Margins of a verdict that become columns; NaN where they are not defined."""
 
 

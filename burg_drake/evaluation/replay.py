@@ -17,6 +17,7 @@ from burg_drake.core.grasps import (
     Mode,
     Stage,
     Verdict,
+    shown_number,
 )
 from burg_drake.evaluation.records import (
     RecordedTrial,
@@ -145,13 +146,13 @@ def _bits(value: float | str) -> str:
 def arm_figures(verdict: Verdict) -> list[str]:
     """What the screen of the arm has measured, as lines for people; none if it was not asked."""
     figures = [
-        f"{name} {verdict.margins[margin] * factor:.{digits}f} {unit}"
-        for name, margin, factor, digits, unit in (
-            ("arm clearance", "arm_clearance", 1e3, 1, "mm"),
-            ("beyond a joint limit by", "joint_excess", 180.0 / math.pi, 1, "deg"),
-            ("planned motion", "duration", 1.0, 2, "s"),
+        f"{label} {shown_number(name, verdict.margins[name], digits)}"
+        for label, name, digits in (
+            ("arm clearance", "arm_clearance", 1),
+            ("beyond a joint limit by", "joint_excess", 1),
+            ("planned motion", "duration", 2),
         )
-        if margin in verdict.margins
+        if name in verdict.margins
     ]
     return [", ".join(figures)] if figures else []
 

@@ -13,7 +13,8 @@ import trimesh
 from numpy.typing import NDArray
 
 from burg_drake.core import Array
-from burg_drake.objects.library import DEFAULT_RGBA, ObjectEntry, ObjectLibrary, Rgba
+from burg_drake.core.terminal import Rgba
+from burg_drake.objects.library import DEFAULT_RGBA, ObjectEntry, ObjectLibrary
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from pathlib import Path
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
 
 from burg_drake.core import Array, quaternion_from_rotation
-from burg_drake.objects.library import Rgba
+from burg_drake.core.terminal import Rgba
 
 
 def new_stage(path: Path, root: str) -> Usd.Stage:

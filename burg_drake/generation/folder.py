@@ -9,10 +9,10 @@ scenes that were being sampled.
 from __future__ import annotations
 
 import csv
-import fcntl
 import io
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -23,6 +23,7 @@ from burg_drake.core.files import (
     atomic_write,
     open_regular,
     remove_unfinished,
+    try_lock,
     writable_folder,
 )
 from burg_drake.generation.sample import SampledScene
@@ -123,17 +124,20 @@ class SceneFolder:
         self.path = writable_folder(path)
         self._lock = os.open(self.path, os.O_RDONLY)
         try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            os.close(self._lock)
-            raise InvalidInputError(
-                f"{path} is being written by another process; wait for it, or choose another folder"
-            ) from error
-        try:
+            self._take(path)
             self._open(provenance)
         except BaseException:
             os.close(self._lock)
             raise
+
+    def _take(self, path: str | Path) -> None:
+        """Takes the lock; a file system without locks counts as one that others have."""
+        with suppress(OSError):
+            if try_lock(self._lock):
+                return
+        raise InvalidInputError(
+            f"{path} is being written by another process; wait for it, or choose another folder"
+        )
 
     def _open(self, provenance: SamplingProvenance) -> None:
         remove_unfinished(self.path)

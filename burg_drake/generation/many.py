@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from burg_drake.core import InvalidInputError, SimulationError
+from burg_drake.core import InvalidInputError, SimulationError, one_line
 from burg_drake.core.workers import map_unordered
-from burg_drake.evaluation.stages import one_line
 from burg_drake.generation.folder import SceneFolder, SceneRow
 from burg_drake.generation.sample import (
     SampledScene,

@@ -24,7 +24,6 @@ from .poses import (
     rotate as rotate,
 )
 from .rays import (
-    Indices as Indices,
     RayCaster as RayCaster,
 )
 from .shape import Shape as Shape

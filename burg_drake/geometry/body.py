@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array, inverse
+from burg_drake.core import Array, Indices, inverse
 from burg_drake.geometry.convex import Boxes
 from burg_drake.geometry.penetration import penetration_depths
 from burg_drake.geometry.polytope import PRISM_SIDES
@@ -28,8 +28,6 @@ poses (1e-15), far below what matters in a trial."""
 
 BLOCK = 2**14
 """Numbers in an array of the narrow phase: what fits a processor's caches."""
-
-Indices = NDArray[np.intp]
 
 
 class HandParts:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array, transform_points
+from burg_drake.core import Array, Indices, transform_points
 from burg_drake.geometry.convex import Ball, Cylinder
 from burg_drake.geometry.poses import Poses
 from burg_drake.geometry.shape import Shape
@@ -34,8 +34,6 @@ MOST_STEPS = 200
 
 BLOCK = 2**16
 """Vertices that are looked at together; what fits a processor's caches."""
-
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

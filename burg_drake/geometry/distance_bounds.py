@@ -12,8 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from burg_drake.core import Array
-from burg_drake.geometry.body import Body, HandParts, Indices
+from burg_drake.core import Array, Indices
+from burg_drake.geometry.body import Body, HandParts
 from burg_drake.geometry.poses import Poses, rotate
 
 Pairs = tuple[Indices, ...]

@@ -14,8 +14,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array
-from burg_drake.geometry.body import Body, HandBodyPairs, HandParts, Indices
+from burg_drake.core import Array, Indices
+from burg_drake.geometry.body import Body, HandBodyPairs, HandParts
 from burg_drake.geometry.nearest_body import NearestBody
 from burg_drake.geometry.poses import Poses
 from burg_drake.geometry.shape import Shape

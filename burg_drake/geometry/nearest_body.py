@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array
-from burg_drake.geometry.body import Body, HandParts, Indices
+from burg_drake.core import Array, Indices
+from burg_drake.geometry.body import Body, HandParts
 from burg_drake.geometry.distance import Cores, distances
 from burg_drake.geometry.distance_bounds import Pairs, SceneBoxes
 from burg_drake.geometry.poses import Poses

@@ -9,11 +9,8 @@ from __future__ import annotations
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
-from numpy.typing import NDArray
 
-from burg_drake.core import Array
-
-Indices = NDArray[np.int64]
+from burg_drake.core import Array, Indices
 
 START_OFFSET = 1e-5
 """How far a ray starts past its origin, as a share of the mesh's bounding radius. It exceeds the

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from burg_drake.core import Array, InvalidInputError, MeshError
-from burg_drake.geometry.rays import Indices, RayCaster
+from burg_drake.core import Array, Indices, InvalidInputError, MeshError
+from burg_drake.geometry.rays import RayCaster
 
 if TYPE_CHECKING:
     import trimesh
@@ -58,7 +58,7 @@ class Surface:
             raise MeshError("the mesh has no faces with area; nothing can be grasped")
         volume = np.einsum("ij,ij->", triangles[:, 0] - vertices.mean(axis=0), cross) / 6.0
         if volume < 0.0 and mesh.is_watertight:
-            raise MeshError("the mesh is wound inside out; turn its faces with mesh.invert()")
+            raise MeshError("the mesh is wound inside out; flip its faces with mesh.invert()")
         mass = length if weights is None else length * checked_weights(weights, len(faces))
         total = np.cumsum(mass[kept])
         if not total[-1] > 0.0:

@@ -72,26 +72,23 @@ class Planner:
             witness: its motion.
             width: distance between the pads that hold the target [m]; NaN if it is not known.
         """
-        edges, hand = self.reach.edges, self.reach.diagram.station.hand
+        is_free, hand = self.reach.path_is_free, self.reach.diagram.station.hand
         if len(witness.transfer) > 2:
-            witness = replace(witness, transfer=self.reach.tree.shortcut(witness.transfer))
+            witness = replace(witness, transfer=self.reach.shortcut(witness.transfer))
         motion, back_W = self.reach.motion, -witness.X_WG[:3, 2]
 
         def carrying(u_W: Array, start_W: Array) -> IsFree:
-            return lambda q: (
-                edges.first_blocked(
-                    q,
-                    hand=False,
-                    carried=instance or None,
-                    moved_W=start_W + self._along(u_W, q) if instance else None,
-                    width=width,
-                )
-                is None
+            return lambda q: is_free(
+                q,
+                hand=False,
+                carried=instance or None,
+                moved_W=start_W + self._along(u_W, q) if instance else None,
+                width=width,
             )
 
         checks = PathChecks(
-            transfer=lambda q: edges.first_blocked(q) is None,
-            approach=lambda q: edges.first_blocked(q, hand=False) is None,
+            transfer=is_free,
+            approach=lambda q: is_free(q, hand=False),
             retreat=carrying(back_W, np.zeros(3)),
             lift=carrying(motion.direction_W, motion.retreat * back_W),
         )

@@ -29,7 +29,7 @@ from burg_drake.pipeline.source import ObjectSource, object_name
 from burg_drake.pipeline.stages import Built, is_current
 from burg_drake.pipeline.target import check_targets, opened_for_build, scratch_folder
 
-Progress = Callable[[str, str, int, int], None]
+OnObjectBuilt = Callable[[str, str, int, int], None]
 """Called after each object with its name, its state (`built`, `cached` or `failed`), the number of
 objects done and the number of all."""
 
@@ -65,7 +65,7 @@ def build_library(
     name: str | None = None,
     confirm: bool = True,
     workers: int = 1,
-    progress: Progress | None = None,
+    progress: OnObjectBuilt | None = None,
 ) -> BuildReport:
     """Builds or updates a library.
 
@@ -150,7 +150,7 @@ def _longest_first(
 class _Tally:
     """The library while it grows, and the report."""
 
-    def __init__(self, library: ObjectLibrary, total: int, progress: Progress | None) -> None:
+    def __init__(self, library: ObjectLibrary, total: int, progress: OnObjectBuilt | None) -> None:
         self.library = library
         self.entries: dict[str, ObjectEntry] = dict(library.objects)
         self.total = total

@@ -23,7 +23,7 @@ from burg_drake.pipeline.record import (
     read_record,
 )
 
-IssueKind = Literal["missing", "changed", "stale", "broken", "implausible", "unsure"]
+LibraryIssueKind = Literal["missing", "changed", "stale", "broken", "implausible", "unsure"]
 
 USUAL_FRICTION = (0.05, 1.5)
 """Coefficients of dry household materials, ice and soft rubber left out."""
@@ -41,7 +41,7 @@ class LibraryIssue:
     """
 
     object: str
-    kind: IssueKind
+    kind: LibraryIssueKind
     message: str
 
     @property
@@ -160,7 +160,7 @@ def _pose_issues(name: str, entry: ObjectEntry) -> Iterator[LibraryIssue]:
         yield _issue(name, "unsure", text)
 
 
-def _issue(name: str, kind: IssueKind, message: str) -> LibraryIssue:
+def _issue(name: str, kind: LibraryIssueKind, message: str) -> LibraryIssue:
     return LibraryIssue(object=name, kind=kind, message=message)
 
 

@@ -44,7 +44,7 @@ from burg_drake.pipeline.record import Geometry, intact, read_record
 from burg_drake.pipeline.source import ObjectSource
 
 PIECES_FOLDER = "pieces"
-Pieces = tuple[trimesh.Trimesh, ...]
+PieceMeshes = tuple[trimesh.Trimesh, ...]
 
 
 def build_geometry(
@@ -140,7 +140,7 @@ def _solid(
     return solid_of_shell(mesh.surface, source.wall_thickness), source.wall_thickness
 
 
-def _support(contact: ContactGeometry, pieces: Pieces) -> Array:
+def _support(contact: ContactGeometry, pieces: PieceMeshes) -> Array:
     """(N, 3) points of O whose hull rests on a plane [m]."""
     if contact.primitive is not None:
         return np.asarray(primitive_mesh(contact.primitive).vertices)

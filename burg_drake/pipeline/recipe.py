@@ -30,9 +30,10 @@ import yaml
 from burg_drake.core import InvalidInputError
 from burg_drake.core.documents import Reader, Vector3, load_nodes
 from burg_drake.core.paths import require_name
-from burg_drake.objects.library import ContactKind, Decomposition, Inertia, Rgba
-from burg_drake.objects.meshes import UNITS
-from burg_drake.pipeline.source import NAME_PATTERN, ObjectSource, Openings, object_name
+from burg_drake.core.terminal import Rgba
+from burg_drake.objects.library import ContactKind, Decomposition, Inertia
+from burg_drake.objects.meshes import UNITS, Openings
+from burg_drake.pipeline.source import NAME_PATTERN, ObjectSource, object_name
 
 Unit = Literal["mm", "cm", "m", "in"]
 

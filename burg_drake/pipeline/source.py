@@ -5,15 +5,15 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import trimesh
 
 from burg_drake.core import InvalidInputError, content_hash, quoted
 from burg_drake.core.documents import Vector3
-from burg_drake.objects.library import DEFAULT_FRICTION, ContactKind, Decomposition, Inertia, Rgba
-
-Openings = Literal["wall", "close"]
+from burg_drake.core.terminal import Rgba
+from burg_drake.objects.library import DEFAULT_FRICTION, ContactKind, Decomposition, Inertia
+from burg_drake.objects.meshes import Openings
 
 NAME_PATTERN = re.compile(r"[a-z0-9][a-z0-9_]*")
 

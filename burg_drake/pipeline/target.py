@@ -6,7 +6,6 @@ new, or was made by an earlier build.
 
 from __future__ import annotations
 
-import fcntl
 import os
 import shutil
 import tempfile
@@ -17,7 +16,7 @@ from pathlib import Path
 import trimesh
 
 from burg_drake.core import InvalidInputError
-from burg_drake.core.files import writable_folder
+from burg_drake.core.files import try_lock, writable_folder
 from burg_drake.objects.library import LIBRARY_FILE
 from burg_drake.pipeline.record import is_object_folder
 from burg_drake.pipeline.source import NAME_PATTERN, ObjectSource
@@ -108,9 +107,8 @@ def _locked(root: Path) -> Iterator[None]:
         raise InvalidInputError(f"cannot write {path}: {error.strerror}") from error
     try:
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            current = os.path.samestat(os.fstat(file), os.stat(path))
-        except (BlockingIOError, FileNotFoundError):
+            current = try_lock(file) and os.path.samestat(os.fstat(file), os.stat(path))
+        except FileNotFoundError:
             current = False
         except OSError as error:
             raise InvalidInputError(f"cannot lock {path}: {error.strerror}") from error

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from reportlab.pdfgen.canvas import Canvas
 
-from burg_drake.core import Array, InvalidInputError
+from burg_drake.core import MILLIMETRES, Array, InvalidInputError, setting
 from burg_drake.core.files import atomic_write
 from burg_drake.printout.board_edge import draw_edge, draw_origin
 from burg_drake.printout.drawings import Drawing, draw_arrows, draw_objects
@@ -47,8 +47,15 @@ class PrintSettings:
         names: write their names beside them.
     """
 
-    page: str = "A4"
-    margin: float = 5e-3
+    page: str = setting(
+        "A4",
+        "A4 to A0, letter, legal, tabloid, or WxH in mm; upright or across, whichever takes fewer"
+        " pages",
+        metavar="PAGE",
+    )
+    margin: float = setting(
+        5e-3, "what the printer leaves white on all sides", unit=MILLIMETRES, low=0
+    )
     measured: tuple[float, float] = (0.1, 0.1)
     height_map: bool = True
     names: bool = True

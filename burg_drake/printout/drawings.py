@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from burg_drake.core import Array
+from burg_drake.core.terminal import Rgb
 from burg_drake.printout.outlines import mask_outlines
 from burg_drake.printout.projection import Grid, Layer
 from burg_drake.printout.relief import instance_hue, projected_layers
-from burg_drake.printout.tints import DARKEST, LIGHTEST, Rgb, height_at, tint
+from burg_drake.printout.tints import DARKEST, LIGHTEST, height_at, tint
 from burg_drake.scene.document import IN_BOUNDS_TOLERANCE, Scene, placed_vertices
 
 FINENESS = 0.1e-3

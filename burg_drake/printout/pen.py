@@ -10,7 +10,7 @@ from reportlab.pdfbase.pdfmetrics import stringWidth
 from reportlab.pdfgen.canvas import FILL_EVEN_ODD, FILL_NON_ZERO, Canvas
 
 from burg_drake.core import Array
-from burg_drake.printout.tints import Rgb
+from burg_drake.core.terminal import Rgb
 
 POINT = 0.0254 / 72
 """Unit of PDF [m]."""

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import InvalidInputError, transform_points
+from burg_drake.core.terminal import Rgb
 from burg_drake.printout.projection import Grid, Layer, lowest_of, lowest_surface
-from burg_drake.printout.tints import FIXED_HUE, Rgb, hue, luma_at, tint
+from burg_drake.printout.tints import FIXED_HUE, hue, luma_at, tint
 from burg_drake.scene.document import Scene, SceneLike, as_scene
 
 RESOLUTION = 0.5e-3

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from burg_drake.core import Array
+from burg_drake.core.terminal import Rgb
 from burg_drake.printout.board_edge import ORIGIN
 from burg_drake.printout.drawings import Arrow, Drawing
 from burg_drake.printout.labels import FreeSpace
@@ -28,7 +29,6 @@ from burg_drake.printout.pen import (
     text_width,
 )
 from burg_drake.printout.tiling import BLEED, Tiling
-from burg_drake.printout.tints import Rgb
 from burg_drake.scene.document import MarkerLayout
 
 FRAME = 3e-3

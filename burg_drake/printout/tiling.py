@@ -22,7 +22,7 @@ FLAP = 7e-3
 """Width of the strip under the next page, which glue holds [m], where the gap between markers is
 wide enough."""
 
-Interval = tuple[float, float]
+Span = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -135,21 +135,19 @@ def _tiling(
     return Tiling(paper, tuple(cuts[0]), tuple(size[1] - c for c in cuts[1]), tiles, flap)
 
 
-def _bars(starts: Array, ends: Array) -> list[Interval]:
+def _bars(starts: Array, ends: Array) -> list[Span]:
     """Columns (or rows) of markers: where they begin and end, in order."""
     return sorted(set(zip(np.round(starts, 9).tolist(), np.round(ends, 9).tolist(), strict=True)))
 
 
-def _flap(*axes: list[Interval]) -> float:
+def _flap(*axes: list[Span]) -> float:
     """What half of the narrowest gap leaves, but for half a millimetre; none below 3 mm."""
     gaps = [b[0] - a[1] for bars in axes for a, b in itertools.pairwise(bars)]
     flap = min([FLAP, *(gap / 2 - 5e-4 for gap in gaps)])
     return flap if flap >= 3e-3 else 0.0
 
 
-def cut_axis(
-    span: Interval, bars: list[Interval], room: float, flap: float = FLAP
-) -> list[float] | None:
+def cut_axis(span: Span, bars: list[Span], room: float, flap: float = FLAP) -> list[float] | None:
     """Where to cut along one axis.
 
     Args:
@@ -180,9 +178,7 @@ def cut_axis(
     return cuts
 
 
-def _fewest_cuts(
-    span: Interval, allowed: list[Interval], room: float, flap: float
-) -> list[float] | None:
+def _fewest_cuts(span: Span, allowed: list[Span], room: float, flap: float) -> list[float] | None:
     """Each page takes as much as it holds, which makes the fewest."""
     cuts: list[float] = []
     start = span[0]
@@ -201,7 +197,7 @@ def _fewest_cuts(
 def _tile(
     number: int,
     size: tuple[float, float],
-    spans: tuple[Interval, Interval],
+    spans: tuple[Span, Span],
     cuts: tuple[list[float], list[float]],
     paper: Paper,
     flap: float,
@@ -240,7 +236,7 @@ def _around(cuts: list[float], k: int) -> tuple[float | None, float | None]:
     return (cuts[k - 1] if k > 0 else None), (cuts[k] if k < len(cuts) else None)
 
 
-def _part(span: Interval, cuts: list[float], k: int, flap: float) -> Interval:
+def _part(span: Span, cuts: list[float], k: int, flap: float) -> Span:
     """What part k has to show, bleed and flap included."""
     before, after = _around(cuts, k)
     start = span[0] if before is None else before - BLEED

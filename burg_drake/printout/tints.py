@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from burg_drake.core import Array
+from burg_drake.core.terminal import Rgb
 
 LUMA = np.array([0.299, 0.587, 0.114])
 """Weights of red, green and blue (ITU-R BT.601)."""
@@ -34,8 +35,6 @@ HUES = (
 """Of free objects in turn; mostly hues of Okabe and Ito, "Color Universal Design" (2008)."""
 FIXED_HUE = (0.35, 0.35, 0.35)
 """Of fixed objects."""
-
-Rgb = tuple[float, float, float]
 
 
 def hue(index: int) -> Rgb:

@@ -1,3 +1,4 @@
+from .rest.neighbours import Neighbours as Neighbours
 from .robustness.friction_search import (
     friction_limit as friction_limit,
 )
@@ -19,8 +20,14 @@ from .robustness.settings import (
     LoadSettings as LoadSettings,
     Noise as Noise,
 )
-from .trials.carrier import Carrier as Carrier
-from .trials.contacts import BodyContact as BodyContact
+from .trials.carrier import (
+    Carrier as Carrier,
+    HandSegment as HandSegment,
+)
+from .trials.contacts import (
+    BodyContact as BodyContact,
+    ContactReader as ContactReader,
+)
 from .trials.execution import Execution as Execution
 from .trials.lift_carrier import LiftPath as LiftPath
 from .trials.lift_clearance import (

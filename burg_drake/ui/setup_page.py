@@ -41,7 +41,7 @@ from burg_drake.ui.view import (
     ShownInstance,
     set_initial_view,
 )
-from burg_drake.ui.widgets import Call, PageActions, register, show_overlay, style
+from burg_drake.ui.widgets import ActionCall, PageActions, register, show_overlay, style
 
 LEFT_WIDTH, RIGHT_WIDTH = 290, 330
 """Of the panels [pixel]."""
@@ -147,10 +147,10 @@ class SetupPage:
         )
         register(gui, actions, self._calls())
 
-    def _calls(self) -> dict[str, Call]:
+    def _calls(self) -> dict[str, ActionCall]:
         """What keys do; see `shortcuts`."""
 
-        def anywhere(action: Callable[[], Any]) -> Call:
+        def anywhere(action: Callable[[], Any]) -> ActionCall:
             return lambda client: action()
 
         calls = selection_calls(self._session)

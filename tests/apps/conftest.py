@@ -13,6 +13,7 @@ from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
+from burg_drake.station.document.engine import Engine
 
 SCENE = """\
 version: 1
@@ -25,6 +26,15 @@ instances:
   - object: bottle
     X_SO: {translation: [0.29, 0.11, 0.0]}
 """
+TWO = """\
+version: 1
+name: tabletop_two
+library: household
+instances:
+- {object: mug, X_SO: {translation: [0.125242, 0.109047, 0.0], rpy_deg: [0, 0, 140]}}
+- {object: box, X_SO: {translation: [0.475, 0.115, -2.1e-05], rpy_deg: [0, 0, 75]}}
+"""
+"""Of the built-in `tabletop_six`, where they are."""
 ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 """Across the narrow side of the household box, from above."""
 X_OG = np.stack([ABOVE, ABOVE @ make_pose(p_AB=(0, 0, 0.1)), ABOVE @ make_pose(p_AB=(0, 0, -0.1))])
@@ -55,13 +65,17 @@ def scene_file(tmp_path: Path) -> Path:
 @pytest.fixture(scope="session")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     """Three grasps on the box with known outcomes; the arm is not asked."""
-    folder = tmp_path_factory.mktemp("run") / "box"
+    return box_run(tmp_path_factory.mktemp("run") / "box", "screening")
+
+
+def box_run(folder: Path, engine: str | Engine) -> Run:
+    folder.with_suffix(".yaml").write_text(TWO)
     grasps = GraspSet.create(X_OG, object="box", width=0.06)
     return evaluate(
-        "tabletop_six",
+        folder.with_suffix(".yaml"),
         "panda_tabletop",
         folder,
-        settings=EvaluationSettings(mode="hand", engine="screening"),
+        settings=EvaluationSettings(mode="hand", engine=engine),
         grasps={"box": grasps},
         workers=1,
         progress=False,

@@ -86,6 +86,8 @@ def test_a_photo_without_a_board_says_so(folder: Path, capsys: Capture) -> None:
 
 
 def test_a_scaled_print_is_told_or_doubted(folder: Path, capsys: Capture) -> None:
+    can = SCENE.replace(SCENE[SCENE.index("  - object: mug") : SCENE.index("  - object: can")], "")
+    (folder / "two.yaml").write_text(can)
     scene = load_scene(folder / "two.yaml")
     X_SC = looking(np.array([0.3, 0.1, 0.7]), np.array([0.29, 0.2, 0.0]))
     drawn = board_image(scene.board, INTRINSICS, X_SC, scale=(0.97, 0.98))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import os
 import shlex
@@ -148,6 +149,7 @@ def run_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> int:
         raise error
 
     monkeypatch.setattr("burg_drake.apps.runs.report.run_report", fail)
+    monkeypatch.setattr(cli, "build_parser", inspect.unwrap(cli.build_parser))
     return cli.main(["report", "somewhere"])
 
 
@@ -214,6 +216,7 @@ def test_what_goes_on_later_ends_on_sigterm_as_on_ctrl_c(
         return 0
 
     monkeypatch.setattr(evaluate, "run_evaluate", run)
+    monkeypatch.setattr(cli, "build_parser", inspect.unwrap(cli.build_parser))
     assert cli.main(["evaluate", "tabletop_six"]) == 130
     assert "interrupted; run the same command to continue" in capsys.readouterr().err
     assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL

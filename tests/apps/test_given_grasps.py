@@ -17,6 +17,7 @@ from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.records.table_file import read_table
 from burg_drake.scene.document.scene import load_scene
 from burg_drake.station.document.station_document import load_station
+from tests.apps.conftest import TWO
 
 Capture = pytest.CaptureFixture[str]
 
@@ -29,9 +30,10 @@ QUICK = ["--engine", "screening", "--workers", "1", "--quiet"]
 
 
 def judged(folder: Path, *arguments: str) -> dict[str, np.ndarray]:
-    """The results of evaluating on the built-in scene."""
+    """The results of evaluating on a scene of two objects."""
+    (folder / "two.yaml").write_text(TWO)
     options = ["-o", str(folder / "run"), *QUICK]
-    assert main(["evaluate", "tabletop_six", *arguments, *options]) == 0
+    assert main(["evaluate", str(folder / "two.yaml"), *arguments, *options]) == 0
     return read_table(folder / "run" / "results.csv")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -15,12 +16,17 @@ from burg_drake.grasping.quality.metrics import METRICS
 Capture = pytest.CaptureFixture[str]
 
 
-@pytest.fixture
-def grasp_file(tmp_path: Path) -> Path:
-    path = tmp_path / "grasps.h5"
+@pytest.fixture(scope="module")
+def sampled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("sampled") / "grasps.h5"
     options = ["--only", "can", "--only", "box", "-n", "12", "-o", str(path)]
     assert main(["grasps", "sample", "household", *options]) == 0
     return path
+
+
+@pytest.fixture
+def grasp_file(sampled: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copy(sampled, tmp_path))
 
 
 def score(*arguments: str | Path) -> int:

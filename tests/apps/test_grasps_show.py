@@ -24,14 +24,14 @@ N = 12
 
 @pytest.fixture
 def grasps() -> GraspSet:
-    """From above on mug and bowl, with numbers, names, and one number missing."""
+    """From above on mug and bottle, with numbers, names, and one number missing."""
     height = np.linspace(0.02, 0.08, N)
     X_OG = grasp_from_axes((1, 0, 0), (0, 0, -1), np.stack([0 * height, 0 * height, height], -1))
     clearance = np.linspace(-0.002, 0.02, N)
     clearance[4] = np.nan
     return GraspSet.create(
         X_OG,
-        object=["mug"] * 8 + ["bowl"] * 4,
+        object=["mug"] * 8 + ["bottle"] * 4,
         width=0.05,
         score=height,
         columns={"clearance": clearance, "maker": ["a", "b", "b"] * 4},
@@ -71,29 +71,29 @@ def test_objects_in_rows_by_score(file: Path, tmp_path: Path, capsys: Capture) -
     assert "<script src" not in text and "@import" not in text
 
 
-def test_in_the_scene_by_any_column(file: Path, capsys: Capture) -> None:
-    scene = ("--scene", "tabletop_six")
+def test_in_the_scene_by_any_column(file: Path, scene_file: Path, capsys: Capture) -> None:
+    scene = ("--scene", scene_file)
     lines = shown(capsys, file, *scene, "--color", "clearance", "--range", 0, 0.01)
     assert lines[0] == "clearance [m]"
     assert lines[2].startswith("≤ 0") and lines[2].endswith("≥ 0.01")
     assert lines[3:] == ["1 below the range, 5 above the range", "■ not known (1)"]
     assert shown(capsys, file, *scene, "--color", "maker") == ["■ b (8)", "■ a (4)"]
-    assert shown(capsys, file, *scene, "--color", "instance") == ["■ mug (8)", "■ bowl (4)"]
+    assert shown(capsys, file, *scene, "--color", "instance") == ["■ mug (8)", "■ bottle (4)"]
 
 
 def test_choice(file: Path, capsys: Capture) -> None:
     library = ("--library", "household", "--color", "object")
-    assert shown(capsys, file, *library, "--only", "bowl") == [
-        "■ bowl (4)",
+    assert shown(capsys, file, *library, "--only", "bottle") == [
+        "■ bottle (4)",
         "4 of 12 grasps shown",
     ]
     assert shown(capsys, file, *library, "--most", 3) == [
-        "■ bowl (3)",
+        "■ bottle (3)",
         "■ mug (3)",
         "6 of 12 grasps shown: the best 3 of each object by score; --most N or --all shows more",
     ]
-    assert shown(capsys, file, *library, "--all") == ["■ mug (8)", "■ bowl (4)"]
-    named = ("--grasps-object", "mug=can", "--grasps-object", "bowl=box")
+    assert shown(capsys, file, *library, "--all") == ["■ mug (8)", "■ bottle (4)"]
+    named = ("--grasps-object", "mug=can", "--grasps-object", "bottle=box")
     assert shown(capsys, file, *library, *named) == ["■ can (8)", "■ box (4)"]
 
 
@@ -113,7 +113,7 @@ def test_the_list_has_the_best_first_and_any_that_is_asked_for(
     options = ("--library", "household", "--most", 2, "--html", page)
     shown(capsys, file, *options)
     labels, _, chosen = picker(page)
-    best = [7, 6, 11, 10]  # of mug and bowl by score
+    best = [7, 6, 11, 10]  # of mug and bottle by score
     assert labels == ["no gripper", *(f"{grasps.score[k]:.3g} {grasps.id[k]}" for k in best)]
     assert chosen == "no gripper"
     shown(capsys, file, *options, "--select", worst)
@@ -142,15 +142,15 @@ def test_the_list_tells_what_is_coloured_highest_first(
 
 
 def test_the_gripper_is_put_where_the_grasp_is(
-    file: Path, grasps: GraspSet, tmp_path: Path, capsys: Capture
+    file: Path, grasps: GraspSet, scene_file: Path, tmp_path: Path, capsys: Capture
 ) -> None:
     """Of the Panda hand, G is 0.1034 m before the flange, and two parts slide, half each."""
     page = tmp_path / "page.html"
-    shown(capsys, file, "--scene", "tabletop_six", "--html", page, "--only", "mug")
+    shown(capsys, file, "--scene", scene_file, "--html", page, "--only", "mug")
     labels, data, _ = picker(page)
     assert len(labels) == 9 and all(label.split()[1].startswith("mug-") for label in labels[1:])
     X_WO = load_station("panda_tabletop").document.X_WS.matrix()
-    X_WO = X_WO @ load_scene("tabletop_six").X_SO("mug")
+    X_WO = X_WO @ load_scene(scene_file).X_SO("mug")
     for entry, k in zip(data["grasps"], range(7, -1, -1), strict=True):
         X_WG, X_WH = (np.reshape(entry[frame], (4, 4)).T for frame in "GH")
         assert pytest.approx(X_WO @ grasps.X_OG[k], abs=2e-6) == X_WG
@@ -163,10 +163,10 @@ def test_the_gripper_is_put_where_the_grasp_is(
 
 
 def test_what_the_file_says_of_its_objects(
-    grasps: GraspSet, tmp_path: Path, capsys: Capture
+    grasps: GraspSet, scene_file: Path, tmp_path: Path, capsys: Capture
 ) -> None:
     path = tmp_path / "told.npz"
-    told = GraspSet.create(grasps.X_OG, object="mug", provenance={"scene": "tabletop_six"})
+    told = GraspSet.create(grasps.X_OG, object="mug", provenance={"scene": str(scene_file)})
     told.save(path)
     assert shown(capsys, path) == [f"■ grasps ({N})"]
     grasps.save(tmp_path / "untold.npz")
@@ -199,14 +199,17 @@ def test_a_run_by_its_margins(run: Run, capsys: Capture) -> None:
     assert shown(capsys, run.path, "--color", "stage") == ["■ executed (2)", "■ clear (1)"]
 
 
-def test_columns_of_a_run_by_the_names_of_its_table(tmp_path: Path, capsys: Capture) -> None:
+def test_columns_of_a_run_by_the_names_of_its_table(
+    scene_file: Path, tmp_path: Path, capsys: Capture
+) -> None:
     X_OG = grasp_from_axes((1, 0, 0), (0, 0, -1), np.array([[0.0, 0.0, 0.0]]))  # in the table
     given = GraspSet.create(X_OG, object="mug", columns={"maker": ["me"], "outcome": ["slipped"]})
     given.save(tmp_path / "given.h5")
     folder = str(tmp_path / "run")
-    options = ["--mode", "hand", "--workers", "1", "--quiet", "-o", folder]
+    options = ["--mode", "hand", "--engine", "screening", "--workers", "1", "--quiet"]
     file = str(tmp_path / "given.h5")
-    assert main(["evaluate", "tabletop_six", "--grasps", file, *options]) == 0
+    scene = str(scene_file)
+    assert main(["evaluate", scene, "--grasps", file, *options, "-o", folder]) == 0
     capsys.readouterr()
     assert shown(capsys, folder, "--color", "given_maker") == ["■ me (1)"]
     assert shown(capsys, folder, "--color", "maker") == ["■ me (1)"]

@@ -12,6 +12,7 @@ from burg_drake.apps.cli import main
 from burg_drake.objects.library.document import load_library
 
 Capture = pytest.CaptureFixture[str]
+QUICK = "--no-confirm"
 
 
 def build(*arguments: object) -> int:
@@ -36,7 +37,7 @@ def test_friction_of_one_and_of_all(mesh: Path, tmp_path: Path) -> None:
     masses = tmp_path / "masses.yaml"
     masses.write_text("block: 0.1\nOther-Block: 0.3\n")
     arguments = ("--masses", masses, "--friction", "0.3", "--friction", "block=0.6")
-    assert build(tmp_path, "-o", tmp_path / "library", *arguments) == 0
+    assert build(tmp_path, QUICK, "-o", tmp_path / "library", *arguments) == 0
     objects = load_library(tmp_path / "library").objects
     assert {n: (o.mass, o.friction) for n, o in objects.items()} == {
         "block": (0.1, 0.6),
@@ -47,13 +48,13 @@ def test_friction_of_one_and_of_all(mesh: Path, tmp_path: Path) -> None:
 def test_scale_and_density(tmp_path: Path) -> None:
     trimesh.creation.box((50, 40, 60)).export(tmp_path / "block.stl")
     arguments = ("--scale", "0.001", "--density", "1000")
-    assert build(tmp_path / "block.stl", "-o", tmp_path / "library", *arguments) == 0
+    assert build(tmp_path / "block.stl", QUICK, "-o", tmp_path / "library", *arguments) == 0
     assert load_library(tmp_path / "library").entry("block").mass == pytest.approx(0.12, rel=1e-6)
 
 
 def test_one_broken_mesh_is_one_failure(mesh: Path, tmp_path: Path, capsys: Capture) -> None:
     (tmp_path / "broken.obj").write_text("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    assert build(mesh, tmp_path / "broken.obj", "-o", tmp_path / "library") == 1
+    assert build(mesh, tmp_path / "broken.obj", QUICK, "-o", tmp_path / "library") == 1
     captured = capsys.readouterr()
     (line,) = captured.err.splitlines()
     assert line.startswith("burg-drake: error: ")
@@ -160,7 +161,7 @@ def test_bad_masses(
 
 def test_mass_0_in_a_library(mesh: Path, tmp_path: Path, capsys: Capture) -> None:
     library = tmp_path / "library"
-    assert build(mesh, "-o", library, "--mass", "block=0.25") == 0
+    assert build(mesh, QUICK, "-o", library, "--mass", "block=0.25") == 0
     text = (library / "library.yaml").read_text()
     (library / "library.yaml").write_text(text.replace("mass: 0.25", "mass: 0"))
     capsys.readouterr()
@@ -192,5 +193,5 @@ def test_the_help_describes_masses_files(capsys: Capture) -> None:
 def test_masses_of_the_command_line_go_first(mesh: Path, tmp_path: Path) -> None:
     (tmp_path / "masses.yaml").write_text("block: 1\n")
     arguments = ("--masses", tmp_path / "masses.yaml", "--mass", "block=0.2")
-    assert build(mesh, "-o", tmp_path / "library", *arguments) == 0
+    assert build(mesh, QUICK, "-o", tmp_path / "library", *arguments) == 0
     assert load_library(tmp_path / "library").entry("block").mass == 0.2

@@ -25,6 +25,7 @@ from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.station.document.engine import ENGINES
+from burg_drake.station.document.grasp_motion import GraspMotion
 
 SCENE = """\
 version: 1
@@ -42,6 +43,7 @@ TURN = make_pose(rotation_from_rpy([0.0123, 0.0234, 0.0345]))
 """A turn whose matrix no quaternion gives back bit for bit."""
 ENGINE = dataclasses.replace(ENGINES["screening"], time_step=0.01)
 """Not a preset, though it has the name of one; fast."""
+LOW = GraspMotion(lift_height=0.1)
 Capture = pytest.CaptureFixture[str]
 
 
@@ -56,7 +58,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         folder / "stack.yaml",
         "panda_tabletop",
         folder / "run",
-        settings=EvaluationSettings(engine=ENGINE, mode="hand"),
+        settings=EvaluationSettings(engine=ENGINE, mode="hand", motion=LOW),
         grasps={"box": GraspSet.create(grasps, object="box", width=0.06)},
         workers=1,
         progress=False,
@@ -90,7 +92,7 @@ def test_what_stands_on_the_target_is_disturbed(run: Run) -> None:
     outcomes = [Outcome.LIFTED_DISTURBED, Outcome.COLLISION_CLUTTER, Outcome.NO_CONTACT]
     assert run.results["outcome"].tolist() == outcomes
     lifted = table_row(run.results, 0)
-    assert lifted["moved_can"] == lifted["others_moved"] > 0.15  # it rose, whatever it did then
+    assert lifted["moved_can"] == lifted["others_moved"] > 0.05  # it rose, whatever it did then
     assert lifted["patch_area"] > 0.0
     assert np.isnan(run.results["moved_box"]).all()
     # it stands on the box and is free from the start with it: both fall for a step, then the box
@@ -179,7 +181,7 @@ def test_a_trial_with_another_friction_is_replayed_with_it(
     from burg_drake.evaluation.stages.judge import trial_verdict
 
     trial = dataclasses.replace(run.trial(run.candidates.id[0]), friction=0.01, mass=0.5)
-    result = HandTrial(run.scene(), run.station(), engine=ENGINE).run(
+    result = HandTrial(run.scene(), run.station(), engine=ENGINE, motion=LOW).run(
         "box", trial.X_OG, friction=0.01, mass=0.5
     )
     assert result.outcome is not Outcome.LIFTED_DISTURBED  # 2 mu N = 0.8 N hold 80 g
@@ -195,11 +197,12 @@ def test_a_trial_with_another_friction_is_replayed_with_it(
 
 def test_a_row_of_an_arm_trial_is_replayed_with_the_arm(tmp_path: Path, capsys: Capture) -> None:
     above = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
+    (tmp_path / "box.yaml").write_text(SCENE.partition("  - object: can")[0])
     run = evaluate(
-        "tabletop_six",
+        tmp_path / "box.yaml",
         "panda_tabletop",
         tmp_path / "run",
-        settings=EvaluationSettings(engine="screening", mode="arm"),
+        settings=EvaluationSettings(engine=ENGINE, mode="arm", motion=LOW),
         grasps={"box": GraspSet.create(above, object="box", width=0.06)},
         workers=1,
         progress=False,

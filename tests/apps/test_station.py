@@ -12,6 +12,14 @@ from burg_drake.motion.workspace import reachability
 
 Capture = pytest.CaptureFixture[str]
 
+BOWL = """\
+version: 1
+name: bowl
+library: household
+instances:
+- {object: bowl, X_SO: {translation: [0.305, 0.31, -2.4e-05]}}
+"""
+
 
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -73,7 +81,8 @@ def test_check_with_a_scene(tmp_path: Path, capsys: Capture) -> None:
         ("X_WS: {translation: [0.24,", "X_WS: {translation: [0.75,"),
         ("size: [1.2, 1.4, 0.1]", "size: [3.0, 1.4, 0.1]"),
     )
-    assert main(["station", "check", str(path), "--scene", "tabletop_six"]) == 0
+    (tmp_path / "bowl.yaml").write_text(BOWL)
+    assert main(["station", "check", str(path), "--scene", str(tmp_path / "bowl.yaml")]) == 0
     lines = capsys.readouterr().err.splitlines()
     assert (
         f"burg-drake: warning: {path}: 'bowl' is out of reach: it is 1.02 m from the arm's"

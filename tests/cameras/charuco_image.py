@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from burg_drake.cameras.calibration.target import CharucoTarget
 from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.cameras.sources.frame import Image
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array
 from burg_drake.scene.document.markers import marker_dictionary
 from tests.cameras import synthetic
 
@@ -67,8 +67,8 @@ class _TargetSheet:
     def __init__(self, target: CharucoTarget) -> None:
         self._x, self._y = (_lines(target, count) for count in target.squares)
         x, y = (0.5 * (lines[:-1] + lines[1:]) for lines in (self._x, self._y))
-        self._kinds = np.full((len(self._y) + 1, len(self._x) + 1), TABLE)
-        self._kinds[1:-1, 1:-1] = _kinds(target, *np.meshgrid(x, y))
+        self.kinds = np.full((len(self._y) + 1, len(self._x) + 1), TABLE)
+        self.kinds[1:-1, 1:-1] = _kinds(target, *np.meshgrid(x, y))
 
     def region(self, p_S: Array) -> NDArray[np.intp]:
         """Number of the rectangle that holds each point (..., 2) of the plane."""
@@ -78,12 +78,12 @@ class _TargetSheet:
     @property
     def colors(self) -> Array:
         """(regions, 3) colour of each."""
-        return COLORS[self._kinds.ravel()]
+        return COLORS[self.kinds.ravel()]
 
     @property
     def on_table(self) -> NDArray[np.bool_]:
         """(regions,) the region is bare table."""
-        return self._kinds.ravel() == TABLE
+        return self.kinds.ravel() == TABLE
 
 
 def _lines(target: CharucoTarget, count: int) -> Array:

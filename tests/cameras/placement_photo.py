@@ -1,8 +1,8 @@
 """Photos of a scene whose objects stand off their targets, by Drake's renderer: truth for tests of
 the placement check, and of one's own.
 
-Rendered finer than asked for and averaged, so that a pixel has the colours of all that it covers,
-as in a camera. Depth is that of the pixel's middle.
+Colours are rendered finer than asked for and averaged, so that a pixel has those of all that it
+covers, as in a camera. Depth is that of the pixel's middle.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ from pydrake.math import RigidTransform
 from pydrake.systems.sensors import CameraInfo
 
 from burg_drake.cameras.optics.intrinsics import Intrinsics, camera_info
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import MissingDependencyError
-from burg_drake.core.frames import Array
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.world.board_visual import board_meshes
 from burg_drake.station.world.camera_sensors import LIGHTS
@@ -116,7 +116,7 @@ class ScenePhotographer:
             intrinsics: of a camera without distortion.
             X_SO: (4, 4) where objects stand that do not stand on their targets; None for those
                 that are not there.
-            supersampling: pixels rendered for each of the photo, each way; odd.
+            supersampling: pixels rendered for each of the photo, each way.
         """
         placed = {**self._targets, **(X_SO or {})}
         poses = FramePoseVector()
@@ -126,13 +126,12 @@ class ScenePhotographer:
         self._graph.get_source_pose_port(self._source).FixValue(self._context, poses)
         query = self._graph.get_query_output_port().Eval(self._context)
         s = supersampling
-        fine, world = camera_info(_finer(intrinsics, s)), self._graph.world_frame_id()
-        color_camera, depth_camera = _cameras(fine)
-        X_PC = RigidTransform(X_SC)
-        color = query.RenderColorImage(color_camera, world, X_PC).data[..., :3]
-        depth = query.RenderDepthImage(depth_camera, world, X_PC).data[s // 2 :: s, s // 2 :: s]
-        label = query.RenderLabelImage(color_camera, world, X_PC).data[s // 2 :: s, s // 2 :: s]
-        label = label[..., 0].copy()
+        fine, _ = _cameras(camera_info(_finer(intrinsics, s)))
+        color_camera, depth_camera = _cameras(camera_info(intrinsics))
+        world, X_PC = self._graph.world_frame_id(), RigidTransform(X_SC)
+        color = query.RenderColorImage(fine, world, X_PC).data[..., :3]
+        depth = query.RenderDepthImage(depth_camera, world, X_PC).data
+        label = query.RenderLabelImage(color_camera, world, X_PC).data[..., 0].copy()
         label[label >= SURROUNDINGS] = -1
         size = (intrinsics.width, intrinsics.height)
         return Photo(

@@ -1,8 +1,9 @@
 """Images of a board with exact truth, to test and to compare what estimates poses from images.
 
 Made without a renderer: each pixel is the mean over its area of what the sheet shows there, so that
-an edge lies where the pose puts it to about a hundredth of a pixel. White paper with the markers on
-a table; covers may lie on it, and blur, noise, uneven light and lens distortion may be added.
+an edge lies where the pose puts it to a few hundredths of a pixel, or better if asked. White paper
+with the markers on a table; covers may lie on it, and blur, noise, uneven light and lens distortion
+may be added.
 """
 
 from __future__ import annotations
@@ -14,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array
 from burg_drake.scene.document.markers import MarkerLayout
 from burg_drake.scene.document.scene import Board
 
-SAMPLES = 89
-"""Samples a pixel that an edge crosses; a Fibonacci number, see `_lattice`."""
+COARSE, FINE = 34, 89
+"""Samples a pixel that an edge crosses; Fibonacci numbers, see `_lattice`."""
 CHUNK = 1 << 9
 """Pixels that are sampled at once; few enough that their samples stay in the processor's cache."""
 HORIZON = -0.02
@@ -58,6 +59,7 @@ def board_image(
     look: ImageDegradation = ImageDegradation(),
     scale: tuple[float, float] = (1.0, 1.0),
     rng: np.random.Generator | None = None,
+    samples: int = COARSE,
 ) -> NDArray[np.uint8]:
     """What a camera sees of a board that lies on a table.
 
@@ -70,6 +72,8 @@ def board_image(
         look: blur, noise, light.
         scale: size of the print against the document, along x and y, from S's origin.
         rng: for noise.
+        samples: of a pixel that an edge crosses, a Fibonacci number; `FINE` where the last
+            hundredths of a pixel count.
 
     Returns:
         (H, W, 3) RGB image.
@@ -80,7 +84,7 @@ def board_image(
     if look.noise > 0.0 and rng is None:
         raise InvalidInputError("noise needs a random generator; give rng")
     sheet = _Sheet(board, np.empty((0, 5)) if covers is None else np.asarray(covers, float), scale)
-    image = area_means(sheet, intrinsics, np.asarray(X_SC, dtype=float))
+    image = area_means(sheet, intrinsics, np.asarray(X_SC, dtype=float), samples)
     return degraded(image, look, rng)
 
 
@@ -161,7 +165,7 @@ def covers_of(
 class _Sheet:
     """What lies where on the table's plane.
 
-    The plane is cut by all lines along which a cell of a marker or the sheet ends; `_kinds` tells
+    The plane is cut by all lines along which a cell of a marker or the sheet ends; `kinds` tells
     what is between them.
     """
 
@@ -179,7 +183,7 @@ class _Sheet:
             columns = np.searchsorted(x, x0 + cell * (np.arange(layout.cells) + 0.5))
             for row, ink in zip(rows, black, strict=True):
                 kinds[row, columns[ink]] = INK
-        self._x, self._y, self._kinds, self._covers = x * scale[0], y * scale[1], kinds, covers
+        self._x, self._y, self.kinds, self._covers = x * scale[0], y * scale[1], kinds, covers
 
     def region(self, p_S: Array) -> NDArray[np.intp]:
         """Number of the rectangle or cover that holds each point of the plane.
@@ -197,19 +201,19 @@ class _Sheet:
         for k, cover in enumerate(self._covers):
             center, reach = cover[:2], np.hypot(*cover[2:4])
             near = np.flatnonzero(((high > center - reach) & (low < center + reach)).all(axis=1))
-            i[near] = np.where(_under(cover[None], p_S[near]), self._kinds.size + k, i[near])
+            i[near] = np.where(_under(cover[None], p_S[near]), self.kinds.size + k, i[near])
         return i
 
     @property
     def colors(self) -> Array:
         """(regions, 3) color of each."""
-        kinds = np.r_[self._kinds.ravel(), np.full(len(self._covers), COVER)]
+        kinds = np.r_[self.kinds.ravel(), np.full(len(self._covers), COVER)]
         return COLORS[kinds]
 
     @property
     def on_table(self) -> NDArray[np.bool_]:
         """(regions,) the region is bare table."""
-        return np.r_[self._kinds.ravel() == TABLE, np.zeros(len(self._covers), bool)]
+        return np.r_[self.kinds.ravel() == TABLE, np.zeros(len(self._covers), bool)]
 
 
 def _under(covers: Array, p_S: Array) -> NDArray[np.bool_]:
@@ -222,7 +226,7 @@ def _under(covers: Array, p_S: Array) -> NDArray[np.bool_]:
     return hidden
 
 
-def area_means(sheet: _Sheet, intrinsics: Intrinsics, X_SC: Array) -> Array:
+def area_means(sheet: _Sheet, intrinsics: Intrinsics, X_SC: Array, samples: int = COARSE) -> Array:
     """(H, W, 3) color, averaged over each pixel's area."""
     h, w = intrinsics.height, intrinsics.width
     u, v = np.meshgrid(np.arange(w + 1) - 0.5, np.arange(h + 1) - 0.5)
@@ -238,7 +242,9 @@ def area_means(sheet: _Sheet, intrinsics: Intrinsics, X_SC: Array) -> Array:
     kinds = kinds.ravel().astype(np.int8)
     image = looks[kinds[corners[0]]]
     rows, columns = np.nonzero((corners != corners[0]).any(axis=0))
-    fx, fy = _lattice()
+    mixed = _mixed(sheet.kinds, corners[:, rows, columns])
+    rows, columns = rows[mixed], columns[mixed]
+    fx, fy = _lattice(samples)
     for k in range(0, len(rows), CHUNK):
         r, c = rows[k : k + CHUNK, None, None], columns[k : k + CHUNK, None, None]
         across, down = fx[None, :, None], fy[None, :, None]
@@ -248,9 +254,20 @@ def area_means(sheet: _Sheet, intrinsics: Intrinsics, X_SC: Array) -> Array:
         below = below + rays[r + 1, c + 1, np.arange(3)] * across
         inside = kinds[sheet.region(_on_plane(X_SC, above * (1 - down) + below * down))]
         counts = np.stack([(inside == kind).sum(axis=1) for kind in range(len(looks))], axis=1)
-        image[r[:, 0, 0], c[:, 0, 0]] = counts @ looks / SAMPLES
+        image[r[:, 0, 0], c[:, 0, 0]] = counts @ looks / samples
     p_S = _on_plane(X_SC, rays[:-1, :-1])
     return image[..., :3] + image[..., 3:] * _grain(p_S)[..., None]
+
+
+def _mixed(kinds: NDArray[np.int_], regions: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """(N,) whether something else than at points (M, N) may lie between them: if all look alike
+    in the block of rectangles that they span, and it has two along x and along y at most, no."""
+    i, j = np.divmod(np.minimum(regions, kinds.size - 1), kinds.shape[1])
+    (y0, x0), (y1, x1) = (i.min(axis=0), j.min(axis=0)), (i.max(axis=0), j.max(axis=0))
+    block = np.stack([kinds[y0, x0], kinds[y0, x1], kinds[y1, x0], kinds[y1, x1]])
+    alike = (block == block[0]).all(axis=0) & (y1 - y0 <= 1) & (x1 - x0 <= 1)
+    covered = (regions >= kinds.size).any(axis=0)
+    return np.asarray(~alike | covered)
 
 
 def _rays(intrinsics: Intrinsics, pixels: Array) -> Array:
@@ -264,10 +281,10 @@ def _on_plane(X_SC: Array, rays_S: Array) -> Array:
     return X_SC[:2, 3] - X_SC[2, 3] * rays_S[..., :2] / rays_S[..., 2:]
 
 
-def _lattice() -> tuple[Array, Array]:
+def _lattice(samples: int) -> tuple[Array, Array]:
     """Points in a unit square that no edge of any direction runs along (a Fibonacci lattice)."""
-    k = np.arange(SAMPLES)
-    x, y = (k + 0.5) / SAMPLES, np.mod(k * GOLDEN, 1.0)
+    k = np.arange(samples)
+    x, y = (k + 0.5) / samples, np.mod(k * GOLDEN, 1.0)
     return x, y + 0.5 - y.mean()
 
 

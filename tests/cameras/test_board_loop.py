@@ -10,7 +10,8 @@ import pytest
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
-from scipy.ndimage import binary_dilation, binary_erosion, distance_transform_edt
+from scipy.ndimage import binary_dilation, binary_erosion
+from scipy.spatial import KDTree
 
 from burg_drake.cameras.optics.field_of_view import FieldOfView
 from burg_drake.cameras.overlay.style import OverlayStyle
@@ -18,9 +19,10 @@ from burg_drake.cameras.projection.line_drawing import OUTLINE, visible_lines
 from burg_drake.cameras.projection.scene_mesh import build_scene_mesh
 from burg_drake.cameras.systems.board_loop import BoardLoop, LoopCamera, build_board_loop
 from burg_drake.cameras.systems.pose_filter import PoseFilter
+from burg_drake.core.arrays import Array
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import Array, inverse, make_pose, rotation_angle, rotation_from_rpy
+from burg_drake.core.frames import inverse, make_pose, rotation_angle, rotation_from_rpy
 from burg_drake.scene.document.scene import Board, Scene, SceneDocument, load_scene
 from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.document.station_document import Camera, Station, load_station
@@ -85,7 +87,7 @@ def test_the_pose_is_the_station_s_own(loop: BoardLoop, context: Context) -> Non
     X_SC = inverse(loop.built.station.document.X_WS.matrix()) @ X_WC
     np.testing.assert_allclose(loop.X_SC(context), X_SC, atol=1e-12)
     seen = [errors(loop, context)]
-    for view in ((0.6, 80, 10, 0), (0.8, 60, 200, 30), (0.7, 50, 300, -20), (1.0, 70, 120, 90)):
+    for view in ((0.8, 60, 200, 30), (0.7, 50, 300, -20), (1.0, 70, 120, 90)):
         loop.place_camera(context, looking(*view))
         seen.append(errors(loop, context))
     millimetres, degrees = np.transpose(seen)
@@ -147,18 +149,19 @@ def test_outlines_are_on_the_edges_that_drake_renders(
     label = np.array(port.Eval(built.diagram.CreateDefaultContext()).data).squeeze()
     ids = [int(i) for i in built.free.values()]
     label = np.where(np.isin(label, ids), label, 0)
-    # edges lie between pixels: at the corners of a grid of half pixels
-    grid = np.zeros((2 * height - 1, 2 * width - 1), dtype=bool)
-    grid[1::2, :] |= np.repeat(label[1:] != label[:-1], 2, axis=1)[:, 1:]
-    grid[:, 1::2] |= np.repeat(label[:, 1:] != label[:, :-1], 2, axis=0)[1:]
-    away = distance_transform_edt(~grid) / (2 * fine)  # in pixels of the camera
+    # edges lie between pixels: middles and ends of their sides
+    right = np.argwhere(label[:, 1:] != label[:, :-1]) + np.array([0.0, 0.5])
+    below = np.argwhere(label[1:] != label[:-1]) + np.array([0.5, 0.0])
+    along = np.array([-0.5, 0.0, 0.5])[:, None, None]
+    edges = np.concatenate([*(right + along * (1.0, 0.0)), *(below + along * (0.0, 1.0))])
 
     X_SC = output(loop, context, "board.X_SC")
     lines = visible_lines(build_scene_mesh(scene), FieldOfView(loop.intrinsics), X_SC)
     middle = lines.ends[lines.kind == OUTLINE].mean(axis=1)
-    column, row = np.round(2 * (fine * (middle + 0.5) - 0.5)).astype(int).T
-    inside = (column >= 0) & (row >= 0) & (column < grid.shape[1]) & (row < grid.shape[0])
-    distance = away[row[inside], column[inside]]
+    column, row = (fine * (middle + 0.5) - 0.5).T
+    inside = (column >= 0) & (row >= 0) & (column < width - 1) & (row < height - 1)
+    at = np.stack([row[inside], column[inside]], axis=1)
+    distance = KDTree(edges).query(at)[0] / fine  # in pixels of the camera
     assert len(distance) > 500
     assert np.median(distance) < 0.1
     assert np.quantile(distance, 0.95) < 0.25
@@ -205,7 +208,9 @@ def test_images_at_a_rate(station: Station) -> None:
     """With a period the estimate stays until the next image, and then is of that one."""
     empty = SceneDocument(name="empty", library="household")
     scene = Scene(empty, load_scene("tabletop_six").library, Path("empty.yaml"))
-    loop = build_board_loop(scene, station, LoopCamera(period=0.1, depth=True), style=PLAIN)
+    loop = build_board_loop(
+        scene, station, LoopCamera(period=0.1, samples=1, depth=True), style=PLAIN
+    )
     simulator = Simulator(loop.diagram)
     context = simulator.get_mutable_context()
     first, second = looking(0.8, 70, 0, 0), looking(0.7, 60, 50, 10)
@@ -245,7 +250,8 @@ def test_a_filter_is_not_an_image_late(station: Station) -> None:
     empty = SceneDocument(name="empty", library="household")
     scene = Scene(empty, load_scene("tabletop_six").library, Path("empty.yaml"))
     pose_filter = PoseFilter(period=0.1, patience=1)
-    loop = build_board_loop(scene, station, LoopCamera(period=0.1), style=PLAIN, filter=pose_filter)
+    camera = LoopCamera(period=0.1, samples=1)
+    loop = build_board_loop(scene, station, camera, style=PLAIN, filter=pose_filter)
     simulator = Simulator(loop.diagram)
     context = simulator.get_mutable_context()
     for k, roll in enumerate((0.0, 40.0, 80.0)):
@@ -283,14 +289,14 @@ def test_bad_input(scene: Scene, station: Station, loop: BoardLoop, context: Con
 def test_camera_of_another_resolution(scene: Scene, station: Station) -> None:
     camera = Camera(
         X_WC=Pose.from_matrix(station.document.X_WS.matrix() @ looking(0.8, 65, 40, 0)),
-        width=1280,
-        height=720,
-        focal=(1000.0, 1010.0),
-        center=(630.0, 365.0),
+        width=640,
+        height=360,
+        focal=(500.0, 505.0),
+        center=(315.0, 182.5),
     )
     document = replace(station.document, cameras={"wide": camera})
     loop = build_board_loop(scene, replace(station, document=document), "wide", style=PLAIN)
     context = loop.diagram.CreateDefaultContext()
     millimetres, degrees = errors(loop, context)
-    assert millimetres < 0.3 and degrees < 0.02
-    assert output(loop, context, "overlay_image").shape == (720, 1280, 4)
+    assert millimetres < 0.6 and degrees < 0.04
+    assert output(loop, context, "overlay_image").shape == (360, 640, 4)

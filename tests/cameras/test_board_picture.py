@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.rectification import top_view
 from burg_drake.cameras.rectification.stream import board_observations
 from burg_drake.cameras.rectification.top_view import BoardPicture, BoardRectifier, board_picture
 from burg_drake.cameras.sources.opening import open_source
@@ -24,6 +25,8 @@ from tests.cameras.paper_photos import photo, shown_at
 
 BOARD = Board()
 VGA = Intrinsics(width=640, height=480, focal=(600.0, 600.0), center=(319.5, 239.5))
+COARSE = 4e-3
+"""Side of a pixel of a top view at which nobody looks [m]."""
 TILTED = view((0.3, 0.21), 0.75, 30.0, 40.0, 12.0)
 BENT = Intrinsics(
     width=800, height=600, focal=(700.0, 700.0), center=(399.5, 299.5),
@@ -74,29 +77,33 @@ def test_markers_are_at_their_places(plain: np.ndarray) -> None:
 
 
 def test_distortion_is_taken_out(bent: np.ndarray) -> None:
-    assert misplaced(board_picture(bent, BOARD, BENT)).max() < 3e-4
-    wrong = board_picture(bent, BOARD, replace(BENT, distortion=()))
+    assert misplaced(board_picture(bent, BOARD, BENT, resolution=1e-3)).max() < 3e-4
+    wrong = board_picture(bent, BOARD, replace(BENT, distortion=()), resolution=1e-3)
     assert misplaced(wrong).max() > 1e-3
     assert "check the intrinsics" in wrong.note
 
 
 def test_without_intrinsics(plain: np.ndarray, bent: np.ndarray) -> None:
     for image in (plain, bent):
-        picture = board_picture(image, BOARD)
+        picture = board_picture(image, BOARD, resolution=1e-3)
         assert misplaced(picture).max() < 5e-4
         assert picture.error < 1e-3
 
 
-def test_no_more_pixels_than_graphics_cards_take(plain: np.ndarray) -> None:
+def test_no_more_pixels_than_graphics_cards_take(
+    plain: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert top_view.LARGEST == 2048
+    monkeypatch.setattr(top_view, "LARGEST", 512)
     picture = board_picture(plain, BOARD, VGA, margin=0.0, resolution=1e-4)
-    assert picture.image.shape == (1448, 2048, 3)
+    assert picture.image.shape == (362, 512, 3)
 
 
 @pytest.mark.parametrize("intrinsics", [VGA, None])
 def test_refusals(plain: np.ndarray, intrinsics: Intrinsics | None) -> None:
     def why(image: np.ndarray, board: Board) -> str:
         with pytest.raises(InvalidInputError) as error:
-            board_picture(image, board, intrinsics)
+            board_picture(image, board, intrinsics, resolution=COARSE)
         return str(error.value)
 
     assert "no marker of the board" in why(np.full_like(plain, 200), BOARD)
@@ -120,7 +127,7 @@ def test_a_larger_board_whose_first_row_is_the_same(
     for p_SQ in BOARD.layout.p_SQ[columns : len(smaller.layout.ids)]:  # objects stand on these
         corners = VGA.project(transform_points(inverse(TILTED), p_SQ))
         cv2.fillConvexPoly(image, np.rint(corners).astype(np.int32), (128, 128, 128))
-    assert board_picture(image, BOARD, intrinsics).error < 0.001
+    assert board_picture(image, BOARD, intrinsics, resolution=COARSE).error < 0.001
     with pytest.raises(InvalidInputError, match="another board"):
         board_picture(image, smaller, intrinsics)
 
@@ -139,7 +146,7 @@ def test_looks_at_files(plain: np.ndarray, tmp_path: Path) -> None:
     (tmp_path / "3.png").write_bytes(b"no image")
     cv2.imwrite(str(tmp_path / "4.png"), plain[::2, ::2])
     with open_source(tmp_path) as source:
-        looks = list(board_observations(source, BoardRectifier(BOARD, VGA)))
+        looks = list(board_observations(source, BoardRectifier(BOARD, VGA, resolution=COARSE)))
     assert [look.picture is not None for look in looks] == [True, False, False, False]
     assert looks[0].reason == ""
     assert "no marker of the board in sight" in looks[1].reason
@@ -150,7 +157,8 @@ def test_looks_at_files(plain: np.ndarray, tmp_path: Path) -> None:
 def test_looks_at_a_camera_until_it_is_stopped(plain: np.ndarray) -> None:
     stop = threading.Event()
     camera = Pictures(plain, plain, plain, live=True)
-    looks = board_observations(camera, BoardRectifier(BOARD, VGA), period=0.01, stop=stop)
+    rectifier = BoardRectifier(BOARD, VGA, resolution=COARSE)
+    looks = board_observations(camera, rectifier, period=0.01, stop=stop)
     assert next(looks).picture is not None
     assert next(looks).picture is not None
     stop.set()

@@ -15,7 +15,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.scene.document.markers import Markers
 from burg_drake.scene.document.scene import Board
 from tests.cameras.board_views import CAMERA, SMALL, error, view
-from tests.cameras.synthetic import ImageDegradation, board_depth, board_image, covers_of
+from tests.cameras.synthetic import FINE, ImageDegradation, board_depth, board_image, covers_of
 
 BOARD = Board()
 LITTLE = Board(size=(0.3, 0.21))  # 4 x 3 markers
@@ -30,7 +30,7 @@ def poses() -> BoardPose:
 
 @pytest.fixture(scope="module")
 def clean() -> np.ndarray:
-    return board_image(BOARD, CAMERA, VIEW)
+    return board_image(BOARD, CAMERA, VIEW, samples=FINE)
 
 
 def near(estimate: BoardEstimate, truth: np.ndarray, mm: float, degrees: float) -> bool:

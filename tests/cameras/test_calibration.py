@@ -21,8 +21,9 @@ from burg_drake.cameras.calibration.target import CharucoTarget, CharucoView
 from burg_drake.cameras.calibration.view_collector import ViewCollector
 from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.cameras.sources.frame import Frame
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import Array, make_pose
+from burg_drake.core.frames import make_pose
 from tests.cameras.charuco_image import target_image
 
 TARGET = CharucoTarget()
@@ -195,7 +196,7 @@ def test_too_few_views_are_refused() -> None:
 
 def test_views_without_tilt_are_known_to_tell_little() -> None:
     straight = calibrate_views(views_of(LENSES["radial4"], 12, 0.1, tilt=0.02), TARGET)
-    tilted = calibrate_views(views_of(LENSES["radial4"], 25, 0.1), TARGET)
+    tilted = calibrate_views(views_of(LENSES["radial4"], 15, 0.1), TARGET)
     assert any("tilt the target by 20 to 45 degrees" in line for line in advice(straight))
     assert straight.parameters["fx"][1] > 20 * tilted.parameters["fx"][1]
     assert is_useless(straight) and not is_useless(tilted)
@@ -205,7 +206,7 @@ def test_views_without_tilt_are_known_to_tell_little() -> None:
 def test_advice_names_edges_without_corners() -> None:
     views = views_of(LENSES["radial4"], 25, 0.05)
     kept = []
-    for view in views:
+    for view in views[:16]:
         inside = view.corners[:, 0] < 500
         kept.append(replace(view, ids=view.ids[inside], corners=view.corners[inside]))
     found = calibrate_views([v for v in kept if len(v.ids) > 15], TARGET)

@@ -13,8 +13,9 @@ from burg_drake.cameras.calibration.target import CharucoTarget, CharucoView, fi
 from burg_drake.cameras.calibration.target_sheet import upper_left, write_target
 from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.cameras.sources.frame import Image
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import BurgError, InvalidInputError
-from burg_drake.core.frames import Array, make_pose
+from burg_drake.core.frames import make_pose
 from burg_drake.printout.board_printout import PrintSettings
 from tests.cameras.charuco_image import target_image
 from tests.printout.paper import rasterised

@@ -26,9 +26,10 @@ from burg_drake.cameras.placement.document import (
 from burg_drake.cameras.projection.line_drawing import INNER, OUTLINE, VisibleLines, visible_lines
 from burg_drake.cameras.projection.scene_mesh import SceneMesh, build_scene_mesh
 from burg_drake.cameras.projection.surface_image import SurfaceCamera
+from burg_drake.core.arrays import Array
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import Array, make_pose
+from burg_drake.core.frames import make_pose
 from burg_drake.scene.document.scene import Scene
 
 LENS = (-0.25, 0.08, 0.0004, -0.0003, 0.0)

@@ -23,8 +23,9 @@ from burg_drake.cameras.sources.opencv_log import quiet
 from burg_drake.cameras.sources.opening import open_source
 from burg_drake.cameras.sources.simulated import SimulatedSource
 from burg_drake.cameras.sources.video import VideoSource
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import Array, make_pose
+from burg_drake.core.frames import make_pose
 from burg_drake.scene.document.scene import load_scene
 from burg_drake.station.document.station_document import load_station
 

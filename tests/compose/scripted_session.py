@@ -1,6 +1,6 @@
 """A session in a process of its own, to be killed or to run out of disk; run by its path.
 
-Arguments: what to open, the folder, and `work`, `saved` or `full`.
+Arguments: what to open, the folder, and `work` or `full`.
 """
 
 from __future__ import annotations
@@ -16,22 +16,30 @@ from burg_drake.core.errors import BurgError
 
 
 def main(reference: str, folder: str, what: str) -> None:
-    """Takes four steps, takes one of them back, and waits to be killed; or fills the disk."""
+    """Takes four steps, takes one of them back, does the same in a scene that is saved, in the
+    folder `saved`, and waits to be killed; or fills the disk."""
+    if what == "full":
+        fill_the_disk(begun(reference, folder), folder)
+        return
+    (Path(folder) / "saved").mkdir()
+    sessions = [begun(reference, folder), begun(reference, f"{folder}/saved")]
+    for session in sessions:
+        session.do(AddObject("marble"))
+        session.do(Delete(("bowl",)))
+        session.undo()
+    sessions[1].save("breakfast")
+    print("ready", flush=True)
+    time.sleep(60)
+
+
+def begun(reference: str, folder: str) -> ComposeSession:
+    """A session with two bowls."""
     session = ComposeSession.open(
         reference, load_station("wsg_tabletop"), folder=folder, address="http://127.0.0.1:8080"
     )
     for x in (0.1, 0.3):
         session.do(AddObject("bowl", position=(x, 0.15)))
-    if what == "full":
-        fill_the_disk(session, folder)
-        return
-    session.do(AddObject("marble"))
-    session.do(Delete(("bowl",)))
-    session.undo()
-    if what == "saved":
-        session.save("breakfast")
-    print("ready", flush=True)
-    time.sleep(60)
+    return session
 
 
 def fill_the_disk(session: ComposeSession, folder: str) -> None:

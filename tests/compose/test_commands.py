@@ -26,8 +26,9 @@ from burg_drake.compose import (
     board_size,
 )
 from burg_drake.compose.editing.view import SessionView
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import BurgError
-from burg_drake.core.frames import Array, make_pose, rotation_from_rpy
+from burg_drake.core.frames import make_pose, rotation_from_rpy
 from burg_drake.scene.document.scene import Board
 
 ROUNDED = 2e-6

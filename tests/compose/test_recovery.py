@@ -30,13 +30,17 @@ def start(reference: str, folder: Path, what: str) -> subprocess.Popen[str]:
     )
 
 
-def test_a_killed_session_goes_on_where_it_was(station: Station, tmp_path: Path) -> None:
+def test_killed_sessions_go_on_where_they_were(station: Station, tmp_path: Path) -> None:
+    """One that was never saved and one that was, in a process; another one is sent to it."""
     process = start("household", tmp_path, "work")
     assert process.stdout is not None and process.stdout.readline() == "ready\n"
+    saved = tmp_path / "saved" / "breakfast.yaml"
     try:
         other = ComposeSession.open("household", station, folder=tmp_path)
         assert other.view.document.name == "new_scene_2"  # the first one is in use
         other.close()
+        with pytest.raises(SceneInUse, match=r"is open already at http://127.0.0.1:8080; go there"):
+            ComposeSession.open(saved, station)
     finally:
         process.send_signal(signal.SIGKILL)
         process.wait()
@@ -49,20 +53,8 @@ def test_a_killed_session_goes_on_where_it_was(station: Station, tmp_path: Path)
         for _ in range(4):
             session.undo()
         assert not session.view.instances
-    assert not list(tmp_path.iterdir())  # nothing was left to keep
-
-
-def test_a_second_process_is_sent_to_the_first(station: Station, tmp_path: Path) -> None:
-    process = start("household", tmp_path, "saved")
-    assert process.stdout is not None and process.stdout.readline() == "ready\n"
-    path = tmp_path / "breakfast.yaml"
-    try:
-        with pytest.raises(SceneInUse, match=r"is open already at http://127.0.0.1:8080; go there"):
-            ComposeSession.open(path, station)
-    finally:
-        process.send_signal(signal.SIGKILL)
-        process.wait()
-    with ComposeSession.open(path, station) as session:  # saved, and with its history
+    assert [path.name for path in tmp_path.iterdir()] == ["saved"]  # nothing was left to keep
+    with ComposeSession.open(saved, station) as session:  # saved, and with its history
         assert session.view.saved and not session.view.notices
         assert session.undo().undo_label == "add bowl"
 

@@ -12,6 +12,7 @@ from burg_drake.core.files.atomic import (
     require_writable,
     writable_folder,
 )
+from burg_drake.core.files.lock import try_lock
 
 
 def test_writes_text_and_bytes_into_folders_that_do_not_exist_yet(tmp_path: Path):
@@ -115,3 +116,15 @@ def test_files_that_belong_together_are_replaced_together(tmp_path: Path) -> Non
         atomic_write_all({beside: "new", table / "below": "new"})
     assert (table.read_text(), beside.read_text()) == ("1", "2")
     assert sorted(tmp_path.iterdir()) == [table, beside]
+
+
+def test_a_lock_is_for_one_or_shared(tmp_path: Path) -> None:
+    path = tmp_path / "lock"
+    path.touch()
+    with path.open() as one, path.open() as other, path.open() as third:
+        assert try_lock(one.fileno()) and not try_lock(other.fileno())
+        assert not try_lock(other.fileno(), shared=True)
+        one.close()
+        assert try_lock(other.fileno(), shared=True) and try_lock(third.fileno(), shared=True)
+    with path.open() as again:
+        assert try_lock(again.fileno())

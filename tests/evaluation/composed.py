@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from burg_drake.core.documents.schema import Pose
 from burg_drake.objects.library.document import load_library
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
+from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene
 
 
 def composed(*placed: tuple[str, str, float, float, float]) -> Scene:
@@ -22,3 +23,9 @@ def composed(*placed: tuple[str, str, float, float, float]) -> Scene:
     )
     document = SceneDocument(name="composed", library="household", instances=instances)
     return Scene(document, load_library("household"), Path("composed.yaml"))
+
+
+def tabletop(*names: str) -> Scene:
+    """The built-in scene `tabletop_six` with these of its instances and no others."""
+    six = load_scene("tabletop_six")
+    return replace(six, document=replace(six.document, instances=tuple(map(six.instance, names))))

@@ -2,17 +2,31 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.campaign_folder import Campaign
+from burg_drake.evaluation.store.run_folder import Run, load_run
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.document.station_document import Station, load_station
 
 # Worker processes and scripts import the judges by name.
 sys.path.insert(0, str(Path(__file__).parent))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def no_chart_of_reach() -> Iterator[None]:
+    """How far the arm reaches is most of the work of a page, and has a test of its own."""
+    with pytest.MonkeyPatch.context() as patch:
+        place = "burg_drake.evaluation.report.page.reachability_section"
+        patch.setattr(place, lambda run: None)
+        yield
 
 
 @pytest.fixture
@@ -35,6 +49,36 @@ def known_judge(monkeypatch: pytest.MonkeyPatch) -> None:
     import known_judge
 
     known_judge.install(monkeypatch.setattr)
+
+
+@pytest.fixture(scope="session")
+def known_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """A complete run of `scene` by the known judge; nobody changes it, its scene or its library."""
+    import known_judge
+    from known_scene import write_scene
+
+    folder = tmp_path_factory.mktemp("known")
+    with pytest.MonkeyPatch.context() as patch:
+        known_judge.install(patch.setattr)
+        return evaluate(
+            write_scene(folder),
+            load_station("panda_tabletop"),
+            folder / "run",
+            settings=EvaluationSettings(grasps_per_object=30, blind=True),
+            workers=1,
+            progress=False,
+        )
+
+
+@pytest.fixture
+def own_run(known_run: Run, scene: Scene, tmp_path: Path, known_judge: None) -> Run:
+    """A copy of it, made of `scene`, that a test may change."""
+    folder = shutil.copytree(known_run.path, tmp_path / "run")
+    for name in ("run.yaml", "results.csv", "report.html"):
+        text = (folder / name).read_text(encoding="utf-8")
+        moved = text.replace(str(known_run.path.parent), str(tmp_path))
+        (folder / name).write_text(moved, encoding="utf-8")
+    return load_run(folder)
 
 
 @pytest.fixture(scope="session")

@@ -1,10 +1,11 @@
-"""Declares one more margin and looks for it in all that verdicts are written to; run as a program
-in a process of its own, with a folder for files, by `test_one_record`."""
+"""Declares two more margins and looks for them in all that verdicts are written to; run as a
+program in a process of its own, with a folder for files, by `test_one_record`."""
 
 from __future__ import annotations
 
 import importlib.util
 import json
+import math
 import sys
 from pathlib import Path
 
@@ -12,24 +13,27 @@ import numpy as np
 import pyarrow.parquet
 
 DECLARATION = "burg_drake.core.grasps.verdict"
-LINE = '    wobble: float = margin("rad", "how much it wobbles", mode="reach")\n'
+LINES = (
+    '    wobble: float = margin("rad", "how much it wobbles", mode="reach")\n'
+    '    detour: float = margin("m", "how far round", mode="reach", stage=Stage.REACHABLE)\n'
+)
 AFTER = "    def of_trial(self) -> dict[str, float]:\n"
 
 
 def declare() -> None:
-    """The declaration with a line more, in the place of the installed one."""
+    """The declaration with two lines more, in the place of the installed one."""
     spec = importlib.util.find_spec(DECLARATION)
     assert spec is not None and spec.origin is not None and DECLARATION not in sys.modules
     source = Path(spec.origin).read_text(encoding="utf-8")
     assert source.count(AFTER) == 1
     module = importlib.util.module_from_spec(spec)
     sys.modules[DECLARATION] = module
-    source = source.replace(AFTER, LINE + "\n" + AFTER)
+    source = source.replace(AFTER, LINES + "\n" + AFTER)
     exec(compile(source, spec.origin, "exec"), vars(module))
 
 
 def look_for_it(folder: Path) -> None:
-    """Fails where the margin is missing."""
+    """Fails where the margin of a trial is missing."""
     from burg_drake.core.grasps import Margins, Outcome, Stage, Verdict
     from burg_drake.core.grasps.column_meanings import GROUPS, describe
     from burg_drake.evaluation.records import journal, table, table_file, trial
@@ -85,6 +89,24 @@ def look_for_it(folder: Path) -> None:
     assert vars(as_result(other).margins)["wobble"] == 0.5
 
 
+def look_for_that_of_the_arm() -> None:
+    """Fails where the margin that the arm's screen measures is missing, or taken for a trial's."""
+    from burg_drake.core.grasps import Margins, Outcome, Stage, Verdict
+    from burg_drake.evaluation.feasibility import MARGIN_COLUMNS
+    from burg_drake.evaluation.replay import as_result, differences
+
+    assert "detour" in MARGIN_COLUMNS and "wobble" not in MARGIN_COLUMNS
+    assert "detour" not in Margins().of_trial()
+    recorded = Verdict(Outcome.LIFTED, Stage.EXECUTED, margins={"clearance": 0.1, "detour": 0.5})
+    by_hand = Verdict(Outcome.LIFTED, Stage.EXECUTED, margins={"clearance": 0.1})
+    assert differences(recorded, by_hand) == []  # a replay that need not ask the arm
+    again = Verdict(Outcome.LIFTED, Stage.EXECUTED, margins={"clearance": 0.1, "detour": 1.0})
+    (found,) = differences(recorded, again)
+    assert found.name == "detour"
+    assert math.isnan(vars(as_result(recorded).margins)["detour"])
+
+
 if __name__ == "__main__":
     declare()
     look_for_it(Path(sys.argv[1]))
+    look_for_that_of_the_arm()

@@ -22,20 +22,21 @@ from burg_drake.evaluation.results.summary import summarize
 from burg_drake.evaluation.results.summary_tables import summary_view
 from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.scene.document.scene import load_scene
 from burg_drake.station.document.station_document import load_station
+from tests.evaluation.composed import tabletop
 
 pytestmark = pytest.mark.usefixtures("judged_here")
 
 ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 """Across the narrow side of the household box, from above."""
+BOX = tabletop("box")
 GRASPS = np.stack([ABOVE, ABOVE @ make_pose(p_AB=(0, 0, 0.1))])
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return evaluate(
-        "tabletop_six",
+        BOX,
         "panda_tabletop",
         tmp_path_factory.mktemp("arm") / "run",
         settings=EvaluationSettings(engine="screening", mode="arm"),
@@ -90,8 +91,7 @@ def test_a_row_alone_gives_the_same_bits(run: Run) -> None:
     row = table_row(read_table(run.table_path), 0)
     trial, origin = read_trial(row, "here"), read_origin(row, "here")
     assert trial.verdict is not None and decisive_mode(trial, origin) == "arm"
-    scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")
-    verdict, plan = rerun(scene, station, trial, origin)
+    verdict, plan = rerun(BOX, load_station("panda_tabletop"), trial, origin)
     assert differences(trial.verdict, verdict) == []
     assert plan is not None and plan.duration == row["duration"]
     assert as_result(verdict).outcome is Outcome.LIFTED

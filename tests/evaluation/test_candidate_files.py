@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import Array, grasp_from_axes, inverse, make_pose
+from burg_drake.core.frames import grasp_from_axes, inverse, make_pose
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.candidates.sampling import sample_candidates
 from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings

@@ -9,10 +9,12 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from asked import asked
+from inline_executor import Inline
 from known_judge import KnownJudge, Make, ShortOfMemory, expected, install
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
@@ -48,7 +50,9 @@ def test_results_do_not_depend_on_workers(
     assert one.complete and one.failures == []
     assert one.results["id"].tolist() == one.candidates.id
     assert one.results["outcome"].tolist() == [expected(id) for id in one.candidates.id]
-    other = evaluate(scene, station, tmp_path / "other", **asked(seed=1, workers=1, **options))
+    other = evaluate(
+        scene, station, tmp_path / "other", **asked(seed=1, executor=Inline(), **options)
+    )
     assert not same_results(one, other)
 
 
@@ -60,6 +64,7 @@ def test_a_complete_run_returns_at_once(
         station,
         tmp_path / "run",
         settings=EvaluationSettings(grasps_per_object=5, blind=True),
+        executor=Inline(),
         progress=False,
     )
     monkeypatch.setattr("burg_drake.evaluation.cascade.Job", None)
@@ -106,7 +111,7 @@ def patch(name, value):
     __import__(module)
     setattr(sys.modules[module], attribute, value)
 known_judge.install(patch, Path(sys.argv[2]), pause=0.2)
-from burg_drake.evaluation import EvaluationSettings, evaluate
+from burg_drake import EvaluationSettings, evaluate
 settings = EvaluationSettings(grasps_per_object=40, blind=True)
 evaluate(sys.argv[3], "panda_tabletop", sys.argv[4], settings=settings, workers=2)
 """
@@ -168,7 +173,7 @@ def test_a_killed_run_goes_on_where_it_was(
         station,
         tmp_path / "fresh",
         settings=EvaluationSettings(grasps_per_object=40, blind=True),
-        workers=1,
+        executor=Inline(),
         progress=False,
     )
     assert same_results(run, fresh)
@@ -180,11 +185,12 @@ def test_grasps_whose_workers_were_ended_are_tried_again(
 ) -> None:
     """Those ended from outside by the same call, those that crashed on request; no others."""
 
-    def judge(known: KnownJudge, out: str, **options: bool) -> Run:
+    def judge(known: KnownJudge, out: str, **options: Any) -> Run:
         make = Make(known)
         monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: make)
         options |= {"grasps_per_object": 10, "blind": True, "progress": False}
-        return evaluate(scene, station, tmp_path / out, **asked(workers=1, **options))
+        judging = {"workers": 1} if isinstance(known, ShortOfMemory) else {"executor": Inline()}
+        return evaluate(scene, station, tmp_path / out, **asked(**judging, **options))
 
     def judged(name: str) -> list[str]:
         return (tmp_path / name).read_text().split()
@@ -196,6 +202,7 @@ def test_grasps_whose_workers_were_ended_are_tried_again(
     run = judge(short, "run")
     assert run.complete and run.failures == [killed, crashing] and run.interrupted == [killed]
     assert run.row(killed)["reason"] == "the worker process was ended from outside by SIGKILL"
+    assert run.row(crashing)["reason"] == "the worker process was ended by SIGSEGV"
 
     run = judge(replace(short, log=tmp_path / "short again"), "run")  # dies again: no endless loop
     assert judged("short again") == [killed] and run.interrupted == [killed]
@@ -231,7 +238,7 @@ def test_another_run_is_not_mixed_in(
         station,
         run,
         settings=EvaluationSettings(grasps_per_object=5, blind=True),
-        workers=1,
+        executor=Inline(),
         progress=False,
     )
     with pytest.raises(InvalidInputError) as error:
@@ -284,7 +291,7 @@ def test_another_run_is_not_mixed_in(
 def test_some_objects_only(
     scene: Scene, station: Station, tmp_path: Path, known_judge: None
 ) -> None:
-    options = {"grasps_per_object": 3, "blind": True, "workers": 1, "progress": False}
+    options = {"grasps_per_object": 3, "blind": True, "executor": Inline(), "progress": False}
     run = evaluate(scene, station, tmp_path / "a", **asked(only=["right", "bar"], **options))
     everything = evaluate(scene, station, tmp_path / "b", **asked(**options))
     assert run.candidates.id == [i for i in everything.candidates.id if not i.startswith("left")]
@@ -300,6 +307,7 @@ def test_some_objects_only(
         tmp_path / "c",
         settings=EvaluationSettings(only=["cube"]),
         grasps=given,
+        executor=Inline(),
         progress=False,
     )
     assert set(run.candidates.instance) == {"left"}
@@ -323,7 +331,9 @@ def test_given_grasps_are_judged_in_place_of_sampled_ones(
     scene: Scene, station: Station, tmp_path: Path, known_judge: None
 ) -> None:
     grasps = {"bar": GraspSet.create(np.eye(4), object="bar")}
-    run = evaluate(scene, station, tmp_path / "run", grasps=grasps, workers=1, progress=False)
+    run = evaluate(
+        scene, station, tmp_path / "run", grasps=grasps, executor=Inline(), progress=False
+    )
     assert run.candidates.id == [f"bar-{grasps['bar'].id[0]}"]
     assert run.document.grasps.objects == {"cube": 0, "bar": 1}
     np.testing.assert_array_equal(run.candidate(run.candidates.id[0]).X_OG, np.eye(4))
@@ -335,9 +345,13 @@ def test_given_grasps_are_reproduced_from_the_run(
     poses = make_pose(p_AB=[[0, 0, 0.1], [0, 0, 0.2]])
     cubes = GraspSet.create(poses, object="cube")
     given = {"right": cubes.select([1]), "left": cubes.select([0])}
-    run = evaluate(scene, station, tmp_path / "run", grasps=given, workers=1, progress=False)
+    run = evaluate(
+        scene, station, tmp_path / "run", grasps=given, executor=Inline(), progress=False
+    )
     back = read_grasps(scene, run.path / "grasps.npz").by_instance
-    again = evaluate(scene, station, tmp_path / "again", grasps=back, workers=1, progress=False)
+    again = evaluate(
+        scene, station, tmp_path / "again", grasps=back, executor=Inline(), progress=False
+    )
     assert same_results(run, again) and len(again.candidates) == 2
     assert evaluate(scene, station, run.path, grasps=back, progress=False).complete  # the same run
 
@@ -346,10 +360,12 @@ def test_a_set_goes_to_its_instances_or_else_to_all_of_its_object(
     scene: Scene, station: Station, tmp_path: Path, known_judge: None
 ) -> None:
     cubes = GraspSet.create(make_pose(p_AB=[[0, 0, 0.1], [0, 0, 0.2]]), object="cube")
-    everywhere = evaluate(scene, station, tmp_path / "a", grasps=cubes, workers=1, progress=False)
+    everywhere = evaluate(
+        scene, station, tmp_path / "a", grasps=cubes, executor=Inline(), progress=False
+    )
     assert everywhere.candidates.instance.tolist() == ["left", "left", "right", "right"]
     told = cubes.with_columns(instance=["right", "left"])
-    run = evaluate(scene, station, tmp_path / "b", grasps=told, workers=1, progress=False)
+    run = evaluate(scene, station, tmp_path / "b", grasps=told, executor=Inline(), progress=False)
     assert set(run.candidates.id) == {f"right-{cubes.id[0]}", f"left-{cubes.id[1]}"}
 
 
@@ -381,7 +397,7 @@ def test_a_run_that_is_killed_at_its_start_goes_on(
     def die(*arguments: object) -> None:
         raise KeyboardInterrupt
 
-    options = {"grasps_per_object": 2, "blind": True, "workers": 1, "progress": False}
+    options = {"grasps_per_object": 2, "blind": True, "executor": Inline(), "progress": False}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(f"burg_drake.evaluation.store.run_folder.{write}", die)
         with pytest.raises(KeyboardInterrupt):
@@ -396,33 +412,6 @@ def test_no_grasps_are_a_complete_run(
 ) -> None:
     run = evaluate(scene, station, tmp_path / "run", grasps={}, progress=False)
     assert run.complete and run.report_path.exists() and run.best() == []
-
-
-def test_failures_are_reported_and_the_others_go_on(
-    scene: Scene, station: Station, tmp_path: Path, known_judge: None, monkeypatch
-) -> None:
-    from known_judge import CrashingJudge
-
-    id = evaluate(
-        scene,
-        station,
-        tmp_path / "a",
-        settings=EvaluationSettings(grasps_per_object=2, blind=True),
-        workers=1,
-        progress=False,
-    ).candidates.id[0]
-    judge = Make(CrashingJudge(how=((id, "segfault"),)))
-    monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: judge)
-    run = evaluate(
-        scene,
-        station,
-        tmp_path / "b",
-        settings=EvaluationSettings(grasps_per_object=2, blind=True),
-        workers=1,
-        progress=False,
-    )
-    assert run.complete and run.failures == [id]
-    assert run.row(id)["reason"] == "the worker process was ended by SIGSEGV"
 
 
 def test_bad_input_is_said_before_any_work(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.grasp_sets.sampled import sample_grasps
 from burg_drake.evaluation.grasp_sets.scored import scored_set

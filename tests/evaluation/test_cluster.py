@@ -39,7 +39,7 @@ from burg_drake.evaluation.cluster.members import ClusterWorkers, threads_by_add
 from burg_drake.evaluation.cluster.node import NO_WEB  # noqa: E402
 from burg_drake.evaluation.cluster.sent_job import SentJob  # noqa: E402
 
-LIMITS = WorkerLimits(cpu=0.5, wall=2.0)
+LIMITS = WorkerLimits(cpu=0.25)
 
 
 class Cluster:
@@ -105,7 +105,7 @@ def test_jobs_are_judged_as_they_are_here(cluster: Cluster, tmp_path: Path) -> N
 
 
 def test_faults_cost_only_the_grasps_that_cause_them(cluster: Cluster) -> None:
-    kinds = ("segfault", "killed", "hang", "spin", "memory")
+    kinds = ("segfault", "killed", "spin", "memory")
     how = dict(zip(executed(len(kinds)), kinds, strict=True))
     judge = CrashingJudge(how=tuple(how.items()))
     answers = list(cluster.executor.judge([Job("job", Make(judge), grasps(40))]))
@@ -115,8 +115,7 @@ def test_faults_cost_only_the_grasps_that_cause_them(cluster: Cluster) -> None:
     assert [reasons[id] for id in how] == [
         "the worker process was ended by SIGSEGV",
         "the worker process was ended from outside by SIGKILL",
-        "took longer than 2 s",
-        "took longer than 0.5 s of CPU time",
+        "took longer than 0.25 s of CPU time",
         "MemoryError",
     ]
     interrupted = [grasp.id for _, grasp, verdict in answers if verdict.interrupted]
@@ -133,19 +132,19 @@ def test_a_bad_job_does_not_end_the_others(cluster: Cluster) -> None:
         list(cluster.executor.judge(jobs[:1]))
 
 
-def test_lost_workers_cost_nothing_but_a_grasp_at_which_several_are_lost(cluster: Cluster) -> None:
+def test_lost_workers_cost_nothing_but_a_grasp_at_which_several_are_lost(
+    cluster: Cluster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("dispatch", "sent_job"):
+        monkeypatch.setattr(f"burg_drake.evaluation.cluster.{name}.LOSSES", 2)
     (guilty,) = executed(1)
     judge = CrashingJudge(how=((guilty, "parent"),), pause=0.01)
-    answers = []
-    for answer in cluster.executor.judge([Job("job", Make(judge), grasps(60))]):
-        answers.append(answer)
-        if len(answers) == 30:
-            cluster.nodes.workers[0].kill()
+    answers = list(cluster.executor.judge([Job("job", Make(judge), grasps(60))]))
     failed = {guilty: Outcome.SIMULATION_FAILED}
     assert outcomes(answers) == {g.id: expected(g.id) for g in grasps(60)} | failed
     verdict = next(v for _, g, v in answers if g.id == guilty)
     assert verdict.interrupted
-    assert verdict.reason == "3 workers of the cluster were lost at it, one after the other"
+    assert verdict.reason == "2 workers of the cluster were lost at it, one after the other"
 
 
 def test_leaving_early_ends_the_children(cluster: Cluster, tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from inline_executor import Inline
 
 from burg_drake.apps.cli import main
 from burg_drake.core.documents.schema import Pose
@@ -25,8 +26,7 @@ from burg_drake.pipeline.build import ObjectSource, build_library
 from burg_drake.scene.document.scene import Instance, SceneDocument, load_scene, save_scene
 from burg_drake.station.diagram.station_diagram import instance_pose
 from burg_drake.station.document.station_document import load_station
-
-pytestmark = pytest.mark.usefixtures("judged_here")
+from tests.evaluation.composed import tabletop
 
 SCENE, STATION = "tabletop_six", "panda_tabletop"
 BOX = (0.06, 0.158, 0.21)
@@ -74,11 +74,13 @@ def known_grasps() -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """The command line on the known grasps."""
+    """The command line on the known grasps, with the box and the bottle that they are about."""
     folder = tmp_path_factory.mktemp("run")
+    save_scene(tabletop("box", "bottle").document, folder / "scene.yaml")
     GraspSet.create(known_grasps(), object="box").save(folder / "known.npz")
-    arguments = ["--station", STATION, "--grasps", str(folder / "known.npz"), "--workers", "2"]
-    assert main(["evaluate", SCENE, *arguments, "-o", str(folder / "out")]) == 0
+    arguments = ["--station", STATION, "--grasps", str(folder / "known.npz"), "--workers", "1"]
+    scene, out = str(folder / "scene.yaml"), str(folder / "out")
+    assert main(["evaluate", scene, *arguments, "-o", out]) == 0
     return load_run(folder / "out")
 
 
@@ -140,11 +142,11 @@ def test_files_are_there_and_agree(run: Run) -> None:
 
 def test_the_same_again_in_another_process_and_order(run: Run, tmp_path: Path) -> None:
     again = evaluate(
-        SCENE,
+        run.document.scene.path,
         STATION,
         tmp_path / "again",
         grasps={"box": GraspSet.create(known_grasps()[::-1], object="box")},
-        workers=1,
+        executor=Inline(),
         progress=False,
     )
     for id in run.candidates.id:
@@ -154,27 +156,35 @@ def test_the_same_again_in_another_process_and_order(run: Run, tmp_path: Path) -
                 assert repr(first[name]) == repr(second[name]), (id, name)
 
 
-@pytest.mark.parametrize(("factor", "outcome"), [(0.8, Outcome.SLIPPED), (1.4, Outcome.LIFTED)])
-def test_friction_decides_as_statics_says(tmp_path: Path, factor: float, outcome: Outcome) -> None:
+def test_friction_decides_as_statics_says(tmp_path: Path) -> None:
+    """Two boxes with friction below and above the limit, 2 mu N = m g."""
     mass, force = 0.411, load_station(STATION).hand.force
-    friction = factor * mass * 9.81 / (2 * force)  # 2 mu N = m g is the limit
     box = trimesh.creation.box(BOX)
     box.apply_translation((0.0, 0.0, BOX[2] / 2))
-    source = ObjectSource(name="box", mesh=box, mass=mass, friction=friction, pieces=(box,))
-    assert build_library([source], tmp_path / "slippery").failed == {}
+    sources = [
+        ObjectSource(name=name, mesh=box, mass=mass, friction=friction, pieces=(box,))
+        for name, factor in (("below", 0.8), ("above", 1.4))
+        if (friction := factor * mass * 9.81 / (2 * force))
+    ]
+    assert build_library(sources, tmp_path / "boxes", confirm=False).failed == {}
     document = SceneDocument(
-        name="slippery",
-        library="slippery",
-        instances=(Instance(object="box", X_SO=Pose((0.3, 0.2, 0.0))),),
+        name="boxes",
+        library="boxes",
+        instances=tuple(
+            Instance(object=name, X_SO=Pose((x, 0.2, 0.0)))
+            for name, x in (("below", 0.15), ("above", 0.45))
+        ),
     )
-    save_scene(document, tmp_path / "slippery.yaml")
+    save_scene(document, tmp_path / "boxes.yaml")
+    X_OG = on_the_box(BOX[2] - 0.025)
     run = evaluate(
-        tmp_path / "slippery.yaml",
+        tmp_path / "boxes.yaml",
         STATION,
         tmp_path / "run",
         settings=EvaluationSettings(mode="hand"),
-        grasps={"box": GraspSet.create(on_the_box(BOX[2] - 0.025), object="box")},
-        workers=1,
+        grasps={name: GraspSet.create(X_OG, object=name) for name in ("below", "above")},
+        executor=Inline(),
         progress=False,
     )
-    assert run.results["outcome"].tolist() == [outcome]
+    found = dict(zip(run.results["instance"], run.results["outcome"], strict=True))
+    assert found == {"below": Outcome.SLIPPED, "above": Outcome.LIFTED}

@@ -16,7 +16,6 @@ from known_judge import (
     DieOnStart,
     KnownJudge,
     Make,
-    ShortOfMemory,
     die,
     expected,
     refuse,
@@ -33,7 +32,7 @@ def grasps(n: int) -> list[Candidate]:
     return [Candidate(f"cube-{i:04d}", "cube", np.eye(4)) for i in range(n)]
 
 
-@pytest.mark.parametrize("workers", [1, 3])
+@pytest.mark.parametrize("workers", [1, 2])
 def test_every_grasp_is_judged_once(workers: int) -> None:
     judged = list(judge_all(grasps(50), Make(KnownJudge()), workers=workers))
     assert sorted(c.id for c, _ in judged) == [c.id for c in grasps(50)]
@@ -49,30 +48,23 @@ def test_no_grasps_need_no_workers() -> None:
 
 
 def test_deaths_cost_only_the_grasps_that_cause_them() -> None:
-    how = {"cube-0003": "segfault", "cube-0004": "exit", "cube-0017": "error"}
+    """Three of them in a row, one later."""
+    how = {"cube-0002": "segfault", "cube-0003": "segfault"}
+    how |= {"cube-0004": "exit", "cube-0017": "error"}
     make = Make(CrashingJudge(how=tuple(how.items())))
     judged = {c.id: v for c, v in judge_all(grasps(30), make, workers=2)}
     assert len(judged) == 30
     failed = {id: v for id, v in judged.items() if v.outcome is Outcome.SIMULATION_FAILED}
     assert {id: v.reason for id, v in failed.items()} == {
+        "cube-0002": "the worker process was ended by SIGSEGV",
         "cube-0003": "the worker process was ended by SIGSEGV",
         "cube-0004": "the worker process ended: SystemExit: a condition of Drake failed",
         "cube-0017": "RuntimeError: the solver did not converge",
     }
     assert {v.stage for v in failed.values()} == {Stage.EXECUTED}
     assert not any(v.interrupted for v in failed.values())
-
-
-def test_a_grasp_whose_workers_are_ended_from_outside_says_so() -> None:
-    """Each is tried twice and no more, whoever ends the process."""
-    executed = [c.id for c in grasps(20) if expected(c.id).stage is Stage.EXECUTED][:2]
-    make = Make(ShortOfMemory(killed=(executed[0],), crashing=(executed[1],)))
-    judged = {c.id: v for c, v in judge_all(grasps(20), make, workers=1)}
-    assert [judged[id].reason for id in executed] == [
-        "the worker process was ended from outside by SIGKILL",
-        "the worker process was ended by SIGSEGV",
-    ]
-    assert [id for id, v in judged.items() if v.interrupted] == executed[:1]
+    others = {id: v.outcome for id, v in judged.items() if id not in failed}
+    assert others == {id: expected(id) for id in judged if id not in failed}
 
 
 def test_a_death_while_screening_costs_only_the_grasp_that_causes_it() -> None:
@@ -83,16 +75,15 @@ def test_a_death_while_screening_costs_only_the_grasp_that_causes_it() -> None:
         "cube-0015": ("reach", Stage.REACHABLE, died),
         "cube-0016": ("reach_error", Stage.REACHABLE, "RuntimeError: no joint"),
     }
-    for crashing in (("cube-0003", "cube-0012"), ("cube-0015", "cube-0016"), tuple(expect)):
-        how = tuple((id, expect[id][0]) for id in crashing)
-        make = Make(CrashingJudge(how=how, batches=(20, 7)))
-        judged = {c.id: v for c, v in judge_all(grasps(20), make, workers=1)}
-        failed = {id: v for id, v in judged.items() if v.outcome is Outcome.SIMULATION_FAILED}
-        assert {id: (v.stage, v.reason) for id, v in failed.items()} == {
-            id: expect[id][1:] for id in crashing
-        }
-        others = {c.id: expected(c.id) for c in grasps(20) if c.id not in crashing}
-        assert {id: v.outcome for id, v in judged.items() if id not in crashing} == others
+    how = tuple((id, kind) for id, (kind, *_) in expect.items())
+    make = Make(CrashingJudge(how=how, batches=(20, 7)))
+    judged = {c.id: v for c, v in judge_all(grasps(20), make, workers=1)}
+    failed = {id: v for id, v in judged.items() if v.outcome is Outcome.SIMULATION_FAILED}
+    assert {id: (v.stage, v.reason) for id, v in failed.items()} == {
+        id: told[1:] for id, told in expect.items()
+    }
+    others = {c.id: expected(c.id) for c in grasps(20) if c.id not in expect}
+    assert {id: v.outcome for id, v in judged.items() if id not in expect} == others
 
 
 def test_grasps_are_screened_together_and_once(tmp_path) -> None:
@@ -117,19 +108,10 @@ def test_a_death_that_does_not_come_again_leaves_no_trace(tmp_path) -> None:
 def test_deaths_without_end_end_the_run() -> None:
     make = Make(CrashingJudge(how=tuple((c.id, "segfault") for c in grasps(40))))
     judged = []
-    with pytest.raises(SimulationError, match=r"^5 grasps in a row could not .*: .*SIGSEGV"):
-        for candidate, _ in judge_all(grasps(40), make, workers=2, limits=WorkerLimits(hopeless=5)):
+    with pytest.raises(SimulationError, match=r"^2 grasps in a row could not .*: .*SIGSEGV"):
+        for candidate, _ in judge_all(grasps(40), make, workers=2, limits=WorkerLimits(hopeless=2)):
             judged.append(candidate.id)
-    assert len(set(judged)) == len(judged) == 5  # none of them is lost
-
-
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_row_of_crashing_grasps_does_not_end_the_run(workers: int) -> None:
-    crashing = [c.id for c in grasps(20)[6:11]]
-    make = Make(CrashingJudge(how=tuple((id, "segfault") for id in crashing)))
-    judged = {c.id: v.outcome for c, v in judge_all(grasps(20), make, workers=workers)}
-    failed = dict.fromkeys(crashing, Outcome.SIMULATION_FAILED)
-    assert judged == {c.id: expected(c.id) for c in grasps(20)} | failed
+    assert len(set(judged)) == len(judged) == 2  # none of them is lost
 
 
 def test_a_replacement_that_dies_while_starting_is_replaced(tmp_path) -> None:
@@ -144,18 +126,15 @@ def test_a_replacement_that_dies_while_starting_is_replaced(tmp_path) -> None:
         list(judge_all(grasps(10), make, workers=1))
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_grasp_that_takes_too_long_is_settled(workers: int) -> None:
+def test_a_grasp_that_takes_too_long_is_settled() -> None:
     # 20 grasps of 50 ms each: a whole task is not a grasp
     judge = CrashingJudge(pause=0.05, how=(("cube-0003", "hang"), ("cube-0012", "spin")))
-    limits = WorkerLimits(cpu=0.4, wall=4.0)
-    judged = {
-        c.id: v for c, v in judge_all(grasps(20), Make(judge), workers=workers, limits=limits)
-    }
+    limits = WorkerLimits(cpu=0.25, wall=1.5)
+    judged = {c.id: v for c, v in judge_all(grasps(20), Make(judge), workers=2, limits=limits)}
     assert len(judged) == 20
     reasons = {
-        "cube-0003": "took longer than 4 s",
-        "cube-0012": "took longer than 0.4 s of CPU time",
+        "cube-0003": "took longer than 1.5 s",
+        "cube-0012": "took longer than 0.25 s of CPU time",
     }
     for id, verdict in judged.items():
         if id in reasons:
@@ -179,7 +158,7 @@ def test_a_slow_grasp_is_not_one_that_takes_too_long() -> None:
 
 def test_what_cannot_be_built_is_said_as_it_is() -> None:
     with pytest.raises(InvalidInputError, match=r"^no such model$"):
-        list(judge_all(grasps(3), refuse, workers=2))
+        list(judge_all(grasps(3), refuse, workers=1))
     with pytest.raises(SimulationError, match=r"cannot build the simulation: .* ended by SIGSEGV"):
         list(judge_all(grasps(3), die, workers=1))
     with pytest.raises(InvalidInputError, match="workers is 0; give 1 or more"):

@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 from known_judge import refuse
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import BurgError, InvalidInputError, UnknownNameError
-from burg_drake.core.frames import Array, grasp_from_axes, make_pose
+from burg_drake.core.frames import grasp_from_axes, make_pose
 from burg_drake.core.grasps import Verdict
 from burg_drake.core.grasps.column_meanings import describe
 from burg_drake.core.grasps.grasp_set import GraspSet
@@ -27,9 +28,12 @@ from burg_drake.evaluation.records.journal import encode
 from burg_drake.evaluation.records.table_file import read_table, write_table
 from burg_drake.evaluation.store.plan_folder import PlanOutput
 from burg_drake.motion.plans.grasp_plan import load_plan
-from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.scene.document.scene import Scene, load_scene, save_scene
 from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.document.station_document import Station, load_station
+from tests.evaluation.composed import tabletop
+
+pytestmark = pytest.mark.usefixtures("judged_here")
 
 ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 """Across the narrow side of the household box, from above."""
@@ -44,8 +48,11 @@ EXPECTED = ["reachable", "collision_target", "collision_table"]
 
 
 @pytest.fixture(scope="module")
-def scene() -> Scene:
-    return load_scene("tabletop_six")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    """The household box where it stands in the built-in scene, and nothing else."""
+    path = tmp_path_factory.mktemp("scene") / "box.yaml"
+    save_scene(tabletop("box").document, path)
+    return load_scene(path)
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +66,7 @@ def plans(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def judged(scene: Scene, station: Station, plans: Path) -> GraspSet:
+def judged(scene: Scene, station: Station, plans: Path, judged_here: None) -> GraspSet:
     given = GraspSet.create(GRASPS, object="box", width=0.06)
     return reach(scene, station, given, plans=plans, workers=1)
 
@@ -193,7 +200,7 @@ import sys
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.feasibility import reach
 grasps = GraspSet.load(sys.argv[1])
-reach("tabletop_six", "panda_tabletop", grasps, plans=sys.argv[2], workers=1)
+reach(sys.argv[3], "panda_tabletop", grasps, plans=sys.argv[2], workers=1)
 """
 
 
@@ -205,8 +212,8 @@ def test_a_killed_call_is_gone_on_with(
     given = GraspSet.create(GRASPS, object="box", width=0.06)
     given.save(tmp_path / "grasps.npz")
     name = f"box-{judged.id[0]}.json"
-    command = [sys.executable, "-c", KILLED, str(tmp_path / "grasps.npz"), str(folder)]
-    process = subprocess.Popen(command, start_new_session=True)
+    command = [sys.executable, "-c", KILLED, tmp_path / "grasps.npz", folder, scene.path]
+    process = subprocess.Popen(list(map(str, command)), start_new_session=True)
     while not any(folder.glob(f"*{name}*")) and process.poll() is None:
         time.sleep(0.0005)
     os.killpg(process.pid, signal.SIGKILL)
@@ -248,13 +255,14 @@ def test_what_cannot_be_answered_has_no_outcome(
     judge = Make(CrashingJudge(how=((lost, "screen"),)))
     monkeypatch.setattr("burg_drake.evaluation.feasibility.ReachJudgeFactory", lambda *_: judge)
     given = GraspSet.create(GRASPS, object="box", width=0.06)
-    found = reach(scene, station, given, workers=1)
+    found = reach(scene, station, given, workers=2)
     empty = found.column("outcome") == ""
     assert found.id[empty].tolist() == [judged.id[2]]
     assert found.column("reason")[empty].tolist() == ["the worker process was ended by SIGSEGV"]
 
 
-def test_a_set_has_to_name_its_objects(scene: Scene, station: Station) -> None:
+def test_a_set_has_to_name_its_objects(station: Station) -> None:
+    scene = load_scene("tabletop_six")
     with pytest.raises(InvalidInputError) as error:
         reach(scene, station, GraspSet.create(GRASPS, object=""))
     assert str(error.value) == (

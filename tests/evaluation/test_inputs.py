@@ -8,24 +8,15 @@ from pathlib import Path
 import pytest
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.records.run_document import origin_of
-from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.inputs import find_inputs
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.station_document import Station
 
 
 @pytest.fixture
-def run(scene: Scene, station: Station, tmp_path: Path, known_judge: None) -> Run:
-    return evaluate(
-        scene,
-        station,
-        tmp_path / "run",
-        settings=EvaluationSettings(grasps_per_object=3, blind=True),
-        progress=False,
-    )
+def run(own_run: Run) -> Run:
+    return own_run
 
 
 def spoil(path: Path) -> None:

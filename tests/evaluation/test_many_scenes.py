@@ -20,7 +20,7 @@ from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.records.table import TEXT
-from burg_drake.evaluation.report import campaign_page
+from burg_drake.evaluation.report.campaign import campaign_page
 from burg_drake.evaluation.results.summary import summarize
 from burg_drake.evaluation.store.campaign_folder import Campaign, load_campaign
 from burg_drake.evaluation.store.loading import load_runs, read_results

@@ -19,7 +19,7 @@ from burg_drake.evaluation.merge import united_run
 from burg_drake.evaluation.merge.runs import unite
 from burg_drake.evaluation.records.journal import JOURNAL_FILE, decode, encode
 from burg_drake.evaluation.records.shard import Shard
-from burg_drake.evaluation.report import report_page
+from burg_drake.evaluation.report.page import report_page
 from burg_drake.evaluation.store.campaign_folder import Campaign
 from burg_drake.evaluation.store.run_folder import Run, load_run
 from burg_drake.scene.document.scene import Scene

@@ -23,9 +23,9 @@ from burg_drake.evaluation.report.sections.reproduction import reproduce_command
 from burg_drake.evaluation.results.summary import summarize
 from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.scene.document.scene import load_scene
 from burg_drake.station.document.grasp_motion import GraspMotion
 from burg_drake.station.document.station_document import load_station
+from tests.evaluation.composed import tabletop
 
 pytestmark = pytest.mark.usefixtures("judged_here")
 
@@ -34,12 +34,13 @@ ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 HANDLE = grasp_from_axes((0.0, 1.0, 0.0), (-0.18, 0.0, -0.98), (-0.071, 0.0, 0.012))
 """Across the handle of the household screwdriver, almost from above."""
 MOTION = GraspMotion(retreat=0.02, lift_height=0.06, lift_direction=(0.0, -0.6, 0.8))
+BOX = tabletop("box")
 GRASPS = GraspSet.create(ABOVE[None], object="box", width=0.06)
 
 
 def judged(folder: Path, motion: GraspMotion | None) -> Run:
     return evaluate(
-        "tabletop_six",
+        BOX,
         "panda_tabletop",
         folder,
         settings=EvaluationSettings(mode="hand", motion=motion),
@@ -61,7 +62,7 @@ def test_a_row_tells_the_motion_and_repeats_the_trial(run: Run) -> None:
     assert row["lift"] == pytest.approx(0.08, abs=0.001)
     trial, origin = read_trial(row, "row"), read_origin(row, "row")
     assert origin.settings().motion == MOTION
-    verdict, _ = rerun(load_scene("tabletop_six"), load_station("panda_tabletop"), trial, origin)
+    verdict, _ = rerun(BOX, load_station("panda_tabletop"), trial, origin)
     assert trial.verdict is not None and not differences(trial.verdict, verdict)
 
 
@@ -82,7 +83,7 @@ def test_the_report_says_how_to_ask_for_it_again(run: Run) -> None:
 def test_the_lift_for_which_the_arm_has_room_is_executed_and_repeated(tmp_path: Path) -> None:
     """Under the roof of the shelf there is no room for the whole lift; the row alone tells how far
     the hand was lifted, and the arm is not asked again."""
-    scene, station = load_scene("tabletop_six"), load_station("panda_shelf")
+    scene, station = tabletop("screwdriver"), load_station("panda_shelf")
     run = evaluate(
         scene,
         station,

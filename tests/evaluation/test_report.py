@@ -13,10 +13,10 @@ from page_reading import part, read_page
 
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.report import report_page
 from burg_drake.evaluation.report.elements.blocks import Html, element, join
 from burg_drake.evaluation.report.elements.charts import Series, histogram, nice_step
 from burg_drake.evaluation.report.elements.style import STYLES, style_sheet
+from burg_drake.evaluation.report.page import report_page
 from burg_drake.evaluation.report.sections.outcomes import STOPPED
 from burg_drake.evaluation.results.summary import summarize
 from burg_drake.evaluation.run.settings import EvaluationSettings
@@ -24,14 +24,8 @@ from burg_drake.evaluation.store.run_folder import Run
 
 
 @pytest.fixture
-def run(scene, station, tmp_path: Path, known_judge: None) -> Run:
-    return evaluate(
-        scene,
-        station,
-        tmp_path / "run",
-        settings=EvaluationSettings(grasps_per_object=30, blind=True),
-        progress=False,
-    )
+def run(known_run: Run, known_judge: None) -> Run:
+    return known_run
 
 
 def test_the_page_is_whole_and_stands_alone(run: Run) -> None:
@@ -64,7 +58,7 @@ def test_the_command_is_the_one_that_was_run(run: Run) -> None:
 
 
 def test_failures_are_listed_and_escaped(
-    scene, station, tmp_path: Path, known_judge: None, monkeypatch, run: Run
+    scene, station, tmp_path: Path, judged_here: None, monkeypatch, run: Run
 ) -> None:
     judge = Make(CrashingJudge(how=((run.candidates.id[0], "error"),)))
     monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: judge)
@@ -74,7 +68,8 @@ def test_failures_are_listed_and_escaped(
         moved,
         station,
         tmp_path / "f",
-        settings=EvaluationSettings(grasps_per_object=30, blind=True),
+        settings=EvaluationSettings(grasps_per_object=3, blind=True),
+        workers=1,
         progress=False,
     )
     text = read_page(failed.report_path.read_text()).text
@@ -135,7 +130,8 @@ def test_a_custom_engine_is_told_apart_from_its_preset(run: Run) -> None:
     assert "(custom)" not in text and "not a preset" not in text
 
 
-def test_an_unfinished_run_says_so(run: Run) -> None:
+def test_an_unfinished_run_says_so(own_run: Run) -> None:
+    run = own_run
     journal = run.path / "journal.jsonl"
     journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:10]))
     text = read_page(report_page(Run(run.path, run.document))).text

@@ -19,7 +19,7 @@ from burg_drake.core.documents.schema import Pose
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.core.statistics import clustered_interval, wilson_interval
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.report import campaign_page, write_campaign_report
+from burg_drake.evaluation.report.campaign import campaign_page, write_campaign_report
 from burg_drake.evaluation.report.elements.style import STYLES
 from burg_drake.evaluation.report.sections.causes import causes_of, rows_of_run
 from burg_drake.evaluation.report.sections.outcomes import worst_first

@@ -3,28 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 
 import pytest
 
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.report import report_page
+from burg_drake.evaluation.report.page import report_page
 from burg_drake.evaluation.report.sections.reachability import reachability_section
-from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.station_document import Station
 
 
 @pytest.fixture
-def run(scene: Scene, station: Station, tmp_path: Path, known_judge: None) -> Run:
-    return evaluate(
-        scene,
-        station,
-        tmp_path / "run",
-        settings=EvaluationSettings(grasps_per_object=3, blind=True),
-        progress=False,
-    )
+def run(own_run: Run) -> Run:
+    return own_run
 
 
 def test_it_shows_where_the_objects_stand(

@@ -8,23 +8,13 @@ import numpy as np
 import pytest
 
 from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.grasp_sets.run_set import run_grasps
-from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import JOURNAL_FILE, Run, load_run
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.station_document import Station
 
 
 @pytest.fixture
-def run(scene: Scene, station: Station, tmp_path: Path, known_judge: None) -> Run:
-    return evaluate(
-        scene,
-        station,
-        tmp_path / "run",
-        settings=EvaluationSettings(grasps_per_object=5, blind=True),
-        progress=False,
-    )
+def run(own_run: Run) -> Run:
+    return own_run
 
 
 def test_columns_of_the_results(run: Run, tmp_path: Path) -> None:

@@ -26,14 +26,8 @@ from burg_drake.station.document.station_document import Station, load_station
 
 
 @pytest.fixture
-def run(scene: Scene, station: Station, tmp_path: Path, known_judge: None) -> Run:
-    return evaluate(
-        scene,
-        station,
-        tmp_path / "run",
-        settings=EvaluationSettings(grasps_per_object=10, blind=True),
-        progress=False,
-    )
+def run(own_run: Run) -> Run:
+    return own_run
 
 
 def test_a_run_is_read_back_as_it_was(run: Run) -> None:
@@ -61,13 +55,13 @@ def test_an_id_that_is_like_no_other_gets_no_suggestion(run: Run) -> None:
         with pytest.raises(UnknownNameError) as caught:
             run.row(id)
         assert str(caught.value) == (
-            f"{run.path} has no judged grasp {id!r}; known: {first} and 21 others (all ids are in"
+            f"{run.path} has no judged grasp {id!r}; known: {first} and 81 others (all ids are in"
             " results.csv)"
         )
 
 
 def test_a_run_shows_itself_in_a_line(run: Run) -> None:
-    assert repr(run) == f"Run('{run.path}', scene 'three', 30 of 30 grasps judged)"
+    assert repr(run) == f"Run('{run.path}', scene 'three', 90 of 90 grasps judged)"
 
 
 def test_the_best_grasp_is_lifted_and_disturbs_least(run: Run) -> None:
@@ -144,12 +138,12 @@ def test_provenance_says_what_made_the_results(run: Run) -> None:
     for package in ("drake", "numpy", "scipy", "trimesh", "embreex"):
         assert document.versions[package] == importlib.metadata.version(package)
     assert document.library.objects == {"cube": "build of cube", "bar": "build of bar"}
-    assert document.grasps.objects == {"cube": 20, "bar": 10}
+    assert document.grasps.objects == {"cube": 60, "bar": 30}
     assert document.grasps.content == run.candidates.content
     assert document.grasps.approach_angle_deg == 75.0
     assert document.engine.name == "standard" and document.trial["lift_height"] == 0.3
     assert document.station.path == "panda_tabletop"
-    assert sum(s.judged or 0 for s in document.stretches) == 30
+    assert sum(s.judged or 0 for s in document.stretches) == 90
     assert RunDocument.__dataclass_fields__["version"].default == 1
 
 
@@ -184,7 +178,7 @@ def test_an_engine_of_the_same_name_and_other_settings_is_another_run(
             scene,
             station,
             run.path,
-            settings=EvaluationSettings(grasps_per_object=10, blind=True, engine=engine),
+            settings=EvaluationSettings(grasps_per_object=30, blind=True, engine=engine),
             progress=False,
         )
 

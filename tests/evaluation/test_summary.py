@@ -26,14 +26,8 @@ from burg_drake.evaluation.store.run_folder import Run
 
 
 @pytest.fixture
-def run(scene, station, tmp_path: Path, known_judge: None) -> Run:
-    return evaluate(
-        scene,
-        station,
-        tmp_path / "run",
-        settings=EvaluationSettings(grasps_per_object=30, blind=True),
-        progress=False,
-    )
+def run(known_run: Run, known_judge: None) -> Run:
+    return known_run
 
 
 def test_counts_are_those_of_the_known_judge(run: Run) -> None:
@@ -73,7 +67,7 @@ def test_counts_never_rise_along_the_stages(run: Run) -> None:
 
 
 def test_a_failed_simulation_is_neither_executed_nor_lost_from_the_counts(
-    scene, station, tmp_path: Path, known_judge: None, monkeypatch, run: Run
+    scene, station, tmp_path: Path, judged_here: None, monkeypatch, run: Run
 ) -> None:
     judge = Make(CrashingJudge(how=((run.candidates.id[0], "error"),)))
     monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: judge)
@@ -81,7 +75,8 @@ def test_a_failed_simulation_is_neither_executed_nor_lost_from_the_counts(
         scene,
         station,
         tmp_path / "f",
-        settings=EvaluationSettings(grasps_per_object=30, blind=True),
+        settings=EvaluationSettings(grasps_per_object=3, blind=True),
+        workers=1,
         progress=False,
     )
     funnel = summarize(failed).total.funnel

@@ -26,7 +26,10 @@ BELOW = grasp_from_axes((1, 0, 0), (0, 0, 1), (0.0, 0.0, 0.02))
 
 
 def test_motions_go_by_numbers_and_are_kept(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    judged_here: None,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     scene = make_scene(tmp_path)
     verdicts = {"box": [ended("lifted"), ended("slipped")]}

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import Array
 from burg_drake.export.scene_export import FORMATS, Exported, export_scene
 from burg_drake.objects.library.document import load_library
 from burg_drake.objects.library.entry import ContactGeometry

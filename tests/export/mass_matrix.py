@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.objects.library.entry import Inertia
 
 

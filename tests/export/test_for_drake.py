@@ -9,7 +9,7 @@ import pytest
 from pydrake.geometry import Role
 from pydrake.multibody.tree import RigidBody
 
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.export.scene_export import Exported
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.diagram.builder import build_station_diagram
@@ -100,7 +100,7 @@ def test_there_is_something_to_look_at(world: DrakeWorld, X_WO: dict[str, Array]
 
 
 def test_objects_stay(world: DrakeWorld, scene: Scene, X_WO: dict[str, Array]) -> None:
-    world.simulator.AdvanceTo(1.0)
+    world.simulator.AdvanceTo(0.3)
     for name in scene.instances:
         moved = world.X_WB(name) - X_WO[name]
         assert np.abs(moved[:3, 3]).max() < 5e-4, name

@@ -8,7 +8,7 @@ import pytest
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.export.scene_export import Exported
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.document.station_document import Station

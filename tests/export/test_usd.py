@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pxr import Gf, Usd, UsdGeom, UsdPhysics, UsdShade
 
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.export.scene_export import Exported
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.document.station_document import Station

@@ -16,8 +16,9 @@ import numpy as np
 import pytest
 
 import burg_drake.formats
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import Array, rotation_angle
+from burg_drake.core.frames import rotation_angle
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.formats.common.grasp_format import PANDA, Gripper, GripperJoint
 from burg_drake.formats.common.one_object import description_of

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.formats.common.grasp_format import PANDA
 from burg_drake.formats.grasps import graspgen

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 import trimesh
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array, make_pose
+from burg_drake.core.frames import make_pose
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.formats.common.grasp_format import PANDA, Gripper
 from burg_drake.formats.grasp_files import read_grasp_file, write_grasp_file

@@ -12,8 +12,8 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.formats.common.grasp_format import PANDA
 from burg_drake.formats.grasp_files import read_grasp_file

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -33,11 +34,20 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-@pytest.fixture
-def whole(tmp_path: Path, household: ObjectLibrary, tabletop: Station) -> Path:
+@pytest.fixture(scope="module")
+def sampled(
+    tmp_path_factory: pytest.TempPathFactory, household: ObjectLibrary, tabletop: Station
+) -> Path:
     """Twelve scenes, sampled by this process in one go."""
-    sample_scenes(RECIPE, household, tabletop, tmp_path / "whole", 12)
-    return tmp_path / "whole"
+    folder = tmp_path_factory.mktemp("sampled") / "whole"
+    sample_scenes(RECIPE, household, tabletop, folder, 12)
+    return folder
+
+
+@pytest.fixture
+def whole(sampled: Path, tmp_path: Path) -> Path:
+    """A copy of them, that a test may change."""
+    return shutil.copytree(sampled, tmp_path / "whole")
 
 
 def test_the_same_bytes_by_workers_and_after_a_kill(
@@ -60,7 +70,7 @@ def test_the_same_bytes_by_workers_and_after_a_kill(
     process.wait()
     with (part / "scenes.csv").open("a") as table:
         table.write("9,yes,3")  # torn
-    found = sample_scenes(RECIPE, household, tabletop, part, 12, workers=2)
+    found = sample_scenes(RECIPE, household, tabletop, part, 12)
     assert len(found.rows) == 12
     assert contents(part) == contents(whole)
 

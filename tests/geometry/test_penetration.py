@@ -116,7 +116,7 @@ def test_depth_is_the_shortest_way_out(kind: str) -> None:
     direction takes them apart with a little more."""
     rng = np.random.default_rng(0)
     tried = 0
-    for _ in range(20):
+    for _ in range(10):
         one = rng.normal(size=(12, 3))
         size = rng.uniform(0.5, 2.5, 3)
         other = rng.normal(size=(9, 3)) if kind == "hull" else CUBE * size
@@ -130,12 +130,12 @@ def test_depth_is_the_shortest_way_out(kind: str) -> None:
         if found == 0.0:
             continue
         tried += 1
-        directions = rng.normal(size=(40, 3))
+        directions = rng.normal(size=(15, 3))
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
         assert all(overlap_exists(one, moved + 0.99 * found * d) for d in directions)
         ways = Polytope.from_points((one[:, None] - moved[None]).reshape(-1, 3)).normals
         assert not all(overlap_exists(one, moved + 1.01 * found * d) for d in ways)
-    assert tried >= 5
+    assert tried >= 3
 
 
 @pytest.mark.parametrize(
@@ -185,10 +185,10 @@ def least_overlap(one: Polytope, cylinder: Cylinder, X_AB: np.ndarray) -> float:
         reach = cylinder.radius * np.hypot(x, y) + cylinder.half_length * abs(z)
         return float((one.vertices @ d).max() - X_AB[:3, 3] @ d + reach)
 
-    i = np.arange(2000) + 0.5  # a spiral of directions all around
-    polar, turn = np.arccos(1 - 2 * i / 2000), np.pi * (1 + 5**0.5) * i
+    i = np.arange(500) + 0.5  # a spiral of directions all around
+    polar, turn = np.arccos(1 - 2 * i / 500), np.pi * (1 + 5**0.5) * i
     around = np.stack([np.cos(turn) * np.sin(polar), np.sin(turn) * np.sin(polar), np.cos(polar)])
-    starts = sorted(around.T, key=overlap)[:6]
+    starts = sorted(around.T, key=overlap)[:4]
     options = {"xatol": 1e-9, "fatol": 1e-11, "maxiter": 1000}
     return min(
         minimize(overlap, start, method="Nelder-Mead", options=options).fun for start in starts
@@ -200,12 +200,12 @@ def test_cylinder_depth_is_the_least_over_all_directions() -> None:
     hull = Polytope.from_points(0.4 * rng.normal(size=(10, 3)))
     deep = 0
     for one in (Polytope.from_points(CUBE), hull):
-        for _ in range(8):
+        for _ in range(5):
             X_AB = random_pose(rng, 0.8)
             found = depth(one, CYLINDER, X_AB)
             assert found == pytest.approx(max(0.0, least_overlap(one, CYLINDER, X_AB)), abs=1e-8)
             deep += found > 0.0
-    assert 4 < deep < 16
+    assert 2 < deep < 10
 
 
 def test_prism_is_within_a_cylinder_by_a_hundredth() -> None:

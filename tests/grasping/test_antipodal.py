@@ -68,7 +68,7 @@ def test_contacts_do_not_lie_inside_of_material(start):
 )
 @pytest.mark.parametrize("opening", [(0.0, 0.08), (0.0, 0.03), (0.02, 0.05), (0.05, 0.06)])
 def test_the_opening_is_respected(mesh, opening):
-    widths = grasp(mesh, n=1000, opening=opening).width
+    widths = grasp(mesh, n=300, opening=opening).width
     assert (widths >= opening[0]).all()
     assert (widths <= opening[1] - 2.0 * FINGER_CLEARANCE).all()
 
@@ -282,7 +282,7 @@ def test_unusable_meshes():
     cases = {
         "no faces with area": trimesh.Trimesh(),
         "not finite": broken,
-        r"wound inside out; turn its faces with mesh.invert\(\)": inverted,
+        r"wound inside out; flip its faces with mesh.invert\(\)": inverted,
     }
     for message, mesh in cases.items():
         with pytest.raises(MeshError, match=message):

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from grasp_samples import about, brute_force, crowded_grasps, random_grasps
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array, make_pose, swap_fingers
+from burg_drake.core.frames import make_pose, swap_fingers
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.grasping.comparison.average_precision import (
     FRICTIONS,

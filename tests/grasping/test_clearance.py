@@ -44,7 +44,7 @@ def clearance(tmp_path_factory: pytest.TempPathFactory) -> HandClearance:
         ObjectSource(name=n, mesh=trimesh.creation.box(s, lift((0, 0, s[2] / 2))), mass=0.2)
         for n, s in SIZES.items()
     ]
-    build_library(sources, folder / "library")
+    build_library(sources, folder / "library", confirm=False)
     instances = tuple(Instance(object=n, X_SO=Pose((*PLACES[n], 0.0))) for n in SIZES)
     document = SceneDocument(name="test", library="library", instances=instances)
     save_scene(document, folder / "scene.yaml")
@@ -131,7 +131,7 @@ def test_agrees_with_points_in_the_hand(clearance: HandClearance) -> None:
 
 
 def test_swapped_fingers_get_the_same_verdict(clearance: HandClearance) -> None:
-    for X_WG in random_grasps(200):
+    for X_WG in random_grasps(80):
         one, other = (clearance.check("box", X) for X in (X_WG, swap_fingers(X_WG)))
         assert (one.outcome, one.blocker) == (other.outcome, other.blocker)
         assert one.overlap == pytest.approx(other.overlap, abs=1e-7)

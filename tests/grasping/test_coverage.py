@@ -12,7 +12,8 @@ from burg_drake.core.frames import make_pose, swap_fingers
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.grasping.comparison.matching import Share, coverage, nearest_grasps, precision
 from burg_drake.grasping.similarity.neighbour_search import Tolerance
-from burg_drake.grasping.similarity.pose_distance import DISTANCE_VERSION, LEVER, pose_distances
+from burg_drake.grasping.similarity.pose_distance import DISTANCE_VERSION, LEVER
+from tests.grasping.pose_distances import pose_distances
 
 STEP = 1 / 128
 """[m]; a binary fraction, so that grasps lie exactly on a bound."""

@@ -9,15 +9,16 @@ import numpy as np
 import pytest
 from grasp_samples import about, crowded_grasps, random_grasps
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array, make_pose, swap_fingers
+from burg_drake.core.frames import make_pose, swap_fingers
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.grasping.similarity.diversity import (
-    covering_radius,
     farthest_points,
     neighbour_distances,
 )
-from burg_drake.grasping.similarity.pose_distance import LEVER, pose_distances
+from burg_drake.grasping.similarity.pose_distance import LEVER
+from tests.grasping.pose_distances import pose_distances
 
 
 def on_a_line(n: int) -> Array:
@@ -55,7 +56,7 @@ def test_the_radius_is_at_most_twice_the_best_one(n: int) -> None:
     X = crowded_grasps(14, 3)
     d = pose_distances(X[:, None], X[None]).combined
     best = min(d[list(some)].min(axis=0).max() for some in combinations(range(14), n))
-    radius = covering_radius(X, X[farthest_points(X, n)])
+    radius = d[farthest_points(X, n)].min(axis=0).max()
     assert best <= radius <= 2.0 * best
 
 
@@ -105,15 +106,6 @@ def test_numbers_out_of_range(n: int, first: int | None, text: str) -> None:
 def test_nothing_can_be_selected_of_nothing() -> None:
     assert len(farthest_points(np.empty((0, 4, 4)), 0)) == 0
     assert len(farthest_points(on_a_line(3), 0)) == 0
-    assert covering_radius(np.empty((0, 4, 4)), on_a_line(1)) == 0.0
-
-
-def test_covering_radius_on_a_line() -> None:
-    X = on_a_line(9)
-    assert covering_radius(X, X[4:5]) == 4 / 64
-    assert covering_radius(X, X[[2, 6]]) == 2 / 64
-    assert covering_radius(X, swap_fingers(X)) == 0.0
-    assert covering_radius(X, X[:0]) == math.inf
 
 
 def test_neighbours_are_on_the_same_object_and_instance() -> None:

@@ -9,11 +9,13 @@ import pytest
 from grasp_samples import about, crowded_grasps, random_grasps
 from scipy.spatial.transform import Rotation
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array, check_pose, make_pose, swap_fingers
+from burg_drake.core.frames import check_pose, make_pose, swap_fingers
 from burg_drake.grasping.similarity import neighbour_search
 from burg_drake.grasping.similarity.neighbour_search import Tolerance, find_nearest, find_within
-from burg_drake.grasping.similarity.pose_distance import components, pose_distances
+from burg_drake.grasping.similarity.pose_distance import components
+from tests.grasping.pose_distances import pose_distances
 
 TOLERANCES = [
     Tolerance(),

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 import trimesh
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import Array, make_pose, rotation_from_rpy, swap_fingers
-from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core.frames import make_pose, rotation_from_rpy, swap_fingers
 from burg_drake.geometry.surface import Surface
 from burg_drake.grasping.quality.jaws import PANDA_JAWS
 from burg_drake.grasping.quality.metrics import (
     GRAVITY,
     METRICS,
-    QUALITY_VERSION,
     Payload,
     Quality,
+    check_metric,
     grasp_quality,
-    score_grasps,
+    score_of,
 )
 from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal
 
@@ -175,35 +175,28 @@ def test_heavier_objects_and_weaker_hands() -> None:
     np.testing.assert_allclose(weak.load_margin, one.load_margin / 4.0, rtol=1e-3)
 
 
-def test_a_set_gets_columns_and_a_score() -> None:
+def test_what_touches_nothing_has_no_quality() -> None:
     beside = make_pose(None, (0.0, 0.5, 0.0))[None]
-    grasps = GraspSet.create(
-        np.concatenate([HELD, beside]), object="box", provenance={"library": "mine"}
-    )
-    scored = score_grasps(grasps, BOX, PAYLOAD)
-    assert set(METRICS) <= set(scored.columns)
-    np.testing.assert_array_equal(scored.column("force_closure"), [True, False])
+    quality = grasp_quality(np.concatenate([HELD, beside]), BOX, PAYLOAD)
+    np.testing.assert_array_equal(quality.force_closure, [True, False])
     for name in set(METRICS) - {"force_closure"}:
-        assert np.isnan(scored.column(name)[1]), name
-    np.testing.assert_array_equal(scored.score, scored.column("load_margin"))
-    assert np.isnan(scored.column("gravity_margin")).all()
-    assert scored.provenance["library"] == "mine"
-    assert scored.provenance["quality"]["version"] == QUALITY_VERSION
-    assert scored.provenance["quality"]["payload"]["friction"] == 0.4
-    by_angle = score_grasps(grasps, BOX, PAYLOAD, by="contact_offset")
-    np.testing.assert_array_equal(by_angle.score, -scored.column("contact_offset"))
-    assert len(score_grasps(grasps.select([]), BOX, PAYLOAD, up=(0, 0, 1))) == 0
+        assert np.isnan(getattr(quality, name)[1]), name
+    assert np.isnan(quality.gravity_margin).all()
+    assert len(grasp_quality(HELD[:0], BOX, PAYLOAD, up=(0, 0, 1)).epsilon) == 0
+
+
+def test_scores_are_higher_where_grasps_are_better() -> None:
+    values = np.array([0.1, 0.3])
+    np.testing.assert_array_equal(score_of(values, "load_margin"), values)
+    np.testing.assert_array_equal(score_of(values, "contact_offset"), -values)
 
 
 def test_bad_input() -> None:
-    grasps = GraspSet.create(HELD, object="box")
     with pytest.raises(UnknownNameError, match=r"there is no metric 'epsilom'.*epsilon"):
-        score_grasps(grasps, BOX, PAYLOAD, by="epsilom")
-    with pytest.raises(InvalidInputError, match="gravity_margin needs to know where up is"):
-        score_grasps(grasps, BOX, PAYLOAD, by="gravity_margin")
+        check_metric("epsilom")
     with pytest.raises(
         InvalidInputError, match=r"up has shape \(2,\); expected \(3,\) or \(1, 3\)"
     ):
-        score_grasps(grasps, BOX, PAYLOAD, up=(0, 1))
+        grasp_quality(HELD, BOX, PAYLOAD, up=(0, 1))
     with pytest.raises(InvalidInputError, match="mass is 0 kg; give more than 0"):
         replace(PAYLOAD, mass=0.0)

@@ -10,7 +10,8 @@ from grasp_samples import about, brute_force, crowded_grasps, random_grasps
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import make_pose, swap_fingers
-from burg_drake.grasping.similarity.pose_distance import LEVER, pose_distances
+from burg_drake.grasping.similarity.pose_distance import LEVER
+from tests.grasping.pose_distances import pose_distances
 
 HERE = make_pose()
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core.frames import Array, make_pose, rotation_from_rpy, swap_fingers
+from burg_drake.core.arrays import Array
+from burg_drake.core.frames import make_pose, rotation_from_rpy, swap_fingers
 from burg_drake.geometry.surface import Surface
 from burg_drake.grasping.quality.contacts import Contacts, friction_needed, grasp_contacts
 from burg_drake.grasping.quality.jaws import PANDA_JAWS

@@ -144,7 +144,7 @@ def test_vessels_are_hollow(name, radius, floor):
     ("name", "axis", "level", "count"), [("scissors", 2, 0.0057, 2), ("mug", 1, 0.0, 1)]
 )
 def test_fingers_fit_through_the_handles(name, axis, level, count):
-    shape, cell = SHAPES[name], 0.0025
+    shape, cell = SHAPES[name], 0.0035
     lower, upper = np.delete(shape.mesh.bounds, axis, axis=1)
     u, v = (np.arange(a, b + cell, cell) for a, b in zip(lower, upper, strict=True))
     grid = np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)

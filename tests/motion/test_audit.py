@@ -21,8 +21,9 @@ from burg_drake.scene.document.scene import Scene, load_scene
 from burg_drake.station.document.station_document import Obstacle, Station, load_station
 
 SOURCE = Path(__file__).resolve().parents[2] / "benchmarks" / "reach_audit.py"
-STEP = 0.02
+STEP = 0.03
 """Of the audit here; the benchmark has 5 mm [m]."""
+TARGETS = ("mug", "bottle", "bowl")
 
 Motion = tuple[str, Witness, float]
 """Target, motion, width."""
@@ -40,7 +41,9 @@ def reach_audit() -> ModuleType:
 
 @pytest.fixture(scope="module")
 def scene() -> Scene:
-    return load_scene("tabletop_six")
+    whole = load_scene("tabletop_six")
+    few = tuple(i for i in whole.document.instances if i.object in TARGETS)
+    return replace(whole, document=replace(whole.document, instances=few))
 
 
 @pytest.fixture(scope="module")
@@ -53,13 +56,13 @@ def motions(scene: Scene, station: Station) -> list[Motion]:
     """One of each of some objects, among them a mug and a bowl that fingers reach into."""
     reach = ArmReach(scene, station)
     found = []
-    for name in ("mug", "bottle", "box", "bowl"):
+    for name in TARGETS:
         mesh = scene.library.surface(scene.instance(name).object)
         sampled = sample_antipodal(
             mesh, 300, rng_from("audit", name), AntipodalSettings(friction=0.5)
         )
         X_WG = reach.diagram.X_WO(name) @ sampled.X_OG
-        above = np.flatnonzero(X_WG[:, 2, 2] < -0.5)[:12]
+        above = np.flatnonzero(X_WG[:, 2, 2] < -0.5)[:6]
         verdicts = reach.check_all([name] * len(above), X_WG[above], sampled.width[above])
         pairs = zip(verdicts, sampled.width[above].tolist(), strict=True)
         found += [(name, v.witness, width) for v, width in pairs if v.witness is not None][:1]

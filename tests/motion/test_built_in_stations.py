@@ -14,7 +14,7 @@ from burg_drake.station.document.station_document import load_station
 
 WITH_ARM = [n for n in builtin_names("stations") if load_station(n).document.arm is not None]
 COARSE = ReachabilitySettings(
-    spacing=0.1, heights=(0.05,), tilts_deg=(0.0, 45.0), headings=(1, 4), yaws=4
+    spacing=0.12, heights=(0.05,), tilts_deg=(0.0, 45.0), headings=(1, 4), yaws=2
 )
 FROM_ABOVE = {"panda_bin": 0.8, "panda_shelf": 0.75}
 """Share of the board that has to be reached straight down; all of it where nothing is said. Walls

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,16 +11,22 @@ import pytest
 from burg_drake.core.frames import grasp_from_axes
 from burg_drake.motion.proximity import arm_shape
 from burg_drake.motion.reach.arm_reach import ArmReach
-from burg_drake.scene.document.scene import load_scene
+from burg_drake.scene.document.scene import Scene, load_scene
 from burg_drake.station.diagram.station_diagram import instance_pose
 from burg_drake.station.document.station_document import load_station
 
 KINDS = {"distances", "postures", "roadmap", "robot"}
 
 
-def grasps(count: int) -> tuple[list[str], np.ndarray]:
+def few_objects() -> Scene:
+    whole = load_scene("tabletop_six")
+    two = tuple(i for i in whole.document.instances if i.object in ("bottle", "mug"))
+    return replace(whole, document=replace(whole.document, instances=two))
+
+
+def grasps(scene: Scene, count: int) -> tuple[list[str], np.ndarray]:
     """From above, into instances of the scene and beside them."""
-    scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")
+    station = load_station("panda_tabletop")
     rng = np.random.default_rng(0)
     names = [list(scene.instances)[k % len(scene.instances)] for k in range(count)]
     X_OG = [
@@ -33,22 +40,26 @@ def grasps(count: int) -> tuple[list[str], np.ndarray]:
 def test_verdicts_do_not_depend_on_the_cache(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    names, X_WG = grasps(24)
+    scene = few_objects()
+    names, X_WG = grasps(scene, 24)
     found = []
     for place in ("off", str(tmp_path), str(tmp_path)):
         monkeypatch.setenv("BURG_DRAKE_CACHE", place)
         arm_shape._kept.clear()
-        reach = ArmReach("tabletop_six", "panda_tabletop")
+        reach = ArmReach(scene, "panda_tabletop")
         lower, upper = reach.kinematics.lower, reach.kinematics.upper
         q = np.random.default_rng(1).uniform(lower, upper, (500, 7))
         verdicts = reach.check_all(names, X_WG)
-        bits = [reach.proximity.bounds(q).lower.tobytes(), reach.tree.roadmap.distance.tobytes()]
+        bits = [
+            reach._proximity.bounds(q).lower.tobytes(),
+            reach._tree.roadmap.distance.tobytes(),
+        ]
         for verdict in verdicts:
             bits += [verdict.outcome, verdict.blocker, np.array(verdict.clearance).tobytes()]
             if way := verdict.witness:
                 bits += [x.tobytes() for x in (way.transfer, way.approach, way.lift)]
         found.append(bits)
-    assert sum(verdict.witness is not None for verdict in verdicts) > 3
+    assert sum(verdict.witness is not None for verdict in verdicts) > 2
     assert found[0] == found[1] == found[2]
     assert {path.name.split("-")[0] for path in tmp_path.iterdir()} == KINDS
     assert not caplog.messages

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from burg_drake.core.frames import Array, grasp_from_axes, swap_fingers
+from burg_drake.core.arrays import Array
+from burg_drake.core.frames import grasp_from_axes, swap_fingers
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.motion.ik.numeric import ArmKinematics
 from burg_drake.motion.ik.panda import PandaIk, panda_forward

@@ -67,12 +67,12 @@ def test_bodies_left_out_do_not_meet_within_the_joints_limits() -> None:
     lower = np.array([joint.position_lower_limits()[0] for joint in joints])
     upper = np.array([joint.position_upper_limits()[0] for joint in joints])
     rng = np.random.default_rng(8)
-    q = rng.uniform(lower, upper, (600, len(joints)))
+    q = rng.uniform(lower, upper, (300, len(joints)))
     q[::2] = np.where(rng.uniform(size=q[::2].shape) < 0.5, lower, upper)
     verdicts = [checked.is_free(row) for row in q]
     plain = checked.checker
     assert verdicts == [plain.CheckConfigCollisionFree(checked.configuration(row)) for row in q]
-    assert 50 < sum(verdicts) < 550
+    assert 25 < sum(verdicts) < 275
 
 
 @pytest.mark.parametrize(("gap", "touching"), [(1e-3, False), (-1e-3, True)])
@@ -145,10 +145,10 @@ def test_both_ways_to_ask_agree(station: Station) -> None:
     can = Instance(name="can", object="can", X_SO=Pose((0.3, 0.2, 0.0)))
     checked = collision(station, can)
     limits = [(j.position_lower_limits()[0], j.position_upper_limits()[0]) for j in checked.joints]
-    postures = np.random.default_rng(7).uniform(*np.transpose(limits), (400, 7))
+    postures = np.random.default_rng(7).uniform(*np.transpose(limits), (200, 7))
     answers = [(checked.is_free(q), not checked.overlaps(q)) for q in postures]
     assert all(a == b for a, b in answers)
-    assert 40 < sum(a for a, _ in answers) < 390
+    assert 20 < sum(a for a, _ in answers) < 195
 
 
 def test_what_is_carried_counts_against_the_links_alone(station: Station) -> None:
@@ -164,7 +164,7 @@ def test_what_is_carried_counts_against_the_links_alone(station: Station) -> Non
     assert not checked.is_free(HOME)
 
 
-@pytest.mark.parametrize("moved", [(0.0, 0.0, 0.0), (0.0, 0.0, 0.3), (-0.08, 0.05, 0.07)])
+@pytest.mark.parametrize("moved", [(0.0, 0.0, 0.3), (-0.08, 0.05, 0.07)])
 def test_moved_is_as_if_placed_there(station: Station, moved: tuple[float, float, float]) -> None:
     """Two tilted boxes; one is carried, against a diagram in which free ones stand there."""
     tilt, (x, y, z) = (20.0, -30.0, 50.0), moved
@@ -184,7 +184,7 @@ def test_moved_is_as_if_placed_there(station: Station, moved: tuple[float, float
     oracle = ArmCollision(build_station_diagram(scene, station))
     hand = ("panda_hand", "panda_leftfinger", "panda_rightfinger")
     rng, seen = np.random.default_rng(3), set[tuple[bool, bool]]()
-    for q in HOME + rng.uniform(-0.8, 0.8, (150, 7)):
+    for q in HOME + rng.uniform(-0.8, 0.8, (100, 7)):
         every = {(o.link, o.other) for o in oracle.overlaps(q)}
         counted = {(link, other) for link, other in every if other != "box" or link not in hand}
         overlaps = checked.overlaps(q, carried="box", moved_W=moved)
@@ -213,11 +213,11 @@ def test_clones_answer_as_drakes_own_checker_does(station: Station, carried: str
             plain.SetCollisionFilterMatrix(filtered)
         rise = 0.1 if carried else 0.0
         free = []
-        for q in HOME + rng.uniform(-0.9, 0.9, (200, 7)):
+        for q in HOME + rng.uniform(-0.9, 0.9, (100, 7)):
             configuration = checked.configuration(q, carried, rise)
             free.append(plain.CheckConfigCollisionFree(configuration))
             assert checked.is_free(q, carried=carried, moved_W=(0.0, 0.0, rise)) is free[-1]
-        assert (20 < sum(free) < 180) if instances == (mug,) else not any(free)
+        assert (10 < sum(free) < 90) if instances == (mug,) else not any(free)
 
 
 def test_what_is_carried_does_not_count_against_the_scene(station: Station) -> None:

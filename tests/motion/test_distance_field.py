@@ -8,7 +8,7 @@ import pytest
 from burg_drake.core.frames import make_pose, rotation_from_rpy
 from burg_drake.geometry.shape import Shape
 from burg_drake.motion.proximity.distance_field import CELL, DistanceField
-from burg_drake.motion.proximity.solids import HullSolid, Solid, solid_of
+from burg_drake.motion.proximity.solids import HullSolid, ProximitySolid, solid_of
 
 X_WP = make_pose(rotation_from_rpy((0.3, -0.5, 0.8)), (0.4, 0.1, 0.2))
 HALF = np.array((0.03, 0.05, 0.02))
@@ -19,11 +19,11 @@ def box_distance(p: np.ndarray) -> np.ndarray:
     return np.linalg.norm(np.maximum(beyond, 0), axis=1) + np.minimum(beyond.max(axis=1), 0)
 
 
-def box() -> Solid:
+def box() -> ProximitySolid:
     return solid_of(Shape.box(X_WP, HALF), np.eye(4))
 
 
-def box_of_planes() -> Solid:
+def box_of_planes() -> ProximitySolid:
     polytope = Shape.box(X_WP, HALF).polytope
     assert polytope is not None
     moved = polytope.moved(X_WP)

@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 from gantry import UPPER, box, gantry_diagram
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.content import rng_from
 from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import Array, grasp_from_axes, make_pose, rot_z, swap_fingers
+from burg_drake.core.frames import grasp_from_axes, make_pose, rot_z, swap_fingers
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.grasping.clearance.hand_clearance import HandClearance
 from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal
@@ -49,7 +50,7 @@ def place_on_gantry(q: Array) -> Array:
     return q - (0.0, 0.0, TCP)
 
 
-@pytest.mark.parametrize("room", [0.204, 0.117, 0.0204])
+@pytest.mark.parametrize("room", [0.117, 0.0204])
 def test_the_block_rises_to_the_bar(tmp_path: Path, room: float) -> None:
     motion = GraspMotion(standoff=0.01, least_lift=0.02)
     found = gantry(tmp_path, motion, bar=in_front(HIGH + room)).check("", X_WG)
@@ -125,16 +126,16 @@ Grasps = tuple[list[str], Array, Array]
 
 @pytest.fixture(scope="module")
 def grasps(scene: Scene, reach: ArmReach) -> Grasps:
-    """From the front, four of each object, at which the open hand is clear."""
+    """From the front, two of each object, at which the open hand is clear."""
     clearance = HandClearance(build_station_diagram(scene, reach.diagram.station, robot="hand"))
     names, poses, widths = [], [], []
     for name in scene.instances:
         mesh = scene.library.surface(scene.instance(name).object)
         sampled = sample_antipodal(
-            mesh, 2000, rng_from("motions", name), AntipodalSettings(friction=0.5)
+            mesh, 1000, rng_from("motions", name), AntipodalSettings(friction=0.5)
         )
         X = reach.diagram.X_WO(name) @ sampled.X_OG
-        front = np.flatnonzero((X[:, 0, 2] > 0.5) & clearance.is_clear(X))[:4]
+        front = np.flatnonzero((X[:, 0, 2] > 0.5) & clearance.is_clear(X))[:2]
         names += [name] * len(front)
         poses.append(X[front])
         widths.append(sampled.width[front])
@@ -150,7 +151,7 @@ def test_hand_and_target_go_back_and_up(
     reach: ArmReach, grasps: Grasps, found: list[Reach]
 ) -> None:
     reached = [reach for reach in found if reach.outcome is None]
-    assert len(reached) > 5 and len({round(reach.lift, 3) for reach in reached}) > 1
+    assert len(reached) > 2 and len({round(reach.lift, 3) for reach in reached}) > 1
     X_WA, X_HG = reach.diagram.station.document.arm.X_WA.matrix(), reach.diagram.station.hand.X_HG
     for one in reached:
         witness = one.witness
@@ -176,7 +177,7 @@ def test_drake_sees_nothing_in_the_way(
     audit = reach_audit.Audit(scene, station)
     names, _, widths = grasps
     reached = [k for k, reach in enumerate(found) if reach.witness is not None][::2]
-    assert len(reached) >= 3
+    assert len(reached) >= 2
     for k in reached:
         assert not audit.faults(names[k], found[k].witness, float(widths[k]), step=0.02), names[k]
 
@@ -185,8 +186,8 @@ def test_it_does_not_matter_how_a_grasp_is_given_or_with_what_others(
     reach: ArmReach, grasps: Grasps, found: list[Reach]
 ) -> None:
     names, X, widths = grasps
-    some = [k for k, one in enumerate(found) if one.outcome is None][:4]
-    some += [k for k, one in enumerate(found) if one.outcome is not None][:2]
+    some = [k for k, one in enumerate(found) if one.outcome is None][:1]
+    some += [k for k, one in enumerate(found) if one.outcome is not None][:1]
     for k in some:
         one = reach.check(names[k], swap_fingers(X[k]), float(widths[k]))
         assert (one.outcome, one.blocker) == (found[k].outcome, found[k].blocker)

@@ -77,8 +77,8 @@ def test_solutions_are_at_the_pose_by_drake_s_kinematics(
     np.testing.assert_allclose(flange_by_drake(plant, found.q), X[found.pose], atol=FINE)
 
 
-def test_every_one_of_100_000_random_postures_is_found_again(ik: PandaIk) -> None:
-    q = random_postures(ik, 100_000, seed=2)
+def test_every_one_of_30_000_random_postures_is_found_again(ik: PandaIk) -> None:
+    q = random_postures(ik, 30_000, seed=2)
     X = panda_forward(q)
     found = ik.solve(X, q[:, 6:])
     assert nearest(found, q).max() < 1e-7

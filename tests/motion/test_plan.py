@@ -73,7 +73,7 @@ def test_it_leads_from_home_to_the_grasp_and_up(
 
 
 def test_drake_finds_its_samples_free(planned: Plan, planner: Planner) -> None:
-    collision, arm = planner.reach.collision, planner.reach.kinematics
+    collision, arm = planner.reach._tree.edges.collision, planner.reach.kinematics
     for part in (planned.transfer, planned.approach):
         assert all(collision.is_free(q) for q in part.q[::EVERY])
     q = planned.lift.q[::EVERY]

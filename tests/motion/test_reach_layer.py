@@ -41,7 +41,7 @@ def back() -> Station:
 
 @pytest.fixture(scope="module")
 def layer(back: Station) -> ReachLayer:
-    return reach_from_above(back, BOARD, spacing=0.03, yaws=2)
+    return reach_from_above(back, BOARD, spacing=0.04, yaws=2)
 
 
 def test_points_are_as_when_asked_alone(layer: ReachLayer, back: Station) -> None:
@@ -49,7 +49,7 @@ def test_points_are_as_when_asked_alone(layer: ReachLayer, back: Station) -> Non
     assert 0.2 < layer.covered < 0.9
     reach = ArmReach(empty_scene(), back)
     rng = np.random.default_rng(5)
-    rows = rng.choice(layer.reached.size, 16, replace=False)
+    rows = rng.choice(layer.reached.size, 12, replace=False)
     j, i, k = np.unravel_index(rows, layer.reached.shape)
     p_SG = np.column_stack([layer.x[i], layer.y[j], np.full(len(rows), layer.height)])
     down = rotation_from_rpy((np.pi, 0.0, 0.0))

@@ -57,12 +57,18 @@ def gantry(folder: Path, **background: Obstacle) -> ArmReach:
     return ArmReach(diagram.scene, diagram.station)
 
 
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> ArmReach:
+    """With nothing in the way."""
+    return gantry(tmp_path_factory.mktemp("gantry"))
+
+
 def at(reach: ArmReach, x: float = 0.5, z: float = Z, approach: tuple[float, ...] = DOWN) -> Reach:
     return reach.check("", grasp_from_axes((0.0, 1.0, 0.0), approach, (x, 0.0, z)))
 
 
-def test_nothing_in_the_way(tmp_path: Path) -> None:
-    assert at(gantry(tmp_path)).outcome is None
+def test_nothing_in_the_way(alone: ArmReach) -> None:
+    assert at(alone).outcome is None
 
 
 def test_what_only_the_flange_meets_at_the_grasp_is_an_arm_collision(tmp_path: Path) -> None:
@@ -89,18 +95,18 @@ def test_a_cage_leaves_no_path(tmp_path: Path) -> None:
     assert at(reach, x=0.2).outcome is None
 
 
-def test_a_joint_limit_is_told_with_what_is_missing(tmp_path: Path) -> None:
-    found = at(gantry(tmp_path), x=UPPER[0] + 0.05)
+def test_a_joint_limit_is_told_with_what_is_missing(alone: ArmReach) -> None:
+    found = at(alone, x=UPPER[0] + 0.05)
     assert found.outcome is Outcome.JOINT_LIMIT and not found.blocker
     assert found.excess == pytest.approx(0.05 + ReachSettings().limit_margin, abs=1e-6)
 
 
-def test_a_limit_on_the_way_up_fails_the_lift_line(tmp_path: Path) -> None:
-    assert at(gantry(tmp_path), z=UPPER[2] - TCP - 0.2).outcome is Outcome.LIFT_LINE
+def test_a_limit_on_the_way_up_fails_the_lift_line(alone: ArmReach) -> None:
+    assert at(alone, z=UPPER[2] - TCP - 0.2).outcome is Outcome.LIFT_LINE
 
 
-def test_a_gantry_does_not_tilt(tmp_path: Path) -> None:
-    found = at(gantry(tmp_path), approach=(0.3, 0.0, -1.0))
+def test_a_gantry_does_not_tilt(alone: ArmReach) -> None:
+    found = at(alone, approach=(0.3, 0.0, -1.0))
     assert found.outcome is Outcome.NO_IK and np.isnan(found.excess)
 
 

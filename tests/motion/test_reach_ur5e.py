@@ -79,10 +79,10 @@ def test_motions_are_free_and_whole(
 
 
 def between(q: np.ndarray) -> np.ndarray:
-    """A polyline in steps of about 0.03 rad."""
+    """A polyline in steps of about 0.05 rad."""
     parts = []
     for a, b in pairwise(q):
-        count = int(np.abs(b - a).max() / 0.03) + 2
+        count = int(np.abs(b - a).max() / 0.05) + 2
         parts.append(np.linspace(a, b, count))
     return np.concatenate(parts)
 

@@ -28,6 +28,7 @@ COARSE = ReachabilitySettings(
     spacing=0.2, heights=(0.06, 0.2), tilts_deg=(0.0, 50.0), headings=(1, 3), yaws=2
 )
 STARTS = 48
+SOME = slice(None, None, 3)
 
 
 @pytest.fixture(scope="module")
@@ -59,9 +60,8 @@ def test_agrees_with_drake_and_numeric_inverse_kinematics(
     diagram = build_station_diagram(six, station, robot="arm", weld_objects=True)
     arm, collision = ArmKinematics.of(diagram), ArmCollision(diagram)
     assert station.document.arm is not None
-    X_AG = inverse(station.document.arm.X_WA.matrix()) @ grasps(shelf_map, station).reshape(
-        -1, 4, 4
-    )
+    X_WG = grasps(shelf_map, station).reshape(-1, 4, 4)[SOME]
+    X_AG = inverse(station.document.arm.X_WA.matrix()) @ X_WG
     rng = np.random.default_rng(3)
     found = np.zeros(len(X_AG), dtype=bool)
     for X in (X_AG, swap_fingers(X_AG)):
@@ -72,7 +72,7 @@ def test_agrees_with_drake_and_numeric_inverse_kinematics(
         for k in np.flatnonzero(met):
             if not found[pose[k]]:
                 found[pose[k]] = collision.is_free(q[k])
-    reached = shelf_map.reached.ravel()
+    reached = shelf_map.reached.ravel()[SOME]
     assert 0.2 < found.mean() < 0.9
     assert (reached == found).mean() > 0.97
 

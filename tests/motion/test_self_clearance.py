@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from pydrake.multibody.tree import BodyIndex
 
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.motion.collision.checker import ArmCollision
 from burg_drake.motion.proximity.arm_shape import ArmShape
 from burg_drake.motion.proximity.ball_tree import BallTrees, BodyBalls

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.objects.physics.landscape import PotentialLandscape
 from burg_drake.objects.physics.pose_classes import PoseClasses, angle_between
 from burg_drake.objects.physics.stability import stable_poses

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -25,7 +26,10 @@ def _box(size: tuple[float, float, float] = (0.1, 0.06, 0.03)) -> trimesh.Trimes
 
 @pytest.fixture
 def meshes(tmp_path: Path) -> Path:
-    folder = tmp_path / "meshes"
+    return _write_meshes(tmp_path / "meshes")
+
+
+def _write_meshes(folder: Path) -> Path:
     folder.mkdir()
     _box().export(folder / "Box.stl")
     trimesh.creation.cylinder(0.03, 0.1, sections=32).export(folder / "can.obj")
@@ -37,6 +41,21 @@ def _sources(meshes: Path, mass: float = 0.2) -> list[ObjectSource]:
         ObjectSource.from_file(meshes / "Box.stl", mass=mass),
         ObjectSource.from_file(meshes / "can.obj"),
     ]
+
+
+@pytest.fixture(scope="module")
+def first_build(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with `meshes`, and the library `lib` that was built of them."""
+    folder = tmp_path_factory.mktemp("first")
+    _write_meshes(folder / "meshes")
+    build(_sources(folder / "meshes"), folder / "lib")
+    return folder
+
+
+@pytest.fixture
+def built(first_build: Path, meshes: Path, tmp_path: Path) -> None:
+    """`lib` is there already, built of `meshes`."""
+    shutil.copytree(first_build / "lib", tmp_path / "lib")
 
 
 def _times(root: Path) -> dict[str, int]:
@@ -76,6 +95,7 @@ def test_a_density_that_was_assumed_is_reported(meshes: Path, tmp_path: Path) ->
     assert "box" not in report.notes
 
 
+@pytest.mark.usefixtures("built")
 def test_what_has_not_changed_is_not_touched(meshes: Path, tmp_path: Path) -> None:
     build(_sources(meshes), tmp_path / "lib")
     before = _times(tmp_path / "lib")
@@ -84,6 +104,7 @@ def test_what_has_not_changed_is_not_touched(meshes: Path, tmp_path: Path) -> No
     assert _times(tmp_path / "lib") == before
 
 
+@pytest.mark.usefixtures("built")
 def test_a_new_mass_rewrites_the_sdf_and_nothing_else(
     meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -102,6 +123,7 @@ def test_a_new_mass_rewrites_the_sdf_and_nothing_else(
     assert "<mass>0.4</mass>" in report.library.path(entry.sdf).read_text()
 
 
+@pytest.mark.usefixtures("built")
 def test_a_new_colour_keeps_the_pieces(
     meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -115,6 +137,7 @@ def test_a_new_colour_keeps_the_pieces(
     assert (tmp_path / "lib/box/pieces/000.obj").read_bytes() == pieces
 
 
+@pytest.mark.usefixtures("built")
 def test_a_changed_mesh_is_built_again(meshes: Path, tmp_path: Path) -> None:
     build(_sources(meshes), tmp_path / "lib")
     _box((0.12, 0.06, 0.03)).export(meshes / "Box.stl")
@@ -123,6 +146,7 @@ def test_a_changed_mesh_is_built_again(meshes: Path, tmp_path: Path) -> None:
     assert report.library.entry("box").upper[0] == pytest.approx(0.06)
 
 
+@pytest.mark.usefixtures("built")
 def test_lost_files_are_built_again(meshes: Path, tmp_path: Path) -> None:
     report = build(_sources(meshes), tmp_path / "lib")
     report.library.path(report.library.entry("box").pieces[0]).unlink()
@@ -131,6 +155,7 @@ def test_lost_files_are_built_again(meshes: Path, tmp_path: Path) -> None:
     assert build(_sources(meshes), tmp_path / "lib").built == ("box",)
 
 
+@pytest.mark.usefixtures("built")
 def test_a_new_description_is_taken_over(meshes: Path, tmp_path: Path) -> None:
     source = _sources(meshes)[0]
     before = build([source], tmp_path / "lib").library.entry("box")
@@ -174,6 +199,7 @@ def test_one_broken_mesh_fails_alone(meshes: Path, tmp_path: Path) -> None:
     assert not (tmp_path / "lib" / "broken").exists()
 
 
+@pytest.mark.usefixtures("built")
 def test_a_failure_keeps_the_earlier_object(meshes: Path, tmp_path: Path) -> None:
     build(_sources(meshes), tmp_path / "lib")
     (meshes / "Box.stl").write_bytes(b"")
@@ -212,6 +238,7 @@ def test_a_kill_loses_nothing_that_was_finished(
     assert len(report.built) == 1
 
 
+@pytest.mark.usefixtures("built")
 def test_what_a_killed_build_left_lying_is_removed(meshes: Path, tmp_path: Path) -> None:
     dead = tmp_path / "lib" / f"{SCRATCH}999999999-abc"
     (dead / "box").mkdir(parents=True)
@@ -250,7 +277,9 @@ def test_given_pieces_become_the_collision_geometry(tmp_path: Path) -> None:
 def test_open_meshes_become_walls(tmp_path: Path) -> None:
     lidless = _box()
     lidless.update_faces(lidless.triangles_center[:, 2] < 0.0149)
-    source = ObjectSource(name="box", mesh=lidless, mass=0.1, wall_thickness=0.001)
+    source = ObjectSource(
+        name="box", mesh=lidless, pieces=(_box(),), mass=0.1, wall_thickness=0.001
+    )
     report = build([source], tmp_path / "lib")
     properties = report.library.entry("box").mass_properties
     area = 0.1 * 0.06 + 2.0 * (0.1 + 0.06) * 0.03
@@ -278,6 +307,7 @@ def test_ten_unchanged_objects_take_less_than_a_fifth_of_a_second(tmp_path: Path
     assert time.process_time() - start < 0.2
 
 
+@pytest.mark.usefixtures("built")
 def test_permissions_are_those_of_other_files(meshes: Path, tmp_path: Path) -> None:
     build(_sources(meshes), tmp_path / "lib")
     umask = os.umask(0)
@@ -335,6 +365,7 @@ def test_the_centre_of_mass_decides_how_it_rests(tmp_path: Path) -> None:
     assert not [p for p in entry.stable_poses if p.X_SO.matrix()[2, 2] < -0.99]
 
 
+@pytest.mark.usefixtures("built")
 def test_where_a_mesh_came_from_is_told_from_the_library(meshes: Path, tmp_path: Path) -> None:
     entry = build(_sources(meshes), tmp_path / "lib").library.entry("can")
     assert (entry.source.file, entry.source.path) == ("can.obj", "../meshes/can.obj")
@@ -354,6 +385,7 @@ def test_a_library_is_a_package(meshes: Path, tmp_path: Path) -> None:
     assert plant.HasBodyNamed("body", model)
 
 
+@pytest.mark.usefixtures("built")
 @pytest.mark.parametrize("mass", [0.2, 0.4])
 def test_files_that_were_changed_are_built_again(meshes: Path, tmp_path: Path, mass: float) -> None:
     build(_sources(meshes), tmp_path / "lib")
@@ -367,6 +399,7 @@ def test_files_that_were_changed_are_built_again(meshes: Path, tmp_path: Path, m
     assert (tmp_path / "lib/box/mesh.mtl").is_file()
 
 
+@pytest.mark.usefixtures("built")
 def test_a_document_that_was_edited_is_written_again(meshes: Path, tmp_path: Path) -> None:
     build(_sources(meshes), tmp_path / "lib")
     document = tmp_path / "lib/library.yaml"

@@ -16,7 +16,7 @@ from burg_drake.pipeline.source import ObjectSource
 
 @pytest.fixture(scope="module")
 def ring() -> trimesh.Trimesh:
-    return trimesh.creation.annulus(r_min=0.049, r_max=0.05, height=0.06, sections=40)
+    return trimesh.creation.annulus(r_min=0.049, r_max=0.05, height=0.06, sections=24)
 
 
 def test_a_finer_cut_by_itself(tmp_path: Path, ring: trimesh.Trimesh) -> None:

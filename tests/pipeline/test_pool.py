@@ -43,7 +43,7 @@ class Fatal(trimesh.Trimesh):
         trimesh.Trimesh.faces.fset(self, values)
 
 
-def test_a_worker_that_dies_costs_one_object(
+def test_errors_and_a_worker_that_dies_cost_one_object_each(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     box = trimesh.creation.box((0.05, 0.06, 0.07))
@@ -52,19 +52,19 @@ def test_a_worker_that_dies_costs_one_object(
     monkeypatch.syspath_prepend(str(Path(__file__).parent))
     Fatal.__module__ = module
     __import__(module).Fatal = Fatal
-    sources = [*boxes(3), ObjectSource(name="fatal", mesh=fatal, mass=0.1)]
-    report = build_library(sources, tmp_path / "lib", confirm=False, workers=2)
-    assert report.built == ("box_0", "box_1", "box_2")
-    assert report.failed == {"fatal": "the worker process was ended from outside by SIGKILL"}
-    assert not (tmp_path / "lib" / "fatal").exists()
-
-
-def test_errors_cross_the_pipe(tmp_path: Path) -> None:
     (tmp_path / "nan.obj").write_text("v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    sources = [*boxes(2), ObjectSource.from_file(tmp_path / "nan.obj")]
+    sources = [
+        *boxes(2),
+        ObjectSource(name="fatal", mesh=fatal, mass=0.1),
+        ObjectSource.from_file(tmp_path / "nan.obj"),
+    ]
     report = build_library(sources, tmp_path / "lib", confirm=False, workers=2)
     assert report.built == ("box_0", "box_1")
-    assert report.failed == {"nan": f"{tmp_path / 'nan.obj'}: 1 of 3 vertices are NaN or infinite"}
+    assert report.failed == {
+        "fatal": "the worker process was ended from outside by SIGKILL",
+        "nan": f"{tmp_path / 'nan.obj'}: 1 of 3 vertices are NaN or infinite",
+    }
+    assert not (tmp_path / "lib" / "fatal").exists()
 
 
 def test_drake_giving_up_is_a_failure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.core.frames import Array, grasp_from_axes
+from burg_drake.core.arrays import Array
+from burg_drake.core.frames import grasp_from_axes
 from burg_drake.ros.messages import MessageClasses
 from burg_drake.scene.document.scene import Scene, load_scene
 from tests.cameras.synthetic import board_image

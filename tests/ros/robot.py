@@ -15,7 +15,7 @@ import threading
 import time
 from pathlib import Path
 
-PERIOD = 0.1
+PERIOD = 0.25
 PATIENCE = 40.0
 
 

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.ros.board_node import BoardNode
 from burg_drake.scene.document.scene import Scene
 from tests.cameras.synthetic import board_image

@@ -22,13 +22,8 @@ from numpy.typing import NDArray
 
 from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.cameras.overlay.renderer import Overlay
-from burg_drake.core.frames import (
-    Array,
-    inverse,
-    make_pose,
-    rotation_angle,
-    rotation_from_quaternion,
-)
+from burg_drake.core.arrays import Array
+from burg_drake.core.frames import inverse, make_pose, rotation_angle, rotation_from_quaternion
 from burg_drake.scene.document.scene import Scene
 
 ROBOT = Path(__file__).with_name("robot.py")

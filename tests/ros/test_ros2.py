@@ -14,8 +14,8 @@ import pytest
 from numpy.typing import NDArray
 
 from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import MissingDependencyError
-from burg_drake.core.frames import Array
 from burg_drake.ros.board_node import BoardNode
 from burg_drake.ros.distribution import connect
 from burg_drake.ros.link import Names, Parent

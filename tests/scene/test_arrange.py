@@ -10,13 +10,14 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 from scipy.stats import chisquare, kstest
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import Array, transform_points
+from burg_drake.core.frames import transform_points
 from burg_drake.objects.library.document import ObjectLibrary, load_library
 from burg_drake.scene.arrangement.arranging import arrange, choose
 from burg_drake.scene.arrangement.object_shapes import ObjectShapes
 from burg_drake.scene.arrangement.occupancy import Arrangement, ObjectRequest, draw_pose
-from burg_drake.scene.document.layout import LAYOUTS, Layout, PoseChoice
+from burg_drake.scene.document.layout import LAYOUTS, LayoutName, PoseChoice
 from burg_drake.scene.document.scene import Board
 
 BOARD = Board(size=(0.594, 0.42))
@@ -33,7 +34,7 @@ OF_PIECES = ("banana", "bottle", "mug", "screwdriver", "scissors")
 
 def laid_out(
     shapes: ObjectShapes,
-    layout: Layout,
+    layout: LayoutName,
     seed: int,
     count: int = 6,
     only: tuple[str, ...] = (*OF_PIECES, "box", "can"),
@@ -66,7 +67,7 @@ def overlap(one: Array, other: Array) -> bool:
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
-def test_nothing_overlaps_or_is_beyond_the_edge(shapes: ObjectShapes, layout: Layout) -> None:
+def test_nothing_overlaps_or_is_beyond_the_edge(shapes: ObjectShapes, layout: LayoutName) -> None:
     arrangement = laid_out(shapes, layout, seed=1)
     assert len(arrangement.instances) + len(arrangement.missing) == 6
     assert len(arrangement.instances) >= 4
@@ -114,7 +115,7 @@ def hull_area(library: ObjectLibrary, arrangement: Arrangement) -> float:
 
 def test_packed_is_denser_than_all_random_ones(shapes: ObjectShapes) -> None:
     wanted = [ObjectRequest(name=f"box_{i}", object="box", pose=0) for i in range(4)]
-    areas: dict[Layout, list[float]] = {"packed": [], "close": []}
+    areas: dict[LayoutName, list[float]] = {"packed": [], "close": []}
     for layout, found in areas.items():
         for seed in range(5):
             rng = np.random.default_rng(seed)

@@ -7,7 +7,8 @@ import pytest
 import scipy.optimize
 from scipy.spatial import ConvexHull
 
-from burg_drake.core.frames import Array, make_pose, rotation_from_rpy, transform_points
+from burg_drake.core.arrays import Array
+from burg_drake.core.frames import make_pose, rotation_from_rpy, transform_points
 from burg_drake.objects.library.document import load_library
 from burg_drake.scene.arrangement.sweep import ConvexShapes, contact_distances
 

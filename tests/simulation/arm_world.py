@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from trial_world import make_station
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import Array, inverse, make_pose, rot_z
+from burg_drake.core.frames import inverse, make_pose, rot_z
 from burg_drake.core.paths.resources import resolve
 from burg_drake.motion.ik.panda import PandaIk
 from burg_drake.motion.plans.grasp_plan import Plan

@@ -25,14 +25,15 @@ from burg_drake.simulation.trials.hand_trial import HandTrial
 # Tests import what they share by name.
 sys.path.insert(0, str(Path(__file__).parent))
 
-from trial_world import BOX, BOX_MASS, POST, SLOW, box_mesh, make_station
+from trial_world import BOX, BOX_MASS, POST, QUICK, WIDE, box_mesh, make_station
 
 MakeScene = Callable[..., Scene]
 
 
 @pytest.fixture(scope="session")
 def library(measured_once: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Box, block, ball, can, bar, post, a box that weighs 20 kg; each stands on its origin."""
+    """Box, block, ball, can, bar, post, a box that weighs 20 kg, and one that is too wide for most
+    hands; each stands on its origin."""
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.03)
     ball.apply_translation((0.0, 0.0, 0.03))
     can = trimesh.creation.cylinder(radius=0.03, height=0.1, sections=64)
@@ -44,6 +45,7 @@ def library(measured_once: None, tmp_path_factory: pytest.TempPathFactory) -> Pa
         ObjectSource(name="ball", mesh=ball, mass=0.1),
         ObjectSource(name="can", mesh=can, mass=0.2),
         ObjectSource(name="bar", mesh=box_mesh((0.03, 0.30, 0.04)), mass=0.2),
+        ObjectSource(name="wide", mesh=box_mesh(WIDE), mass=BOX_MASS),
         ObjectSource(name="post", mesh=box_mesh(POST), mass=0.3),
     ]
     out = tmp_path_factory.mktemp("library")
@@ -75,10 +77,4 @@ def make_scene(library: Path, tmp_path_factory: pytest.TempPathFactory) -> MakeS
 @pytest.fixture(scope="session")
 def box_trial(make_scene: MakeScene) -> HandTrial:
     """The box alone."""
-    return HandTrial(make_scene(("box", 0.3, 0.2, 0.0)), make_station())
-
-
-@pytest.fixture(scope="session")
-def slow_trial(make_scene: MakeScene) -> HandTrial:
-    """The box alone, lifted slowly."""
-    return HandTrial(make_scene(("box", 0.3, 0.2, 0.0)), make_station(), settings=SLOW)
+    return HandTrial(make_scene(("box", 0.3, 0.2, 0.0)), make_station(), engine=QUICK)

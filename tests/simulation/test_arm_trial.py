@@ -11,11 +11,12 @@ import pytest
 from arm_world import HOME, LIFT, make_arm_station, straight_plan, timed
 from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.analysis import Simulator
-from trial_world import BOX_MASS, CENTRE, FORCE, GRAVITY, POST, from_above
+from trial_world import BOX_MASS, CENTRE, FORCE, GRAVITY, POST, QUICK, from_above
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array, make_pose, rotation_from_rpy
+from burg_drake.core.frames import make_pose, rotation_from_rpy
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.motion.ik.limits import ArmLimits
 from burg_drake.motion.plans.grasp_plan import Plan
@@ -29,14 +30,13 @@ from burg_drake.simulation.trials.result import TrialResult
 from burg_drake.simulation.trials.robot_contacts import RobotContactWatch
 from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.document.arm_control import ARM_STIFFNESS
-from burg_drake.station.document.engine import ENGINES
 from burg_drake.station.document.grasp_motion import GraspMotion
 from burg_drake.station.document.station_document import Obstacle
 
-QUICK = ENGINES["screening"]
-"""Of all trials here; `test_driven_arm` has those with the usual steps."""
 WHOLE = replace(QUICK, whole_trial=True)
 SWAP = np.diag([-1.0, -1.0, 1.0, 1.0])
+BESIDE = from_above(0.06, y=-0.03)
+"""Off the middle of the box."""
 SWEEP = 0.8
 """The base joint turns so far on the way to the grasp, in `sweeping` [rad]."""
 IN_THE_WAY = (0.12, 0.0)
@@ -57,6 +57,13 @@ def arm_trial(box_scene: Scene) -> ArmTrial:
 
 
 @pytest.fixture(scope="module")
+def whole_trial(box_scene: Scene, arm_trial: ArmTrial) -> ArmTrial:
+    """The same, never decided early."""
+    clearance = arm_trial.clearance
+    return ArmTrial(box_scene, make_arm_station(), engine=WHOLE, clearance=clearance)
+
+
+@pytest.fixture(scope="module")
 def hand_trial(box_scene: Scene) -> HandTrial:
     return HandTrial(box_scene, make_arm_station(), engine=QUICK)
 
@@ -69,6 +76,22 @@ def crowd(make_scene: MakeScene) -> ArmTrial:
         make_arm_station(),
         engine=QUICK,
     )
+
+
+@pytest.fixture(scope="module")
+def centred(arm_trial: ArmTrial) -> TrialResult:
+    return execute(arm_trial, CENTRE)
+
+
+@pytest.fixture(scope="module")
+def beside(arm_trial: ArmTrial) -> TrialResult:
+    return execute(arm_trial, BESIDE)
+
+
+@pytest.fixture(scope="module")
+def pushed(crowd: ArmTrial) -> TrialResult:
+    """On the way to the box the post is swept away."""
+    return crowd.run("box", CENTRE, sweeping(crowd))
 
 
 def execute(trial: ArmTrial, X_OG: Array, **overrides: float) -> TrialResult:
@@ -119,7 +142,9 @@ def test_ends_as_the_hand_alone_does(arm_trial, hand_trial, X_OG: Array, overrid
         assert result.margins.tilt == pytest.approx(alone.margins.tilt, abs=0.02)
 
 
-def test_goes_back_and_then_up_as_the_hand_alone_does(arm_trial, box_scene: Scene) -> None:
+def test_goes_back_and_then_up_as_the_hand_alone_does(
+    arm_trial, whole_trial, box_scene: Scene
+) -> None:
     motion = GraspMotion(retreat=0.1)
     hand = HandTrial(box_scene, make_arm_station(), engine=QUICK, motion=motion)
     tilted = from_above(0.07) @ make_pose(rotation_from_rpy((0.3, 0.0, 0.0)))  # about its closing
@@ -130,16 +155,19 @@ def test_goes_back_and_then_up_as_the_hand_alone_does(arm_trial, box_scene: Scen
     assert result.margins.lift == pytest.approx(0.1 + LIFT, abs=0.004)
     assert result.margins.lift == pytest.approx(alone.margins.lift, abs=0.002)
     assert result.margins.slip == pytest.approx(alone.margins.slip, abs=0.002)
-    whole = ArmTrial(box_scene, make_arm_station(), engine=WHOLE).run("box", tilted, plan)
+    whole = whole_trial.run("box", tilted, plan)
     assert whole.outcome is result.outcome
+    assert whole.margins.end_time > result.margins.end_time + 1.0  # which was decided on the way
     assert whole.margins.lift == pytest.approx(result.margins.lift, abs=0.001)
+    assert whole.margins.slip == pytest.approx(result.margins.slip, abs=0.001)
+    assert result.margins.tracking_error <= whole.margins.tracking_error < 0.004
     gap = replace(plan, retreat=replace(plan.retreat, q=plan.retreat.q + 0.1))
     with pytest.raises(InvalidInputError, match=r"retreat begins 0\.1 rad from where its approach"):
         arm_trial.run("box", tilted, gap)
 
 
-def test_margins_of_a_lift(arm_trial: ArmTrial) -> None:
-    margins = execute(arm_trial, CENTRE).margins
+def test_margins_of_a_lift(centred: TrialResult) -> None:
+    margins = centred.margins
     assert margins.pad_force == pytest.approx(FORCE, rel=0.01)
     assert margins.lift == pytest.approx(LIFT, abs=0.002)
     assert 0.0 < margins.tracking_error < 0.004
@@ -147,23 +175,15 @@ def test_margins_of_a_lift(arm_trial: ArmTrial) -> None:
     assert margins.pushed == 0.0
 
 
-def test_the_transfer_can_be_executed_too(box_scene: Scene, arm_trial: ArmTrial) -> None:
+def test_a_transfer_is_executed_and_looked_at_so_often_that_nothing_passes(
+    box_scene: Scene, arm_trial: ArmTrial, centred, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From look to look of a fast transfer the hand moves by less than a small object's size."""
     trial = ArmTrial(
         box_scene, make_arm_station(), engine=QUICK, transfer=True, clearance=arm_trial.clearance
     )
     plan = straight_plan(trial, trial.X_WG("box", CENTRE))
-    whole, short = trial.run("box", CENTRE, plan), arm_trial.run("box", CENTRE, plan)
-    assert whole.outcome is short.outcome is Outcome.LIFTED
-    assert whole.margins.end_time - short.margins.end_time == pytest.approx(2.0, abs=0.011)
-
-
-def test_a_transfer_is_looked_at_so_often_that_nothing_passes(
-    box_scene: Scene, arm_trial: ArmTrial, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """From look to look of a fast transfer the hand moves by less than a small object's size."""
-    trial = ArmTrial(box_scene, make_arm_station(), transfer=True, clearance=arm_trial.clearance)
-    plan = straight_plan(trial, trial.X_WG("box", CENTRE))
-    plan = replace(plan, transfer=timed(np.linspace(HOME, plan.approach.q[0], 5), 0.5))
+    plan = replace(plan, transfer=timed(np.linspace(HOME, plan.approach.q[0], 5), 1.2))
     plant_context = trial.diagram.plant.GetMyContextFromRoot(trial.context)
     places: list[Array] = []
     advance = Execution.advance
@@ -175,7 +195,9 @@ def test_a_transfer_is_looked_at_so_often_that_nothing_passes(
         return now
 
     monkeypatch.setattr(Execution, "advance", watched)
-    assert trial.run("box", CENTRE, plan).outcome is Outcome.LIFTED
+    result = trial.run("box", CENTRE, plan)
+    assert result.outcome is centred.outcome is Outcome.LIFTED
+    assert result.margins.end_time - centred.margins.end_time == pytest.approx(1.2, abs=0.011)
     ways = np.linalg.norm(np.diff(places, axis=0), axis=1)
     assert ways.sum() > 0.2
     assert ways.max() < 0.005
@@ -185,12 +207,16 @@ def test_a_transfer_is_looked_at_so_often_that_nothing_passes(
 # --- statics ------------------------------------------------------------------------------------
 
 
-def test_the_load_turns_the_joints_against_their_servos(box_scene: Scene) -> None:
-    """Held at rest: stiffness times deviation balances the box's weight, by virtual work."""
-    trial = ArmTrial(box_scene, make_arm_station(), engine=WHOLE)
+def test_the_load_turns_the_joints_against_their_servos(whole_trial: ArmTrial) -> None:
+    """Held at rest: stiffness times deviation balances the box's weight, by virtual work. On the
+    way the lag is as large as `largest_lag` says."""
+    trial = whole_trial
     plan = straight_plan(trial, trial.X_WG("box", CENTRE))
-    mass = 1.5
-    assert trial.run("box", CENTRE, plan, friction=0.9, mass=mass).outcome is Outcome.LIFTED
+    for mass in (BOX_MASS, 1.5):
+        result = trial.run("box", CENTRE, plan, friction=0.9, mass=mass)
+        assert result.outcome is Outcome.LIFTED
+        lag = largest_lag(trial, plan, mass)
+        assert result.margins.tracking_distance == pytest.approx(lag, rel=0.1)
     plant = trial.diagram.plant
     context = plant.GetMyContextFromRoot(trial.context)
     box = plant.get_body(trial.diagram.free["box"])
@@ -209,13 +235,9 @@ def test_the_load_turns_the_joints_against_their_servos(box_scene: Scene) -> Non
     assert actuation == pytest.approx(torque, abs=0.05)
 
 
-@pytest.mark.parametrize("mass", [BOX_MASS, 1.5])
-def test_the_lag_is_that_of_the_loads(box_scene: Scene, mass: float) -> None:
+def largest_lag(trial: ArmTrial, plan: Plan, mass: float) -> float:
     """Rigid-body dynamics over stiffness: what the links' inertia and, on the way up, the box ask
-    for turns the joints against their servos by as much."""
-    trial = ArmTrial(box_scene, make_arm_station(), engine=WHOLE)
-    plan = straight_plan(trial, trial.X_WG("box", CENTRE))
-    margins = trial.run("box", CENTRE, plan, friction=0.9, mass=mass).margins
+    for turns the joints against their servos by as much [m]."""
     plant = trial.diagram.plant
     context, world = plant.CreateDefaultContext(), plant.world_frame()
     where = [joint.position_start() for joint in trial.diagram.arm_joints]
@@ -231,7 +253,7 @@ def test_the_lag_is_that_of_the_loads(box_scene: Scene, mass: float) -> None:
             torque = plant.CalcMassMatrix(context)[np.ix_(moving, moving)] @ a
             torque += load * J.T @ (J @ a + [0.0, 0.0, GRAVITY])
             lag = max(lag, float(np.linalg.norm(J @ (torque / ARM_STIFFNESS))))
-    assert margins.tracking_distance == pytest.approx(lag, rel=0.1)
+    return lag
 
 
 def test_a_torque_is_limited(arm_trial: ArmTrial) -> None:
@@ -272,34 +294,31 @@ def test_feedforward_adds_to_the_servos(arm_trial: ArmTrial) -> None:
 # --- symmetries ---------------------------------------------------------------------------------
 
 
-def test_swapped_fingers_make_no_difference(arm_trial: ArmTrial) -> None:
+def test_swapped_fingers_make_no_difference(arm_trial: ArmTrial, beside: TrialResult) -> None:
     """Up to the torques of the arm, which holds the hand in another posture."""
-    X_OG = from_above(0.06, y=-0.03)
-    one = execute(arm_trial, X_OG)
-    plan = straight_plan(arm_trial, arm_trial.X_WG("box", X_OG) @ SWAP)
-    other = arm_trial.run("box", X_OG, plan)
-    assert one.outcome is other.outcome is Outcome.LIFTED
+    plan = straight_plan(arm_trial, arm_trial.X_WG("box", BESIDE) @ SWAP)
+    other = arm_trial.run("box", BESIDE, plan)
+    assert beside.outcome is other.outcome is Outcome.LIFTED
     for name, tolerance in (("slip", 2e-4), ("tilt", 2e-3), ("lift", 5e-4), ("pad_force", 0.05)):
-        first, second = getattr(one.margins, name), getattr(other.margins, name)
+        first, second = getattr(beside.margins, name), getattr(other.margins, name)
         assert first == pytest.approx(second, abs=tolerance), name
 
 
-def test_where_the_world_points_makes_no_difference(arm_trial: ArmTrial, box_scene: Scene) -> None:
+def test_where_the_world_points_makes_no_difference(box_scene: Scene, beside: TrialResult) -> None:
     turned = ArmTrial(box_scene, make_arm_station(angle=0.65), engine=QUICK)
-    for X_OG in (CENTRE, from_above(0.06, y=-0.03)):
-        one, other = execute(arm_trial, X_OG), execute(turned, X_OG)
-        assert one.outcome is other.outcome is Outcome.LIFTED
-        assert one.margins.end_time == other.margins.end_time
-        for name in ("slip", "tilt", "lift", "pad_force", "tracking_error", "tracking_distance"):
-            first, second = getattr(one.margins, name), getattr(other.margins, name)
-            assert first == pytest.approx(second, rel=0.02, abs=2e-5), name
+    other = execute(turned, BESIDE)
+    assert beside.outcome is other.outcome is Outcome.LIFTED
+    assert beside.margins.end_time == other.margins.end_time
+    for name in ("slip", "tilt", "lift", "pad_force", "tracking_error", "tracking_distance"):
+        first, second = getattr(beside.margins, name), getattr(other.margins, name)
+        assert first == pytest.approx(second, rel=0.02, abs=2e-5), name
 
 
 # --- what stands in the way ---------------------------------------------------------------------
 
 
-def test_a_link_pushes_an_object_over(crowd: ArmTrial) -> None:
-    result = crowd.run("box", CENTRE, sweeping(crowd))
+def test_a_link_pushes_an_object_over(crowd: ArmTrial, pushed: TrialResult) -> None:
+    result = pushed
     assert re.fullmatch(r"panda_link\d vs post", result.touched)
     assert result.pushed["post"] > 0.02
     assert result.margins.pushed == max(result.pushed.values())
@@ -337,13 +356,11 @@ def test_what_is_fixed_is_met_while_the_target_is_held(box_scene: Scene) -> None
     station = make_arm_station(obstacles={"pole": pole})
     trial = ArmTrial(box_scene, station, engine=WHOLE)
     plan = straight_plan(trial, trial.X_WG("box", CENTRE))
-    for turn, outcome in ((0.0, Outcome.LIFTED), (0.2, Outcome.BLOCKED)):
-        execution = trial.begin("box", plan)
-        assert (execution.approach(), execution.close(), execution.lift()) == (None, None, None)
-        q = plan.lift.q[-1] + turn * np.eye(7)[0]
-        trial.command("arm", np.append(q, np.zeros(7)))
-        assert (execution.hold() or execution.held()) is outcome
-    assert execution.result(outcome).blocker.endswith("pole")
+    execution = trial.begin("box", plan)
+    assert (execution.approach(), execution.close(), execution.lift()) == (None, None, None)
+    trial.command("arm", np.append(plan.lift.q[-1] + 0.2 * np.eye(7)[0], np.zeros(7)))
+    assert execution.hold() is Outcome.BLOCKED
+    assert execution.result(Outcome.BLOCKED).blocker.endswith("pole")
 
 
 def test_what_the_hand_touches_at_the_grasp_and_after(crowd: ArmTrial) -> None:
@@ -394,26 +411,19 @@ def test_the_hand_is_stopped_by_the_table(arm_trial: ArmTrial) -> None:
 # --- the same bits ------------------------------------------------------------------------------
 
 
-def test_the_same_bits_whatever_was_executed_before(crowd: ArmTrial, make_scene) -> None:
-    def lifted(trial: ArmTrial) -> dict[str, str]:
-        return exact(execute(trial, CENTRE))
-
-    def pushed(trial: ArmTrial) -> dict[str, str]:
-        return exact(trial.run("box", CENTRE, sweeping(trial)))
-
+def test_the_same_bits_whatever_was_executed_before(crowd: ArmTrial, pushed: TrialResult) -> None:
     def slips(trial: ArmTrial) -> dict[str, str]:
         return exact(execute(trial, from_above(0.066, y=0.01), friction=0.02, mass=0.5))
 
-    trials = (lifted, pushed, slips)
     new = ArmTrial(crowd.diagram.scene, make_arm_station(), engine=QUICK)
-    found = [run(new) for run in trials]
-    assert len({result["outcome"] for result in found}) == 3
-    assert [run(crowd) for run in trials[::-1]] == found[::-1]
+    assert slips(new) == slips(crowd)
+    assert exact(new.run("box", CENTRE, sweeping(new))) == exact(pushed)
 
 
-def test_after_a_trial_that_failed(arm_trial: ArmTrial, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_after_a_trial_that_failed(
+    arm_trial: ArmTrial, centred: TrialResult, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The state turns into NaN in the middle of a trial, after which no more can be told."""
-    before = exact(execute(arm_trial, CENTRE))
     advance = Execution.advance
 
     def spoil(execution: Execution, steps: int | None = None) -> float:
@@ -428,17 +438,7 @@ def test_after_a_trial_that_failed(arm_trial: ArmTrial, monkeypatch: pytest.Monk
         failed = execute(arm_trial, CENTRE)
     assert failed.outcome is Outcome.SIMULATION_FAILED
     assert failed.reason
-    assert exact(execute(arm_trial, CENTRE)) == before
-
-
-def test_a_whole_trial_ends_as_one_that_is_decided_early(box_scene: Scene, arm_trial) -> None:
-    trial = ArmTrial(box_scene, make_arm_station(), engine=WHOLE, clearance=arm_trial.clearance)
-    whole, early = execute(trial, CENTRE), execute(arm_trial, CENTRE)
-    assert whole.outcome is early.outcome is Outcome.LIFTED
-    assert whole.margins.end_time > early.margins.end_time + 1.0
-    assert whole.margins.lift == pytest.approx(early.margins.lift, abs=0.001)
-    assert whole.margins.slip == pytest.approx(early.margins.slip, abs=0.001)
-    assert early.margins.tracking_error <= whole.margins.tracking_error < 0.004
+    assert exact(execute(arm_trial, CENTRE)) == exact(centred)
 
 
 # --- plans that do not fit ----------------------------------------------------------------------

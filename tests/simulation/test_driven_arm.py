@@ -13,8 +13,8 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.analysis import Simulator
 from trial_world import BOX_MASS, CENTRE, FORCE, GRAVITY
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.motion.ik.limits import ArmLimits
 from burg_drake.motion.plans.grasp_plan import Plan

@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
-from trial_world import BOX, CENTRE, FORCE, GRAVITY, PAD, from_above, lifting, make_station
+from trial_world import BOX, CENTRE, FORCE, GRAVITY, PAD, QUICK, from_above, lifting, make_station
 
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
@@ -16,7 +16,6 @@ from burg_drake.scene.document.scene import Instance
 from burg_drake.simulation.trials.execution import Execution
 from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.simulation.trials.result import TrialResult
-from burg_drake.station.document.engine import ENGINES
 from burg_drake.station.document.station_document import Obstacle
 
 
@@ -36,9 +35,9 @@ def test_centred_grasp_holds_with_the_commanded_force(box_trial: HandTrial) -> N
 
 
 def test_the_whole_trial_confirms_what_was_decided_on_the_way(make_scene, box_trial) -> None:
-    engine = replace(ENGINES["standard"], whole_trial=True)
+    engine = replace(QUICK, whole_trial=True)
     whole = HandTrial(make_scene(("box", 0.3, 0.2, 0.0)), make_station(), engine=engine)
-    for X_OG in GRASPS:
+    for X_OG in (CENTRE, GRASPS[3]):
         early, full = (t.run("box", X_OG) for t in (box_trial, whole))
         assert early.margins.end_time < 0.6 < 1.75 < full.margins.end_time
         assert_same(early, full)
@@ -56,7 +55,7 @@ def test_tilt_of_an_eccentric_grasp_falls_with_friction(box_trial: HandTrial) ->
 
 def test_dropped_while_holding(make_scene, monkeypatch: pytest.MonkeyPatch) -> None:
     """The pads lose most of their friction once the box is up."""
-    engine = replace(ENGINES["standard"], whole_trial=True)
+    engine = replace(QUICK, whole_trial=True)
     trial = HandTrial(make_scene(("box", 0.3, 0.2, 0.0)), make_station(), engine=engine)
     lift = Execution.lift
     greased = []
@@ -85,7 +84,9 @@ def test_half_of_the_lift_is_lifted(make_scene, share: float, outcome: str) -> N
     A = 4 * height / time**2
     a = share * A / (2 - share)
     settings = lifting(height, time)
-    trial = HandTrial(make_scene(("post", 0.3, 0.2, 0.0)), make_station(), settings=settings)
+    trial = HandTrial(
+        make_scene(("post", 0.3, 0.2, 0.0)), make_station(), settings=settings, engine=QUICK
+    )
     sideways = grasp_from_axes((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.2))
     result = trial.run("post", sideways, friction=mass * (GRAVITY + a) / (2 * FORCE))
     assert result.outcome == outcome
@@ -96,7 +97,7 @@ def test_what_lies_on_one_finger_in_the_end_is_not_held(
     make_scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Gripped from above and below; then the hand opens slowly, and the block stays on a finger."""
-    engine = replace(ENGINES["standard"], whole_trial=True)
+    engine = replace(QUICK, whole_trial=True)
     block = Instance(object="block", X_SO=Pose((0.3, 0.2, 0.3)))
     trial = HandTrial(make_scene(block), make_station(), engine=engine)
     lift = Execution.lift
@@ -125,7 +126,7 @@ def test_thin_air(box_trial: HandTrial) -> None:
 
 def test_squeezed_out(make_scene) -> None:
     """Pads that close beside the middle of a slippery ball push it away."""
-    trial = HandTrial(make_scene(("ball", 0.3, 0.2, 0.0)), make_station())
+    trial = HandTrial(make_scene(("ball", 0.3, 0.2, 0.0)), make_station(), engine=QUICK)
     result = trial.run("ball", from_above(0.03, y=0.026), friction=0.05)
     assert result.outcome is Outcome.CLOSED_EMPTY
 
@@ -133,7 +134,7 @@ def test_squeezed_out(make_scene) -> None:
 def test_one_finger_against_an_object_that_does_not_move(make_scene) -> None:
     """20 kg with a coefficient of 1.5 on a table of 0.5 rub with 147 N, more than both fingers'
     80 N: the first finger stops the hand."""
-    trial = HandTrial(make_scene(("heavy", 0.3, 0.2, 0.0)), make_station())
+    trial = HandTrial(make_scene(("heavy", 0.3, 0.2, 0.0)), make_station(), engine=QUICK)
     result = trial.run("heavy", from_above(0.05, x=0.006), friction=1.5)
     assert result.outcome is Outcome.ONE_FINGER
     assert result.margins.lift == pytest.approx(0.0, abs=4e-3)  # it sinks in a little
@@ -157,7 +158,7 @@ def test_fingers_push_a_light_object_to_the_middle(box_trial: HandTrial) -> None
 def test_start_collisions(make_scene, X_OG, outcome, blocker, overlap) -> None:
     scene = make_scene(("box", 0.3, 0.2, 0.0), ("block", 0.15 - 0.04, 0.2, 0.0))
     post = Obstacle(X_WB=Pose((0.34, 0.4, 0.1)), size=(0.04, 0.04, 0.2))
-    result = HandTrial(scene, make_station(obstacles={"post": post})).run("box", X_OG)
+    result = HandTrial(scene, make_station(obstacles={"post": post}), engine=QUICK).run("box", X_OG)
     assert (result.outcome, result.blocker) == (outcome, blocker)
     if overlap is None:
         assert result.margins.overlap > 0.001
@@ -194,25 +195,32 @@ def assert_same(one: TrialResult, other: TrialResult) -> None:
     assert one.margins.lift == pytest.approx(other.margins.lift, abs=2e-3)
 
 
-def test_swapped_fingers_are_the_same_grasp(box_trial: HandTrial) -> None:
-    for X_OG in GRASPS:
-        one, other = (box_trial.run("box", X, friction=0.15) for X in (X_OG, swap_fingers(X_OG)))
-        assert_same(one, other)
+@pytest.fixture(scope="module")
+def results(box_trial: HandTrial) -> list[TrialResult]:
+    """Of these grasps, with little friction."""
+    return [box_trial.run("box", X_OG, friction=0.15) for X_OG in GRASPS]
 
 
-def test_turned_and_moved_world_is_the_same_world(make_scene, box_trial: HandTrial) -> None:
+def test_swapped_fingers_are_the_same_grasp(box_trial: HandTrial, results) -> None:
+    for X_OG, result in zip(GRASPS, results, strict=True):
+        assert_same(result, box_trial.run("box", swap_fingers(X_OG), friction=0.15))
+
+
+def test_turned_and_moved_world_is_the_same_world(make_scene, results) -> None:
     turned = HandTrial(
         make_scene(("box", 0.3, 0.2, 0.0)),
         make_station(X_WS=Pose((0.4, -0.1, 0.0), rpy_deg=(0.0, 0.0, 37.0))),
+        engine=QUICK,
     )
-    for X_OG in GRASPS:
-        one, other = (t.run("box", X_OG, friction=0.15) for t in (box_trial, turned))
-        assert_same(one, other)
+    for X_OG, result in zip(GRASPS, results, strict=True):
+        assert_same(result, turned.run("box", X_OG, friction=0.15))
 
 
 def test_bystanders_do_not_change_a_trial_and_are_not_moved(make_scene, box_trial) -> None:
     crowded = HandTrial(
-        make_scene(("box", 0.3, 0.2, 0.0), ("block", 0.55, 0.35, 20.0)), make_station()
+        make_scene(("box", 0.3, 0.2, 0.0), ("block", 0.55, 0.35, 20.0)),
+        make_station(),
+        engine=QUICK,
     )
     alone, watched = box_trial.run("box", CENTRE), crowded.run("box", CENTRE)
     assert watched.outcome is alone.outcome
@@ -222,7 +230,7 @@ def test_bystanders_do_not_change_a_trial_and_are_not_moved(make_scene, box_tria
 
 def test_neighbour_on_top_goes_up_with_the_target(make_scene) -> None:
     block = Instance(object="block", X_SO=Pose((0.3, 0.235, BOX[2])))
-    trial = HandTrial(make_scene(("box", 0.3, 0.2, 0.0), block), make_station())
+    trial = HandTrial(make_scene(("box", 0.3, 0.2, 0.0), block), make_station(), engine=QUICK)
     result = trial.run("box", from_above(0.05, y=-0.03), friction=0.8)
     assert result.outcome is Outcome.LIFTED_DISTURBED
     assert result.displacements == {"block": result.margins.others_moved}
@@ -238,8 +246,8 @@ def test_neighbours_in_the_way_of_a_finger_are_pushed_as_if_never_locked(make_sc
         Instance(name="far", object="block", X_SO=Pose((0.1, 0.35, 0.0))),
     )
     X_OG = from_above(0.065, x=0.006)
-    lazy = HandTrial(scene, make_station()).run("box", X_OG)
-    full = HandTrial(scene, make_station(), lock=False).run("box", X_OG)
+    lazy = HandTrial(scene, make_station(), engine=QUICK).run("box", X_OG)
+    full = HandTrial(scene, make_station(), lock=False, engine=QUICK).run("box", X_OG)
     assert lazy.outcome is full.outcome is Outcome.LIFTED
     assert lazy.margins.others_moved > 0.002
     np.testing.assert_allclose(margins(lazy)[:6], margins(full)[:6], rtol=0.05, atol=1e-3)

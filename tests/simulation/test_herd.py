@@ -7,7 +7,7 @@ import pytest
 from pydrake.multibody.math import SpatialVelocity
 from trial_world import make_station
 
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 from burg_drake.scene.arrangement.object_shapes import ObjectShapes
 from burg_drake.simulation.rest.relaxation import RELAXING, relax
 from burg_drake.simulation.settling.board_edge import BoardEdgeGuard

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from trial_world import from_above, make_station
+from trial_world import QUICK, from_above, make_station
 
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.grasps.outcome import Outcome
@@ -19,12 +19,10 @@ from burg_drake.scene.document.scene import Instance, Scene
 from burg_drake.simulation.trials.execution import Execution
 from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.simulation.trials.result import TrialResult
-from burg_drake.station.document.engine import ENGINES
 
 GRASPS = {
     "lifted": ("box", from_above(0.065), None, None),
     "slipped": ("box", from_above(0.066, y=0.01, yaw=0.1), 0.02, None),
-    "tilted": ("box", from_above(0.07, y=-0.02), 0.2, None),
     "heavier": ("box", from_above(0.07, x=-0.005), None, 0.9),
     "pushes the block": ("box", from_above(0.065, x=0.006), None, None),
     "carries the block": ("carrier", from_above(0.05, y=-0.03), 0.8, 0.25),
@@ -33,8 +31,6 @@ GRASPS = {
     "slippery ball": ("ball", from_above(0.03, y=0.024), 0.05, None),
 }
 """Target, grasp, friction and mass."""
-QUICK = ENGINES["screening"]
-"""What a trial leaves behind does not depend on the length of its steps."""
 
 
 def exact(result: TrialResult) -> dict[str, str]:
@@ -79,7 +75,7 @@ def test_trials_differ_from_each_other(alone) -> None:
 def test_in_a_batch(scene: Scene, alone) -> None:
     """After each other and after itself; backwards they are executed in another process, below."""
     trial = HandTrial(scene, make_station(), engine=QUICK)
-    for name in (name for name in GRASPS for _ in range(2)):
+    for name in (*GRASPS, [*GRASPS][-1]):
         assert execute(trial, name) == alone[name], name
 
 
@@ -100,7 +96,7 @@ def test_after_a_trial_that_failed(scene: Scene, alone, monkeypatch: pytest.Monk
         failed = trial.run("box", from_above(0.065))
     assert failed.outcome is Outcome.SIMULATION_FAILED
     assert failed.reason
-    for name in ("carries the block", "lifted", "slippery ball"):
+    for name in ("carries the block", "lifted"):
         assert execute(trial, name) == alone[name], name
 
 
@@ -113,7 +109,7 @@ def test_after_a_trial_that_was_left_in_the_middle(scene: Scene, alone) -> None:
     assert execution.close() is None
     trial.command("lift", np.array([0.0, 0.2]))
     execution.advance()
-    for name in ("carries the block", "lifted", "heavier"):
+    for name in ("carries the block", "heavier"):
         assert execute(trial, name) == alone[name], name
 
 
@@ -122,7 +118,7 @@ import json, sys
 sys.path[:] = json.loads(sys.argv[1])
 from test_identity import GRASPS, execute, load_scene_trial
 trial = load_scene_trial(sys.argv[2])
-print(json.dumps({name: execute(trial, name) for name in reversed(GRASPS)}))
+print(json.dumps({name: execute(trial, name) for name in list(GRASPS)[::-2]}))
 """
 
 
@@ -139,4 +135,4 @@ def test_in_another_process_backwards(scene: Scene, alone) -> None:
         [sys.executable, "-c", PROGRAM, path, str(scene.path)],
         check=True, capture_output=True, text=True,
     )  # fmt: skip
-    assert json.loads(run.stdout) == alone
+    assert json.loads(run.stdout) == {name: alone[name] for name in list(GRASPS)[::-2]}

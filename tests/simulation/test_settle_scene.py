@@ -14,7 +14,7 @@ from burg_drake.objects.library.document import load_library
 from burg_drake.scene.arrangement.object_shapes import ObjectShapes
 from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
 from burg_drake.simulation.settling.landing import drop_onto_scene
-from burg_drake.simulation.settling.settled_scene import settle_scene
+from burg_drake.simulation.settling.settled_scene import SettledScene, settle_scene
 from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.station.checks.scene_issues import overlaps
 from burg_drake.station.diagram.builder import build_station_diagram
@@ -40,12 +40,16 @@ def stack(make_scene) -> Scene:
 
 
 @pytest.fixture(scope="module")
-def settled_stack(stack: Scene) -> Scene:
-    return settle_scene(stack, make_station()).scene
+def settled(stack: Scene) -> SettledScene:
+    return settle_scene(stack, make_station())
 
 
-def test_a_stack_stays_a_stack(stack: Scene) -> None:
-    settled = settle_scene(stack, make_station())
+@pytest.fixture(scope="module")
+def settled_stack(settled: SettledScene) -> Scene:
+    return settled.scene
+
+
+def test_a_stack_stays_a_stack(settled: SettledScene) -> None:
     assert settled.at_rest and settled.fallen == () and settled.duration < 1.0
     for k, name in enumerate(("low", "middle", "high")):
         fall = 0.001 * (k + 1)
@@ -73,7 +77,6 @@ def test_a_heap_of_household_objects(tmp_path) -> None:
     library = load_library("household")
     instances = (
         placed("bowl", "bowl", 0.3, 0.2, 0.0),
-        placed("banana", "banana", 0.3, 0.2, 0.12),
         placed("screwdriver", "screwdriver", 0.3, 0.2, 0.3),
     )
     document = SceneDocument(name="heap", library="household", instances=instances)

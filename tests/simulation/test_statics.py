@@ -56,24 +56,7 @@ def slow_trials(make_scene: Callable[..., Scene]) -> dict[str, HandTrial]:
     }
 
 
-def bisected(holds: Callable[[float], bool], low: float, high: float, *, steps: int = 6) -> float:
-    """Where `holds` changes between two values."""
-    assert holds(high) and not holds(low)
-    for _ in range(steps):
-        middle = (low + high) / 2
-        low, high = (low, middle) if holds(middle) else (middle, high)
-    return (low + high) / 2
-
-
 # --- pad force and load -------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("engine", ENGINES)
-def test_pads_press_with_the_commanded_force(make_scene, engine: str) -> None:
-    trial = HandTrial(make_scene(("box", 0.3, 0.2, 0.0)), make_station(), engine=ENGINES[engine])
-    result = trial.run("box", CENTRE)
-    assert result.outcome is Outcome.LIFTED
-    assert result.margins.pad_force == pytest.approx(FORCE, rel=0.01)
 
 
 @pytest.mark.parametrize(("name", "height"), [("ball", 0.03), ("can", 0.08)])
@@ -93,7 +76,7 @@ def test_pads_carry_the_weight_and_press_against_each_other(slow_trials) -> None
     assert left[:2] + right[:2] == pytest.approx(np.zeros(2), abs=0.01 * FORCE)
 
 
-@pytest.mark.parametrize("friction", [0.005, 0.01, 0.02])
+@pytest.mark.parametrize("friction", [0.005, 0.02])
 def test_pads_that_slide_pull_with_coulombs_force(slow_trials, friction: float) -> None:
     """The box stays on the table, and the hand rises past it at a steady speed."""
     trial = slow_trials["standard"]
@@ -115,35 +98,27 @@ def box_grasp(trial: HandTrial) -> np.ndarray:
 # --- payload ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("engine", ["standard", "screening"])
-def test_smallest_friction_that_holds(slow_trials, engine: str) -> None:
-    """2 mu N = m g."""
-    trial = slow_trials[engine]
-
-    def holds(share: float) -> bool:
-        return trial.run("box", CENTRE, friction=share * COULOMB_FRICTION).outcome.held
-
-    assert bisected(holds, 0.9, 1.1) == pytest.approx(1.0, abs=0.01)
+@pytest.mark.parametrize(
+    ("engine", "tolerance"), [("reference", 0.02), ("standard", 0.01), ("screening", 0.01)]
+)
+def test_smallest_friction_that_holds(slow_trials, engine: str, tolerance: float) -> None:
+    """2 mu N = m g, with the commanded force."""
+    lost, held = (
+        slow_trials[engine].run("box", CENTRE, friction=share * COULOMB_FRICTION)
+        for share in (1.0 - tolerance, 1.0 + tolerance)
+    )
+    assert not lost.outcome.held and held.outcome is Outcome.LIFTED
+    assert held.margins.pad_force == pytest.approx(FORCE, rel=0.01)
 
 
 @pytest.mark.parametrize("engine", ["standard", "screening"])
 def test_largest_mass_that_is_held(slow_trials, engine: str) -> None:
     """2 mu N = m g."""
-    trial = slow_trials[engine]
-
-    def holds(share: float) -> bool:
-        return trial.run("box", CENTRE, friction=0.08, mass=COULOMB_MASS / share).outcome.held
-
-    assert bisected(holds, 0.9, 1.1) == pytest.approx(1.0, abs=0.01)
-
-
-def test_the_reference_knows_the_payload_as_well(slow_trials) -> None:
-    for share in (0.98, 1.02):
-        by_friction = slow_trials["reference"].run("box", CENTRE, friction=share * COULOMB_FRICTION)
-        by_mass = slow_trials["reference"].run(
-            "box", CENTRE, friction=0.08, mass=COULOMB_MASS / share
-        )
-        assert by_friction.outcome.held is by_mass.outcome.held is (share > 1.0)
+    lost, held = (
+        slow_trials[engine].run("box", CENTRE, friction=0.08, mass=COULOMB_MASS / share)
+        for share in (0.99, 1.01)
+    )
+    assert not lost.outcome.held and held.outcome.held
 
 
 # --- torsion ------------------------------------------------------------------------------------
@@ -204,9 +179,8 @@ def test_smallest_friction_that_keeps_a_bar_level(bar_trials, engine, tolerance)
         return bar_trials[engine].run("bar", X_OG, friction=friction).margins.tilt
 
     assert tilt(0.9) == pytest.approx(STEEP_LIFT / far_end, rel=0.05)
+    assert tilt(1.0 - tolerance) > np.deg2rad(2.5) > tilt(1.0 + tolerance)
     assert tilt(1.3) < np.deg2rad(0.5)
-    limit = bisected(lambda share: tilt(share) < np.deg2rad(2.5), 0.9, 1.3, steps=5)
-    assert limit == pytest.approx(1.0, abs=tolerance)
 
 
 # --- contact patches ----------------------------------------------------------------------------

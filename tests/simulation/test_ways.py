@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
-from trial_world import CENTRE, FORCE, GRAVITY, from_above, lifting, make_station
+from trial_world import CENTRE, FORCE, GRAVITY, QUICK, from_above, lifting, make_station
 
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
@@ -16,11 +16,10 @@ from burg_drake.scene.document.scene import Instance
 from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.diagram.floating_hand import FloatingHand
-from burg_drake.station.document.engine import ENGINES
 from burg_drake.station.document.grasp_motion import GraspMotion
 from burg_drake.station.document.station_document import Obstacle
 
-WHOLE = replace(ENGINES["standard"], whole_trial=True)
+WHOLE = replace(QUICK, whole_trial=True)
 IN_THE_AIR = Instance(object="box", X_SO=Pose((0.3, 0.2, 0.6)))
 BLOCK = Instance(object="block", X_SO=Pose((0.3, 0.2, 0.6)))
 BLOCK_MASS, MIDDLE = 0.1, from_above(0.025)
@@ -51,17 +50,20 @@ def test_the_joint_goes_along_any_direction_and_begins_where_the_hand_is(make_sc
 
 def test_a_retreat_straight_up_is_a_lift(make_scene, box_trial: HandTrial) -> None:
     motion = GraspMotion(retreat=0.30, lift_height=0.0)
-    retreat = HandTrial(make_scene(("box", 0.3, 0.2, 0.0)), make_station(), motion=motion)
-    for X_OG in (CENTRE, from_above(0.06, y=0.02)):
-        one, other = retreat.run("box", X_OG), box_trial.run("box", X_OG)
-        assert one.outcome is other.outcome is Outcome.LIFTED
-        assert asdict(one.margins) == asdict(other.margins)
+    retreat = HandTrial(
+        make_scene(("box", 0.3, 0.2, 0.0)), make_station(), motion=motion, engine=QUICK
+    )
+    one, other = (trial.run("box", from_above(0.06, y=0.02)) for trial in (retreat, box_trial))
+    assert one.outcome is other.outcome is Outcome.LIFTED
+    assert asdict(one.margins) == asdict(other.margins)
 
 
 def test_a_lift_in_two_parts_is_as_long_as_both(make_scene, box_trial: HandTrial) -> None:
     """The hand stands still between them, in which the box must not jump."""
     motion = GraspMotion(retreat=0.1, lift_height=0.2)
-    trial = HandTrial(make_scene(("box", 0.3, 0.2, 0.0)), make_station(), motion=motion)
+    trial = HandTrial(
+        make_scene(("box", 0.3, 0.2, 0.0)), make_station(), motion=motion, engine=QUICK
+    )
     result, at_once = trial.run("box", CENTRE), box_trial.run("box", CENTRE)
     assert result.outcome is Outcome.LIFTED
     assert result.margins.lift == pytest.approx(0.30, abs=0.001)
@@ -70,7 +72,7 @@ def test_a_lift_in_two_parts_is_as_long_as_both(make_scene, box_trial: HandTrial
 
 
 @pytest.mark.parametrize(
-    "u", [(0, 0, 1), (0, 1, 0), (0, -1, 1), (0, 0, -1)], ids=["up", "sideways", "tilted", "down"]
+    "u", [(0, 1, 0), (0, -1, 1), (0, 0, -1)], ids=["sideways", "tilted", "down"]
 )
 def test_friction_bears_weight_and_acceleration(make_scene, u: tuple[float, ...]) -> None:
     """2 mu N = m |g z + a u|, where the hand accelerates by a along u and brakes by as much."""
@@ -94,7 +96,7 @@ def test_what_is_decided_on_a_tilted_way_is_confirmed_by_the_whole_trial(make_sc
     scene, station = make_scene(IN_THE_AIR), make_station()
     early, whole = (
         HandTrial(scene, station, engine=e, motion=motion).run("box", CENTRE)
-        for e in (ENGINES["standard"], WHOLE)
+        for e in (QUICK, WHOLE)
     )
     assert early.outcome is whole.outcome is Outcome.LIFTED
     assert early.margins.end_time < whole.margins.end_time - 0.5
@@ -128,7 +130,7 @@ def board(z: float) -> dict[str, Obstacle]:
 def test_a_retreat_leads_out_from_under_a_board(make_scene) -> None:
     scene, station = make_scene(("box", 0.3, 0.2, 0.0)), make_station(obstacles=board(0.15))
     up, out = (
-        HandTrial(scene, station, motion=motion).run("box", FROM_THE_SIDE)
+        HandTrial(scene, station, motion=motion, engine=QUICK).run("box", FROM_THE_SIDE)
         for motion in (GraspMotion(), GraspMotion(retreat=0.2))
     )
     assert (up.outcome, up.blocker) == (Outcome.BLOCKED, "shelf")
@@ -140,18 +142,20 @@ def test_a_station_says_where_the_hand_goes(make_scene) -> None:
     """Unless the call does: under the board there is room for a lift of 2 cm."""
     scene, station = make_scene(("box", 0.3, 0.2, 0.0)), make_station(obstacles=board(0.15))
     low = replace(station, document=replace(station.document, motion=GraspMotion(lift_height=0.02)))
-    trial = HandTrial(scene, low)
+    trial = HandTrial(scene, low, engine=QUICK)
     result = trial.run("box", FROM_THE_SIDE)
     assert result.outcome is Outcome.LIFTED
     assert result.margins.lift == pytest.approx(0.02, abs=0.001)
     assert trial.run("box", FROM_THE_SIDE, lift=0.3).outcome is Outcome.BLOCKED
-    high = HandTrial(scene, low, motion=GraspMotion()).run("box", FROM_THE_SIDE)
+    high = HandTrial(scene, low, motion=GraspMotion(), engine=QUICK).run("box", FROM_THE_SIDE)
     assert high.outcome is Outcome.BLOCKED
 
 
 def test_a_way_down_through_the_table_is_blocked(make_scene) -> None:
     motion = GraspMotion(lift_direction=(0.0, 0.0, -1.0))
-    trial = HandTrial(make_scene(("box", 0.3, 0.2, 0.0)), make_station(), motion=motion)
+    trial = HandTrial(
+        make_scene(("box", 0.3, 0.2, 0.0)), make_station(), motion=motion, engine=QUICK
+    )
     result = trial.run("box", CENTRE)
     assert (result.outcome, result.blocker) == (Outcome.BLOCKED, "table")
 

@@ -7,14 +7,18 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import Array, grasp_from_axes
+from burg_drake.core.frames import grasp_from_axes
 from burg_drake.core.paths.resources import resolve
 from burg_drake.simulation.trials.trial_settings import USUAL_LIFT, TrialSettings
+from burg_drake.station.document.engine import ENGINES
 from burg_drake.station.document.grasp_motion import GraspMotion
 from burg_drake.station.document.gripper_document import load_hand
 from burg_drake.station.document.station_document import Obstacle, Station, StationDocument, Table
 
+QUICK = ENGINES["screening"]
+"""Of most trials; `test_statics` holds all engines against closed forms."""
 GRAVITY = 9.81
 FORCE = 40.0
 """Of each finger of the Panda hand [N]."""
@@ -23,6 +27,8 @@ PAD = (0.0175, 0.0185)
 BOX = (0.06, 0.09, 0.08)
 """Size of the box [m]; only its x extent fits between the fingers."""
 BOX_MASS = 0.3
+WIDE = (0.096, 0.15, 0.10)
+"""Size of a box that the Panda's fingers do not fit about [m]."""
 POST = (0.04, 0.04, 0.42)
 """Size of the post [m], which reaches up to an arm's forearm."""
 

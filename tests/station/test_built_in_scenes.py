@@ -9,13 +9,14 @@ from pydrake.systems.analysis import Simulator
 from burg_drake.core.frames import inverse, rotation_angle, transform_points
 from burg_drake.core.paths.resources import builtin_names
 from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.checks.scene_issues import check_scene
+from burg_drake.station.checks.scene_check import SceneCheck
 from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.document.station_document import load_station
 
-SECONDS = 1.0
-MOVED = 1e-4
-TURNED = np.deg2rad(0.1)
+SECONDS = 0.4
+MOVED = 4e-5
+TURNED = np.deg2rad(0.04)
+"""What creeps passes these in the same time as 0.1 mm or 0.1 degrees in one second."""
 
 
 @pytest.mark.parametrize("name", builtin_names("scenes"))
@@ -24,7 +25,7 @@ def test_nothing_moves(name: str) -> None:
     built = build_station_diagram(scene, station, robot="none")
     simulator = Simulator(built.diagram)
     context = built.plant.GetMyContextFromRoot(simulator.get_context())
-    for time in np.linspace(0.0, SECONDS, 11)[1:]:
+    for time in np.linspace(0.0, SECONDS, 5)[1:]:
         simulator.AdvanceTo(time)
         for instance, index in built.free.items():
             body = built.plant.get_body(index)
@@ -37,6 +38,7 @@ def test_nothing_moves(name: str) -> None:
 
 
 @pytest.mark.parametrize("station", builtin_names("stations"))
-@pytest.mark.parametrize("name", builtin_names("scenes"))
-def test_every_scene_is_sound_on_every_station(name: str, station: str) -> None:
-    assert check_scene(load_scene(name), load_station(station)) == ()
+def test_every_scene_is_sound_on_every_station(station: str) -> None:
+    scenes = [load_scene(name) for name in builtin_names("scenes")]
+    check = SceneCheck(load_station(station), scenes[0].library)
+    assert {scene.name: check.issues(scene) for scene in scenes if check.issues(scene)} == {}

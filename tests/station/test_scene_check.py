@@ -14,9 +14,10 @@ import pytest
 import scipy.optimize
 from scipy.spatial import ConvexHull
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import Array, transform_points
+from burg_drake.core.frames import transform_points
 from burg_drake.objects.library.document import ObjectLibrary, load_library
 from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
 from burg_drake.scene.document.validation import SceneIssue

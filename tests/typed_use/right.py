@@ -51,3 +51,22 @@ try:
     assert_type(load_intrinsics("camera.yaml"), Intrinsics)
 except burg.errors.UnknownNameError as error:
     problem: burg.BurgError = error
+
+mode: burg.runs.Mode = "hand"
+success: burg.trials.Success = "held"
+
+
+def tell(progress: burg.runs.Progress) -> None:
+    print(progress.done, progress.total)
+
+
+def of_scene(one: burg.Scene) -> Mapping[str, burg.GraspSet]:
+    return {name: close for name in one.instances}
+
+
+listener: burg.runs.Listener = tell
+source: burg.runs.GraspsLike = of_scene
+settings = burg.EvaluationSettings(mode=mode)
+burg.evaluate(scene, station, "three", grasps=source, settings=settings, progress=listener)
+assert_type(burg.HandTrial(scene, station).hand, burg.stations.FloatingHand)
+assert_type(burg.arm.ArmSpan.of(burg.ArmReach(scene, station).kinematics, "mine").radius, float)

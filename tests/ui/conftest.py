@@ -1,17 +1,17 @@
 """A real Chromium without a window, for pages.
 
-It renders WebGL in software at a few frames a second: tests wait for what a page says, never for
-frames or for time.
+It renders WebGL in software: tests wait for what a page says, never for frames or for time.
 """
 
 from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
-pytest.importorskip("viser", reason="pages need viser: pip install 'burg-drake[ui]'")
+viser = pytest.importorskip("viser", reason="pages need viser: pip install 'burg-drake[ui]'")
 sync_api = pytest.importorskip("playwright.sync_api", reason="driven by playwright")
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
@@ -51,6 +51,25 @@ def browser(playwright: sync_api.Playwright, chromium: str) -> Iterator[sync_api
     )
     yield browser
     browser.close()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def lamps_alone() -> Iterator[None]:
+    """Pages are lit by lamps alone: without a graphics processor Chromium takes seconds for every
+    picture of the surroundings that viser adds, and draws one frame a second meanwhile."""
+    from burg_drake.ui.server import guarded_viser
+
+    with pytest.MonkeyPatch.context() as patch:
+        guarded_server = guarded_viser.guarded_server
+
+        def lit_by_lamps(*arguments: Any) -> viser.ViserServer:
+            server = guarded_server(*arguments)
+            server.scene.configure_environment_map(None)
+            server.scene.configure_default_lights(cast_shadow=False)
+            return server
+
+        patch.setattr(guarded_viser, "guarded_server", lit_by_lamps)
+        yield
 
 
 @pytest.fixture

@@ -19,12 +19,13 @@ def test_clicks_survive_the_death_of_the_server(page: Page, trials: Path) -> Non
     port = free_port()
     process = start(trials, port)
     saved, number = page.locator("#saved"), page.locator("#number")
+    page.clock.install()
     page.goto(f"http://127.0.0.1:{port}/")
     expect(saved).to_have_text("All saved")
     expect(number).to_have_text("1")
     page.fill("#operator", "AB")
     page.fill("#note", "<b>wet</b> & cold")
-    page.wait_for_timeout(700)  # clicks right after a trial comes up do not count
+    page.clock.fast_forward(700)  # clicks right after a trial comes up do not count
     page.fill("#width", "abc")
     page.click('[data-outcome="slipped"]')
     expect(page.locator("#widthnote")).to_contain_text("Not a width in mm")
@@ -40,7 +41,7 @@ def test_clicks_survive_the_death_of_the_server(page: Page, trials: Path) -> Non
     assert (trial.outcome, trial.note) == (RealOutcome.SLIPPED, "<b>wet</b> & cold")
     assert trial.robot is not None and trial.robot.width_mm == 500.0
 
-    page.wait_for_timeout(700)
+    page.clock.fast_forward(700)
     page.keyboard.press("1")  # lifted, with nobody to hear it
     expect(number).to_have_text("3")
     expect(saved).to_contain_text("1 entry is kept here")
@@ -76,14 +77,16 @@ def test_what_is_refused_for_good_can_be_dropped(page: Page, trials: Path) -> No
     server = serve_again(trials, port)
     text, sheet = trials.read_text(), load_trials(trials)
     troubles = page.locator("#troubles")
+    page.clock.install()
     try:
         page.goto(f"http://127.0.0.1:{port}/")
         expect(page.locator("#number")).to_have_text("1")
         save_trials(replace(sheet, trials=sheet.trials[:-1]), trials)
-        page.wait_for_timeout(700)
+        page.clock.fast_forward(700)
         page.click('[data-outcome="slipped"]')
         expect(page.locator("#saved")).to_contain_text("holds other trials by now")
         expect(troubles).to_be_hidden()  # it may pass
+        page.clock.fast_forward(10_000)
         expect(troubles).to_contain_text("Trial 1, slipped, is refused: ", timeout=15_000)
         expect(troubles).to_contain_text("start the page again. It is sent again until")
         troubles.get_by_role("button", name="Drop it").click()

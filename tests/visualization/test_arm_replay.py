@@ -11,19 +11,19 @@ from burg_drake.core.frames import grasp_from_axes, transform_points
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.motion.planner import plan
 from burg_drake.motion.plans.grasp_plan import Plan
-from burg_drake.scene.document.scene import load_scene
 from burg_drake.simulation.trials.arm_trial import ArmTrial
 from burg_drake.station.document.engine import ENGINES
 from burg_drake.station.document.station_document import load_station
 from burg_drake.visualization.scenes.arm_replay import record_arm_trial
 from burg_drake.visualization.scenes.scene import open_meshcat
+from tests.evaluation.composed import tabletop
 
 X_OG = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 """Across the narrow side of the household box, from above."""
 
 
 def test_the_arm_is_recorded_from_home_on() -> None:
-    scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")
+    scene, station = tabletop("box"), load_station("panda_tabletop")
     found = plan(scene, station, "box", X_OG, width=0.06)
     assert isinstance(found, Plan)
     meshcat = open_meshcat()

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core.frames import Array, make_pose, rot_z
+from burg_drake.core.arrays import Array
+from burg_drake.core.frames import make_pose, rot_z
 from burg_drake.visualization.grasps.mesh import FINGER_LENGTH, STEM_LENGTH
 from burg_drake.visualization.grasps.strokes import grasp_corners, grasp_strokes
 from burg_drake.visualization.meshcat.portrait import camera_rotation

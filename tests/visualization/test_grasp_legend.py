@@ -113,8 +113,9 @@ def test_errors() -> None:
 
 
 def test_units() -> None:
-    names = ("slip", "tilt", "pad_force", "patch_area", "moved_mug", "epsilon")
+    names = ("slip", "tilt", "pad_force", "patch_area", "moved_mug", "epsilon", "made_up")
     assert [with_unit(name) for name in names] == [
         *("slip [m]", "tilt [rad]", "pad_force [N]", "patch_area [m²]", "moved_mug [m]"),
-        "epsilon",
+        *("epsilon", "made_up"),
     ]
+    assert with_unit("arm_clearance") == "arm_clearance [m]"

@@ -17,7 +17,7 @@ from burg_drake.core.frames import (
 )
 from burg_drake.core.grasps import Margins
 from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.scene.document.scene import Scene
 from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.simulation.trials.result import TrialResult
 from burg_drake.station.document.engine import ENGINES
@@ -30,6 +30,7 @@ from burg_drake.visualization.scenes.replay import (
     record_trial,
 )
 from burg_drake.visualization.scenes.scene import open_meshcat
+from tests.evaluation.composed import tabletop
 
 X_OG = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 """Across the narrow side of the box, from above."""
@@ -37,7 +38,7 @@ X_OG = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 
 @pytest.fixture(scope="module")
 def scene() -> Scene:
-    return load_scene("tabletop_six")
+    return tabletop("box", "mug")
 
 
 @pytest.fixture(scope="module")

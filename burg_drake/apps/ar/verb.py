@@ -11,16 +11,17 @@ from typing import TYPE_CHECKING, Any
 from burg_drake.apps.options import (
     Parser,
     add_measured_board,
+    add_options,
+    add_page,
     add_scene,
     add_verb,
-    number,
-    port,
+    chosen_intrinsics,
     positive,
     positive_int,
     print_scale,
+    settings_from,
 )
 from burg_drake.apps.terminal import interrupts_ignored, open_in_browser, terminated_as_interrupted
-from burg_drake.core import InvalidInputError
 
 if TYPE_CHECKING:
     from burg_drake.cameras.live import Event, LiveSession, ViewActions
@@ -28,10 +29,8 @@ if TYPE_CHECKING:
     from burg_drake.cameras.sources import FrameSource
     from burg_drake.scene.document import Scene
 
-SIMULATED = "sim:"
 IDLE_AFTER = 3.0
 """The camera is not looked at when no browser has asked for a picture for so long [s]."""
-"""Length of the rulers on printouts."""
 
 
 def add_to(verbs: Any) -> None:
@@ -74,34 +73,11 @@ def _add_options(parser: Parser) -> None:
 
 
 def _add_view(parser: Any) -> None:
+    from burg_drake.cameras.overlay import OverlayStyle
+
     view = parser.add_argument_group("view")
-    view.add_argument(
-        "--opacity",
-        type=share,
-        metavar="X",
-        help=("opacity of the objects, from 0 (outlines only) to 1"),
-    )
-    view.add_argument(
-        "--tolerance-mm",
-        type=positive,
-        metavar="X",
-        help=("objects within this distance of their target are green"),
-    )
-    view.add_argument(
-        "--tolerance-deg", type=positive, metavar="X", help="the same for their rotation"
-    )
-    view.add_argument(
-        "--port", type=port, metavar="N", help="port of the page (default: the first free one)"
-    )
-    view.add_argument(
-        "--host",
-        metavar="ADDRESS",
-        default="127.0.0.1",
-        help="address to serve it on. The default is for this computer alone; with 0.0.0.0"
-        " everybody on the network can see and use it, for example on a tablet next to the"
-        " board",
-    )
-    view.add_argument("--open", action="store_true", help="open the page in the browser")
+    add_options(view, OverlayStyle, "opacity", "tolerance", "angle_tolerance", unset=True)
+    add_page(view, "all of the network can see and use it, such as a tablet beside the board")
     view.add_argument(
         "--no-browser",
         action="store_true",
@@ -146,7 +122,7 @@ def run_ar(arguments: argparse.Namespace) -> int:
 
     scene = load_scene(arguments.scene)
     _require_places(arguments)
-    intrinsics = _intrinsics(arguments)
+    intrinsics = chosen_intrinsics(arguments)
     source = _open(arguments, scene, intrinsics)
     with terminated_as_interrupted():
         try:
@@ -212,8 +188,6 @@ def _serve(
 def _session(
     arguments: argparse.Namespace, scene: Scene, intrinsics: Intrinsics, source: FrameSource
 ) -> tuple[LiveSession, ViewActions]:
-    from dataclasses import replace
-
     from burg_drake.cameras.live import (
         EventLog,
         FrameProcessor,
@@ -223,19 +197,13 @@ def _session(
     )
     from burg_drake.cameras.overlay import OverlayStyle
 
-    style, settings = OverlayStyle(), ViewSettings()
-    if arguments.tolerance_mm is not None:
-        style = replace(style, tolerance=1e-3 * arguments.tolerance_mm)
-    if arguments.tolerance_deg is not None:
-        style = replace(style, angle_tolerance=math.radians(arguments.tolerance_deg))
-    if arguments.opacity is not None:
-        settings = replace(settings, opacity=arguments.opacity)
+    style = settings_from(arguments, OverlayStyle)
     always = _is_scripted(arguments) or arguments.check or arguments.snapshot
     live = LiveSession(
         FrameProcessor(scene, intrinsics, print_scale=print_scale(arguments), style=style),
         source,
         events=EventLog(_print_event),
-        settings=settings,
+        settings=ViewSettings(opacity=style.opacity),
         paced=not arguments.no_browser,
         idle_after=math.inf if always else IDLE_AFTER,
     )
@@ -254,19 +222,6 @@ def _open(arguments: argparse.Namespace, scene: Scene, intrinsics: Intrinsics) -
     return open_source(arguments.camera, scene=scene, size=size, fps=arguments.fps)
 
 
-def _intrinsics(arguments: argparse.Namespace) -> Intrinsics:
-    from burg_drake.cameras.optics import load_intrinsics
-
-    if arguments.intrinsics is not None:
-        return load_intrinsics(arguments.intrinsics)
-    if not arguments.camera.startswith(SIMULATED):
-        raise InvalidInputError(
-            f"camera {arguments.camera} needs --intrinsics FILE; burg-drake camera calibrate makes"
-            " one"
-        )
-    return load_intrinsics(arguments.camera)
-
-
 def _require_places(arguments: argparse.Namespace) -> None:
     """Refuses results that cannot be written, before anything else is done."""
     from burg_drake.cameras.live import require_new_folder, require_video_path
@@ -278,11 +233,3 @@ def _require_places(arguments: argparse.Namespace) -> None:
         require_new_folder(arguments.snapshot)
     if not arguments.no_browser:
         writable_folder(arguments.output)
-
-
-def share(text: str) -> float:
-    """A number from 0 to 1."""
-    value = number(text)
-    if not 0.0 <= value <= 1.0:
-        raise argparse.ArgumentTypeError(f"{text} is not a number from 0 to 1")
-    return value

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.camera.intrinsics_text import print_intrinsics
 from burg_drake.apps.camera.target import add_board, given_target, two_numbers
-from burg_drake.apps.options import add_verb, positive_int
+from burg_drake.apps.options import Parser, add_verb, positive_int
 
 if TYPE_CHECKING:
     from burg_drake.cameras.calibration import Calibration, CharucoTarget, CharucoView
@@ -21,7 +21,7 @@ DEFAULT_VIEWS = 20
 
 def add_to(group: Any) -> None:
     """Adds the verb to the group `camera`."""
-    calibrate = add_verb(
+    add_verb(
         group,
         "calibrate",
         run_calibrate,
@@ -31,7 +31,11 @@ def add_to(group: Any) -> None:
         "burg-drake camera calibrate photos --squares 5x7 --square-mm 30 --marker-mm 22 -o K.yaml",
         "",
         "Exit code 1, and no file without --keep, if the photos do not determine the camera well.",
+        options=_add_options,
     )
+
+
+def _add_options(calibrate: Parser) -> None:
     calibrate.add_argument(
         "images", metavar="IMAGE", nargs="*", help="photos of the target, folders, or a video"
     )

@@ -6,7 +6,7 @@ import argparse
 import re
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.options import add_measured_board, add_verb, positive
+from burg_drake.apps.options import Parser, add_measured_board, add_options, add_verb, settings_from
 
 if TYPE_CHECKING:
     from burg_drake.cameras.calibration import CharucoTarget
@@ -14,17 +14,25 @@ if TYPE_CHECKING:
 
 def add_to(group: Any) -> None:
     """Adds the verb to the group `camera`."""
-    target = add_verb(
+    add_verb(
         group,
         "target",
         run_target,
         "print a ChArUco board to calibrate cameras with, as a PDF at true scale",
         "burg-drake camera target -o target.pdf",
         "burg-drake camera target --page A3 --square-mm 30 --marker-mm 22 -o target.pdf",
+        options=_add_options,
     )
+
+
+def _add_options(target: Parser) -> None:
+    from burg_drake.printout import PrintSettings
+
     target.add_argument("-o", "--output", metavar="FILE", required=True, help="PDF to write")
     target.add_argument(
-        "--page", default="A4", help="A4, A3, letter, ... or WxH in mm (default: %(default)s)"
+        "--page",
+        default=PrintSettings.page,
+        help="A4, A3, letter, ... or WxH in mm (default: %(default)s)",
     )
     add_measured_board(
         target,
@@ -35,43 +43,25 @@ def add_to(group: Any) -> None:
 
 def add_board(parser: Any) -> None:
     """The options about the board."""
+    from burg_drake.cameras.calibration import CharucoTarget
+
+    columns, rows = CharucoTarget.squares
     board = parser.add_argument_group("the board", "what `burg-drake camera target` printed")
     board.add_argument(
         "--squares",
         metavar="CxR",
         type=two_numbers,
-        default=(8, 11),
-        help="columns and rows (default: 8x11)",
+        default=CharucoTarget.squares,
+        help=f"columns and rows (default: {columns}x{rows})",
     )
-    board.add_argument(
-        "--square-mm", type=positive, default=20.0, help="side of a square (default: %(default)g)"
-    )
-    board.add_argument(
-        "--marker-mm", type=positive, default=14.0, help="side of a marker (default: %(default)g)"
-    )
-    board.add_argument(
-        "--dictionary",
-        default="5X5_100",
-        help=("ArUco dictionary of the markers (default: %(default)s)"),
-    )
-    board.add_argument(
-        "--legacy",
-        action="store_true",
-        help="a board of OpenCV before 4.6: with an even number of rows, white in the upper left",
-    )
+    add_options(board, CharucoTarget)
 
 
 def given_target(arguments: argparse.Namespace) -> CharucoTarget:
     """The board that the options tell."""
     from burg_drake.cameras.calibration import CharucoTarget
 
-    return CharucoTarget(
-        squares=arguments.squares,
-        square=1e-3 * arguments.square_mm,
-        marker=1e-3 * arguments.marker_mm,
-        dictionary=arguments.dictionary,
-        legacy=arguments.legacy,
-    )
+    return settings_from(arguments, CharucoTarget, squares=arguments.squares)
 
 
 def run_target(arguments: argparse.Namespace) -> int:

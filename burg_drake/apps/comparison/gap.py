@@ -19,6 +19,7 @@ from burg_drake.apps.options import (
     add_quiet,
     add_sampling,
     add_verb,
+    add_workers,
     chosen_cluster,
     chosen_motion,
     given_motion,
@@ -29,7 +30,6 @@ from burg_drake.apps.options import (
     require_sampled,
     scene_names,
     settings_from,
-    workers,
 )
 from burg_drake.core import InvalidInputError
 
@@ -95,9 +95,7 @@ def _add_options(parser: Parser) -> None:
     add_given(parser, which)
     add_options(parser, EvaluationSettings, "engine", unset=True, shown_default=DEFAULT_ENGINE)
     who = parser.add_mutually_exclusive_group()
-    who.add_argument(
-        "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
-    )
+    add_workers(who)
     add_cluster(who)
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
     add_motion(parser)

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from burg_drake.apps.options import Parser, add_cluster, chosen_cluster, workers
+from burg_drake.apps.options import Parser, add_cluster, add_workers, chosen_cluster
 from burg_drake.core import InvalidInputError
 
 if TYPE_CHECKING:
@@ -27,12 +27,7 @@ def add_rejudge(parser: Parser) -> None:
         " that file)",
     )
     who = group.add_mutually_exclusive_group()
-    who.add_argument(
-        "--workers",
-        metavar="N",
-        type=workers,
-        help="with --rejudge, processes (default: one a processor)",
-    )
+    add_workers(who, "with --rejudge, processes (default: one a processor)")
     add_cluster(who)
     group.add_argument("--quiet", action="store_true", help="with --rejudge, no progress")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, get_args
 
 from burg_drake.apps.library.building import run_add, run_build, run_import_burg, run_import_ycb
 from burg_drake.apps.library.viewing import run_check, run_list, run_show
@@ -12,11 +12,11 @@ from burg_drake.apps.options import (
     add_quiet,
     add_verb,
     add_view,
+    add_workers,
     coefficient,
     friction,
     named_positive,
     positive,
-    workers,
 )
 
 FORMATS_TEXT = """\
@@ -222,7 +222,7 @@ def _add_named_values(parser: Parser) -> None:
 
 def _add_common_values(parser: Parser) -> None:
     from burg_drake.objects.library import CONTACT_KINDS
-    from burg_drake.objects.meshes import UNITS
+    from burg_drake.objects.meshes import UNITS, Openings
 
     parser.add_argument(
         "--density", metavar="KG/M3", type=positive, help="for objects without a mass"
@@ -242,7 +242,7 @@ def _add_common_values(parser: Parser) -> None:
     )
     parser.add_argument(
         "--openings",
-        choices=("wall", "close"),
+        choices=get_args(Openings),
         help="large openings: make the surface a wall (default), or close them",
     )
     parser.add_argument(
@@ -257,7 +257,5 @@ def _add_effort(parser: Parser) -> None:
     parser.add_argument(
         "--no-confirm", action="store_true", help="do not simulate the stable poses"
     )
-    parser.add_argument(
-        "--workers", type=workers, metavar="N", help="processes (default: one a processor)"
-    )
+    add_workers(parser)
     add_quiet(parser)

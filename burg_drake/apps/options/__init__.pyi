@@ -9,22 +9,20 @@ from .arguments import (
     add_scene as add_scene,
     add_station as add_station,
     add_verb as add_verb,
-    add_view as add_view,
+    add_workers as add_workers,
     coefficient as coefficient,
     examples as examples,
     friction as friction,
-    measured_mm as measured_mm,
     named_positive as named_positive,
     not_negative as not_negative,
     number as number,
-    port as port,
     positive as positive,
     positive_int as positive_int,
     print_scale as print_scale,
     scene_names as scene_names,
     seed as seed,
-    workers as workers,
 )
+from .camera import chosen_intrinsics as chosen_intrinsics
 from .cluster import (
     add_cluster as add_cluster,
     chosen_cluster as chosen_cluster,
@@ -61,6 +59,10 @@ from .hand_motion import (
     given_motion as given_motion,
     motion_option as motion_option,
     require_standoff_of_arm as require_standoff_of_arm,
+)
+from .pages import (
+    add_page as add_page,
+    add_view as add_view,
 )
 from .retries import (
     add_retry_failed as add_retry_failed,

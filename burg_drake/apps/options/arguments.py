@@ -202,17 +202,17 @@ def add_quiet(parser: Parser) -> None:
     parser.add_argument("--quiet", action="store_true", help="no progress")
 
 
-def add_view(parser: Parser) -> None:
-    """The options of verbs that show something."""
-    parser.add_argument(
-        "--html", metavar="FILE", help="write one self-contained page instead of a live view"
-    )
-    parser.add_argument(
-        "--port", type=port, metavar="N", help="port of the live view (default: the first free one)"
-    )
-    parser.add_argument(
-        "--no-wait", action="store_true", help="do not keep the live view open until Ctrl-C"
-    )
+def add_workers(
+    parser: Any, help: str = "processes (default: one a processor)", default: int | None = None
+) -> None:
+    """The option --workers of verbs that share their work out.
+
+    Args:
+        parser: gets it.
+        help: what it means to the verb.
+        default: None lets the library choose.
+    """
+    parser.add_argument("--workers", metavar="N", type=workers, default=default, help=help)
 
 
 def positive_int(text: str) -> int:

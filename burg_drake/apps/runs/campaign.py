@@ -15,7 +15,7 @@ from burg_drake.core import InvalidInputError, listing
 if TYPE_CHECKING:
     from burg_drake.core.grasps import GraspSet
     from burg_drake.evaluation.results import Summary
-    from burg_drake.evaluation.run import Given
+    from burg_drake.evaluation.run import GraspsLike
     from burg_drake.evaluation.store import Campaign
     from burg_drake.evaluation.workers import Executor
     from burg_drake.scene.document import Scene
@@ -125,7 +125,7 @@ def _scene_table(summary: Summary) -> Any:
     return table
 
 
-def _given(arguments: argparse.Namespace, station: Station) -> Given | None:
+def _given(arguments: argparse.Namespace, station: Station) -> GraspsLike | None:
     """The grasps of the file: those in the frames of their objects as a set for all scenes."""
     from burg_drake.apps.options import FRAMES, gripper_for
     from burg_drake.evaluation.grasp_sets import read_input

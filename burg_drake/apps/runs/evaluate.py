@@ -18,6 +18,7 @@ from burg_drake.apps.options import (
     add_sampling,
     add_station,
     add_verb,
+    add_workers,
     chosen_cluster,
     chosen_motion,
     how_to_retry,
@@ -26,7 +27,6 @@ from burg_drake.apps.options import (
     require_sampled,
     require_standoff_of_arm,
     scene_names,
-    workers,
 )
 from burg_drake.apps.runs.campaign import evaluate_many
 from burg_drake.apps.runs.settings import requested_settings
@@ -87,9 +87,7 @@ def _add_options(parser: Parser) -> None:
     add_given(parser, which)
     add_options(parser, EvaluationSettings, "engine")
     who = parser.add_mutually_exclusive_group()
-    who.add_argument(
-        "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
-    )
+    add_workers(who)
     add_cluster(who)
     add_options(parser, EvaluationSettings, "table", "mode", "shard")
     add_motion(parser)

@@ -6,7 +6,7 @@ import argparse
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from burg_drake.apps.options import (
     Output,
@@ -20,6 +20,7 @@ from burg_drake.apps.options import (
     add_scene,
     add_station,
     add_verb,
+    add_workers,
     chosen_motion,
     grasps_per_object,
     how_to_retry,
@@ -28,7 +29,6 @@ from burg_drake.apps.options import (
     read_given,
     require_file,
     require_sampled,
-    workers,
 )
 from burg_drake.apps.runs.reach_tables import print_tables
 from burg_drake.core import InvalidInputError
@@ -70,6 +70,8 @@ def add_to(verbs: Any) -> None:
 
 
 def _add_options(parser: Parser) -> None:
+    from burg_drake.evaluation.store import PlanFormat
+
     add_scene(parser)
     which = parser.add_mutually_exclusive_group()
     add_sampling(parser, DEFAULT_GRASPS, which)
@@ -95,7 +97,7 @@ def _add_options(parser: Parser) -> None:
     )
     parser.add_argument(
         "--plan-format",
-        choices=("json", "csv"),
+        choices=get_args(PlanFormat),
         help="format of the plans: JSON laid out as ROS's JointTrajectory, or CSV tables;"
         " load_plan in Python reads both (default: json)",
     )
@@ -105,9 +107,7 @@ def _add_options(parser: Parser) -> None:
         help="decide by quick bounds instead of Drake's CollisionChecker: twice as fast, and wrong"
         " about one or two grasps in a hundred, either way",
     )
-    parser.add_argument(
-        "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
-    )
+    add_workers(parser)
     add_retry_failed(parser, "grasps")
     add_quiet(parser)
 

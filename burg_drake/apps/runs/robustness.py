@@ -13,11 +13,11 @@ from burg_drake.apps.options import (
     add_quiet,
     add_retry_failed,
     add_verb,
+    add_workers,
     how_to_retry,
     positive_int,
     seed,
     settings_from,
-    workers,
 )
 from burg_drake.core import InvalidInputError
 
@@ -82,9 +82,7 @@ def _add_options(parser: Parser) -> None:
         metavar="FILE",
         help="table, .csv or .parquet (default: robustness.csv in the run's folder)",
     )
-    parser.add_argument(
-        "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
-    )
+    add_workers(parser)
     add_retry_failed(parser, "tests")
     add_quiet(parser)
 

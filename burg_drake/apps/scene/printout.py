@@ -6,7 +6,14 @@ import argparse
 import sys
 from typing import Any
 
-from burg_drake.apps.options import Parser, add_measured_board, add_scene, add_verb, not_negative
+from burg_drake.apps.options import (
+    Parser,
+    add_measured_board,
+    add_options,
+    add_scene,
+    add_verb,
+    settings_from,
+)
 
 
 def add_to(verbs: Any) -> None:
@@ -27,24 +34,13 @@ def add_to(verbs: Any) -> None:
 
 
 def _add_options(parser: Parser) -> None:
+    from burg_drake.printout import PrintSettings
+
     add_scene(parser)
     parser.add_argument(
         "-o", "--output", metavar="FILE", required=True, help="file to write (.pdf)"
     )
-    parser.add_argument(
-        "--page",
-        metavar="PAGE",
-        default="A4",
-        help="A4 to A0, letter, legal, tabloid, or WxH in mm; upright or across, whichever takes"
-        " fewer pages (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--margin-mm",
-        metavar="MM",
-        type=not_negative,
-        default=5.0,
-        help="margin that the printer leaves white on all sides (default: %(default)g)",
-    )
+    add_options(parser, PrintSettings, "page", "margin")
     add_measured_board(
         parser,
         "measured length of the printed 100 mm rulers, along x and y of the page; the print is"
@@ -70,9 +66,9 @@ def run_printout(arguments: argparse.Namespace) -> int:
 
     require_pdf(arguments.output)
     x, y = arguments.measured_mm
-    settings = PrintSettings(
-        page=arguments.page,
-        margin=arguments.margin_mm * 1e-3,
+    settings = settings_from(
+        arguments,
+        PrintSettings,
         measured=(x * 1e-3, y * 1e-3),
         height_map=not arguments.no_height_map,
         names=not arguments.no_names,

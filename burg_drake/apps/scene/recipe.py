@@ -7,7 +7,13 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.options import add_station, positive_int, seed, workers
+from burg_drake.apps.options import (
+    add_options,
+    add_station,
+    add_workers,
+    positive_int,
+    settings_from,
+)
 
 if TYPE_CHECKING:
     from burg_drake.objects.library import ObjectLibrary
@@ -51,16 +57,7 @@ def _add_objects(parser: Any) -> None:
         help="objects in a scene (default: %(default)d)",
     )
     group.add_argument("--only", metavar="A,B", help="draw from these objects alone")
-    group.add_argument(
-        "--repeat", action="store_true", help="an object may be in a scene several times"
-    )
-    group.add_argument(
-        "--poses",
-        choices=("probability", "uniform"),
-        default="probability",
-        help="how stable poses are drawn (default: %(default)s)",
-    )
-    group.add_argument("--seed", metavar="N", type=seed, default=0, help="(default: %(default)d)")
+    add_options(group, SceneRecipe, "repeat", "poses", "seed")
     group.add_argument(
         "--count",
         metavar="N",
@@ -68,9 +65,7 @@ def _add_objects(parser: Any) -> None:
         default=1,
         help="number of scenes (default: %(default)d)",
     )
-    group.add_argument(
-        "--workers", metavar="N", type=workers, default=1, help="processes (default: %(default)d)"
-    )
+    add_workers(group, "processes (default: %(default)d)", default=1)
 
 
 def _add_layout(parser: Any) -> None:
@@ -92,18 +87,7 @@ def _add_layout(parser: Any) -> None:
     )
     how.add_argument("--packed", action="store_true", help="side by side, as dense as it gets")
     how.add_argument("--heap", action="store_true", help="dropped on the middle of the board")
-    group.add_argument(
-        "--tries",
-        metavar="K",
-        type=positive_int,
-        default=SceneRecipe.tries,
-        help="random places for each object (default: %(default)d)",
-    )
-    group.add_argument(
-        "--fewer",
-        action="store_true",
-        help="accept a scene in which not all objects found a place; they are reported",
-    )
+    add_options(group, SceneRecipe, "tries", "fewer")
     group.add_argument("--no-settle", action="store_true", help="leave objects as they were placed")
 
 
@@ -112,29 +96,9 @@ def _add_rules(parser: Any) -> None:
 
     group = parser.add_argument_group("rules")
     add_station(group)
-    group.add_argument(
-        "--within-reach", action="store_true", help="the arm can grasp every object where it is"
-    )
-    group.add_argument(
-        "--clear-grasps",
-        metavar="K",
-        type=positive_int,
-        default=0,
-        help="every object has at least N grasps at which the hand touches nothing else",
-    )
-    group.add_argument(
-        "--visible-from",
-        metavar="CAMERA",
-        default="",
-        help="this camera of the station sees half of every object, at least",
-    )
-    group.add_argument(
-        "--attempts",
-        metavar="N",
-        type=positive_int,
-        default=SceneRecipe.attempts,
-        help="scenes that are drawn until one is accepted (default: %(default)d)",
-    )
+    add_options(group, SceneRecipe, "within_reach")
+    add_options(group, SceneRecipe, "clear_grasps", "visible_from", unset=True)
+    add_options(group, SceneRecipe, "attempts")
 
 
 def recipe_of(
@@ -151,23 +115,16 @@ def recipe_of(
         )
     names = [name.strip() for name in (arguments.only or "").split(",")]
     layout: Any = "packed" if arguments.packed else "heap" if arguments.heap else arguments.spacing
-    return SceneRecipe(
+    return settings_from(
+        arguments,
+        SceneRecipe,
         library=library_reference(arguments.library, library, folder),
         count=arguments.objects,
         only=tuple(sorted(set(filter(None, names)))),
-        repeat=arguments.repeat,
         board=Board(size=board_extents(arguments.size, upright=arguments.portrait)),
         layout=layout or "random",
-        poses=arguments.poses,
-        tries=arguments.tries,
-        fewer=arguments.fewer,
-        seed=arguments.seed,
         station=station_reference(arguments.station, station, folder),
         settle=not arguments.no_settle,
-        attempts=arguments.attempts,
-        within_reach=arguments.within_reach,
-        clear_grasps=arguments.clear_grasps,
-        visible_from=arguments.visible_from,
     )
 
 

@@ -8,7 +8,7 @@ import os
 import sys
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.options import Parser, add_station, add_verb, port, scene_names
+from burg_drake.apps.options import Parser, add_page, add_station, add_verb, scene_names
 from burg_drake.apps.terminal import (
     interrupts_ignored,
     open_in_browser,
@@ -53,17 +53,10 @@ def _add_options(parser: Parser) -> None:
         f" {DEFAULT_LIBRARY}) (default: %(default)s)",
     )
     add_station(parser)
-    parser.add_argument(
-        "--port", type=port, metavar="N", help="port of the page (default: the first free one)"
+    add_page(
+        parser,
+        "any other can open it, by an address that is printed and good for one browser",
     )
-    parser.add_argument(
-        "--host",
-        metavar="ADDRESS",
-        default="127.0.0.1",
-        help="address to serve it on. The default is for this computer alone; with 0.0.0.0 any"
-        " other can open it, by an address that is printed and good for one browser",
-    )
-    parser.add_argument("--open", action="store_true", help="open the page in the browser")
 
 
 def run_setup(arguments: argparse.Namespace) -> int:

@@ -19,10 +19,10 @@ SHOWN = {"m": ("mm", 1e-3), "m2": ("mm2", 1e-6), "rad": ("deg", math.radians(1.0
 """What SI units are printed in, and how large that is; others as they are."""
 
 
-Rows = Mapping[str, tuple[int, Mapping[str, float]]]
+NumberRows = Mapping[str, tuple[int, Mapping[str, float]]]
 
 
-def print_numbers(title: str, rows: Rows, frame: str = "object") -> None:
+def print_numbers(title: str, rows: NumberRows, frame: str = "object") -> None:
     """Prints figures of columns of grasps; a narrow terminal gets fewer of them.
 
     Args:
@@ -40,7 +40,9 @@ def print_numbers(title: str, rows: Rows, frame: str = "object") -> None:
     table.show()
 
 
-def number_table(title: str, heads: list[str], rows: Rows, frame: str = "object") -> TextTable:
+def number_table(
+    title: str, heads: list[str], rows: NumberRows, frame: str = "object"
+) -> TextTable:
     """The table of some of the figures; see `print_numbers`."""
     table = TextTable(title).names("column").numbers("known", *heads)
     if {"x", "y", "z"} & set(rows):

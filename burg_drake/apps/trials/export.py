@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 from collections import Counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
-from burg_drake.apps.options import add_quiet, add_retry_failed, add_verb, workers
+from burg_drake.apps.options import Parser, add_quiet, add_retry_failed, add_verb, add_workers
 from burg_drake.apps.trials.arguments import add_moved, add_sheet
 from burg_drake.core import shown
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def add_to(group: Any) -> None:
     """Adds the verb."""
-    parser = add_verb(
+    add_verb(
         group,
         "export",
         run_export,
@@ -25,13 +25,16 @@ def add_to(group: Any) -> None:
         "burg-drake trials export trials.yaml -o plans/",
         "burg-drake trials export trials.yaml -o plans/ --format csv --station my_cell.yaml",
         "",
-        (
-            "File names begin with the number of the trial; index.csv lists all trials, with"
-            " what stops"
-        ),
+        "Files begin with the number of the trial; index.csv lists all trials, with what stops",
         "the arm where there is no file. The same command continues where an interrupted one",
         "stopped. Exit code 1 if a trial could not be judged.",
+        options=_add_options,
     )
+
+
+def _add_options(parser: Parser) -> None:
+    from burg_drake.evaluation.store import PlanFormat
+
     add_sheet(parser)
     parser.add_argument(
         "-o",
@@ -42,7 +45,7 @@ def add_to(group: Any) -> None:
     )
     parser.add_argument(
         "--format",
-        choices=("json", "csv"),
+        choices=get_args(PlanFormat),
         default="json",
         help="JSON laid out as ROS's JointTrajectory, or tables; load_plan in Python reads both"
         " (default: %(default)s)",
@@ -51,9 +54,7 @@ def add_to(group: Any) -> None:
         "--station", metavar="STATION", help="station with the arm (default: that of each run)"
     )
     add_moved(parser)
-    parser.add_argument(
-        "--workers", metavar="N", type=workers, help="processes (default: one a processor)"
-    )
+    add_workers(parser)
     add_retry_failed(parser, "trials")
     add_quiet(parser)
     parser.set_defaults(after_interrupt="; run the same command to continue")

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import (
     add_measured_board,
+    add_page,
     add_verb,
-    port,
+    chosen_intrinsics,
     positive,
     print_scale,
 )
@@ -21,11 +22,9 @@ from burg_drake.apps.terminal import terminated_as_interrupted, wait_for_interru
 from burg_drake.apps.trials.arguments import add_moved, add_sheet
 
 if TYPE_CHECKING:
-    from burg_drake.cameras.optics import Intrinsics
     from burg_drake.experiment.pages import LabBook, LabCamera
     from burg_drake.scene.document import Scene
 
-SIMULATED = "sim:"
 SECRET_BYTES = 24
 
 
@@ -44,17 +43,10 @@ def add_to(verbs: Any) -> None:
     )
     add_sheet(parser)
     add_moved(parser)
-    parser.add_argument(
-        "--port", type=port, metavar="N", help="port of the page (default: the first free one)"
+    add_page(
+        parser,
+        "tablets on the network can open it, each by an address with a token that is printed",
     )
-    parser.add_argument(
-        "--host",
-        metavar="ADDRESS",
-        default="127.0.0.1",
-        help="address to serve it on. The default is for this computer alone; with 0.0.0.0 tablets"
-        " on the network can open it, each by an address with a token that is printed",
-    )
-    parser.add_argument("--open", action="store_true", help="open the page in the browser")
     parser.add_argument(
         "--show-simulated",
         action="store_true",
@@ -128,7 +120,7 @@ def _camera(arguments: argparse.Namespace, lab: LabBook) -> LabCamera:
     from burg_drake.cameras.sources import open_source
     from burg_drake.experiment.pages import LabCamera
 
-    intrinsics = _intrinsics(arguments)
+    intrinsics = chosen_intrinsics(arguments)
     size = (intrinsics.width, intrinsics.height)
 
     def opened(scene: Scene) -> Any:
@@ -139,20 +131,6 @@ def _camera(arguments: argparse.Namespace, lab: LabBook) -> LabCamera:
     first = next((trial for trial in trials if trial.outcome is None), trials[0])
     camera.watch(first.number)  # what does not work is said now
     return camera
-
-
-def _intrinsics(arguments: argparse.Namespace) -> Intrinsics:
-    from burg_drake.cameras.optics import load_intrinsics
-    from burg_drake.core import InvalidInputError
-
-    if arguments.intrinsics is not None:
-        return load_intrinsics(arguments.intrinsics)
-    if not arguments.camera.startswith(SIMULATED):
-        raise InvalidInputError(
-            f"camera {arguments.camera} needs --intrinsics FILE; burg-drake camera calibrate makes"
-            " one"
-        )
-    return load_intrinsics(arguments.camera)
 
 
 def _kept_secret(plan: str) -> str | None:

@@ -1,10 +1,9 @@
 from .requests import (
     address as address,
-    json_body as json_body,
     picture_number as picture_number,
 )
 from .server import (
-    Answer as Answer,
+    Handler as Handler,
     PageHandler as PageHandler,
     PageServer as PageServer,
 )

@@ -33,7 +33,7 @@ PORTS = 50
 IDLE = 30.0
 """A connection without requests is closed after this [s]."""
 
-Answer = Callable[[Any], None]
+Handler = Callable[[Any], None]
 """Answers a request, with the body of a POST, or the query of a GET."""
 
 
@@ -132,7 +132,7 @@ class PageHandler(BaseHTTPRequestHandler):
         """
         raise NotImplementedError
 
-    def find(self, routes: Mapping[str, Answer], path: str) -> Answer:
+    def find(self, routes: Mapping[str, Handler], path: str) -> Handler:
         """Who answers a request for a path.
 
         Raises:
@@ -148,7 +148,7 @@ class PageHandler(BaseHTTPRequestHandler):
         """JSON values and status of the answer to what was refused."""
         return {"error": str(error)}, self.refused_code
 
-    def answer(self, routes: Mapping[str, Answer]) -> None:
+    def answer(self, routes: Mapping[str, Handler]) -> None:
         """Answers a request by whoever is in charge of its path."""
         try:
             path, query = self.admitted()

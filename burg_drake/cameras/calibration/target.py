@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.cameras.sources import Image
-from burg_drake.core import Array, FieldError, InvalidInputError
+from burg_drake.core import MILLIMETRES, Array, FieldError, InvalidInputError, setting
 from burg_drake.scene.document import marker_dictionary
 
 LEAST_CORNERS = 8
@@ -47,10 +47,17 @@ class CharucoTarget:
     """
 
     squares: tuple[int, int] = (8, 11)
-    square: float = 0.020
-    marker: float = 0.014
-    dictionary: str = "5X5_100"
-    legacy: bool = False
+    square: float = setting(
+        0.020, "side of a square", unit=MILLIMETRES, metavar="SQUARE_MM", above=0
+    )
+    marker: float = setting(
+        0.014, "side of a marker", unit=MILLIMETRES, metavar="MARKER_MM", above=0
+    )
+    dictionary: str = setting("5X5_100", "of the markers", metavar="DICTIONARY")
+    legacy: bool = setting(
+        False,
+        "a board of OpenCV before 4.6: with an even number of rows, white in the upper left",
+    )
 
     def __post_init__(self) -> None:
         if min(self.squares) < 3:

@@ -40,7 +40,7 @@ LOOK = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
-class Counts:
+class FrameCounts:
     """Of the frames that were looked at.
 
     Attributes:
@@ -88,7 +88,7 @@ class LiveSession:
         processor.intrinsics.require_size(*source.size, source.name)
         self.processor, self.source, self.events = processor, source, events
         self.picture: Picture | None = None
-        self.counts = Counts()
+        self.counts = FrameCounts()
         self.last_located: LocatedFrame | None = None
         self.reader = FrameReader(
             source,
@@ -278,7 +278,7 @@ class LiveSession:
             self.counts = replace(self.counts, frames=self.counts.frames + 1, reason=str(error))
             return None
         estimate, counts = located.estimate, self.counts
-        self.counts = Counts(
+        self.counts = FrameCounts(
             frames=counts.frames + 1,
             valid=counts.valid + estimate.valid,
             reason=counts.reason if estimate.valid else estimate.reason,

@@ -12,9 +12,9 @@ from burg_drake.cameras.overlay.style import OverlayStyle
 from burg_drake.cameras.placement import Placement
 from burg_drake.core import Array
 
-Verdict = Literal["placed", "off", "uncertain", "not_seen"]
+PlacementVerdict = Literal["placed", "off", "uncertain", "not_seen"]
 
-COLORS: dict[Verdict, tuple[int, int, int]] = {
+COLORS: dict[PlacementVerdict, tuple[int, int, int]] = {
     "placed": (70, 230, 120),
     "off": (255, 110, 70),
     "uncertain": (255, 205, 70),
@@ -42,7 +42,7 @@ class Mark:
         lines: (N, 2, 3) arrows in S [m].
     """
 
-    verdict: Verdict
+    verdict: PlacementVerdict
     text: str
     lines: Array
 
@@ -61,7 +61,7 @@ def mark(placement: Placement, style: OverlayStyle, height: float) -> Mark:
     move = -np.array(placement.displacement)
     turn = -(placement.angle or 0.0)
     far, turned = math.hypot(*move) > style.tolerance, abs(turn) > style.angle_tolerance
-    verdict: Verdict = "off" if far or turned else "placed"
+    verdict: PlacementVerdict = "off" if far or turned else "placed"
     if placement.status == "uncertain":
         verdict = "uncertain"
     target = (placement.target.matrix() @ (*(placement.reference or (0.0, 0.0, 0.0)), 1.0))[:3]

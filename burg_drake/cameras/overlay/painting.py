@@ -6,13 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
 from burg_drake.cameras.overlay.antialiasing import strokes
 from burg_drake.cameras.projection import NOTHING, SurfaceImage
-from burg_drake.core import Array
-
-Bytes = NDArray[np.uint8]
+from burg_drake.core import Array, Bytes
 
 RIM = 1.2
 """Width of the dark rim on both sides of a line, which stands out from the board's white

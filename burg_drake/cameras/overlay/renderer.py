@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from burg_drake.cameras.optics import FieldOfView, Intrinsics
 from burg_drake.cameras.overlay.corrections import COLORS, Mark, mark
-from burg_drake.cameras.overlay.painting import Bytes, Ink, fill, stroke
+from burg_drake.cameras.overlay.painting import Ink, fill, stroke
 from burg_drake.cameras.overlay.style import OverlayStyle
 from burg_drake.cameras.overlay.tag_layout import lay_out
 from burg_drake.cameras.overlay.text_tags import WHITE, notice, paste, tag
@@ -17,7 +17,6 @@ from burg_drake.cameras.placement import PlacementCheck
 from burg_drake.cameras.projection import (
     NOTHING,
     OUTLINE,
-    Indices,
     SceneMesh,
     SurfaceCamera,
     SurfaceImage,
@@ -27,9 +26,9 @@ from burg_drake.cameras.projection import (
     footprints,
     visible_lines,
 )
-from burg_drake.core import Array, InvalidInputError, inverse, transform_points
+from burg_drake.core import Array, Bytes, Indices, InvalidInputError, inverse, transform_points
 from burg_drake.core.terminal import CATEGORIES, distinct_colors
-from burg_drake.scene.document import Scene, SceneLike, as_scene
+from burg_drake.scene.document import SceneLike, as_scene
 
 LIGHT = np.array([0.35, -0.45, 0.82])
 """Where the light comes from, in S: from above, and a little from the front and the right."""
@@ -202,11 +201,11 @@ class Overlay:
                 paste(drawn, plate, corner)
 
 
-def instance_labels(scene: Scene, intrinsics: Intrinsics, X_SC: Array) -> NDArray[np.int16]:
+def instance_labels(scene: SceneLike, intrinsics: Intrinsics, X_SC: Array) -> NDArray[np.int16]:
     """Which instance each pixel shows.
 
     Args:
-        scene: whose objects, at their places.
+        scene: whose objects, at their places; as loaded, or a reference for `load_scene`.
         intrinsics: of the camera.
         X_SC: (4, 4) camera's optical frame in the scene frame.
 
@@ -214,7 +213,7 @@ def instance_labels(scene: Scene, intrinsics: Intrinsics, X_SC: Array) -> NDArra
         (H, W) numbers of the instances, in the order of `scene.instances` and then
         `scene.background`; -1 where there is none.
     """
-    shape, view = build_scene_mesh(scene), FieldOfView(intrinsics)
+    shape, view = build_scene_mesh(as_scene(scene)), FieldOfView(intrinsics)
     lines = visible_lines(shape, view, X_SC)
     return SurfaceCamera(shape, view).render(X_SC, lines, _shades(shape)).owner
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from burg_drake.core import InvalidInputError
+from burg_drake.core import DEGREES, MILLIMETRES, InvalidInputError, setting
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,13 +23,24 @@ class OverlayStyle:
         shown: instances that are drawn, as if there were no others; all if None.
     """
 
-    opacity: float = 0.45
+    opacity: float = setting(
+        0.45, "of the objects, 0 (outlines) to 1", metavar="X", low=0, high=1, noun="a number"
+    )
     outline_width: float = 2.0
     names: bool = True
     footprints: bool = True
     errors: bool = True
-    tolerance: float = 1e-3
-    angle_tolerance: float = math.radians(1.0)
+    tolerance: float = setting(
+        1e-3, "objects placed within it are green", unit=MILLIMETRES, metavar="X", above=0
+    )
+    angle_tolerance: float = setting(
+        math.radians(1.0),
+        "the same for how they are turned",
+        unit=DEGREES,
+        name="tolerance_deg",
+        metavar="X",
+        above=0,
+    )
     shown: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-Bytes = NDArray[np.uint8]
+from burg_drake.core import Bytes
+
 PADDING = (6, 3)
 """Around a text, to the sides and above and below [pixels]."""
 DARK = (24, 28, 34)

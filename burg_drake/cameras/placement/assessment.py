@@ -7,7 +7,7 @@ from typing import cast
 import numpy as np
 
 from burg_drake.cameras.placement.alignment import TargetShape
-from burg_drake.cameras.placement.document import Placement, Status
+from burg_drake.cameras.placement.document import Placement, PlacementStatus
 from burg_drake.cameras.placement.localization import SUPPORTED, Located
 from burg_drake.cameras.placement.search import RANGE
 from burg_drake.core import Array
@@ -57,7 +57,7 @@ def placement_of(
     q, spread = alignment.q, alignment.spread(camera)
     deviation = np.sqrt(np.maximum(np.diag(spread), 0.0))
     reason = _doubt(shape, found, deviation, rough)
-    status: Status = "uncertain" if reason else "measured"
+    status: PlacementStatus = "uncertain" if reason else "measured"
     residual = alignment.residual
     angle = float((q[2] + np.pi) % (2.0 * np.pi) - np.pi)
     return Placement(

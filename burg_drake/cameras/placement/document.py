@@ -18,7 +18,7 @@ from burg_drake.core.documents import Pose, load_document, save_document
 from burg_drake.core.files import IMAGE_SIZE, read_bytes
 from burg_drake.core.paths import resolve
 
-Status = Literal["measured", "uncertain", "not_seen"]
+PlacementStatus = Literal["measured", "uncertain", "not_seen"]
 Method = Literal["silhouette", "depth"]
 
 PACKAGES = {"opencv": "opencv-python-headless", "numpy": "numpy", "scipy": "scipy"}
@@ -100,7 +100,7 @@ class Placement:
     """
 
     object: str
-    status: Status
+    status: PlacementStatus
     reason: str = ""
     target: Pose
     measured: Pose | None = None

@@ -6,7 +6,6 @@ from .line_drawing import (
     visible_lines as visible_lines,
 )
 from .mesh_outline import (
-    Indices as Indices,
     MeshOutline as MeshOutline,
 )
 from .scene_mesh import (

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from burg_drake.cameras.projection.mesh_outline import Indices
 from burg_drake.cameras.projection.scene_mesh import SceneMesh
-from burg_drake.core import Array
+from burg_drake.core import Array, Indices
 
 NEAR_BOARD = 2e-3
 """What of an object is not higher above the board counts as standing on it [m]."""

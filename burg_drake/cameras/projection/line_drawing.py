@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.cameras.optics import NEAR, FieldOfView
-from burg_drake.cameras.projection.mesh_outline import Indices
 from burg_drake.cameras.projection.scene_mesh import SceneMesh
-from burg_drake.core import Array, inverse, transform_points
+from burg_drake.core import Array, Indices, inverse, transform_points
 
 OUTLINE, INNER, CREASE = 0, 1, 2
 """Kinds of lines: behind which lies another object or nothing; the same object; an edge."""

@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from burg_drake.core import Array, inverse, transform_points
-
-Indices = NDArray[np.int64]
+from burg_drake.core import Array, Indices, inverse, transform_points
 
 CREASE = np.deg2rad(35.0)
 """Faces that meet at a larger angle than this make an edge that people see as one [rad]."""

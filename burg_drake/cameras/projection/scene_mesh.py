@@ -6,12 +6,12 @@ from functools import cached_property
 
 import numpy as np
 
-from burg_drake.cameras.projection.mesh_outline import Indices, MeshOutline
-from burg_drake.core import Array, UnknownNameError, nearest, transform_points
+from burg_drake.cameras.projection.mesh_outline import MeshOutline
+from burg_drake.core import Array, Indices, UnknownNameError, nearest, transform_points
 from burg_drake.geometry import RayCaster
 from burg_drake.scene.document import Scene
 
-Surface = tuple[Array, Indices]
+TriangleArrays = tuple[Array, Indices]
 
 
 class SceneMesh:
@@ -24,7 +24,7 @@ class SceneMesh:
         boxes: (N, 2, 3) corners of each instance's bounding box along the axes of S [m].
     """
 
-    def __init__(self, placed: dict[str, Surface]) -> None:
+    def __init__(self, placed: dict[str, TriangleArrays]) -> None:
         """Joins surfaces.
 
         Args:

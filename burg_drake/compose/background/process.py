@@ -50,14 +50,11 @@ class BackgroundJob(Generic[T]):
         cancelled: nobody waits for it any more.
         done: it has a result or an error, or was cancelled.
         error: why it has no result; None if it has, or is not done.
-        task: what was asked.
-        future: what will become of it.
     """
 
     def __init__(
         self,
-        worker: BackgroundWorker,
-        task: BackgroundTask[T],
+        cancel: Callable[[BackgroundJob[T]], None],
         on_change: Callable[[BackgroundJob[T]], None],
     ) -> None:
         self.progress: tuple[float, str] = (0.0, "waiting")
@@ -65,11 +62,10 @@ class BackgroundJob(Generic[T]):
         self.cancelled = False
         self.error: BurgError | None = None
         self.done = False
-        self.task = task
-        self._worker, self._on_change = worker, on_change
+        self._cancel, self._on_change = cancel, on_change
         self._result: list[T] = []
         self._notify = threading.Event()
-        self.future: WorkerFuture[T] | None = None
+        self._future: WorkerFuture[T] | None = None
 
     @property
     def result(self) -> T:
@@ -98,7 +94,7 @@ class BackgroundJob(Generic[T]):
 
     def cancel(self) -> None:
         """Ends it; nothing if it is done."""
-        self._worker.cancel(self)
+        self._cancel(self)
 
     def report(self, share: float, word: str, partial: Any) -> None:
         """The worker is so far."""
@@ -144,31 +140,31 @@ class BackgroundWorker:
             task: what to do.
             on_change: called with the job when it is further or done, in a thread of the worker.
         """
-        job = BackgroundJob(self, task, on_change)
+        job = BackgroundJob(self.cancel, on_change)
         with self._lock:
             older, self._newest = self._newest, job
             try:
-                job.future = self._pool.submit_task(
+                job._future = self._pool.submit_task(
                     Task(do_in_background, (task,), on_progress=_reports_to(job))
                 )
             except RuntimeError:  # it was closed
                 job.cancelled = True
-        if older is not None and not older.done and older.future is not None:
+        if older is not None and not older.done and older._future is not None:
             older.cancelled = True
-            older.future.interrupt()
-        if job.future is None:
+            older._future.interrupt()
+        if job._future is None:
             job.finish(TaskCancelled("this was cancelled"))
         else:
-            job.future.add_done_callback(lambda future: _finish(job, future))
+            job._future.add_done_callback(lambda future: _finish(job, future))
         return job
 
     def cancel(self, job: BackgroundJob[Any]) -> None:
         """See `BackgroundJob.cancel`."""
         with self._lock:
-            if job.done or job.cancelled or job.future is None:
+            if job.done or job.cancelled or job._future is None:
                 return
             job.cancelled = True
-        job.future.terminate()
+        job._future.terminate()
 
     def close(self) -> None:
         """Ends the process."""

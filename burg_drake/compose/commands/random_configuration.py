@@ -7,10 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from burg_drake.compose.commands.command import require_number
-from burg_drake.compose.document import State, Surroundings, known_scene, object_vertices
+from burg_drake.compose.document import (
+    State,
+    Surroundings,
+    known_scene,
+    object_vertices,
+    shapes_for,
+)
 from burg_drake.core import Array, InvalidInputError, listing, transform_points
 from burg_drake.scene.arrangement import ObjectRequest, area, arrange, choose
-from burg_drake.scene.document import Layout, PoseChoice
+from burg_drake.scene.document import LayoutName, PoseChoice
 from burg_drake.station.document import boxes_in_scene
 
 MOST = 60
@@ -25,14 +31,14 @@ class RandomConfiguration:
         seed: the same one gives the same configuration.
         count: so many objects of the library take the place of the free ones; those that are there
             stay, elsewhere, if None.
-        layout: how they stand to one another; see `scene.document.layout.Layout`.
+        layout: how they stand to one another; see `scene.document.layout.LayoutName`.
         poses: how stable poses are drawn.
         repeat: an object of the library may come several times.
     """
 
     seed: int = 0
     count: int | None = None
-    layout: Layout = "random"
+    layout: LayoutName = "random"
     poses: PoseChoice = "probability"
     repeat: bool = False
 
@@ -41,7 +47,7 @@ class RandomConfiguration:
     def apply(self, state: State, surroundings: Surroundings) -> State:
         rng = np.random.default_rng(int(require_number(self.seed, "seed", 0, 2**63, "")))
         wanted = self._wanted(state, surroundings, rng)
-        shapes, board = surroundings.checker.shapes(state), state.document.board
+        shapes, board = shapes_for(surroundings.checker, state), state.document.board
         covered = sum(min(map(area, shapes[one.object].shadows)) for one in wanted)
         if self.layout != "heap" and covered > board.size[0] * board.size[1]:
             raise InvalidInputError(

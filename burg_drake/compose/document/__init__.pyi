@@ -12,6 +12,7 @@ from .checker import (
     SceneChecker as SceneChecker,
     known_scene as known_scene,
     missing_objects as missing_objects,
+    shapes_for as shapes_for,
     with_missing_objects as with_missing_objects,
 )
 from .free_place import (

@@ -56,11 +56,12 @@ class SceneChecker:
             self._check, self._library = SceneCheck(self._station, state.library), state.library
         return self._check
 
-    def shapes(self, state: State) -> ObjectShapes:
-        """The shapes of a state's library."""
-        if self._shapes is None or self._shapes.library is not state.library:
-            self._shapes = ObjectShapes(state.library)
-        return self._shapes
+
+def shapes_for(checker: SceneChecker, state: State) -> ObjectShapes:
+    """The shapes of a state's library, which a checker keeps as it keeps its other knowledge."""
+    if checker._shapes is None or checker._shapes.library is not state.library:
+        checker._shapes = ObjectShapes(state.library)
+    return checker._shapes
 
 
 def missing_objects(state: State) -> tuple[str, ...]:

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from burg_drake.compose.background import SettlingProposal
     from burg_drake.evaluation.stages import GraspCount
 
-Status = Literal["ok", "collision", "in_ground", "out_of_bounds", "hovering", "unknown"]
+InstanceStatus = Literal["ok", "collision", "in_ground", "out_of_bounds", "hovering", "unknown"]
 """`unknown`: the library has no such object any more, or the scene cannot be checked."""
 
-WORST_FIRST: tuple[Status, ...] = ("collision", "in_ground", "out_of_bounds", "hovering")
-STATUS: Mapping[str, Status] = {
+WORST_FIRST: tuple[InstanceStatus, ...] = ("collision", "in_ground", "out_of_bounds", "hovering")
+STATUS: Mapping[str, InstanceStatus] = {
     "overlap": "collision",
     "in_ground": "in_ground",
     "out_of_bounds": "out_of_bounds",
@@ -59,7 +59,7 @@ class SessionView:
     revision: int
     state: State
     issues: tuple[SceneIssue, ...]
-    status: Mapping[str, Status]
+    status: Mapping[str, InstanceStatus]
     undo_label: str | None
     redo_label: str | None
     saved: bool
@@ -98,7 +98,7 @@ class SessionView:
         return self.state.X_SO(name)
 
 
-def status_of(state: State, issues: Iterable[SceneIssue] | None) -> dict[str, Status]:
+def status_of(state: State, issues: Iterable[SceneIssue] | None) -> dict[str, InstanceStatus]:
     """The worst that is said of each instance; both of a pair that overlaps are in collision.
 
     Args:
@@ -107,12 +107,12 @@ def status_of(state: State, issues: Iterable[SceneIssue] | None) -> dict[str, St
     """
     if issues is None:
         return dict.fromkeys(state.instances, "unknown")
-    found_statuses: dict[str, set[Status]] = {name: set() for name in state.instances}
+    found_statuses: dict[str, set[InstanceStatus]] = {name: set() for name in state.instances}
     for issue in issues:
         for name in (issue.instance, issue.other):
             if name in found_statuses:
                 found_statuses[name].add(STATUS[issue.kind])
-    found: dict[str, Status] = {
+    found: dict[str, InstanceStatus] = {
         name: next((status for status in WORST_FIRST if status in all_said), "ok")
         for name, all_said in found_statuses.items()
     }

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import os
 from pathlib import Path
 
 from burg_drake.core import InvalidInputError, shown
+from burg_drake.core.files import try_lock
 
 
 class SceneInUse(InvalidInputError):
@@ -66,16 +66,16 @@ def _locked(path: Path, scene: Path) -> int | None:
         except OSError:
             return None
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
+            locked = try_lock(file)
+        except OSError:  # a file system without locks
+            return file
+        if not locked:
             address = os.pread(file, 200, 0).decode(errors="replace")
             os.close(file)
             where = f" at {shown(address, 200)}" if address else ""
             raise SceneInUse(
                 f"{scene} is open already{where}; go there, or close it first", address
-            ) from error
-        except OSError:  # a file system without locks
-            return file
+            )
         with contextlib.suppress(OSError):
             if os.path.samestat(os.fstat(file), os.stat(path)):
                 return file

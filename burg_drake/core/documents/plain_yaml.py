@@ -11,7 +11,7 @@ from typing import Any
 
 import yaml
 
-from burg_drake.core.documents.yaml_events import TAGS, Event, checked_events
+from burg_drake.core.documents.yaml_events import TAGS, YamlEvent, checked_events
 from burg_drake.core.errors import DocumentError, quoted
 from burg_drake.core.files import DOCUMENT, GRASP_FILE, Limits, read_text
 
@@ -52,7 +52,9 @@ def parse_plain_yaml(
     raise DocumentError(f"{name}: {empty}")
 
 
-def _tree(event: Event, events: Iterator[Event], anchors: dict[str, Tree], name: str) -> Tree:
+def _tree(
+    event: YamlEvent, events: Iterator[YamlEvent], anchors: dict[str, Tree], name: str
+) -> Tree:
     """The value that begins with `event`; takes the events that belong to it."""
     kind = type(event)
     if kind is yaml.ScalarEvent:

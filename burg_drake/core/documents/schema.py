@@ -20,13 +20,13 @@ import numpy as np
 import yaml
 from numpy.typing import ArrayLike
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.documents.reader import Reader
 from burg_drake.core.documents.vectors import Quaternion, Vector3
 from burg_drake.core.documents.yaml_nodes import parse_nodes
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files import atomic_write, read_text
 from burg_drake.core.frames import (
-    Array,
     check_pose,
     make_pose,
     quaternion_from_rotation,

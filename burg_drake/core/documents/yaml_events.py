@@ -16,7 +16,7 @@ from burg_drake.core.files import DOCUMENT, Limits
 
 LOADER = yaml.CSafeLoader if hasattr(yaml, "CSafeLoader") else yaml.SafeLoader
 
-Event = Any
+YamlEvent = Any
 """Of PyYAML, whose kinds of event have different attributes."""
 
 _KINDS = ("str", "int", "float", "bool", "null", "map", "seq")
@@ -30,7 +30,7 @@ TOO_DEEP = "exceeded maximum nesting depth"
 
 def checked_events(
     text: str, name: str, limits: Limits = DOCUMENT, tags: frozenset[str] = TAGS
-) -> Iterator[Event]:
+) -> Iterator[YamlEvent]:
     """The events of a text, until one exceeds the limits.
 
     Args:
@@ -85,7 +85,7 @@ def checked_events(
         yield event
 
 
-def _parsed(text: str, name: str, limits: Limits) -> Iterator[Event]:
+def _parsed(text: str, name: str, limits: Limits) -> Iterator[YamlEvent]:
     if text.count("%TAG") > DIRECTIVES:
         raise DocumentError(f"{name}: more than {DIRECTIVES} %TAG directives; leave them out")
     try:
@@ -103,5 +103,5 @@ def _too_deep(limits: Limits) -> str:
     return f"nested more than {limits.depth} levels deep"
 
 
-def _failure(name: str, event: Event, what: str) -> DocumentError:
+def _failure(name: str, event: YamlEvent, what: str) -> DocumentError:
     return DocumentError(f"{name}:{event.start_mark.line + 1}: {what}")

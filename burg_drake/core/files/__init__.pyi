@@ -26,6 +26,7 @@ from .hdf5 import (
     is_hdf5 as is_hdf5,
     open_hdf5 as open_hdf5,
 )
+from .lock import try_lock as try_lock
 from .numpy_file import (
     NpzFile as NpzFile,
     npy_shape as npy_shape,
@@ -41,8 +42,8 @@ from .read_errors import (
 )
 from .stored_array import (
     NUMBERS as NUMBERS,
+    ArrayShape as ArrayShape,
     ReadBudget as ReadBudget,
-    Shape as Shape,
     StoredArray as StoredArray,
     require_grasps as require_grasps,
     text_array as text_array,

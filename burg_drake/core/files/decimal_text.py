@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from burg_drake.core.arrays import Array
+
 Words = NDArray[np.uint32]
 
 PLACES = 12

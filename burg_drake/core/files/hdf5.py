@@ -52,10 +52,6 @@ class Hdf5File:
     def __contains__(self, key: str) -> bool:
         return self._find(key) is not None
 
-    def is_group(self, key: str) -> bool:
-        """Whether there is a group of that name."""
-        return hasattr(self._find(key), "items")
-
     def names(self, key: str) -> list[str]:
         """What a group holds, in the order of the file.
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files.atomic import atomic_write, open_regular
 from burg_drake.core.files.read_errors import READ_ERRORS, reporting_read_errors, without_warnings
-from burg_drake.core.files.stored_array import ReadBudget, Shape, StoredArray
+from burg_drake.core.files.stored_array import ArrayShape, ReadBudget, StoredArray
 
 HEADERS = {
     (1, 0): np.lib.format.read_array_header_1_0,
@@ -93,7 +93,7 @@ def open_npy(path: Path) -> Iterator[StoredArray]:
         yield _stored(str(path), shape, dtype, load, ReadBudget(path))
 
 
-def npy_shape(path: Path) -> Shape | None:
+def npy_shape(path: Path) -> ArrayShape | None:
     """Shape of the numbers in a `.npy` file, from its header; None for anything else."""
     try:
         with open_regular(path) as stream, without_warnings():
@@ -110,7 +110,7 @@ def write_npy(path: Path, values: NDArray[Any]) -> None:
     atomic_write(path, buffer.getvalue())
 
 
-def _header(stream: IO[bytes], where: str, size: int) -> tuple[Shape, np.dtype[Any]]:
+def _header(stream: IO[bytes], where: str, size: int) -> tuple[ArrayShape, np.dtype[Any]]:
     """Shape and type of an array in a stream of some bytes; refuses what does not fit."""
     shape, _, dtype = HEADERS[np.lib.format.read_magic(stream)](stream)
     if dtype.hasobject:
@@ -127,6 +127,6 @@ def _header(stream: IO[bytes], where: str, size: int) -> tuple[Shape, np.dtype[A
 
 
 def _stored(
-    where: str, shape: Shape, dtype: np.dtype[Any], load: Any, allowance: ReadBudget
+    where: str, shape: ArrayShape, dtype: np.dtype[Any], load: Any, allowance: ReadBudget
 ) -> StoredArray:
     return StoredArray(where, shape, dtype.kind, str(dtype), dtype.itemsize, load, allowance)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from burg_drake.core.errors import InvalidInputError
 
-Shape = tuple[int, ...]
+ArrayShape = tuple[int, ...]
 
 MOST_GRASPS = 5_000_000
 """Of one file. The largest sets that are known have two million grasps for all of their objects."""
@@ -80,14 +80,14 @@ class StoredArray:
     """
 
     where: str
-    shape: Shape
+    shape: ArrayShape
     kind: str
     type: str
     itemsize: int
     load: Callable[[], NDArray[Any]]
     allowance: ReadBudget
 
-    def read(self, kinds: str, *shapes: Shape) -> NDArray[Any]:
+    def read(self, kinds: str, *shapes: ArrayShape) -> NDArray[Any]:
         """The data, if it is what is expected.
 
         Args:

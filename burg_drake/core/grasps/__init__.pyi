@@ -5,7 +5,10 @@ from .column import (
 )
 from .column_meanings import (
     INPUT_PREFIX as INPUT_PREFIX,
+    column_metadata as column_metadata,
     describe as describe,
+    shown_number as shown_number,
+    shown_unit as shown_unit,
 )
 from .csv_metadata_file import (
     csv_metadata as csv_metadata,
@@ -15,7 +18,6 @@ from .grasp_set import GraspSet as GraspSet
 from .mode import (
     MODES as MODES,
     Mode as Mode,
-    asks as asks,
 )
 from .outcome import (
     UNTRIED as UNTRIED,
@@ -37,7 +39,6 @@ from .verdict import (
 from .verdict_columns import (
     ARM_SCREEN_MARGINS as ARM_SCREEN_MARGINS,
     CPU_COLUMNS as CPU_COLUMNS,
-    FINDINGS as FINDINGS,
     LIFT_HEIGHT as LIFT_HEIGHT,
     MARGINS as MARGINS,
     MOVED as MOVED,
@@ -50,7 +51,7 @@ from .verdict_columns import (
     joined_findings as joined_findings,
 )
 from .verdict_field import (
-    Part as Part,
     TableShape as TableShape,
     TextField as TextField,
+    VerdictPart as VerdictPart,
 )

@@ -164,3 +164,21 @@ def describe(name: str) -> Column | None:
         theirs = describe(name.removeprefix(INPUT_PREFIX)) or Column(TEXT, "not known here")
         return replace(theirs, description=f"came with the grasps: {theirs.description}")
     return None
+
+
+def column_metadata(name: str) -> dict[str, str]:
+    """Unit and description of a column, as Parquet keeps them; nothing of one that others made."""
+    column = describe(name)
+    return {} if column is None else {"unit": column.unit, "description": column.description}
+
+
+def shown_unit(name: str) -> tuple[str, float]:
+    """The unit in which people read a column, empty if it has none, and the factor to it."""
+    column = describe(name)
+    return ("", 1.0) if column is None else column.shown
+
+
+def shown_number(name: str, value: float, digits: int) -> str:
+    """A value of a column in a line for people, such as `12.3 mm`."""
+    unit, factor = shown_unit(name)
+    return f"{value * factor:.{digits}f} {unit.replace('°', 'deg')}"

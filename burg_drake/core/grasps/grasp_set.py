@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError, UnknownNameError, listing, nearest
 from burg_drake.core.files import reporting_read_errors
-from burg_drake.core.frames import FARTHEST, Array, canonical_fingers, check_pose
+from burg_drake.core.frames import FARTHEST, canonical_fingers, check_pose
 from burg_drake.core.grasps.identifiers import identifiers
 from burg_drake.core.grasps.storage import FIXED, FIXED_COLUMNS, read_grasp_file, write_grasp_file
 

@@ -7,7 +7,7 @@ import hashlib
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core.frames import Array
+from burg_drake.core.arrays import Array
 
 ID_DIGITS = 12
 """Hexadecimal digits of an identifier; among 100,000 grasps two share one with chance 2e-5."""

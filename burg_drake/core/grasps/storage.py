@@ -45,11 +45,11 @@ TEXT = ("id", "object")
 PREFIX = "column:"
 """Of the names of further columns in `.npz`."""
 
-Columns = dict[str, NDArray[Any]]
+SetColumns = dict[str, NDArray[Any]]
 
 
 def write_grasp_file(
-    path: str | Path, provenance: Mapping[str, Any], fixed: Columns, columns: Columns
+    path: str | Path, provenance: Mapping[str, Any], fixed: SetColumns, columns: SetColumns
 ) -> None:
     """Writes a set of N grasps; see `GraspSet.save`.
 
@@ -71,7 +71,7 @@ def write_grasp_file(
     atomic_write(path, write(header, fixed, columns))
 
 
-def read_grasp_file(path: Path) -> tuple[dict[str, Any], Columns, Columns]:
+def read_grasp_file(path: Path) -> tuple[dict[str, Any], SetColumns, SetColumns]:
     """Provenance, fixed arrays and further columns, as `write_grasp_file` takes them.
 
     Raises:
@@ -95,7 +95,7 @@ def _check(path: Path, header: dict[str, Any]) -> None:
 
 def _read_arrays(
     array: Callable[[str], StoredArray], further: dict[str, str]
-) -> tuple[Columns, Columns]:
+) -> tuple[SetColumns, SetColumns]:
     """The columns that every set has, and further ones.
 
     Args:
@@ -114,7 +114,7 @@ def _read_arrays(
     return fixed, columns
 
 
-def _npz(header: dict[str, Any], fixed: Columns, columns: Columns) -> bytes:
+def _npz(header: dict[str, Any], fixed: SetColumns, columns: SetColumns) -> bytes:
     buffer = io.BytesIO()
     further = {PREFIX + name: values for name, values in columns.items()}
     arrays: dict[str, Any] = {"header": np.array(json.dumps(header)), **fixed, **further}
@@ -122,7 +122,7 @@ def _npz(header: dict[str, Any], fixed: Columns, columns: Columns) -> bytes:
     return buffer.getvalue()
 
 
-def _read_npz(path: Path) -> tuple[dict[str, Any], Columns, Columns]:
+def _read_npz(path: Path) -> tuple[dict[str, Any], SetColumns, SetColumns]:
     with open_npz(path) as file:
         stored = file.array("header")
         if stored.itemsize > 4 * DOCUMENT.size:
@@ -133,7 +133,7 @@ def _read_npz(path: Path) -> tuple[dict[str, Any], Columns, Columns]:
         return header, *_read_arrays(file.array, further)
 
 
-def _hdf5(header: dict[str, Any], fixed: Columns, columns: Columns) -> bytes:
+def _hdf5(header: dict[str, Any], fixed: SetColumns, columns: SetColumns) -> bytes:
     import h5py
 
     buffer = io.BytesIO()
@@ -168,7 +168,7 @@ def _write_dataset(group: Any, name: str, values: NDArray[Any]) -> None:
         data.attrs.update(unit=column.unit, description=column.description)
 
 
-def _read_hdf5(path: Path) -> tuple[dict[str, Any], Columns, Columns]:
+def _read_hdf5(path: Path) -> tuple[dict[str, Any], SetColumns, SetColumns]:
     with open_hdf5(path) as file:
         version = int(file.attribute("version"))
         header: dict[str, Any] = {"format": str(file.attribute("format")), "version": version}

@@ -40,16 +40,16 @@ class Margins:
     overlap: float = margin(
         "m",
         "how deep the open hand overlaps what it collides with; 0 if clear",
-        less_is_better=True,
+        smaller_is_better=True,
     )
     clearance: float = margin("m", "signed distance of the open hand from what is nearest to it")
     slip: float = margin(
         "m",
-        ("displacement of the target in the hand since the grip, at the origin of G"),
-        less_is_better=True,
+        "displacement of the target in the hand since the grip, at the origin of G",
+        smaller_is_better=True,
     )
     tilt: float = margin(
-        "rad", "rotation of the target in the hand since the grip", less_is_better=True
+        "rad", "rotation of the target in the hand since the grip", smaller_is_better=True
     )
     pad_force: float = margin("N", "normal force of the weaker pad along the closing direction")
     patch_area: float = margin("m2", "contact patch of the pad with the smaller one")
@@ -62,10 +62,10 @@ class Margins:
     lift_height: float = margin(
         "m",
         "length of the lift: as requested, or as far as there is room where less is allowed",
-        by_trial=False,
+        stage=Stage.REACHABLE,
     )
     others_moved: float = margin(
-        "m", "largest displacement of any other object's centre of mass", less_is_better=True
+        "m", "largest displacement of any other object's centre of mass", smaller_is_better=True
     )
     end_time: float = margin(
         "s",
@@ -76,31 +76,35 @@ class Margins:
         "m",
         "smallest clearance of the robot along its path, or signed distance of what blocks it",
         mode="reach",
-        by_trial=False,
+        stage=Stage.REACHABLE,
     )
     joint_excess: float = margin(
         "rad",
         "how far the nearest configuration is beyond a joint limit",
         mode="reach",
-        by_trial=False,
-        less_is_better=True,
+        stage=Stage.REACHABLE,
+        smaller_is_better=True,
     )
-    duration: float = margin("s", "duration of the planned motion", mode="arm", by_trial=False)
+    duration: float = margin("s", "duration of the planned motion", mode="arm", stage=Stage.PLANNED)
     tracking_error: float = margin(
-        "rad", "largest deviation of a joint from its command", mode="arm", less_is_better=True
+        "rad",
+        "largest deviation of a joint from its command",
+        mode="arm",
+        smaller_is_better=True,
+        own_unit=("mrad", 1e3),
     )
     tracking_distance: float = margin(
         "m",
         "largest deviation of the origin of G from its commanded position",
         mode="arm",
-        less_is_better=True,
+        smaller_is_better=True,
     )
     pushed: float = margin(
         "m",
         "largest displacement of any free object before the hand closed; for one that hovers,"
         " its fall once it is touched",
         mode="arm",
-        less_is_better=True,
+        smaller_is_better=True,
     )
 
     def __eq__(self, other: object) -> bool:
@@ -117,7 +121,8 @@ class Margins:
 
     def of_trial(self) -> dict[str, float]:
         """Those that a trial measures, by name; NaN where it ended before."""
-        return {f.name: getattr(self, f.name) for f in fields(self) if f.metadata["by_trial"]}
+        of_trial = (f.name for f in fields(self) if f.metadata["stage"] is Stage.EXECUTED)
+        return {name: getattr(self, name) for name in of_trial}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,30 +8,35 @@ from dataclasses import fields
 from typing import Any
 
 from burg_drake.core.grasps.mode import Mode, asks
+from burg_drake.core.grasps.outcome import Stage
 from burg_drake.core.grasps.verdict import CPU_TIMES, Findings, Margins, TrialFindings, Verdict
 from burg_drake.core.grasps.verdict_field import (
     InstancesField,
-    Part,
     VerdictField,
-    declared,
+    VerdictPart,
+    verdict_fields,
 )
 
-TRIAL_FINDINGS = declared(TrialFindings)
+TRIAL_FINDINGS = verdict_fields(TrialFindings)
 """What rows of tables tell of a trial."""
-FINDINGS = declared(Findings)
+FINDINGS = verdict_fields(Findings)
 """What stages find."""
 VERDICT_FIELDS = tuple(
-    sorted(declared(Verdict), key=lambda one: one.name not in ("outcome", "stage"))
+    sorted(verdict_fields(Verdict), key=lambda one: one.name not in ("outcome", "stage"))
 )
 """All fields that are written, in the order of files: how it ended, then why."""
 
 MARGINS = tuple(one.name for one in fields(Margins))
 """Names of all margins, in the order of tables."""
-SMALLER_IS_BETTER = frozenset(one.name for one in fields(Margins) if one.metadata["less_is_better"])
+SMALLER_IS_BETTER = frozenset(
+    one.name for one in fields(Margins) if one.metadata["smaller_is_better"]
+)
 """Names of the margins of which a smaller one is better."""
 LIFT_HEIGHT = "lift_height"
 """Margin: length of the lift that was asked for, or for which there is room."""
-ARM_SCREEN_MARGINS = ("arm_clearance", "joint_excess", LIFT_HEIGHT)
+ARM_SCREEN_MARGINS = tuple(
+    one.name for one in fields(Margins) if one.metadata["stage"] is Stage.REACHABLE
+)
 """Margins that the arm's screen measures."""
 CPU_COLUMNS = {stage: name for stage, (name, _, _) in CPU_TIMES.items()}
 """Columns of the CPU time of each stage."""
@@ -40,7 +45,7 @@ PREFIXES = {one.name: one.prefix for one in VERDICT_FIELDS if isinstance(one, In
 MOVED, PUSHED = PREFIXES["displacements"], PREFIXES["pushed"]
 
 
-def fields_in(mode: Mode, part: Part) -> list[VerdictField]:
+def fields_in(mode: Mode, part: VerdictPart) -> list[VerdictField]:
     """The fields that a part of a row has in tables of a mode."""
     return [one for one in VERDICT_FIELDS if one.part == part and asks(mode, one.mode)]
 

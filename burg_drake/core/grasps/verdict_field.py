@@ -19,7 +19,7 @@ from burg_drake.core.grasps.outcome import Stage
 
 KIND: Final = "kind"
 """Key of the metadata of a dataclass's field."""
-Part = Literal["decided", "measured", "posture", "cost"]
+VerdictPart = Literal["decided", "measured", "posture", "cost"]
 """Parts of a row that fields of a verdict lie in, from left to right; other columns stand between
 them."""
 
@@ -53,7 +53,7 @@ class VerdictField(ABC):
     name: str = ""
     column: Column
     mode: Mode = "hand"
-    part: Part = "measured"
+    part: VerdictPart = "measured"
 
     @property
     def is_text(self) -> bool:
@@ -245,22 +245,23 @@ def margin(
     meaning: str,
     *,
     mode: Mode = "hand",
-    by_trial: bool = True,
-    less_is_better: bool = False,
+    stage: Stage = Stage.EXECUTED,
+    smaller_is_better: bool = False,
+    own_unit: tuple[str, float] | None = None,
 ) -> Any:
     """A margin: NaN where it was not measured.
 
     Args:
-        unit, meaning: see `Column`.
+        unit, meaning, own_unit: see `Column`.
         mode: the first mode in which it is measured.
-        by_trial: whether the trial measures it, or a stage before.
-        less_is_better: whether a grasp is the better the smaller it is.
+        stage: the last one that measures it; `EXECUTED` of what a trial measures.
+        smaller_is_better: whether a grasp is the better the smaller it is.
     """
     metadata = {
-        "column": Column(unit, meaning),
+        "column": Column(unit, meaning, own_unit),
         "mode": mode,
-        "by_trial": by_trial,
-        "less_is_better": less_is_better,
+        "stage": stage,
+        "smaller_is_better": smaller_is_better,
     }
     return field(default=math.nan, metadata=metadata)
 
@@ -270,7 +271,7 @@ def text(
     *,
     of: type[str] = str,
     mode: Mode = "hand",
-    part: Part = "decided",
+    part: VerdictPart = "decided",
     replayed: bool = True,
 ) -> dict[str, VerdictField]:
     """Metadata of a text; see `TextField`."""
@@ -300,7 +301,7 @@ def by_stage(times: Mapping[Stage, tuple[str, str, Mode]]) -> dict[str, VerdictF
     return {KIND: StagesField(column=Column("s", "CPU time of a stage"), times=times, part="cost")}
 
 
-def declared(record: type[Any]) -> tuple[VerdictField, ...]:
+def verdict_fields(record: type[Any]) -> tuple[VerdictField, ...]:
     """The fields of a record that have a kind, in the order of their declaration."""
     return tuple(
         replace(one.metadata[KIND], name=one.name) for one in fields(record) if KIND in one.metadata

@@ -1,5 +1,6 @@
 from .colors import (
     CATEGORIES as CATEGORIES,
+    Rgb as Rgb,
     Rgba as Rgba,
     distinct_colors as distinct_colors,
 )

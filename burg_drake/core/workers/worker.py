@@ -10,7 +10,7 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
-from burg_drake.core.errors import SimulationError, TaskCancelled
+from burg_drake.core.errors import SimulationError, TaskCancelled, one_line
 from burg_drake.core.workers.limits import restore_time_limit_signals, time_limit
 from burg_drake.core.workers.messages import (
     Call,
@@ -44,7 +44,7 @@ def main(handle: int, own_group: bool = False) -> None:
     except (EOFError, BrokenPipeError, ConnectionResetError):
         pass  # the parent is gone, and nobody is left to tell
     except (SystemExit, KeyboardInterrupt) as error:  # DRAKE_DEMAND ends this way
-        connection.send(Ending(_one_line(error)))
+        connection.send(Ending(one_line(error)))
     # Destructors of large diagrams take time and nothing is left to be written.
     os._exit(0)
 
@@ -127,10 +127,5 @@ def _portable(error: Exception) -> tuple[Exception, str]:
     try:
         sent: Exception = pickle.loads(pickle.dumps(error))
     except Exception:  # its class cannot be found, or wants other arguments
-        sent = SimulationError(_one_line(error))
+        sent = SimulationError(one_line(error))
     return sent, where
-
-
-def _one_line(error: BaseException) -> str:
-    message = " ".join(str(error).split())
-    return f"{type(error).__name__}: {message}" if message else type(error).__name__

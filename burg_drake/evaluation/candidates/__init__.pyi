@@ -26,7 +26,7 @@ from .sampling_shortfall import (
     shortfall as shortfall,
 )
 from .scene_frame import (
-    Names as Names,
+    Owners as Owners,
     by_instance as by_instance,
     held_instances as held_instances,
     in_frame as in_frame,

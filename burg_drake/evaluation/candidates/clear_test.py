@@ -15,7 +15,7 @@ from burg_drake.grasping.quality import are_antipodal, grasp_contacts
 if TYPE_CHECKING:
     from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
     from burg_drake.geometry import Surface
-    from burg_drake.grasping.clearance import HandClearance, Mode
+    from burg_drake.grasping.clearance import ClearanceMode, HandClearance
     from burg_drake.grasping.quality import Jaws
 
 PADS = "pads"
@@ -52,7 +52,7 @@ class ClearTest:
     ) -> None:
         self._screen, self._name, self._X_WO = screen, name, X_WO
         self._surface, self._jaws, self._friction = surface, jaws, friction
-        self._mode: Mode = "conservative" if settings.conservative else "exact"
+        self._mode: ClearanceMode = "conservative" if settings.conservative else "exact"
         self._margin = settings.margin
         self.blocked: Counter[str] = Counter()
 

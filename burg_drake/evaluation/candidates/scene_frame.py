@@ -19,12 +19,12 @@ at the grasp point, at the finger tips, and as far behind."""
 SPACING = 0.005
 """Of the points of a surface to which the distance of a grasp is taken [m]."""
 
-Names = NDArray[np.str_]
+Owners = NDArray[np.str_]
 
 
 def held_instances(
     scene: Scene, X_SG: Array, gripper: Gripper, among: Sequence[str] | None = None
-) -> tuple[Names, NDArray[np.bool_]]:
+) -> tuple[Owners, NDArray[np.bool_]]:
     """The free instance that each grasp is about.
 
     It is the one whose surface is nearest to the grasp point among all that lies between the open
@@ -89,7 +89,7 @@ def _distance_beside(scene: Scene, name: str, p_SG: Array) -> Array:
     return np.asarray(distance)
 
 
-def by_instance(scene: Scene, grasps: GraspSet, X_SG: Array, owner: Names) -> dict[str, GraspSet]:
+def by_instance(scene: Scene, grasps: GraspSet, X_SG: Array, owner: Owners) -> dict[str, GraspSet]:
     """Grasps in the frames of their objects, by instance in the scene's order.
 
     Args:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from burg_drake.core import BurgError, ClusterError
+from burg_drake.core import BurgError, ClusterError, one_line
 from burg_drake.evaluation.cluster.members import LOST, scheduler_errors
 from burg_drake.evaluation.cluster.remote import deliver
 from burg_drake.evaluation.cluster.sent_job import SentJob
-from burg_drake.evaluation.stages import one_line
 
 ATTEMPTS = 3
 """So often a worker is sent what it needs to begin."""

@@ -16,7 +16,7 @@ from typing import Any
 
 from distributed import KilledWorker
 
-from burg_drake.core import BurgError, ClusterError, SimulationError
+from burg_drake.core import BurgError, ClusterError, SimulationError, one_line
 from burg_drake.core.grasps import Outcome, Stage, Verdict
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.cluster.delivery import ATTEMPTS, deliver_bundle
@@ -30,7 +30,6 @@ from burg_drake.evaluation.cluster.members import (
 from burg_drake.evaluation.cluster.remote import Answers, Chunk, Supervisor, judge_chunk
 from burg_drake.evaluation.cluster.sent_job import LOSSES, SentChunk, SentJob
 from burg_drake.evaluation.cluster.waiting import Waiting
-from burg_drake.evaluation.stages import one_line
 from burg_drake.evaluation.workers import Answer, Job, JobFailed, OnFailure, WorkerLimits
 
 LOOK = 1.0

@@ -15,14 +15,14 @@ from burg_drake.core.grasps import GraspSet
 from burg_drake.evaluation.candidates import (
     INSTANCE,
     InstanceNames,
-    Names,
+    Owners,
     by_instance,
     held_instances,
     require_instances,
 )
 from burg_drake.evaluation.grasp_sets.input import read_input
 from burg_drake.evaluation.grasp_sets.near_objects import require_near
-from burg_drake.formats.common import PANDA, Frame, Gripper, with_objects_renamed
+from burg_drake.formats.common import PANDA, Gripper, PoseFrame, with_objects_renamed
 from burg_drake.scene.document import Scene, SceneLike, as_scene
 
 OBJECT_ID, SCENE_ID = "object_id", "scene_id"
@@ -55,7 +55,7 @@ def read_grasps(
     *,
     format: str | None = None,
     objects: Mapping[str, str] | None = None,
-    frame: Frame | None = None,
+    frame: PoseFrame | None = None,
     X_SF: Array | None = None,
     object_ids: Mapping[int, str] | None = None,
     scene_id: str | None = None,
@@ -197,7 +197,7 @@ def _owners(
     names: InstanceNames,
     object_ids: Mapping[int, str],
     gripper: Gripper,
-) -> tuple[Names, tuple[str, ...]]:
+) -> tuple[Owners, tuple[str, ...]]:
     """(N,) instances that grasps (N, 4, 4) in the scene frame belong to, and notes about it."""
     names.require_used([""])
     among = names.of_object("") if names.given else None

@@ -13,7 +13,13 @@ from burg_drake.core.grasps import GraspSet
 from burg_drake.evaluation.candidates import in_frame
 from burg_drake.evaluation.grasp_sets.candidate_files import read_grasps
 from burg_drake.evaluation.grasp_sets.input import read_input
-from burg_drake.formats.common import PANDA, Frame, Gripper, ImportedGrasps, with_objects_renamed
+from burg_drake.formats.common import (
+    PANDA,
+    Gripper,
+    ImportedGrasps,
+    PoseFrame,
+    with_objects_renamed,
+)
 from burg_drake.scene.document import Scene
 
 IN_WORDS = {"object": "the frame of their object", "world": "a scene", "camera": "a camera"}
@@ -38,11 +44,11 @@ class SeenScene:
 
 def read_in_frame(
     path: str | Path,
-    wanted: Frame,
+    wanted: PoseFrame,
     gripper: Gripper = PANDA,
     *,
     format: str | None = None,
-    frame: Frame | None = None,
+    frame: PoseFrame | None = None,
     objects: Mapping[str, str] | None = None,
     seen: SeenScene | None = None,
 ) -> ImportedGrasps:

@@ -5,14 +5,14 @@ Several can share it to read what must not change meanwhile.
 
 from __future__ import annotations
 
-import fcntl
 import os
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from burg_drake.core import InvalidInputError
+from burg_drake.core.files import try_lock
 
 TRIES = 5
 PAUSE = 0.02
@@ -22,11 +22,10 @@ PAUSE = 0.02
 def lock(file: int) -> bool:
     """Locks an open file; whether that went well."""
     for k in range(TRIES):
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return True
-        except OSError:
-            time.sleep(PAUSE if k + 1 < TRIES else 0.0)
+        with suppress(OSError):
+            if try_lock(file):
+                return True
+        time.sleep(PAUSE if k + 1 < TRIES else 0.0)
     return False
 
 
@@ -37,8 +36,7 @@ def is_locked(path: Path) -> bool:
     except OSError:
         return False
     try:
-        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        return False
+        return not try_lock(file, shared=True)
     except OSError:
         return True
     finally:
@@ -63,9 +61,11 @@ def unchanged(path: Path, *, make: bool = False) -> Iterator[None]:
         return
     try:
         try:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except OSError as error:
-            raise being_written(path.parent) from error
+            shared = try_lock(file, shared=True)
+        except OSError:
+            shared = False
+        if not shared:
+            raise being_written(path.parent)
         yield
     finally:
         os.close(file)

@@ -19,7 +19,7 @@ from burg_drake.core.files import open_regular
 
 LEDGER_FILE = "scenes.jsonl"
 LONGEST_LINE = 1 << 16
-State = Literal["open", "done", "failed", "empty"]
+LedgerState = Literal["open", "done", "failed", "empty"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +42,7 @@ class SceneState:
     """
 
     scene: str
-    state: State
+    state: LedgerState
     run: str = ""
     grasps: int = 0
     mine: int = 0

@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from burg_drake.core import InvalidInputError, quoted
 
-Item = TypeVar("Item")
+Shared = TypeVar("Shared")
 MOST = 1_000_000
 
 
@@ -71,7 +71,7 @@ def as_shard(shard: Shard | str | None) -> Shard | None:
     return None if found is None or found.count == 1 else found
 
 
-def share(items: Sequence[Item], shard: Shard | str | None) -> Sequence[Item]:
+def share(items: Sequence[Shared], shard: Shard | str | None) -> Sequence[Shared]:
     """What of some items is in a shard; all of them without one."""
     found = as_shard(shard or None)
     return items if found is None else items[found.number - 1 :: found.count]

@@ -33,9 +33,9 @@ from burg_drake.core import quaternion_from_rotation
 from burg_drake.core.grasps import (
     INPUT_PREFIX,
     VERDICT_FIELDS,
-    Part,
     TableShape,
     Verdict,
+    VerdictPart,
     fields_in,
 )
 from burg_drake.evaluation.candidates import Candidates
@@ -127,7 +127,7 @@ def trial_columns(
     return columns
 
 
-def columns_of_verdicts(rows: Sequence[Verdict], part: Part, shape: TableShape) -> Columns:
+def columns_of_verdicts(rows: Sequence[Verdict], part: VerdictPart, shape: TableShape) -> Columns:
     """The columns of verdicts that lie in a part of a row, see `core.grasps.verdict_field`."""
     columns: Columns = {}
     for one in fields_in(shape.mode, part):

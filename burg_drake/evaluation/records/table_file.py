@@ -29,7 +29,14 @@ from burg_drake.core.files import (
     short_message,
     text_array,
 )
-from burg_drake.core.grasps import MARGINS, PREFIXES, csv_metadata, describe, metadata_path
+from burg_drake.core.grasps import (
+    MARGINS,
+    PREFIXES,
+    column_metadata,
+    csv_metadata,
+    describe,
+    metadata_path,
+)
 from burg_drake.evaluation.records.table import INTEGER, TEXT, Columns
 
 T = TypeVar("T", int, float)
@@ -210,16 +217,11 @@ def _parquet_bytes(columns: Columns, metadata: Mapping[str, Any]) -> bytes:
         for name, values in columns.items()
     }
     table = arrow.table(arrays)
-    fields = [field.with_metadata(_field_metadata(field.name)) for field in table.schema]
+    fields = [field.with_metadata(column_metadata(field.name)) for field in table.schema]
     table = table.cast(arrow.schema(fields, {METADATA_KEY: json.dumps(metadata)}))
     sink = arrow.BufferOutputStream()
     parquet.write_table(table, sink)
     return bytes(sink.getvalue().to_pybytes())
-
-
-def _field_metadata(name: str) -> dict[str, str]:
-    column = describe(name)
-    return {} if column is None else {"unit": column.unit, "description": column.description}
 
 
 def _pyarrow() -> tuple[Any, Any]:

@@ -15,7 +15,7 @@ from burg_drake.core.grasps import LIFT_HEIGHT, TRIAL_FINDINGS, Outcome, Stage, 
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.records.origin import ORIGIN_TEXT
 
-Name = TypeVar("Name", bound=StrEnum)
+Member = TypeVar("Member", bound=StrEnum)
 
 LARGEST = 1e6
 """Of mass [kg] and friction; what is beyond cannot be simulated."""
@@ -133,7 +133,7 @@ def read_trial(row: Mapping[str, Any], where: str) -> RecordedTrial:
     )
 
 
-def _member(kind: type[Name], text: str, where: str) -> Name:
+def _member(kind: type[Member], text: str, where: str) -> Member:
     known = [member.value for member in kind]
     if text not in known:
         raise InvalidInputError(

@@ -1,9 +1,5 @@
 from .campaign import (
-    campaign_page as campaign_page,
     renew_report as renew_report,
     write_campaign_report as write_campaign_report,
 )
-from .page import (
-    report_page as report_page,
-    write_report as write_report,
-)
+from .page import write_report as write_report

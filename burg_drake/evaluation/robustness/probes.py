@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count, takewhile
-from typing import TYPE_CHECKING
 
 from burg_drake.core import content_hash
 from burg_drake.core.grasps import Verdict
@@ -18,12 +17,7 @@ from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.robustness.probe_answer import ProbeAnswer
 from burg_drake.evaluation.robustness.settings import TESTS, RobustnessSettings
 from burg_drake.scene.document import Scene
-from burg_drake.simulation.robustness import (
-    perturb,
-)
-
-if TYPE_CHECKING:
-    pass
+from burg_drake.simulation.robustness import perturb
 
 HASH_DIGITS = 8
 """Digits of the hash in the id of a probe: answers found with other settings do not count."""

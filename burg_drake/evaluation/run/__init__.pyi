@@ -7,7 +7,7 @@ from .preparation import (
     require_sound as require_sound,
 )
 from .request import (
-    Given as Given,
+    GraspsLike as GraspsLike,
     Request as Request,
 )
 from .scene_judging import is_finished as is_finished

@@ -33,7 +33,7 @@ from burg_drake.scene.document import Scene
 from burg_drake.station.document import Engine, GraspMotion, Station, engine_preset
 
 ByInstance = Mapping[str, GraspSet]
-Given = GraspSet | ByInstance | Callable[[Scene], ByInstance]
+GraspsLike = GraspSet | ByInstance | Callable[[Scene], ByInstance]
 """Grasps that a user has: a set, sets by instance, or a function that has those of a scene."""
 
 
@@ -57,7 +57,7 @@ class Request:
     motion: GraspMotion
     shard: Shard | None
     only: tuple[str, ...]
-    grasps: Given | None
+    grasps: GraspsLike | None
     retry_failed: bool
 
     @classmethod
@@ -65,7 +65,7 @@ class Request:
         cls,
         station: Station,
         settings: EvaluationSettings,
-        grasps: Given | None = None,
+        grasps: GraspsLike | None = None,
         *,
         retry_failed: bool = False,
     ) -> Request:
@@ -115,7 +115,7 @@ class Request:
             return None
         if self.grasps is None:
             return replace(self, only=only) if scene.instances else None
-        grasps: Given = self.grasps
+        grasps: GraspsLike = self.grasps
         if isinstance(grasps, GraspSet):
             by = grasps.columns.get(INSTANCE, grasps.object)
             among = list(scene.instances) if INSTANCE in grasps.columns else sorted({*known, ""})
@@ -205,7 +205,7 @@ def command() -> str:
     return shlex.join([program, *sys.argv[1:]])
 
 
-def given_content(grasps: Given | None) -> str:
+def given_content(grasps: GraspsLike | None) -> str:
     """Hash of the grasps that are given for many scenes; empty of those that a function has, which
     each scene's run has a hash of."""
     if grasps is None or callable(grasps):

@@ -10,7 +10,6 @@ from .judge import (
     Screen as Screen,
     ScreenAnswers as ScreenAnswers,
     judge_grasp as judge_grasp,
-    one_line as one_line,
     screen_grasps as screen_grasps,
     trial_decision as trial_decision,
     trial_verdict as trial_verdict,

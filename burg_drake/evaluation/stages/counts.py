@@ -22,7 +22,7 @@ from burg_drake.motion.reach import Reach
 from burg_drake.scene.document import Scene, SceneLike, as_scene
 from burg_drake.station.document import GraspMotion, Station, StationLike, as_station
 
-Names = NDArray[np.object_]
+Blockers = NDArray[np.object_]
 
 THE_ARM = "the arm"
 """Stands among what is in the way for the arm's own limits: its range, its joints, its links among
@@ -162,7 +162,7 @@ def _blocker_of(verdict: Reach, others: set[str]) -> str:
     return body if body in others else THE_ARM
 
 
-def _count(grasps: ObjectGrasps, blocker: Names, hindrance: Names | None) -> GraspCount:
+def _count(grasps: ObjectGrasps, blocker: Blockers, hindrance: Blockers | None) -> GraspCount:
     """What hand (N,) and arm (N,) say of grasps; None where the arm was not asked."""
     last = blocker if hindrance is None else hindrance
     return GraspCount(

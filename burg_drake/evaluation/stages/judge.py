@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
+from burg_drake.core import one_line
 from burg_drake.core.grasps import LIFT_HEIGHT, Findings, Outcome, Stage, Verdict, joined_findings
 from burg_drake.evaluation.candidates import Candidate
 
@@ -168,12 +169,6 @@ def _with_lift(candidate: Candidate, decisions: Sequence[Decision]) -> Candidate
         return candidate
     found = [d.margins[LIFT_HEIGHT] for d in decisions if LIFT_HEIGHT in d.margins]
     return replace(candidate, lift=found[-1]) if found else candidate
-
-
-def one_line(error: BaseException) -> str:
-    """An error as one line: its type and message."""
-    message = " ".join(str(error).split())
-    return f"{type(error).__name__}: {message}" if message else type(error).__name__
 
 
 def _verdict(decisions: Sequence[Decision], stage: Stage, cpu: Mapping[Stage, float]) -> Verdict:

@@ -15,7 +15,7 @@ from burg_drake.scene.document import Scene, load_scene
 from burg_drake.station.document import Station, load_station
 
 Document = TypeVar("Document", Scene, Station)
-Place = tuple[str, Callable[[], Document]]
+FilePlace = tuple[str, Callable[[], Document]]
 
 
 @dataclass(frozen=True)
@@ -54,8 +54,8 @@ def find_inputs(
         InvalidInputError: a document is not where it was, or has another content; the message
             says which one is needed.
     """
-    scenes: list[Place[Scene]]
-    stations: list[Place[Station]]
+    scenes: list[FilePlace[Scene]]
+    stations: list[FilePlace[Station]]
     text, word = scene or origin.scene, station or origin.station
     scenes = [(text, lambda: load_scene(_existing(text, "scenes")))]
     stations = [(word, lambda: load_station(_existing(word, "stations")))]
@@ -91,7 +91,7 @@ class _InputSearch:
     force: bool
 
     def find(
-        self, kind: str, content: str, places: Sequence[Place[Document]]
+        self, kind: str, content: str, places: Sequence[FilePlace[Document]]
     ) -> tuple[Document, str] | str:
         """The first document that fits, and a note if it is taken though it does not fit; what is
         needed if there is none."""

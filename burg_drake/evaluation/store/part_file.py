@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from burg_drake.core import InvalidInputError, MissingDependencyError
 from burg_drake.core.files import atomic_write, open_regular
-from burg_drake.core.grasps import describe
+from burg_drake.core.grasps import column_metadata
 from burg_drake.evaluation.records import TEXT, Columns
 from burg_drake.evaluation.store.part_segments import JournalSegment
 
@@ -29,7 +29,6 @@ PLAIN_TEXT = ("id", "X_OG")
 """Texts that differ from row to row; of the others few differ, and each is kept once."""
 SEGMENTS_KEY = b"burg_drake.segments"
 NAME = re.compile(r"part-(\d+)-([0-9a-f]{16})\.parquet")
-MAGIC = b"PAR1"
 LARGEST_FOOTER = 1 << 26
 
 
@@ -83,7 +82,7 @@ def write_part(folder: Path, number: int, table: Any, segments: Sequence[Journal
         InvalidInputError: the folder cannot be written.
     """
     arrow = require_arrow("a columnar table")
-    meant = [field.with_metadata(_meaning(field.name)) for field in table.schema]
+    meant = [field.with_metadata(column_metadata(field.name)) for field in table.schema]
     stored = json.dumps([list(asdict(segment).values()) for segment in segments])
     table = table.cast(arrow.schema(meant, {SEGMENTS_KEY: stored}))
     sink = arrow.BufferOutputStream()
@@ -203,11 +202,6 @@ def _type(name: str, kind: str) -> Any:
 def _is_text(kind: Any) -> bool:
     arrow = require_arrow("a columnar table")
     return bool(arrow.types.is_string(kind) or arrow.types.is_large_string(kind))
-
-
-def _meaning(name: str) -> Mapping[str, str]:
-    column = describe(name)
-    return {} if column is None else {"unit": column.unit, "description": column.description}
 
 
 def _footer_hash(data: bytes) -> str:

@@ -1,4 +1,4 @@
-"""The folder of the plans that `reach` makes, and how a later call goes on with it.
+"""The folder of the plans that `reach` makes, and how a later call continues it.
 
 plans.yaml                   what was asked: documents, grasps, settings, versions
 journal.jsonl                one line a judged grasp, as it came; times of computation are in it

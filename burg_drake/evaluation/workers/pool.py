@@ -20,11 +20,10 @@ from functools import partial
 from queue import SimpleQueue
 from typing import Any
 
-from burg_drake.core import BurgError, SimulationError, WorkerDied
+from burg_drake.core import BurgError, SimulationError, WorkerDied, one_line
 from burg_drake.core.grasps import Outcome, Verdict
 from burg_drake.core.workers import Task, WorkerPool
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.stages import one_line
 from burg_drake.evaluation.workers.job import Job, JobFailed, OnFailure
 from burg_drake.evaluation.workers.limits import WorkerLimits
 from burg_drake.evaluation.workers.open_job import TASK_SIZE, OpenJob, Screening

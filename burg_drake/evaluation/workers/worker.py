@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from burg_drake.core import BurgError, SimulationError
+from burg_drake.core import BurgError, SimulationError, one_line
 from burg_drake.core.grasps import Verdict
 from burg_drake.core.workers import report_progress
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.stages import Judge, ScreenAnswers, judge_grasp, one_line, screen_grasps
+from burg_drake.evaluation.stages import Judge, ScreenAnswers, judge_grasp, screen_grasps
 
 Grasp = tuple[Candidate, ScreenAnswers]
 """A grasp with the answers of the screens that have been asked."""

@@ -27,7 +27,7 @@ from burg_drake.experiment.pairing import (
     successes,
     undecided,
 )
-from burg_drake.experiment.statistics import MARGINS, PROBABILITY
+from burg_drake.experiment.statistics import PREDICTORS, PROBABILITY
 from burg_drake.experiment.trials import Success
 
 
@@ -80,7 +80,7 @@ def pairs_of_runs(
     """Pairs of verdicts of the grasps in common, and what is left out by reason."""
     ended = tables[1].texts["outcome"].take(found.second)
     pairs = make_pairs(
-        tables[0].take(found.first, MARGINS), ended, successes(ended, success), success
+        tables[0].take(found.first, PREDICTORS), ended, successes(ended, success), success
     )
     keep = np.ones(len(pairs), dtype=bool)
     left_out = {}

@@ -28,7 +28,7 @@ from burg_drake.experiment.pairing import (
     side_of_trials,
     undecided,
 )
-from burg_drake.experiment.statistics import MARGINS, PROBABILITY, paired
+from burg_drake.experiment.statistics import PREDICTORS, PROBABILITY, paired
 from burg_drake.experiment.trials import (
     RealTrial,
     Success,
@@ -138,7 +138,7 @@ def _pairs(
     outcomes = [t.outcome for t in trials if t.outcome is not None]
     ended = Factor.of(np.array([o.value for o in outcomes], dtype=np.str_))
     actual = np.array([succeeded(o, success) for o in outcomes], dtype=bool)
-    table = ResultTable.of_columns(columns, NAMES).take(rows, MARGINS)
+    table = ResultTable.of_columns(columns, NAMES).take(rows, PREDICTORS)
     return make_pairs(table, ended, actual, success)
 
 

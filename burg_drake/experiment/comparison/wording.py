@@ -14,13 +14,6 @@ CELL_NAMES = {
     "fn": "failure predicted, success seen",
     "tn": "failure predicted and seen",
 }
-UNITS = {
-    "m": ("mm", 1e3),
-    "rad": ("°", 57.29577951308232),
-    "m2": ("mm²", 1e6),
-    "N": ("N", 1.0),
-}
-"""Units for people by that of a column, and how many of them it is."""
 
 
 def of_selected(comparison: Comparison) -> str:
@@ -118,12 +111,10 @@ def bias_words(comparison: Comparison, judged: Judgement | None = None) -> str:
 
 def margin_title(name: str) -> tuple[str, str, float]:
     """What a margin is called, its unit for people, and how many of them its column's unit is."""
-    from burg_drake.core.grasps import describe
+    from burg_drake.core.grasps import shown_unit
 
     if name == PROBABILITY:
         return "predicted probability", "", 1.0
     if name.endswith("_mm"):
         return name.removesuffix("_mm").replace("_", " "), "mm", 1.0
-    column = describe(name)
-    unit, size = UNITS.get(column.unit, ("", 1.0)) if column else ("", 1.0)
-    return name.replace("_", " "), unit, size
+    return name.replace("_", " "), *shown_unit(name)

@@ -44,7 +44,7 @@ from burg_drake.evaluation.records import (
     require_same_run,
     run_hash,
 )
-from burg_drake.evaluation.run import EvaluationSettings, Given
+from burg_drake.evaluation.run import EvaluationSettings, GraspsLike
 from burg_drake.evaluation.stages import arm_settings, mode_for
 from burg_drake.evaluation.store import (
     RUN_FILE,
@@ -72,7 +72,7 @@ def measure_gap(
     out: str | Path,
     *,
     station: StationLike = "panda_tabletop",
-    grasps: Given | None = None,
+    grasps: GraspsLike | None = None,
     evaluation: EvaluationSettings | None = None,
     settings: GapSettings | None = None,
     tried: Sequence[str] = (),

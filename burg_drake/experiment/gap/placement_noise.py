@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -19,11 +18,6 @@ from burg_drake.scene.document import Scene, SceneIssue
 
 MOST_DRAWS = 200
 """Draws of one object; then it stays where it was planned."""
-
-
-def _deviation(default: float, help: str, **more: Any) -> Any:
-    """The declaration of a standard deviation."""
-    return setting(default, help, low=0, **more)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,17 +30,19 @@ class PlacementNoise:
         seed: of the errors.
     """
 
-    place: float = _deviation(
+    place: float = setting(
         0.002,
         "standard deviation of each object along x and along y",
         unit=THOUSANDTHS,
         name="placement_sd_mm",
+        low=0,
     )
-    turn: float = _deviation(
+    turn: float = setting(
         math.radians(2.0),
         "standard deviation of its rotation about the vertical",
         unit=DEGREES,
         name="placement_sd_deg",
+        low=0,
     )
     seed: int = 0
 

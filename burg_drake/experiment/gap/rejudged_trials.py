@@ -18,8 +18,8 @@ from burg_drake.experiment.statistics import Paired, paired_counts
 from burg_drake.experiment.trials import RealTrial, Success, TrialSheet, grasp_contents, succeeded
 from burg_drake.scene.document import Scene
 
-Cause = Literal["agreed", "placement", "worsened", "physics"]
-CAUSES: dict[Cause, str] = {
+TrialCause = Literal["agreed", "placement", "worsened", "physics"]
+CAUSES: dict[TrialCause, str] = {
     "agreed": "agreed as planned, and as measured",
     "placement": "disagreed as planned, agree as measured: explained by the placement",
     "worsened": "agreed as planned, disagree as measured: worsened",
@@ -73,7 +73,7 @@ class Rejudged:
             return ""
         return self.reason or (self.verdict.reason if self.verdict else "")
 
-    def cause(self, success: Success) -> Cause | None:
+    def cause(self, success: Success) -> TrialCause | None:
         """What the two verdicts say of the real one; None if it could not be judged again, or not
         as planned."""
         if self.outcome is None or self.planned is Outcome.SIMULATION_FAILED:
@@ -109,9 +109,9 @@ class Rejudging:
         return tuple(t for t in self.trials if t.cause(self.success) is not None)
 
     @cached_property
-    def causes(self) -> Counter[Cause]:
+    def causes(self) -> Counter[TrialCause]:
         """Number of trials by what they say."""
-        found: Counter[Cause] = Counter(dict.fromkeys(CAUSES, 0))
+        found: Counter[TrialCause] = Counter(dict.fromkeys(CAUSES, 0))
         found.update(c for t in self.judged if (c := t.cause(self.success)) is not None)
         return found
 

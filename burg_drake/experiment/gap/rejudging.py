@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from burg_drake.core import (
     content_hash,
+    one_line,
     software_versions,
 )
 from burg_drake.core.files import remove_unfinished, writable_folder
@@ -29,7 +30,6 @@ from burg_drake.evaluation.records import (
     origin_of,
     read_journal,
 )
-from burg_drake.evaluation.stages import one_line
 from burg_drake.evaluation.store import Run
 from burg_drake.evaluation.workers import Executor, Job, JobFailed, LocalExecutor
 from burg_drake.experiment.gap.displacement import commanded

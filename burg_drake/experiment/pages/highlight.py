@@ -6,10 +6,9 @@ from collections.abc import Sequence
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from burg_drake.cameras.overlay import lay_out, paste, tag
-from burg_drake.core import Array, inverse
+from burg_drake.core import Array, Bytes, inverse
 from burg_drake.experiment.pages.painting import Painting, Viewpoint
 from burg_drake.experiment.pages.scene_bodies import GROUND, HAND, PlacedBody
 from burg_drake.visualization.pictures import painted_shadow
@@ -25,7 +24,6 @@ SEEN = 30
 LETTERS = 0.042
 """Height of names, as a share of the picture's."""
 JPEG_QUALITY = 82
-Bytes = NDArray[np.uint8]
 
 
 def with_target(painting: Painting, placed: Sequence[PlacedBody], target: str) -> Bytes:

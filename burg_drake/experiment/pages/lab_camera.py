@@ -26,8 +26,7 @@ from burg_drake.cameras.optics import Intrinsics
 from burg_drake.cameras.overlay import OverlayStyle
 from burg_drake.cameras.placement import Placement, PlacementCheck
 from burg_drake.cameras.sources import FrameSource, write_image
-from burg_drake.core import BurgError, InvalidInputError
-from burg_drake.evaluation.stages import one_line
+from burg_drake.core import BurgError, InvalidInputError, one_line
 from burg_drake.experiment.pages.lab_book import LabBook
 from burg_drake.experiment.trials import keep_evidence, object_places
 from burg_drake.scene.document import Scene

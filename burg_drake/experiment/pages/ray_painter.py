@@ -11,11 +11,11 @@ import trimesh
 from pydrake.geometry import Box, Capsule, Cylinder, Ellipsoid, Mesh, Shape, Sphere
 
 from burg_drake.cameras.optics import FieldOfView
-from burg_drake.core import Array, transform_points
+from burg_drake.core import Array, Indices, transform_points
 from burg_drake.core.terminal import CATEGORIES, distinct_colors
 from burg_drake.experiment.pages.painting import BACKGROUND, NOTHING, Painting, Viewpoint
 from burg_drake.experiment.pages.scene_bodies import GROUND, HAND, PlacedBody
-from burg_drake.geometry import Indices, RayCaster
+from burg_drake.geometry import RayCaster
 
 LIGHT = np.array([0.35, -0.45, 0.82])
 """Where the light comes from, in S."""

@@ -10,6 +10,7 @@ import numpy as np
 from pydrake.geometry import Box, Mesh, Shape
 
 from burg_drake.core import Array, inverse, make_pose
+from burg_drake.core.terminal import Rgb
 from burg_drake.scene.document import Scene
 from burg_drake.station.document import Station
 from burg_drake.station.world import OBSTACLE_COLOR, TABLE_COLOR, board_meshes
@@ -21,7 +22,6 @@ BELOW = 1e-3
 """By so much the table is drawn below the board, so that the sheet shows [m]."""
 GROUND = "ground"
 HAND = "hand"
-Rgb = tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,10 +10,10 @@ from burg_drake.core.grasps import Outcome
 from burg_drake.experiment.pairing.matching import CONTENT, KEY
 from burg_drake.experiment.pairing.result_table import ResultTable
 from burg_drake.experiment.pairing.text_codes import Factor, Ids
-from burg_drake.experiment.statistics import MARGINS, Flags, Values
+from burg_drake.experiment.statistics import PREDICTORS, Flags, Values
 from burg_drake.experiment.trials import Success, succeeded
 
-NAMES = (*KEY, *CONTENT, "object", "outcome", "stage", "blocker", "run", *MARGINS)
+NAMES = (*KEY, *CONTENT, "object", "outcome", "stage", "blocker", "run", *PREDICTORS)
 """Columns of the run whose verdicts are predictions."""
 REFERENCE_NAMES = (*KEY, *CONTENT, "outcome")
 """Columns of a run whose verdicts say what is true."""
@@ -90,7 +90,7 @@ def make_pairs(
         ended=ended,
         predicted=successes(texts["outcome"], success),
         actual=actual,
-        margins={name: verdicts.numbers[name] for name in MARGINS},
+        margins={name: verdicts.numbers[name] for name in PREDICTORS},
     )
 
 

@@ -17,7 +17,7 @@ from .estimates import (
     share as share,
 )
 from .margin_calibration import (
-    MARGINS as MARGINS,
+    PREDICTORS as PREDICTORS,
     PROBABILITY as PROBABILITY,
     Bin as Bin,
     IsotonicStep as IsotonicStep,

@@ -23,11 +23,11 @@ FINEST = 2000
 """Rows that an isotonic fit is made of; more are put together first."""
 PROBABILITY: Final = "probability"
 """Name of the predicted probability of success, from a table of robustness."""
-MARGINS: Final = (
+PREDICTORS: Final = (
     *("clearance", "slip", "tilt", "pad_force", "patch_area", "lift", "others_moved"),
     *("arm_clearance", "tracking_distance", "pushed", "score"),
 )
-"""Columns of results that may tell how a grasp ends."""
+"""Columns of results that may tell how a grasp ends: chosen margins, and the score."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -128,11 +128,6 @@ def keep_evidence(
     return copy
 
 
-def placement_file(sheet_path: str | Path, photo: str) -> Path:
-    """Where the placement check of a photo in a trials file is, if there is one."""
-    return Path(sheet_path).parent / PLACEMENTS / f"{Path(photo).stem}.yaml"
-
-
 def _free_stem(folder: Path, number: int) -> str:
     """A name that no photo and no placement check has yet."""
     for k in count(1):

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import os
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 from burg_drake.core import InvalidInputError
+from burg_drake.core.files import try_lock
 
 WAIT = 30.0
 """Time to wait for other writers, each of which takes some hundredths of a second [s]."""
@@ -43,16 +43,16 @@ def _wait_for(file: int, sheet_path: Path) -> None:
     until = time.monotonic() + WAIT
     while True:
         try:
-            return fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            if time.monotonic() > until:
-                raise InvalidInputError(
-                    f"{sheet_path} has been locked by another process for {WAIT:g} s; nothing"
-                    " was recorded"
-                ) from error
-            time.sleep(TURN)
+            if try_lock(file):
+                return
         except OSError as error:
             raise InvalidInputError(
                 f"{sheet_path} is on a file system without locks ({error.strerror}), where two"
                 " writers could lose entries; move it to another one"
             ) from error
+        if time.monotonic() > until:
+            raise InvalidInputError(
+                f"{sheet_path} has been locked by another process for {WAIT:g} s; nothing"
+                " was recorded"
+            )
+        time.sleep(TURN)

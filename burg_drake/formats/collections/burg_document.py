@@ -17,8 +17,8 @@ import yaml
 from burg_drake.core import nearest, quoted
 from burg_drake.core.documents import Reader
 
-Row = tuple[float, float, float, float]
-Matrix = tuple[Row, Row, Row, Row]
+MatrixRow = tuple[float, float, float, float]
+Matrix = tuple[MatrixRow, MatrixRow, MatrixRow, MatrixRow]
 """A pose as lists of numbers."""
 
 

@@ -10,11 +10,11 @@ from .conversion import (
 from .grasp_format import (
     PANDA as PANDA,
     PREGRASP_WIDTH as PREGRASP_WIDTH,
-    Frame as Frame,
     GraspFormat as GraspFormat,
     Gripper as Gripper,
     GripperJoint as GripperJoint,
     ImportedGrasps as ImportedGrasps,
+    PoseFrame as PoseFrame,
 )
 from .losses import conversion_losses as conversion_losses
 from .one_object import (

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from burg_drake.core import Array, inverse
-from burg_drake.formats.common.grasp_format import Frame, GraspFormat, Gripper
+from burg_drake.formats.common.grasp_format import GraspFormat, Gripper, PoseFrame
 
 SAME = 1e-6
 """Lengths [m] and directions closer than that are one."""
@@ -34,7 +34,7 @@ class Convention:
     approach: str
     closing: str
     origin: str
-    frame: Frame
+    frame: PoseFrame
     suffixes: tuple[str, ...]
     cannot_carry: tuple[str, ...]
 

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from burg_drake.core import Array, inverse, make_pose, rot_z
 from burg_drake.core.grasps import GraspSet
 
-Frame = Literal["object", "world", "camera"]
+PoseFrame = Literal["object", "world", "camera"]
 """What grasp poses of a file are measured in."""
 
 PREGRASP_WIDTH = "pregrasp_width"
@@ -117,7 +117,7 @@ class ImportedGrasps:
     """
 
     grasps: GraspSet
-    frame: Frame
+    frame: PoseFrame
     notes: tuple[str, ...] = ()
 
 
@@ -143,7 +143,7 @@ class GraspFormat:
     name: str
     title: str
     suffixes: tuple[str, ...]
-    frame: Frame
+    frame: PoseFrame
     source: str
     carries: tuple[str, ...]
     cannot_carry: tuple[str, ...]

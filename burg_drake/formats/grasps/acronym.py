@@ -34,8 +34,8 @@ from burg_drake.core import Array, InvalidInputError, inverse
 from burg_drake.core.files import (
     NUMBERS,
     READ_ERRORS,
+    ArrayShape,
     Hdf5File,
-    Shape,
     atomic_write,
     is_hdf5,
     open_hdf5,
@@ -67,7 +67,7 @@ MOTIONS = tuple(
     for kind in ("angular", "linear")
 )
 """Trials' results of FleX besides `object_in_gripper`."""
-PHYSICAL: dict[str, tuple[Shape, ...]] = {
+PHYSICAL: dict[str, tuple[ArrayShape, ...]] = {
     **dict.fromkeys(("mass", "friction", "density", "volume"), ((), (1,))),
     "com": ((3,),),
     "inertia": ((3, 3), (9,)),

@@ -5,8 +5,8 @@ from .collision_geometry import (
     shape_of as shape_of,
 )
 from .hand_clearance import (
+    ClearanceMode as ClearanceMode,
     HandClearance as HandClearance,
-    Mode as Mode,
     hand_clearance_alone as hand_clearance_alone,
 )
 from .verdict import (

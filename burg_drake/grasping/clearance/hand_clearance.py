@@ -29,7 +29,7 @@ from burg_drake.scene.document import Instance, Scene, SceneDocument
 from burg_drake.station.diagram import FloatingHand, StationDiagram, build_station_diagram
 from burg_drake.station.document import StationLike, as_station
 
-Mode = Literal["exact", "conservative"]
+ClearanceMode = Literal["exact", "conservative"]
 
 TRAVEL_STEPS = (0.125, 0.025)
 """Steps of `free_travel`: 5 and 1 mm a finger of the Panda hand, both a fraction of a pad."""
@@ -87,13 +87,13 @@ class HandClearance:
         return verdict
 
     def check_all(
-        self, instance: str, X_WG: Array, *, mode: Mode = "exact", margin: float = 0.0
+        self, instance: str, X_WG: Array, *, mode: ClearanceMode = "exact", margin: float = 0.0
     ) -> list[Clearance]:
         """The verdicts of `measure`, one object each."""
         return list(self.measure(instance, X_WG, mode=mode, margin=margin))
 
     def measure(
-        self, instance: str, X_WG: Array, *, mode: Mode = "exact", margin: float = 0.0
+        self, instance: str, X_WG: Array, *, mode: ClearanceMode = "exact", margin: float = 0.0
     ) -> ClearanceBatch:
         """Screens grasps.
 
@@ -125,8 +125,10 @@ class HandClearance:
         """
         if not 0.0 <= margin < np.inf:
             raise InvalidInputError(f"margin is {margin} m; give a clearance of 0 or more")
-        if mode not in get_args(Mode):
-            raise UnknownNameError(f"mode {mode!r} does not exist; {nearest(mode, get_args(Mode))}")
+        if mode not in get_args(ClearanceMode):
+            raise UnknownNameError(
+                f"mode {mode!r} does not exist; {nearest(mode, get_args(ClearanceMode))}"
+            )
         outcomes = self.outcomes(instance)
         X_WG = check_pose(X_WG, "X_WG")
         faces_only = mode == "conservative"

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core import Array, make_pose
-from burg_drake.geometry import Indices, Surface
+from burg_drake.core import Array, Indices, make_pose
+from burg_drake.geometry import Surface
 from burg_drake.grasping.quality.jaws import PANDA_JAWS, Jaws
 from burg_drake.grasping.quality.pad_indentation import indentation
 

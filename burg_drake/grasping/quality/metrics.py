@@ -9,14 +9,13 @@ to rest in the hand after `sliding`. The hand's body, the table and other object
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from burg_drake.core import Array, InvalidInputError, UnknownNameError, canonical_fingers, nearest
-from burg_drake.core.grasps import GraspSet
 from burg_drake.geometry import Surface
 from burg_drake.grasping.quality.contacts import (
     Contacts,
@@ -137,43 +136,6 @@ METRICS = tuple(field.name for field in fields(Quality))
 """Names of the columns."""
 
 
-def score_grasps(
-    grasps: GraspSet,
-    surface: Surface,
-    payload: Payload,
-    jaws: Jaws = PANDA_JAWS,
-    *,
-    up: ArrayLike | None = None,
-    by: str = DEFAULT_METRIC,
-) -> GraspSet:
-    """Adds the metrics as columns.
-
-    Args:
-        grasps: N grasps of one object.
-        surface: the object's.
-        payload: its mass, centre of mass and friction.
-        jaws: the hand's.
-        up: (3,) or (N, 3) direction against gravity in the object frame; None if unknown.
-        by: one of `METRICS`, which becomes the score: its negative where less is better.
-
-    Returns:
-        The same grasps with a column for each metric; the provenance tells what they were computed
-        with, and `QUALITY_VERSION`.
-
-    Raises:
-        UnknownNameError: there is no such metric.
-        InvalidInputError: the metric is `gravity_margin` and `up` is not given, or is no direction.
-    """
-    check_metric(by)
-    if by == "gravity_margin" and up is None:
-        raise InvalidInputError("gravity_margin needs to know where up is; give a scene")
-    quality = grasp_quality(grasps.X_OG, surface, payload, jaws, up=up)
-    columns = {name: getattr(quality, name) for name in METRICS}
-    scored = grasps.with_columns(**columns, score=score_of(columns[by], by))
-    how = quality_provenance(jaws, by, payload=asdict(payload))
-    return replace(scored, provenance={**grasps.provenance, "quality": how})
-
-
 def quality_provenance(jaws: Jaws, by: str, **details: Any) -> dict[str, Any]:
     """What the metrics of a set were computed with, as JSON values."""
     how = {"version": QUALITY_VERSION, "by": by, "jaws": asdict(jaws), **details}
@@ -205,9 +167,19 @@ def grasp_quality(
     *,
     up: ArrayLike | None = None,
 ) -> Quality:
-    """All metrics of grasps (N, 4, 4); other arguments as for `score_grasps`.
+    """All metrics of grasps.
 
     A grasp and the one with exchanged fingers get the same figures to the last bit.
+
+    Args:
+        X_OG: (N, 4, 4) grasps of one object.
+        surface: the object's.
+        payload: its mass, centre of mass and friction.
+        jaws: the hand's.
+        up: (3,) or (N, 3) direction against gravity in the object frame; None if unknown.
+
+    Raises:
+        InvalidInputError: `up` is no direction.
     """
     X_OG = canonical_fingers(X_OG)
     up_O = None if up is None else _directions(up, len(X_OG))

@@ -7,8 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from burg_drake.core import Array
-from burg_drake.geometry import Indices
+from burg_drake.core import Array, Indices
 
 
 @dataclass(frozen=True, eq=False)

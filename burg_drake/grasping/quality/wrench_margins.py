@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array
+from burg_drake.core import Array, perpendicular
 from burg_drake.grasping.quality.triangulation import triangulated_ball
 from burg_drake.grasping.quality.wrench_space import WrenchSpace
 
@@ -236,12 +236,7 @@ def _best(values: Array) -> tuple[Array, NDArray[np.int64]]:
 
 def _around(nu: Array, step: Array) -> Array:
     """Unit vectors (N, 2, 5, 3): nu (N, 2, 3) first, then four around it."""
-    x, y, z = np.moveaxis(nu, -1, 0)
-    sign = np.copysign(1.0, z)
-    a = -1.0 / (sign + z)
-    b = x * y * a
-    t1 = np.stack([1.0 + sign * x * x * a, sign * b, -sign * x], axis=-1) * step[:, None, None]
-    t2 = np.stack([b, sign + y * y * a, -y], axis=-1) * step[:, None, None]
+    t1, t2 = (tangent * step[:, None, None] for tangent in perpendicular(nu))
     around = np.stack([nu, nu + t1, nu - t1, nu + t2, nu - t2], axis=2)
     around[:, :, 1:] /= np.sqrt(1.0 + step * step)[:, None, None, None]
     return around

@@ -16,7 +16,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from burg_drake.core import Array, InvalidInputError, content_hash, grasp_from_axes, pregrasp
+from burg_drake.core import (
+    Array,
+    InvalidInputError,
+    content_hash,
+    grasp_from_axes,
+    perpendicular,
+    pregrasp,
+)
 from burg_drake.core.grasps import GraspSet
 from burg_drake.geometry import Surface
 from burg_drake.grasping.sampling.approach import ApproachCone, random_approach_angles
@@ -25,7 +32,6 @@ from burg_drake.grasping.sampling.contact_pairs import (
     FINGER_CLEARANCE,
     ContactPairs,
     draw_pairs,
-    perpendicular,
 )
 from burg_drake.grasping.similarity import farthest_points
 from burg_drake.objects.library import DEFAULT_FRICTION

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array
-from burg_drake.geometry import Indices, Surface
+from burg_drake.core import Array, Indices, perpendicular
+from burg_drake.geometry import Surface
 
 FINGER_CLEARANCE = 0.001
 """Room that each open finger keeps to its contact [m], so that the open hand can be placed."""
@@ -136,17 +136,3 @@ def _directions_in_cone(axis: Array, half_angle: float, rng: np.random.Generator
     sine = np.sqrt(1.0 - cosine**2)
     directions: Array = cosine * axis + sine * (np.cos(azimuth) * u + np.sin(azimuth) * v)
     return directions
-
-
-def perpendicular(axis: Array) -> tuple[Array, Array]:
-    """Two unit vectors (N, 3) that make a right-handed frame with the unit vectors `axis`.
-
-    Without branch or pole (Duff et al., "Building an orthonormal basis, revisited", JCGT 2017).
-    """
-    x, y, z = axis.T
-    sign = np.copysign(1.0, z)
-    a = -1.0 / (sign + z)
-    b = x * y * a
-    u = np.stack([1.0 + sign * x * x * a, sign * b, -sign * x], axis=1)
-    v = np.stack([b, sign + y * y * a, -y], axis=1)
-    return u, v

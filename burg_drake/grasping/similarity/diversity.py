@@ -83,23 +83,6 @@ def neighbour_distances(grasps: GraspSet, *, lever: float = LEVER) -> Array:
     return distance
 
 
-def covering_radius(X_OG: ArrayLike, X_OF: ArrayLike, *, lever: float = LEVER) -> float:
-    """How far the worst grasp of a set is from the nearest one of a selection.
-
-    What `farthest_points` keeps small.
-
-    Args:
-        X_OG: (N, 4, 4) grasp poses.
-        X_OF: (n, 4, 4) selected ones, in the same frame.
-        lever: weight of the angle in the distance [m/rad].
-
-    Returns:
-        Combined distance [m]; infinity if nothing is selected, 0 if there is nothing to cover.
-    """
-    _, distance = find_nearest(components(X_OG), components(X_OF), lever=lever)
-    return float(distance.max(initial=0.0))
-
-
 def _lower(distance: Array, G: Array, new: int, lever: float) -> None:
     """Lowers the distances (N,) to the selection by a grasp that joins it.
 

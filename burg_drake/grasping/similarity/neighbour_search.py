@@ -18,7 +18,15 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core import DEGREES, MILLIMETRES, Array, InvalidInputError, ShownUnit, setting
+from burg_drake.core import (
+    DEGREES,
+    MILLIMETRES,
+    Array,
+    Indices,
+    InvalidInputError,
+    ShownUnit,
+    setting,
+)
 from burg_drake.grasping.similarity.pose_distance import (
     LEVER,
     P,
@@ -27,8 +35,7 @@ from burg_drake.grasping.similarity.pose_distance import (
     pair_translation,
 )
 
-Indices = NDArray[np.intp]
-Settle = Callable[[Indices, Indices, Indices, Array], NDArray[np.bool_]]
+SettlePairs = Callable[[Indices, Indices, Indices, Array], NDArray[np.bool_]]
 """Takes the rows that are open, pairs as positions among those rows and columns, and how far each
 row has looked; returns which rows stay open."""
 
@@ -215,7 +222,7 @@ def _points(G: Array, per_metre: float, per_radian: float) -> Array:
     return np.hstack([per_metre * G[P:].T, 2.0 * per_radian * q])
 
 
-def _search(tree: _GraspTree, G: Array, rows: Indices, radius: float, settle: Settle) -> None:
+def _search(tree: _GraspTree, G: Array, rows: Indices, radius: float, settle: SettlePairs) -> None:
     """Shows each row its nearest points within a radius, and more of them while it is open."""
     count = min(CANDIDATES, tree.points.n)
     while len(rows):
@@ -228,7 +235,7 @@ def _search(tree: _GraspTree, G: Array, rows: Indices, radius: float, settle: Se
 
 
 def _round(
-    tree: _GraspTree, G: Array, rows: Indices, radius: float, count: int, settle: Settle
+    tree: _GraspTree, G: Array, rows: Indices, radius: float, count: int, settle: SettlePairs
 ) -> Indices:
     """Shows each row its `count` nearest points; returns the rows that want to see more."""
     points = _points(G[:, rows], tree.per_metre, tree.per_radian)

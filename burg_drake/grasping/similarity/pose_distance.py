@@ -10,7 +10,6 @@ in any batch, and in either finger form. `coverage` compares whole sets.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,40 +25,6 @@ as in BURG-Toolkit (`combined_distances` in its `metrics.py`, which tells the fi
 
 X, Y, Z, P = 0, 3, 6, 9
 """Where the axes and the position of a grasp begin in its components."""
-
-
-@dataclass(frozen=True, eq=False)
-class PoseDistances:
-    """Distances of pairs of grasps.
-
-    Attributes:
-        translation: (...,) between the origins of the grasp frames [m].
-        angle: (...,) of the rotation between them, the smaller one of both finger forms, in
-            [0, pi] [rad].
-        combined: (...,) translation + lever * angle [m].
-    """
-
-    translation: Array
-    angle: Array
-    combined: Array
-
-
-def pose_distances(X_OG: ArrayLike, X_OF: ArrayLike, *, lever: float = LEVER) -> PoseDistances:
-    """Distances of grasps to grasps, pair by pair.
-
-    Args:
-        X_OG: (..., 4, 4) grasp poses.
-        X_OF: (..., 4, 4) grasp poses in the same frame; leading shapes broadcast, so that
-            `X_OG[:, None]` and `X_OF[None]` give all pairs.
-        lever: weight of the angle [m/rad].
-
-    Raises:
-        InvalidInputError: the lever is negative or not finite.
-    """
-    check_lever(lever)
-    G, F = components(X_OG), components(X_OF)
-    translation, angle = pair_translation(G, F), pair_angle(G, F)
-    return PoseDistances(translation, angle, translation + lever * angle)
 
 
 def components(X_OG: ArrayLike) -> Array:

@@ -10,19 +10,18 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from burg_drake.core import Indices
 from burg_drake.core.grasps import GraspSet
 
 INSTANCE = "instance"
 
-Rows = NDArray[np.intp]
 
-
-def by_target(grasps: GraspSet) -> list[Rows]:
+def by_target(grasps: GraspSet) -> list[Indices]:
     """Indices of the grasps of each object and instance, rising, by object and instance."""
     return [rows for rows, _ in by_shared_target(grasps, grasps)]
 
 
-def by_shared_target(grasps: GraspSet, others: GraspSet) -> Iterator[tuple[Rows, Rows]]:
+def by_shared_target(grasps: GraspSet, others: GraspSet) -> Iterator[tuple[Indices, Indices]]:
     """Indices of the grasps of both sets for each object and instance that both have."""
     instances = INSTANCE in grasps.columns and INSTANCE in others.columns
     keys = [_keys(grasps, instances), _keys(others, instances)]
@@ -39,7 +38,7 @@ def _keys(grasps: GraspSet, instances: bool) -> NDArray[np.str_]:
     return np.array([f"{object}\n{instance}" for object, instance in pairs], dtype=np.str_)
 
 
-def _by_label(labels: Rows) -> dict[int, Rows]:
+def _by_label(labels: Indices) -> dict[int, Indices]:
     if not len(labels):
         return {}
     order = np.argsort(labels, kind="stable")

@@ -1,9 +1,7 @@
 from .limits import ArmLimits as ArmLimits
 from .links import (
     ArmLinks as ArmLinks,
-    Indices as Indices,
     LinkPoses as LinkPoses,
-    Single as Single,
 )
 from .numeric import (
     ArmKinematics as ArmKinematics,

@@ -10,18 +10,14 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.math import RotationMatrix
 from pydrake.multibody.tree import BodyIndex, Joint, PrismaticJoint, RevoluteJoint
 
-from burg_drake.core import Array, InvalidInputError, inverse, make_pose
+from burg_drake.core import Array, Indices, InvalidInputError, Single, inverse, make_pose
 from burg_drake.station.diagram import StationDiagram
 
 ZERO = 1e-12
 """Entries of a constant pose below this are left out of the products."""
-
-Single = NDArray[np.float32]
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

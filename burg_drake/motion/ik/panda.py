@@ -25,7 +25,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from burg_drake.core import Array, InvalidInputError, check_pose, inverse
+from burg_drake.core import Array, Indices, InvalidInputError, check_pose, inverse
 from burg_drake.geometry import Poses
 from burg_drake.motion.ik.numeric import ArmKinematics
 
@@ -46,8 +46,6 @@ CHUNK = 4096
 SAME = 1e-9
 """Deviation of hand poses up to which an arm counts as a Panda [m and of matrix entries]."""
 TURN = 2.0 * np.pi
-
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,9 +7,9 @@ from typing import Protocol
 
 import numpy as np
 
-from burg_drake.core import Array, InvalidInputError, rotation_angle
+from burg_drake.core import Array, Indices, InvalidInputError, rotation_angle
 from burg_drake.motion.ik.numeric import ArmKinematics, solve_ik
-from burg_drake.motion.ik.solutions import ITERATIONS, TOLERANCE, Indices
+from burg_drake.motion.ik.solutions import ITERATIONS, TOLERANCE
 
 MISSED = 5e-3
 """Deviation of the hand above which a routine is taken to solve for another frame [m and rad];

@@ -10,14 +10,11 @@ from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from burg_drake.core import Array, Arrays, cached, content_hash, rng_from
+from burg_drake.core import Array, Arrays, Indices, cached, content_hash, rng_from
 from burg_drake.motion.ik.numeric import ArmKinematics, solve_ik
 from burg_drake.motion.ik.panda import PandaIk
-
-Indices = NDArray[np.intp]
 
 POSTURES = 16_384
 """Size of the table that numeric searches start from."""

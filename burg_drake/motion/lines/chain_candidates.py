@@ -8,9 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array
-
-Indices = NDArray[np.intp]
+from burg_drake.core import Array, Indices
 
 GRASP, APPROACH, RETREAT, LIFT, WHOLE = range(5)
 """Where a candidate ended: at the grasp, on the way there, back, or up, or not at all."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from burg_drake.core import Array
+from burg_drake.core import Array, Indices
 from burg_drake.motion.lines.dense_rows import (
     ClosedFormFiller,
     DenseRows,
@@ -22,7 +22,7 @@ from burg_drake.motion.lines.dense_rows import (
 from burg_drake.motion.lines.failure_reason import GridPlace, failure
 from burg_drake.motion.lines.grid_builder import START, PostureGridBuilder, counted_clearance
 from burg_drake.motion.lines.line_search import Chain, Failure
-from burg_drake.motion.lines.posture_grid import GridChain, Indices, PostureGrid
+from burg_drake.motion.lines.posture_grid import GridChain, PostureGrid
 
 ROWS_A_LAYER = 5
 """Rows of a chain from one layer to the next: 1 cm."""

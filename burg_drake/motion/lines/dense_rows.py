@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array
+from burg_drake.core import Array, Indices
 from burg_drake.motion.ik import BRANCHES, ArmKinematics, PandaIk, panda_forward, solve_ik
 from burg_drake.motion.lines.line_poses import LinePoses
 from burg_drake.motion.lines.reach_settings import ReachSettings
@@ -19,8 +19,6 @@ HALVINGS = 6
 """How often the way between two rows is halved at most; from 1 cm down to 0.2 mm."""
 LEVER = 0.2
 """A turn of the hand counts as the way of a point at this distance from H [m]: finger tips."""
-
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array
-from burg_drake.motion.lines.chain_candidates import APPROACH, GRASP, LIFT, RETREAT, WHOLE, Indices
+from burg_drake.core import Array, Indices
+from burg_drake.motion.lines.chain_candidates import APPROACH, GRASP, LIFT, RETREAT, WHOLE
 from burg_drake.motion.lines.line_poses import LinePoses
 
 Solve = Callable[[Array, Array], tuple[Array, NDArray[np.bool_]]]
 """Postures (S, n) at hand poses (S, 4, 4) by steps from near postures (S, n), and whether they meet
 them."""
-Measure = Callable[[Array], tuple[Array, Array]]
+MeasureClearance = Callable[[Array], tuple[Array, Array]]
 """Bounds of the clearance of postures (S, n): lower, and what has to be positive to count [m]."""
 
 
@@ -54,7 +54,7 @@ class Follower:
     lines: LinePoses
     travel: float
     solve: Solve
-    measure: Measure
+    measure: MeasureClearance
 
     def follow(self, X_AG: Array, q: Array) -> Followed:
         """From the grasp to the pregrasp; then, from the grasp, back and up to the top.

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from burg_drake.core import Array
+from burg_drake.core import Array, Booleans, Indices
 from burg_drake.motion.ik import ArmKinematics, PandaIk
 from burg_drake.motion.lines.line_poses import LinePoses
-from burg_drake.motion.lines.posture_grid import Booleans, Indices, PostureGrid
+from burg_drake.motion.lines.posture_grid import PostureGrid
 from burg_drake.motion.lines.reach_settings import ReachSettings
 from burg_drake.motion.proximity import LIKELY, ArmProximity, ClearanceBounds
 

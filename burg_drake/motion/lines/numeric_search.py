@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array
+from burg_drake.core import Array, Indices
 from burg_drake.core.grasps import Outcome
 from burg_drake.motion.ik import ArmKinematics, ArmSolutions, NumericSolutions
 from burg_drake.motion.lines.chain_candidates import (
@@ -24,7 +24,6 @@ from burg_drake.motion.lines.chain_candidates import (
     RETREAT,
     WHOLE,
     ChainCandidates,
-    Indices,
 )
 from burg_drake.motion.lines.closed_form import DOUBT, ROWS_A_LAYER
 from burg_drake.motion.lines.dense_rows import DenseRows, NumericFiller, near_ik, straighten

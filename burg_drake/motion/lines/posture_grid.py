@@ -12,15 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from burg_drake.core import Array
+from burg_drake.core import Array, Booleans, Indices
 from burg_drake.motion.ik import BRANCHES, PandaIk
 from burg_drake.motion.lines.posture_steps import CROSSINGS, FAR, PostureRows, PostureSteps
-
-Indices = NDArray[np.intp]
-Booleans = NDArray[np.bool_]
-Single = NDArray[np.float32]
 
 DEEP = 0.01
 """See `PostureGrid.take_over` [m]: of 17,000 postures between two that deep 8 were free."""

@@ -10,13 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from burg_drake.core import Booleans, Indices, Single
 from burg_drake.motion.ik import BRANCHES
-
-Indices = NDArray[np.intp]
-Booleans = NDArray[np.bool_]
-Single = NDArray[np.float32]
 
 FAR = np.float32(np.inf)
 CROSSINGS = np.arange(BRANCHES) ^ np.array([[2], [1]])

@@ -1,7 +1,4 @@
-from .grasp_plan import (
-    Plan as Plan,
-    load_plan as load_plan,
-)
+from .grasp_plan import Plan as Plan
 from .planned_motion import PlanOrigin as PlanOrigin
 from .trajectory import (
     Motion as Motion,

@@ -31,7 +31,7 @@ from burg_drake.motion.plans.plan_record import (
 )
 from burg_drake.motion.plans.planned_motion import PHASES, PlannedMotion
 
-Rows = Sequence[tuple[int, list[str]]]
+CsvRows = Sequence[tuple[int, list[str]]]
 """Cells of samples, with the line of the file that they are on."""
 WIDTH_TOLERANCE = 1e-6
 """What rounding by other programs may change of a width [m]."""
@@ -102,7 +102,7 @@ def _data_beside(path: Path, header: Sequence[str]) -> dict[str, Any]:
     return dict(data)
 
 
-def _plan(rows: Rows, joints: tuple[str, ...], data: Any) -> PlannedMotion:
+def _plan(rows: CsvRows, joints: tuple[str, ...], data: Any) -> PlannedMotion:
     n = len(joints)
     for line, row in rows:
         if len(row) != 3 * n + 3:
@@ -127,7 +127,7 @@ def _plan(rows: Rows, joints: tuple[str, ...], data: Any) -> PlannedMotion:
     return plan
 
 
-def _require_widths(plan: PlannedMotion, rows: Rows) -> None:
+def _require_widths(plan: PlannedMotion, rows: CsvRows) -> None:
     """The hand is open until it closes, and then as wide as the target in all rows."""
     for line, (_, phase, *_, text) in rows:
         wanted = _width(plan, phase)
@@ -140,7 +140,7 @@ def _require_widths(plan: PlannedMotion, rows: Rows) -> None:
             )
 
 
-def _read_spans(rows: Rows) -> dict[str, tuple[int, int]]:
+def _read_spans(rows: CsvRows) -> dict[str, tuple[int, int]]:
     """First and last row of each phase."""
     spans: dict[str, tuple[int, int]] = {}
     for k, (line, row) in enumerate(rows):
@@ -153,7 +153,9 @@ def _read_spans(rows: Rows) -> dict[str, tuple[int, int]]:
     return spans
 
 
-def _described_by_rows(rows: Rows, t: Array, spans: dict[str, tuple[int, int]]) -> dict[str, Any]:
+def _described_by_rows(
+    rows: CsvRows, t: Array, spans: dict[str, tuple[int, int]]
+) -> dict[str, Any]:
     """What a table alone tells of its plan."""
     step = float(t[1]) if len(t) > 1 else 0.0
     if not step > 0.0:

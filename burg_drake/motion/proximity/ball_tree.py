@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 from pydrake.multibody.tree import BodyIndex
 
-from burg_drake.core import Array
-from burg_drake.motion.ik import ArmLinks, Indices, LinkPoses, Single
+from burg_drake.core import Array, Indices, Single
+from burg_drake.motion.ik import ArmLinks, LinkPoses
 from burg_drake.motion.proximity.cover import Balls, cover_body
 from burg_drake.station.diagram import StationDiagram
 

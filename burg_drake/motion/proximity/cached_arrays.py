@@ -13,7 +13,7 @@ from burg_drake.core import Arrays
 from burg_drake.motion.proximity.ball_tree import BallTrees, BodyBalls
 from burg_drake.motion.proximity.cover import Balls
 from burg_drake.motion.proximity.pair_table import JointGrid, PairTable
-from burg_drake.motion.proximity.self_clearance import Pair, SelfClearance, Table
+from burg_drake.motion.proximity.self_clearance import ClearanceTable, Pair, SelfClearance
 
 
 def to_arrays(trees: BallTrees, itself: SelfClearance) -> Arrays:
@@ -74,7 +74,7 @@ def from_arrays(arrays: Arrays) -> tuple[BallTrees, SelfClearance]:
     return trees, SelfClearance(trees, _pairs(arrays["pairs"]), tables, _pairs(arrays["apart"]))
 
 
-def _table(arrays: Arrays, prefix: str) -> Table:
+def _table(arrays: Arrays, prefix: str) -> ClearanceTable:
     grid = JointGrid(
         tuple(arrays[f"{prefix}joints"].tolist()),
         arrays[f"{prefix}low"],

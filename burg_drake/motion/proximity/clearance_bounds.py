@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.core import Array, InvalidInputError, content_hash
+from burg_drake.core import Array, Indices, InvalidInputError, Single, content_hash
 from burg_drake.grasping.clearance import shape_of
-from burg_drake.motion.ik import Indices, LinkPoses, Single
+from burg_drake.motion.ik import LinkPoses
 from burg_drake.motion.proximity.arm_shape import ArmShape
 from burg_drake.motion.proximity.displacement_bound import ROUNDING, DisplacementBound
 from burg_drake.motion.proximity.distance_field import DistanceField
-from burg_drake.motion.proximity.solids import Solid, content_of, solid_of
+from burg_drake.motion.proximity.solids import ProximitySolid, content_of, solid_of
 from burg_drake.station.diagram import StationDiagram
 
 BLOCK = 2**12
@@ -176,7 +176,7 @@ class ArmProximity:
             np.minimum.at(lower, k, bound.min(axis=0))
 
 
-def _solids(station_diagram: StationDiagram) -> list[Solid]:
+def _solids(station_diagram: StationDiagram) -> list[ProximitySolid]:
     """Everything that is not the robot, where it stands."""
     plant = station_diagram.plant
     inspector = station_diagram.scene_graph.model_inspector()

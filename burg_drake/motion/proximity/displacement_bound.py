@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from burg_drake.core import Array
-from burg_drake.motion.ik import ArmLinks, LinkPoses, Single
+from burg_drake.core import Array, Single
+from burg_drake.motion.ik import ArmLinks, LinkPoses
 from burg_drake.motion.proximity.ball_tree import BallTrees, BodyBalls
 
 ROUNDING = 1e-5

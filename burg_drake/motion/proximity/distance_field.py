@@ -12,9 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array, Arrays, cached
-from burg_drake.motion.ik import Single
-from burg_drake.motion.proximity.solids import BoxSolid, HullSolid, Solid, content_of
+from burg_drake.core import Array, Arrays, Single, cached
+from burg_drake.motion.proximity.solids import BoxSolid, HullSolid, ProximitySolid, content_of
 
 CELL = 5e-3
 """Side of a cell [m]."""
@@ -48,7 +47,7 @@ class DistanceField:
     boxes: tuple[BoxSolid, ...]
 
     @classmethod
-    def of(cls, solids: list[Solid]) -> DistanceField:
+    def of(cls, solids: list[ProximitySolid]) -> DistanceField:
         """The field of solids in the world; of solids seen before, from the user's cache."""
         boxes = tuple(s for s in solids if isinstance(s, BoxSolid) and 2 * max(s.half) >= LARGE)
         small = [s for s in solids if s not in boxes]
@@ -98,7 +97,7 @@ class DistanceField:
         return bound
 
 
-def _arrays(small: list[Solid]) -> Arrays:
+def _arrays(small: list[ProximitySolid]) -> Arrays:
     """The grid around solids."""
     low = np.min([s.low for s in small], axis=0)
     high = np.max([s.high for s in small], axis=0)
@@ -117,14 +116,16 @@ def _arrays(small: list[Solid]) -> Arrays:
     return {"origin": low, "cell": np.array(cell), "shape": shape, **bounds}
 
 
-def _bounds_at(ticks: list[Array], cell: float, solids: list[Solid]) -> tuple[Single, Single]:
+def _bounds_at(
+    ticks: list[Array], cell: float, solids: list[ProximitySolid]
+) -> tuple[Single, Single]:
     """Bounds at the cells' centres."""
     shape = tuple(len(t) for t in ticks)
     near = np.full(shape, BAND, dtype=np.float32)
     reach = np.float32(cell * np.sqrt(3.0) / 2)
     seed = np.full(shape, np.inf, dtype=np.float32)  # upper bounds of occupied cells
     exact = np.full(shape, np.inf, dtype=np.float32)
-    grid = np.stack(np.meshgrid(*ticks, indexing="ij")).astype(np.float32)
+    grid = [t.astype(np.float32) for t in np.meshgrid(*ticks, indexing="ij", sparse=True)]
     hulls = False
     for solid in solids:
         if not isinstance(solid, HullSolid):
@@ -143,17 +144,20 @@ def _bounds_at(ticks: list[Array], cell: float, solids: list[Solid]) -> tuple[Si
     from scipy.ndimage import distance_transform_edt  # not needed for what is in the cache
 
     occupied = np.isfinite(seed)
-    distance, nearest = distance_transform_edt(
-        ~occupied, sampling=cell, return_distances=True, return_indices=True
+    nearest = distance_transform_edt(
+        ~occupied, sampling=cell, return_distances=False, return_indices=True
     )
-    distance = distance.astype(np.float32)
+    squared = np.zeros(shape)
+    for cells, own in zip(nearest, np.indices(shape, sparse=True), strict=True):
+        squared += ((cells - own) * cell) ** 2
+    distance = np.sqrt(squared).astype(np.float32)
     upper = distance + seed[tuple(nearest)]
     lower = np.where(occupied, near, np.maximum(distance - reach, near))
     return np.minimum(lower, exact), np.minimum(upper, exact)
 
 
 def _window(
-    ticks: list[Array], solid: Solid, margin: float
+    ticks: list[Array], solid: ProximitySolid, margin: float
 ) -> tuple[tuple[slice, ...], list[Array]]:
     """The part of the grid within a margin of a solid's box."""
     window = []

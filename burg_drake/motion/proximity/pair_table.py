@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.core import Array
-from burg_drake.motion.ik import ArmLinks, Indices, Single
+from burg_drake.core import Array, Indices, Single
+from burg_drake.motion.ik import ArmLinks
 from burg_drake.motion.proximity.ball_tree import BodyBalls
 from burg_drake.motion.proximity.link_distance import LinkDistance
 

@@ -11,15 +11,15 @@ from pydrake.geometry import SceneGraphInspector
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex
 
-from burg_drake.core import Array
-from burg_drake.motion.ik import ArmLinks, Indices, LinkPoses, Single
+from burg_drake.core import Array, Indices, Single
+from burg_drake.motion.ik import ArmLinks, LinkPoses
 from burg_drake.motion.proximity.ball_tree import BallTrees
 from burg_drake.motion.proximity.link_distance import LinkDistance
 from burg_drake.motion.proximity.pair_table import JointGrid, PairTable, is_affordable, may_meet
 from burg_drake.station.diagram import StationDiagram
 
 Pair = tuple[int, int]
-Table = tuple[PairTable, tuple[Pair, ...]]
+ClearanceTable = tuple[PairTable, tuple[Pair, ...]]
 
 REFINED = 0.022
 """Below this lower bound [m] of two balls what is in them is compared."""
@@ -61,7 +61,7 @@ class SelfClearance:
         self,
         trees: BallTrees,
         pairs: Sequence[Pair],
-        tables: Sequence[Table] = (),
+        tables: Sequence[ClearanceTable] = (),
         apart: Sequence[Pair] = (),
     ) -> None:
         self._trees = trees
@@ -160,7 +160,7 @@ def _tables(
     trees: BallTrees,
     limits: Array,
     pairs: Sequence[Pair],
-) -> tuple[list[Table], list[Pair]]:
+) -> tuple[list[ClearanceTable], list[Pair]]:
     """Tables of pairs with few joints between them, and the pairs that there is no table of.
 
     Of links that cannot meet wherever these joints stand nothing is kept.

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.core import Array, content_hash
+from burg_drake.core import Array, Single, content_hash
 from burg_drake.geometry import Ball, Boxes, Cylinder, Shape
-from burg_drake.motion.ik import Single
+
+Points = Single | Sequence[Single]
+"""(3, ...) points, or their three coordinates in shapes that broadcast, as those of a grid."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +36,8 @@ class BoxSolid:
         """(3,) its upper corner."""
         return np.asarray(self.X_WB[:3, 3] + np.abs(self.X_WB[:3, :3]) @ self.half)
 
-    def _beyond(self, p: Single) -> list[Single]:
-        """How far points (3, ...) are outside of each pair of faces; negative between them."""
+    def _beyond(self, p: Points) -> list[Single]:
+        """How far points are outside of each pair of faces; negative between them."""
         R = self.X_WB[:3, :3]
         beyond = []
         for axis in range(3):
@@ -56,7 +59,7 @@ class BoxSolid:
         np.maximum(x, y, out=x)
         return np.maximum(x, z, out=x)
 
-    def distance(self, p: Single) -> Single:
+    def distance(self, p: Points) -> Single:
         """The signed distance."""
         x, y, z = self._beyond(p)
         inside = np.minimum(np.maximum(np.maximum(x, y), z), 0.0)
@@ -86,8 +89,8 @@ class BallSolid:
         """(3,) its upper corner."""
         return np.asarray(self.center + self.radius)
 
-    def distance(self, p: Single) -> Single:
-        """The signed distance at points (3, ...)."""
+    def distance(self, p: Points) -> Single:
+        """The signed distance at points."""
         x, y, z = (a - np.float32(c) for a, c in zip(p, self.center, strict=True))
         return np.asarray(np.sqrt(x * x + y * y + z * z) - np.float32(self.radius))
 
@@ -144,15 +147,15 @@ class HullSolid:
         return np.asarray(np.where(farthest > 0.0, farthest + offset, farthest), dtype=np.float32)
 
 
-Solid = BoxSolid | BallSolid | HullSolid
+ProximitySolid = BoxSolid | BallSolid | HullSolid
 
 
-def content_of(solids: list[Solid]) -> str:
+def content_of(solids: list[ProximitySolid]) -> str:
     """Hash of solids."""
     return content_hash([[type(solid).__name__, vars(solid)] for solid in solids])
 
 
-def solid_of(shape: Shape, X_WB: Array) -> Solid:
+def solid_of(shape: Shape, X_WB: Array) -> ProximitySolid:
     """A shape of a body at a pose (4, 4) as a solid."""
     X_WP = X_WB @ shape.X_BP
     if isinstance(shape.convex, Boxes):

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from burg_drake.core import Array, InvalidInputError, check_pose, inverse, swap_fingers
+from burg_drake.core import Array, Indices, InvalidInputError, check_pose, inverse, swap_fingers
 from burg_drake.motion.collision import ArmCollision, EdgeChecker, require_free_home
 from burg_drake.motion.ik import ArmKinematics, IkRoutine, PandaIk, RoutineSolutions
 from burg_drake.motion.lines import (
@@ -43,8 +43,6 @@ POSES = 12 * BATCH
 """... and poses of their ways at which postures are looked for: bounds the memory of long ways to
 some 130 MB."""
 
-Indices = NDArray[np.intp]
-
 
 class ArmReach:
     """Judges grasps of one scene; objects stand where the document places them.
@@ -54,10 +52,6 @@ class ArmReach:
         motion: the hand's straight segments to a grasp and away from it.
         kinematics: the arm on its own.
         diagram: the station diagram of the checks.
-        collision: the arm in the scene, by Drake's checker.
-        proximity: bounds of the arm's clearance.
-        edges: collision checks of motions.
-        tree: paths from home.
     """
 
     def __init__(
@@ -86,20 +80,20 @@ class ArmReach:
         arm = station.document.arm
         assert arm is not None  # build_station_diagram has seen to it
         self.diagram = diagram
-        self.proximity = ArmProximity(diagram)
-        self.collision = ArmCollision(diagram, apart=self.proximity.apart)
-        require_free_home(diagram, self.collision)
+        self._proximity = ArmProximity(diagram)
+        collision = ArmCollision(diagram, apart=self._proximity.apart)
+        require_free_home(diagram, collision)
         self.kinematics = ArmKinematics.of(diagram)
-        self.edges = EdgeChecker(self.proximity, self.collision, exact=self.settings.exact)
+        edges = EdgeChecker(self._proximity, collision, exact=self.settings.exact)
         home = np.array(arm.home)
         lower, upper = self.kinematics.one_revolution_around(home, self.settings.limit_margin)
-        focus = postures_over_objects(diagram, self.proximity.links, home, lower, upper)
-        self.tree = HomeTree(self.edges, home, lower, upper, focus=focus)
+        focus = postures_over_objects(diagram, self._proximity.links, home, lower, upper)
+        self._tree = HomeTree(edges, home, lower, upper, focus=focus)
         self._sweep = HandSweep(scene, station, self.motion)
         X_WA = arm.X_WA.matrix()
         self._X_AW = inverse(X_WA)
         self._lines = LinePoses.of(station.hand.X_HG.matrix(), X_WA[:3, :3], self.motion)
-        self._search = _line_search(self, self._lines, home, ik)
+        self._search = _line_search(self, self._proximity, self._lines, home, ik)
         self._searches: dict[float, LineSearch] = {}
 
     def check(self, instance: str, X_WG: ArrayLike, width: float = np.nan) -> Reach:
@@ -166,6 +160,35 @@ class ArmReach:
         tried = lift_heights(motion.shortest, motion.lift_height)
         return raise_lifts(whole, tried, judge, hand_is_free)
 
+    def path_is_free(
+        self,
+        q: Array,
+        *,
+        hand: bool = True,
+        carried: str | None = None,
+        moved_W: Array | None = None,
+        width: float = np.nan,
+    ) -> bool:
+        """Whether the arm can follow a polyline in joint space without a collision.
+
+        Args:
+            q: (M, n) its corners, at least one.
+            hand: whether the bounds that are asked first count the hand against the scene; without,
+                the motion of the hand has been judged otherwise. Drake counts it all the same.
+            carried: instance that the hand carries, if any.
+            moved_W: (M, 3) how far it is from its place at each corner [m]; straight between
+                corners.
+            width: distance between the pads that carry it [m]; NaN if the hand is open.
+        """
+        blocked = self._tree.edges.first_blocked(
+            q, hand=hand, carried=carried, moved_W=moved_W, width=width
+        )
+        return blocked is None
+
+    def shortcut(self, q: Array) -> Array:
+        """A collision-free path (M, n) with the same ends as one from home that is no longer."""
+        return self._tree.shortcut(q)
+
     def _lifted(self, paths: HandPaths, before: HandVerdicts, height: float) -> list[Reach]:
         """Verdicts on N grasps with a lift to one height [m]."""
         hand = paths.lifted(before, height)
@@ -181,7 +204,7 @@ class ArmReach:
             X_WG, clearance = paths.X_both[part], hand.clearance[part]
             lines = self._searches[height].begin(self._X_AW @ X_WG, clearance)
             task = GraspBatch(paths.instance[part].tolist(), X_WG, paths.width[part], clearance)
-            verdicts = MotionSearch(task, lines, self.tree, self.settings).run()
+            verdicts = MotionSearch(task, lines, self._tree, self.settings).run()
             for index, verdict in zip(part.tolist(), verdicts, strict=True):
                 reached = verdict.outcome is None
                 found[index] = replace(verdict, lift=height) if reached else verdict
@@ -200,21 +223,25 @@ def _both(X_WG: Array, X_AW: Array) -> Array:
 
 
 def _line_search(
-    reach: ArmReach, lines: LinePoses, home: Array, routine: IkRoutine | None
+    reach: ArmReach,
+    proximity: ArmProximity,
+    lines: LinePoses,
+    home: Array,
+    routine: IkRoutine | None,
 ) -> LineSearch:
     """By the closed form first where the arm has one and it is wanted, else numerically."""
     arm, settings = reach.kinematics, reach.settings
     margin = settings.limit_margin
     if routine is not None:
         return NumericLineSearch(
-            *(arm, lines, reach.proximity, home, settings),
+            *(arm, lines, proximity, home, settings),
             solutions=RoutineSolutions(arm, routine, margin),
             beyond=RoutineSolutions(arm, routine, margin, limited=False),
         )
     ik = PandaIk.of(arm) if settings.closed_form else None
     if ik is None:
-        return NumericLineSearch(arm, lines, reach.proximity, home, settings)
-    rest = lines, reach.proximity, home
+        return NumericLineSearch(arm, lines, proximity, home, settings)
+    rest = lines, proximity, home
     few = replace(settings, starts=settings.starts[:1])  # more found nothing more in 3,000 grasps
     return SuccessiveLineSearch(
         ClosedFormLineSearch(arm, ik.within(margin), *rest, settings),

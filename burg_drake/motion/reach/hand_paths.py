@@ -8,13 +8,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array
+from burg_drake.core import Array, Indices
 from burg_drake.core.grasps import Outcome
 from burg_drake.geometry import TOUCHING
 from burg_drake.motion.reach.verdict import Reach
 from burg_drake.motion.sweep import HandSweep, Sweep
-
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,14 +10,10 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from burg_drake.core import Array
+from burg_drake.core import Array, Booleans, Indices
 from burg_drake.core.grasps import Outcome
 from burg_drake.motion.reach.verdict import Reach
-
-Booleans = NDArray[np.bool_]
-Indices = NDArray[np.intp]
 
 STEP = 0.01
 """Distance of the heights that are tried [m]."""
@@ -31,11 +27,11 @@ WHATEVER_HEIGHT = (
 )
 """Outcomes that no smaller lift changes."""
 
-Judge = Callable[[float, Indices], Sequence[Reach]]
+ReachAtHeight = Callable[[float, Indices], Sequence[Reach]]
 """Verdicts on some grasps (S,) that are lifted to a height [m]."""
 HandIsFree = Callable[[float, Indices], Booleans]
 """Whether the hand alone is free on its ways (S,), lifted to a height [m]."""
-IsFree = Callable[[int, Indices], Booleans]
+LevelIsFree = Callable[[int, Indices], Booleans]
 """Whether some rows (S,) are free up to a level."""
 
 
@@ -47,7 +43,7 @@ def lift_heights(least: float, most: float) -> Array:
 
 
 def raise_lifts(
-    whole: Sequence[Reach], tried: Array, judge: Judge, hand_is_free: HandIsFree
+    whole: Sequence[Reach], tried: Array, judge: ReachAtHeight, hand_is_free: HandIsFree
 ) -> list[Reach]:
     """Goes on with grasps whose lift is not whole.
 
@@ -94,7 +90,7 @@ def raise_lifts(
     return found
 
 
-def _halved(low: Indices, high: Indices, is_free: IsFree) -> tuple[Indices, Indices]:
+def _halved(low: Indices, high: Indices, is_free: LevelIsFree) -> tuple[Indices, Indices]:
     """Neighbouring levels of which the lower is free and the upper is not, for R rows, from levels
     (R,) of which that is known."""
     while (high - low > 1).any():
@@ -103,7 +99,7 @@ def _halved(low: Indices, high: Indices, is_free: IsFree) -> tuple[Indices, Indi
 
 
 def _narrowed(
-    low: Indices, high: Indices, middle: Indices, is_free: IsFree
+    low: Indices, high: Indices, middle: Indices, is_free: LevelIsFree
 ) -> tuple[Indices, Indices]:
     """The same with what is between them looked at at one level each (R,)."""
     low, high = low.copy(), high.copy()

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array, make_pose
+from burg_drake.core import Array, Indices, make_pose
 from burg_drake.geometry import TOUCHING, Body, HandScreen, swept_body
 
 AT_REST = 1e-3
@@ -26,8 +26,6 @@ STEP = 1e-3
 
 POSES = 2**17
 """Of the object that are looked at together; bounds the memory to some 20 MB."""
-
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ import numpy as np
 
 from burg_drake.core import Array, inverse, transform_points
 from burg_drake.scene.document import Board, Scene, placed_vertices
-from burg_drake.station.document import Station
+from burg_drake.station.document import Station, StationLike, as_station
 
 if TYPE_CHECKING:
     from burg_drake.motion.ik import ArmKinematics
@@ -31,7 +31,7 @@ class ArmSpan:
     radius: float
 
     @classmethod
-    def of(cls, arm: ArmKinematics, station: Station) -> ArmSpan:
+    def of(cls, arm: ArmKinematics, station: StationLike) -> ArmSpan:
         """The span of a station's arm with its hand.
 
         A point on the axis of a revolute joint belongs to both links that it joins. So a chain of
@@ -41,10 +41,11 @@ class ArmSpan:
 
         Args:
             arm: the arm's kinematics.
-            station: the station that it stands on.
+            station: the station that it stands on: as loaded, or a reference for `load_station`.
         """
         from scipy.optimize import minimize  # takes 0.1 s
 
+        station = as_station(station)
         assert station.document.arm is not None  # whose kinematics these are
         turns = arm.turns == 1.0
         axis, p_AJ = arm.axis[turns], arm.p_AJ[turns]

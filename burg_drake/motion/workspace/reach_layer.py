@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from burg_drake.core import (
     Array,
     Arrays,
+    Indices,
     InvalidInputError,
     cached,
     content_hash,
@@ -28,8 +29,6 @@ from burg_drake.motion.workspace.reachability import board_cells, grasps_over_bo
 from burg_drake.motion.workspace.station_check import empty_scene
 from burg_drake.scene.document import Board
 from burg_drake.station.document import Station, StationLike, as_station, world_content
-
-Indices = NDArray[np.intp]
 
 COARSEST = 4
 """Every so many points along x and y are asked first; where four neighbours among them agree, so

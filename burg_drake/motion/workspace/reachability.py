@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from burg_drake.core import (
     Array,
     Arrays,
+    Indices,
     InvalidInputError,
     cached,
     content_hash,
@@ -31,8 +32,6 @@ from burg_drake.motion.proximity import ArmProximity
 from burg_drake.scene.document import Scene, SceneLike, as_scene
 from burg_drake.station.diagram import build_station_diagram
 from burg_drake.station.document import Station, StationLike, as_station, world_content
-
-Indices = NDArray[np.intp]
 
 CHUNK = 20_000
 """Configurations that are measured together; bounds the memory to some tens of MB."""

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+_Array = NDArray[np.float64]
 
 
 class DecompositionFailed(Exception):
@@ -28,8 +28,8 @@ class DecompositionFailed(Exception):
 
 
 def run_coacd(
-    vertices: Array, faces: NDArray[np.int64], options: dict[str, Any], timeout: float
-) -> tuple[list[Array], float]:
+    vertices: _Array, faces: NDArray[np.int64], options: dict[str, Any], timeout: float
+) -> tuple[list[_Array], float]:
     """Runs CoACD in a child process.
 
     Args:

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from burg_drake.core import Array, MeshError
 from burg_drake.objects.library import Fit
-from burg_drake.objects.physics import sample_surface
+from burg_drake.objects.physics import sample_surface, spread_over
 
 MOST_VOLUME = 1.25
 """Volume of the convex pieces over that of the surface from which on they are called coarse."""
@@ -179,17 +179,9 @@ def _farthest(points: Array, surface: trimesh.Trimesh) -> float:
 
 def _spread(surface: trimesh.Trimesh) -> tuple[Array, Array]:
     """Samples (T, 3) over a surface, each triangle's centre among them, and their faces (T,)."""
-    triangles = np.asarray(surface.triangles)
-    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    edges = np.cumsum(np.linalg.norm(cross, axis=1))
-    at = (np.arange(TARGETS) + 0.5) / TARGETS * edges[-1]
-    face = np.minimum(np.searchsorted(edges, at), len(triangles) - 1)
-    uv = (np.arange(1, TARGETS + 1)[:, None] * (0.7548776662466927, 0.5698402909980532)) % 1.0
-    uv = np.where(uv.sum(axis=1, keepdims=True) > 1.0, 1.0 - uv, uv)
-    t = triangles[face]
-    points = t[:, 0] + uv[:, :1] * (t[:, 1] - t[:, 0]) + uv[:, 1:] * (t[:, 2] - t[:, 0])
-    middle = triangles.mean(axis=1)
-    return np.vstack([points, middle]), np.concatenate([face, np.arange(len(triangles))])
+    points, face = spread_over(surface, TARGETS)
+    middle = np.asarray(surface.triangles).mean(axis=1)
+    return np.vstack([points, middle]), np.concatenate([face, np.arange(len(middle))])
 
 
 def _distances(points: Array, triangles: Array) -> Array:

@@ -22,7 +22,6 @@ from .entry import (
 )
 from .obj_file import (
     DEFAULT_RGBA as DEFAULT_RGBA,
-    Rgba as Rgba,
     face_palette as face_palette,
     write_piece as write_piece,
     write_visual as write_visual,

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from burg_drake.core import Array
 from burg_drake.core.files import atomic_write
+from burg_drake.core.terminal import Rgba
 
 CREASE_ANGLE = np.deg2rad(35.0)
 """Faces that meet at more than this angle are shaded with an edge between them [rad]."""
@@ -22,7 +23,6 @@ CREASE_ANGLE = np.deg2rad(35.0)
 MAX_COLOURS = 16
 """A mesh with more face colours than this is a scan or a picture, not a few materials."""
 
-Rgba = tuple[float, float, float, float]
 
 DEFAULT_RGBA: Rgba = (0.8, 0.8, 0.78, 1.0)
 """Colour of a mesh that comes without one; Drake's renderer would choose orange."""

@@ -3,6 +3,7 @@ from .offset import (
     folded as folded,
     offsets as offsets,
 )
+from .openings import Openings as Openings
 from .solids import decimated as decimated
 from .surface import (
     FORMATS as FORMATS,

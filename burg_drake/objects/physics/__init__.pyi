@@ -13,4 +13,5 @@ from .stability import stable_poses as stable_poses
 from .symmetry import (
     SymmetryTest as SymmetryTest,
     sample_surface as sample_surface,
+    spread_over as spread_over,
 )

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import trimesh
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from burg_drake.core import Array, rot_z
@@ -104,23 +105,30 @@ class SymmetryTest:
 
 
 def sample_surface(surface: trimesh.Trimesh, count: int) -> tuple[Array, Array]:
-    """Points (count, 3) evenly spread over a surface, and its normals there; no randomness.
-
-    Systematic sampling by area, with the points of each triangle from the R2 sequence.
-    """
+    """Points (count, 3) evenly spread over a surface, and its normals there; no randomness."""
+    points, face = spread_over(surface, count)
     triangles = surface.triangles
     cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     area = np.linalg.norm(cross, axis=1)
-    edges = np.cumsum(area)
-    at = (np.arange(count) + 0.5) / count * edges[-1]
-    face = np.minimum(np.searchsorted(edges, at), len(area) - 1)
-    k = np.arange(1, count + 1)[:, None]
-    uv = (k * np.array([0.7548776662466927, 0.5698402909980532])) % 1.0
-    uv = np.where(uv.sum(axis=1, keepdims=True) > 1.0, 1.0 - uv, uv)
-    t = triangles[face]
-    points = t[:, 0] + uv[:, :1] * (t[:, 1] - t[:, 0]) + uv[:, 1:] * (t[:, 2] - t[:, 0])
     order = np.argsort((np.arange(count) * 0.6180339887498949) % 1.0, kind="stable")
     return points[order], (cross[face] / np.maximum(area[face], 1e-300)[:, None])[order]
+
+
+def spread_over(surface: trimesh.Trimesh, count: int) -> tuple[Array, NDArray[np.int64]]:
+    """Points (count, 3) evenly spread over a surface, in the order of its triangles, and the number
+    (count,) of the triangle of each; no randomness.
+
+    Systematic sampling by area, with the points of each triangle from the R2 sequence.
+    """
+    triangles = np.asarray(surface.triangles)
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    edges = np.cumsum(np.linalg.norm(cross, axis=1))
+    at = (np.arange(count) + 0.5) / count * edges[-1]
+    face = np.minimum(np.searchsorted(edges, at), len(triangles) - 1)
+    uv = (np.arange(1, count + 1)[:, None] * (0.7548776662466927, 0.5698402909980532)) % 1.0
+    uv = np.where(uv.sum(axis=1, keepdims=True) > 1.0, 1.0 - uv, uv)
+    t = triangles[face]
+    return t[:, 0] + uv[:, :1] * (t[:, 1] - t[:, 0]) + uv[:, 1:] * (t[:, 2] - t[:, 0]), face
 
 
 def down_frame(down: Array) -> Array:

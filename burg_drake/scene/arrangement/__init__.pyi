@@ -17,6 +17,5 @@ from .polygons import (
 )
 from .sweep import (
     ConvexShapes as ConvexShapes,
-    Indices as Indices,
     contact_distances as contact_distances,
 )

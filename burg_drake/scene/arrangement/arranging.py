@@ -28,7 +28,7 @@ from burg_drake.scene.arrangement.occupancy import (
     to_instance,
 )
 from burg_drake.scene.arrangement.packing import density, pack
-from burg_drake.scene.document import LAYOUTS, TRIES, Board, Layout, PoseChoice
+from burg_drake.scene.document import LAYOUTS, TRIES, Board, LayoutName, PoseChoice
 
 GAPS = {"random": 0.001, "wide": 0.040}
 """Least distance of shadows [m]; a finger of the Panda's hand is 22 mm wide."""
@@ -93,7 +93,7 @@ def arrange(
     board: Board,
     rng: np.random.Generator,
     *,
-    layout: Layout = "random",
+    layout: LayoutName = "random",
     poses: PoseChoice = "probability",
     obstacles: Sequence[Array] = (),
     tries: int = TRIES,
@@ -141,7 +141,7 @@ def _scattered(
     chosen: Sequence[tuple[ObjectShape, int]],
     occupied: OccupiedBoard,
     rng: np.random.Generator,
-    layout: Layout,
+    layout: LayoutName,
     tries: int,
     needs_all: bool,
 ) -> tuple[list[StandingObject | None], int]:

@@ -21,11 +21,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from burg_drake.core import Array, transform_points
-
-Indices = NDArray[np.intp]
+from burg_drake.core import Array, Indices, transform_points
 
 ACCURACY = 1e-7
 """How far the bounds of a way may be apart at last [m]."""

@@ -3,7 +3,7 @@ from .files import scene_references as scene_references
 from .layout import (
     LAYOUTS as LAYOUTS,
     TRIES as TRIES,
-    Layout as Layout,
+    LayoutName as LayoutName,
     PoseChoice as PoseChoice,
 )
 from .markers import (

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
-Layout = Literal["random", "wide", "close", "touching", "packed", "heap"]
+LayoutName = Literal["random", "wide", "close", "touching", "packed", "heap"]
 """`random`: anywhere on the board; `wide`: with room for an open hand's fingers in between; `close`
 and `touching`: beside one another, a few millimetres apart or in contact; `packed`: as dense as it
 gets; `heap`: in any orientation above a spot, to be dropped."""
-LAYOUTS: tuple[Layout, ...] = get_args(Layout)
+LAYOUTS: tuple[LayoutName, ...] = get_args(LayoutName)
 
 PoseChoice = Literal["probability", "uniform"]
 """Which of its stable poses an object gets: by their probabilities, or each as often."""

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, get_args
 
-from burg_drake.core import content_hash
+from burg_drake.core import content_hash, setting
 from burg_drake.core.documents import dump_document, require_ranges
 from burg_drake.scene.document.board import Board
-from burg_drake.scene.document.layout import TRIES, Layout, PoseChoice
+from burg_drake.scene.document.layout import TRIES, LayoutName, PoseChoice
 
 ATTEMPTS = 100
 """Whole scenes that are drawn until one is accepted."""
@@ -52,19 +52,32 @@ class SceneRecipe:
     library: str
     count: int = 6
     only: tuple[str, ...] = ()
-    repeat: bool = False
+    repeat: bool = setting(False, "an object may be in a scene several times")
     board: Board = Board()
-    layout: Layout = "random"
-    poses: PoseChoice = "probability"
-    tries: int = TRIES
-    fewer: bool = False
-    seed: int = 0
+    layout: LayoutName = "random"
+    poses: PoseChoice = setting(
+        "probability", "how stable poses are drawn", choices=get_args(PoseChoice)
+    )
+    tries: int = setting(TRIES, "random places for each object", metavar="K", low=1)
+    fewer: bool = setting(
+        False, "accept a scene in which not all objects found a place; they are reported"
+    )
+    seed: int = setting(0)
     station: str = "panda_tabletop"
     settle: bool = True
-    attempts: int = ATTEMPTS
-    within_reach: bool = False
-    clear_grasps: int = 0
-    visible_from: str = ""
+    attempts: int = setting(ATTEMPTS, "scenes that are drawn until one is accepted", low=1)
+    within_reach: bool = setting(False, "the arm can grasp every object where it is")
+    clear_grasps: int = setting(
+        0,
+        "every object has so many grasps at which the hand touches nothing else",
+        metavar="K",
+        low=1,
+    )
+    visible_from: str = setting(
+        "",
+        "this camera of the station sees half of every object, at least",
+        metavar="CAMERA",
+    )
 
     def __post_init__(self) -> None:
         require_ranges(self, RANGES)

@@ -6,6 +6,7 @@ diagram holds; `station.checks.scene_issues` finds those.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -146,10 +147,18 @@ def read_vertices(mesh: Path) -> Array:
     Raises:
         OSError, ValueError: it cannot be read, or holds no vertices.
     """
+    status = mesh.stat()
+    return _vertices_of(mesh, status.st_mtime_ns, status.st_size)
+
+
+@functools.lru_cache(maxsize=32)
+def _vertices_of(mesh: Path, changed: int, size: int) -> Array:
+    """As `read_vertices`, read-only; of files read before, what was in them."""
     rows = [line.split()[1:4] for line in mesh.read_text().splitlines() if line.startswith("v ")]
     p_OV = np.array(rows, dtype=float).reshape(-1, 3)
     if not len(p_OV) or not np.isfinite(p_OV).all():
         raise ValueError(f"{mesh} has no vertices that are numbers")
+    p_OV.flags.writeable = False
     return p_OV
 
 

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
-from burg_drake.core import DEGREES, MILLIMETRES, PERCENT, InvalidInputError, ShownUnit, setting
+from burg_drake.core import DEGREES, MILLIMETRES, PERCENT, InvalidInputError, setting
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,11 +67,6 @@ class FrictionSettings:
             raise InvalidInputError(f"tolerance is {self.tolerance:g}; give more than 0")
 
 
-def _deviation(default: float, help: str, unit: ShownUnit) -> Any:
-    """The declaration of a standard deviation."""
-    return setting(default, help, unit=unit, low=0)
-
-
 @dataclass(frozen=True, kw_only=True)
 class Noise:
     """Standard deviations.
@@ -84,10 +78,12 @@ class Noise:
         friction: of the target's coefficient, relative.
     """
 
-    translation: float = _deviation(0.005, "of the grasp along each axis", MILLIMETRES)
-    rotation: float = _deviation(math.radians(5.0), "of the grasp about each axis", DEGREES)
-    mass: float = _deviation(0.1, "of the object's mass", PERCENT)
-    friction: float = _deviation(0.2, "of the object's friction coefficient", PERCENT)
+    translation: float = setting(0.005, "of the grasp along each axis", unit=MILLIMETRES, low=0)
+    rotation: float = setting(
+        math.radians(5.0), "of the grasp about each axis", unit=DEGREES, low=0
+    )
+    mass: float = setting(0.1, "of the object's mass", unit=PERCENT, low=0)
+    friction: float = setting(0.2, "of the object's friction coefficient", unit=PERCENT, low=0)
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():

@@ -34,7 +34,7 @@ def placed_scene(
     for name, X in X_WO.items():
         instance = scene.instances[name]
         if name in exact or has_moved(built, name, X):
-            instance = dataclasses.replace(instance, X_SO=_readable(X_SW @ X))
+            instance = dataclasses.replace(instance, X_SO=Pose.readable(X_SW @ X))
         instances.append(instance)
     document = dataclasses.replace(scene.document, instances=tuple(instances))
     return Scene(document, scene.library, scene.path)
@@ -44,11 +44,3 @@ def has_moved(built: StationDiagram, name: str, X_WO: Array) -> bool:
     """Whether an object is elsewhere than in the document by more than a trifle (`STILL`)."""
     moved = displacement_from_document(built, name, X_WO)
     return moved.distance > STILL[0] or moved.angle > STILL[1]
-
-
-def _readable(X_SO: Array) -> Pose:
-    """A pose to the micrometre and a ten thousandth of a degree, as people can read it."""
-    exact = Pose.from_matrix(X_SO)
-    x, y, z = (round(value, 6) + 0.0 for value in exact.translation)
-    roll, pitch, yaw = (round(value, 4) + 0.0 for value in exact.rpy_deg or (0.0, 0.0, 0.0))
-    return Pose((x, y, z), rpy_deg=(roll, pitch, yaw))

@@ -7,6 +7,5 @@ from .execution import (
 from .hand_trial import HandTrial as HandTrial
 from .result import TrialResult as TrialResult
 from .trial_settings import (
-    DEFAULT_TRIAL as DEFAULT_TRIAL,
     TrialSettings as TrialSettings,
 )

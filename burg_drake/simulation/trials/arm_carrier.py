@@ -36,7 +36,7 @@ class ArmCarrier:
         trial: a trial with an arm that has been brought to its start.
         target: the grasped body.
         approach: from the pregrasp, or from further back, to the grasp.
-        ways: from there on, at least one; the hand goes straight on each.
+        segments: from there on, at least one; the hand goes straight on each.
         lift_clearance: gives the check of the path ahead with the target in the hand.
     """
 

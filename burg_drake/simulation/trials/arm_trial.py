@@ -8,7 +8,7 @@ before the hand closed.
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cache, partial
 from itertools import pairwise
 
 import numpy as np
@@ -87,7 +87,7 @@ class ArmTrial(GraspTrial):
         self._X_WA = arm.X_WA.matrix()
         self._kinematics = ArmKinematics.of(diagram)
         self.steps_per_check = max(1, round(settings.poll / engine.time_step))
-        self._lift_clearances: dict[BodyIndex, ArmLiftClearance] = {}
+        self._lift_clearance = cache(partial(ArmLiftClearance, diagram))
 
     def run(
         self,
@@ -159,15 +159,9 @@ class ArmTrial(GraspTrial):
         self.command("arm", approach.at(0))
         self.command("hand", self.hand.opening_command())
         self.simulator.Initialize()
-        lift_clearance = partial(self.lift_clearance, target)
+        lift_clearance = partial(self._lift_clearance, target)
         carrier = ArmCarrier(self, target, approach, segments, lift_clearance)
         return Execution(self, target, moving, carrier)
-
-    def lift_clearance(self, target: BodyIndex) -> ArmLiftClearance:
-        """Looks along the way up with a target in the hand."""
-        if target not in self._lift_clearances:
-            self._lift_clearances[target] = ArmLiftClearance(self.diagram, target)
-        return self._lift_clearances[target]
 
     def _check_plan(self, plan: Plan, X_WG: Array) -> None:
         """Whether a plan is one for this scene, arm and grasp; of one without an origin the arm and

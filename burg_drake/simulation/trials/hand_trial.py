@@ -10,11 +10,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 from pydrake.geometry import Meshcat
-from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.core import Array, InvalidInputError
 from burg_drake.grasping.clearance import HandClearance
@@ -77,7 +76,7 @@ class HandTrial(GraspTrial):
         clearance = HandClearance(diagram)
         super().__init__(diagram, FloatingHand(diagram), settings, clearance, motion)
         self._lock = lock
-        self._lift_clearances: dict[BodyIndex, HandLiftClearance] = {}
+        self._lift_clearance = cache(partial(HandLiftClearance, diagram))
 
     def run(
         self,
@@ -143,7 +142,7 @@ class HandTrial(GraspTrial):
         self.command("lift", np.zeros(2))
         self.command("hand", self.hand.closing_command())
         self.simulator.Initialize()
-        lift_clearance = partial(self.lift_clearance, target)
+        lift_clearance = partial(self._lift_clearance, target)
         return Execution(self, target, moving, LiftCarrier(self, paths, lift_clearance))
 
     def lift_paths(self, X_WG: Array, lift: float | None = None) -> tuple[LiftPath, ...]:
@@ -170,9 +169,3 @@ class HandTrial(GraspTrial):
             LiftPath(self.motion.direction_W, height),
         )
         return tuple(path for path in paths if path.length > 0.0)
-
-    def lift_clearance(self, target: BodyIndex) -> HandLiftClearance:
-        """Looks along the way ahead with a target in the hand."""
-        if target not in self._lift_clearances:
-            self._lift_clearances[target] = HandLiftClearance(self.diagram, target)
-        return self._lift_clearances[target]

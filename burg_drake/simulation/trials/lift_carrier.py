@@ -40,8 +40,8 @@ class LiftCarrier:
 
     Args:
         trial: a trial that has been brought to its start, with the floating hand at the grasp and
-            the joint along the first of the ways.
-        ways: of the hand, at least one.
+            the joint along the first of the paths.
+        paths: of the hand, straight, at least one.
         lift_clearance: gives the check of the path ahead with the target in the hand.
     """
 
@@ -65,8 +65,8 @@ class LiftCarrier:
         self._names = trial.diagram.body_names
         self._hand = set(trial.diagram.robot_bodies)
         self.segments = tuple(
-            HandSegment(*way, _check_count(way.length, settings) + (number + 1 < len(paths)))
-            for number, way in enumerate(paths)
+            HandSegment(*path, _check_count(path.length, settings) + (number + 1 < len(paths)))
+            for number, path in enumerate(paths)
         )
         self.lift_time = sum(settings.time_of(path.length) for path in paths)
         self._number = 0
@@ -134,5 +134,5 @@ class LiftCarrier:
 
 
 def _check_count(length: float, settings: TrialSettings) -> int:
-    """Looks on a way of a length [m]: as many to speed up as to brake."""
+    """Looks on a path of a length [m]: as many to speed up as to brake."""
     return 2 * max(1, round(settings.time_of(length) / settings.poll / 2))

@@ -23,8 +23,8 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform
 
-from burg_drake.core import Array, InvalidInputError
-from burg_drake.scene.arrangement import ConvexShapes, Indices, contact_distances
+from burg_drake.core import Array, Indices, InvalidInputError
+from burg_drake.scene.arrangement import ConvexShapes, contact_distances
 from burg_drake.station.checks.body_shapes import PosedShapes
 from burg_drake.station.checks.collision_world import CollisionWorld
 

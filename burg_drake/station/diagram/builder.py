@@ -132,7 +132,7 @@ def build_station_diagram(
     for name, body in (free if weld_objects else {}).items():
         add_vertical_joint(plant, body, RigidTransform(instance_pose(scene, station, name)))
     fixed |= add_obstacles(plant, station)
-    models = add_robot(builder, station, robot)
+    models = add_robot(builder, station, robot, simulated=not weld_objects)
 
     plant.Finalize()
     for name, body in ({} if weld_objects else free).items():

@@ -41,7 +41,7 @@ class GraspMotion:
 
     Attributes:
         standoff: from pregrasp to grasp [m].
-        retreat: way back along the approach with the object, before the lift [m].
+        retreat: path back along the approach with the object, before the lift [m].
         lift_height: length of the lift [m].
         least_lift: what has to be free of it [m]: the hand rises as high as there is room, but no
             less than this; None if the whole lift has to be free.

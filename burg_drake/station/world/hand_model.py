@@ -46,7 +46,12 @@ class HandModel:
 
 
 def add_hand(
-    builder: RobotDiagramBuilder, hand: Hand, path: Path, packages: Packages = NO_PACKAGES
+    builder: RobotDiagramBuilder,
+    hand: Hand,
+    path: Path,
+    packages: Packages = NO_PACKAGES,
+    *,
+    simulated: bool = True,
 ) -> HandModel:
     """Adds a hand with its servos.
 
@@ -55,6 +60,7 @@ def add_hand(
         hand: the document.
         path: the model file.
         packages: what a station says of packages.
+        simulated: whether contact will be simulated.
 
     Raises:
         InvalidInputError: the model cannot be loaded, is fixed in the world, lacks what the
@@ -63,7 +69,7 @@ def add_hand(
     plant = builder.plant()
     constraints = plant.num_constraints()
     try:
-        (instance,) = add_models(builder.parser(), path, packages)
+        (instance,) = add_models(builder.parser(), path, packages, simulated=simulated)
     except (RuntimeError, ValueError) as error:
         raise InvalidInputError(
             f"hand {hand.name!r}: {path} cannot be loaded as one model"

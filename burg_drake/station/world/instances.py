@@ -15,7 +15,11 @@ from burg_drake.core.paths import Packages
 from burg_drake.objects.library import LINK, MassProperties
 from burg_drake.scene.document import Scene
 from burg_drake.station.world.mesh_pieces import is_mesh, sdf_by_pieces
-from burg_drake.station.world.model_file import add_models, buffered_remarks
+from burg_drake.station.world.model_file import (
+    add_models,
+    buffered_remarks,
+    without_hydroelastic,
+)
 from burg_drake.station.world.robot import ROBOT_MODELS
 from burg_drake.station.world.rolling import add_rolling, is_ball
 
@@ -38,9 +42,10 @@ def add_instance(
     try:
         with buffered_remarks() as remarks:
             if by_pieces and is_mesh(scene, name):
-                (model,) = parser.AddModelsFromString(sdf_by_pieces(scene, name), "sdf")
+                text = without_hydroelastic(sdf_by_pieces(scene, name))
+                (model,) = parser.AddModelsFromString(text, "sdf")
             else:
-                (model,) = add_models(parser, path, packages)
+                (model,) = add_models(parser, path, packages, simulated=not by_pieces)
             body = plant.GetBodyByName(LINK, model)
             _require_inertia(body, scene.entry(name).mass_properties)
             if is_ball(scene, name) and not by_pieces:

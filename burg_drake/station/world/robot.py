@@ -37,12 +37,18 @@ HOVER = 0.5
 
 
 def add_robot(
-    builder: RobotDiagramBuilder, station: Station, robot: Robot
+    builder: RobotDiagramBuilder, station: Station, robot: Robot, *, simulated: bool = True
 ) -> dict[str, ModelInstanceIndex]:
     """Adds hand and arm with their servos.
 
     Gravity does not pull them, unless an inverse-dynamics controller will carry the arm's weight;
     see `ArmControl`.
+
+    Args:
+        builder: its plant is not finalized.
+        station: hand and arm.
+        robot: what of it.
+        simulated: whether contact will be simulated; point queries do without some of its models.
 
     Returns:
         Model instances by role: `hand`, and `arm` or `lift`.
@@ -56,13 +62,15 @@ def add_robot(
         return {}
     check_hand(station.hand, station.hand_model, station.hand_path, station.packages)
     plant = builder.plant()
-    added = add_hand(builder, station.hand, station.hand_model, station.packages)
+    added = add_hand(
+        builder, station.hand, station.hand_model, station.packages, simulated=simulated
+    )
     plant.RenameModelInstance(added.instance, "hand")
     models = {"hand": added.instance}
     if robot == "hand":
         models["lift"] = _add_lift(plant, added.body, _hover_pose(station))
     else:
-        models["arm"] = _add_arm(builder, station, added.body)
+        models["arm"] = _add_arm(builder, station, added.body, simulated)
     for model in models.values():
         plant.set_gravity_enabled(model, robot == "arm" and inverse_dynamics(station))
     return models
@@ -93,7 +101,9 @@ def _add_lift(plant: MultibodyPlant, hand: RigidBody, X_WH: Array) -> ModelInsta
     return lift
 
 
-def _add_arm(builder: RobotDiagramBuilder, station: Station, hand: RigidBody) -> ModelInstanceIndex:
+def _add_arm(
+    builder: RobotDiagramBuilder, station: Station, hand: RigidBody, simulated: bool
+) -> ModelInstanceIndex:
     arm = station.document.arm
     if arm is None:
         raise InvalidInputError(
@@ -103,7 +113,8 @@ def _add_arm(builder: RobotDiagramBuilder, station: Station, hand: RigidBody) ->
     assert station.arm_model is not None
     plant = builder.plant()
     try:
-        (model,) = add_models(builder.parser(), station.arm_model, station.packages)
+        path, packages = station.arm_model, station.packages
+        (model,) = add_models(builder.parser(), path, packages, simulated=simulated)
     except (RuntimeError, ValueError) as error:
         raise InvalidInputError(
             f"{station.path}: arm.model: {station.arm_model} cannot be loaded as one robot"

@@ -10,9 +10,9 @@ from burg_drake.compose.background import SettlingProposal, moved_names
 from burg_drake.compose.document import name_of
 from burg_drake.core import BurgError, quaternion_from_rotation
 from burg_drake.ui.view.object_meshes import ObjectMeshes
-from burg_drake.ui.widgets import Rgb
+from burg_drake.ui.widgets import Rgb8
 
-COLOR: Rgb = (245, 159, 0)
+COLOR: Rgb8 = (245, 159, 0)
 OPACITY = 0.5
 SEEN, SEEN_DEG = 2e-3, 2.0
 """What moves by less [m, degrees] has no shade, which would flicker within the object."""

@@ -14,7 +14,7 @@ from burg_drake.core.terminal import distinct_colors
 from burg_drake.geometry import hull_mesh
 from burg_drake.ui.view.object_meshes import ObjectMeshes
 from burg_drake.ui.view.outlines import footprint
-from burg_drake.ui.widgets import FIXED, Rgb, style_of
+from burg_drake.ui.widgets import FIXED, Rgb8, style_of
 
 Coloring = Literal["objects", "random", "status"]
 
@@ -23,7 +23,7 @@ OUTLINE_HEIGHT = 4e-4
 """Of outlines over the board [m]; at the board's own height they would flicker."""
 THIN, THICK = 2.0, 6.0
 """Lines of outlines and of those of selected objects [pixel]."""
-MISSING: Rgb = (200, 60, 200)
+MISSING: Rgb8 = (200, 60, 200)
 UNKNOWN_RADIUS = 0.03
 """Of the ball in place of an object whose shape cannot be read [m]."""
 
@@ -56,7 +56,7 @@ class _Nodes:
     mesh: Any
     p_OV: Array
     outline: viser.LineSegmentsHandle
-    color: Rgb
+    color: Rgb8
     tint: viser.MeshHandle | None = None
     drawn: tuple[bytes, str, bool] | None = None
 
@@ -158,7 +158,7 @@ class SceneView:
             nodes.tint.visible = True
             nodes.mesh.visible = False
 
-    def _tinted(self, name: str, object: str, color: Rgb) -> viser.MeshHandle | None:
+    def _tinted(self, name: str, object: str, color: Rgb8) -> viser.MeshHandle | None:
         try:
             shape = self._shapes[object]
         except BurgError:
@@ -170,5 +170,5 @@ class SceneView:
         return tint
 
 
-def _status_color(shown: ShownInstance) -> Rgb:
+def _status_color(shown: ShownInstance) -> Rgb8:
     return FIXED if shown.fixed and shown.status == "ok" else style_of(shown.status).color

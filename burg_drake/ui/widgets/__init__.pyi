@@ -9,14 +9,14 @@ from .dialogs import confirm as confirm
 from .page_actions import PageActions as PageActions
 from .scene_files import scene_names as scene_names
 from .shortcuts import (
-    Call as Call,
+    ActionCall as ActionCall,
     register as register,
     show_overlay as show_overlay,
 )
 from .status_colors import (
     FIXED as FIXED,
     STATUS_STYLES as STATUS_STYLES,
-    Rgb as Rgb,
+    Rgb8 as Rgb8,
     style_of as style_of,
 )
 from .texts import (

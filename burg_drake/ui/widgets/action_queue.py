@@ -45,7 +45,7 @@ class ActionQueue:
     """Runs actions in a thread of its own.
 
     Args:
-        complain: gets who asked, and one line that says what went wrong.
+        on_error: gets who asked, and one line that says what went wrong.
     """
 
     def __init__(self, on_error: ErrorCallback) -> None:

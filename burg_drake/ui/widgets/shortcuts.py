@@ -89,10 +89,10 @@ MOUSE: tuple[tuple[str, str], ...] = (
     ("Drag on free space, wheel, right drag", "Rotate, zoom and shift the view"),
 )
 
-Call = Callable[[viser.ClientHandle | None], Any]
+ActionCall = Callable[[viser.ClientHandle | None], Any]
 
 
-def register(gui: viser.GuiApi, actions: PageActions, calls: dict[str, Call]) -> None:
+def register(gui: viser.GuiApi, actions: PageActions, calls: dict[str, ActionCall]) -> None:
     """Makes the keys work, and lists them in viser's palette of commands (Ctrl+K).
 
     Args:
@@ -109,7 +109,7 @@ def register(gui: viser.GuiApi, actions: PageActions, calls: dict[str, Call]) ->
         )
 
         @command.on_trigger
-        async def _(event: Any, call: Call = call) -> None:
+        async def _(event: Any, call: ActionCall = call) -> None:
             actions.submit(lambda: call(event.client), event.client)
 
     typed = gui.add_command("Take what was typed", hotkey="enter", modifier="alt+shift")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-Rgb = tuple[int, int, int]
+Rgb8 = tuple[int, int, int]
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class StatusStyle:
         words: for people.
     """
 
-    color: Rgb
+    color: Rgb8
     words: str
 
     @property
@@ -35,7 +35,7 @@ STATUS_STYLES: dict[str, StatusStyle] = {
 """By status; green, red and pink as in the tool of the paper (Rudorfer et al., 2022)."""
 
 OTHER = StatusStyle((120, 120, 120), "not checked")
-FIXED: Rgb = (150, 155, 162)
+FIXED: Rgb8 = (150, 155, 162)
 """Of background objects and obstacles."""
 
 
@@ -44,6 +44,6 @@ def style_of(status: str) -> StatusStyle:
     return STATUS_STYLES.get(status, OTHER)
 
 
-def hex_color(color: Rgb) -> str:
+def hex_color(color: Rgb8) -> str:
     """A colour as HTML has it."""
     return "#" + "".join(f"{channel:02x}" for channel in color)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from burg_drake.core import InvalidInputError
-from burg_drake.core.grasps import GraspSet
+from burg_drake.core.grasps import PLAIN, TEXT, GraspSet, describe
 from burg_drake.visualization.grasps.groups import (
     GraspGroup,
     NumberGroups,
@@ -19,18 +19,6 @@ from burg_drake.visualization.grasps.groups import (
 from burg_drake.visualization.grasps.mesh import grasp_path
 from burg_drake.visualization.style import BINS, ColorBar, ColorScale, LegendEntry, hex_color
 
-UNITS = {
-    "m": (
-        *("width", "clearance", "overlap", "slip", "lift", "lift_height", "others_moved"),
-        "contact_offset",
-    ),
-    "rad": ("tilt", "antipodal_angle"),
-    "N": ("pad_force",),
-    "m²": ("patch_area",),
-    "s": ("end_time", "cpu_clear", "cpu_reach", "cpu_trial"),
-    "kg": ("mass",),
-}
-"""Of columns that this package or a format that it reads gives these names."""
 TOO_CLOSE = 0.08
 """Ticks that are nearer to an end of the bar, as a share of it, make room for the end's number."""
 
@@ -77,10 +65,10 @@ def default_column(grasps: GraspSet) -> str | None:
 
 def with_unit(name: str) -> str:
     """A column's name for people, with its unit if that is known."""
-    unit = next((unit for unit, names in UNITS.items() if name in names), None)
-    if unit is None and name.startswith("moved_"):
-        unit = "m"
-    return name if unit is None else f"{name} [{unit}]"
+    column = describe(name)
+    if column is None or column.unit in (TEXT, PLAIN):
+        return name
+    return f"{name} [{column.unit.replace('m2', 'm²')}]"
 
 
 def group_entries(groups: Iterable[GraspGroup]) -> list[LegendEntry]:

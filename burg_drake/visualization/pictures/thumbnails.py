@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -41,8 +40,7 @@ from burg_drake.core import (
     rot_z,
     transform_points,
 )
-from burg_drake.core.files import atomic_write
-from burg_drake.core.terminal import distinct_colors
+from burg_drake.core.terminal import Rgb, distinct_colors
 from burg_drake.geometry import hull_mesh
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.system_libraries import describe_missing, missing_render_libraries
@@ -84,7 +82,6 @@ LIGHTS = [
 ]
 """Room light from the upper left, a weaker one with the camera, a faint one from the right."""
 OBJECT_LABEL = 1
-Rgb = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -250,31 +247,3 @@ def exploded(hulls: Sequence[Array], share: float) -> list[Array]:
     everything = np.vstack(hulls)
     middle = (everything.min(axis=0) + everything.max(axis=0)) / 2.0
     return [share * (hull.mean(axis=0) - middle) for hull in hulls]
-
-
-def write_thumbnails(
-    library: ObjectLibrary,
-    folder: str | Path,
-    names: Iterable[str] | None = None,
-    size: tuple[int, int] = SIZE,
-) -> dict[str, Path]:
-    """Writes a picture `NAME.png` of each object.
-
-    Args:
-        library: where the objects are.
-        folder: to write to.
-        names: of objects; all if None.
-        size: width and height [pixel].
-
-    Returns:
-        The files by name.
-
-    Raises:
-        BurgError: as for `ObjectRenderer`, or a file cannot be written.
-    """
-    chosen = list(library.objects if names is None else names)
-    renderer = ObjectRenderer(library, chosen)
-    paths = {name: Path(folder) / f"{name}.png" for name in chosen}
-    for name, path in paths.items():
-        atomic_write(path, renderer.portrait(name, size).png())
-    return paths

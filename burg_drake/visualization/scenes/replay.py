@@ -8,6 +8,7 @@ import numpy as np
 from pydrake.geometry import Meshcat, MeshcatAnimation
 
 from burg_drake.core import Array
+from burg_drake.core.grasps import shown_number
 from burg_drake.simulation.trials import HandTrial, TrialResult
 from burg_drake.station.diagram import FloatingHand
 from burg_drake.visualization.meshcat import aim_at
@@ -116,18 +117,18 @@ def describe(result: TrialResult) -> list[str]:
     if result.reason:
         lines.append(result.reason)
     figures = [
-        f"{name} {value * factor:.{digits}f} {unit}"
-        for name, value, factor, digits, unit in (
-            ("lift", margins.lift, 1e3, 0, "mm"),
-            ("slip", margins.slip, 1e3, 1, "mm"),
-            ("tilt", margins.tilt, 180 / math.pi, 1, "deg"),
-            ("pad force", margins.pad_force, 1.0, 1, "N"),
-            ("patch", margins.patch_area, 1e6, 0, "mm²"),
-            ("others moved", margins.others_moved, 1e3, 1, "mm"),
-            ("pushed before closing", margins.pushed, 1e3, 1, "mm"),
-            ("tracking error", margins.tracking_error, 1e3, 1, "mrad"),
+        f"{label} {shown_number(name, getattr(margins, name), digits)}"
+        for label, name, digits in (
+            ("lift", "lift", 0),
+            ("slip", "slip", 1),
+            ("tilt", "tilt", 1),
+            ("pad force", "pad_force", 1),
+            ("patch", "patch_area", 0),
+            ("others moved", "others_moved", 1),
+            ("pushed before closing", "pushed", 1),
+            ("tracking error", "tracking_error", 1),
         )
-        if math.isfinite(value)
+        if math.isfinite(getattr(margins, name))
     ]
     moved = sorted(result.displacements.items(), key=lambda item: -item[1])
     pushed = [f"{name} {far * 1e3:.1f} mm" for name, far in moved if far >= SHOWN]

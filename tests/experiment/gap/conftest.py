@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Iterable
+from collections.abc import Generator, Iterable, Iterator
 
 import numpy as np
 import pytest
@@ -40,6 +40,15 @@ class Here:
             judge = job.make_judge()
             for candidate in job.candidates:
                 yield job, candidate, judge_grasp(judge, candidate)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def no_chart_of_reach() -> Iterator[None]:
+    """How far the arm reaches is most of the work of a page, and `tests/evaluation` has it."""
+    with pytest.MonkeyPatch.context() as patch:
+        place = "burg_drake.evaluation.report.page.reachability_section"
+        patch.setattr(place, lambda run: None)
+        yield
 
 
 @pytest.fixture(scope="session")

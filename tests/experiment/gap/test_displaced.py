@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import Array
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.candidates.candidates import Candidates, given_candidates
 from burg_drake.experiment.gap import placement_noise

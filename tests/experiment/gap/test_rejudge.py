@@ -14,9 +14,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from burg_drake.apps.cli import main
+from burg_drake.core.arrays import Array
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, SimulationError
-from burg_drake.core.frames import Array
 from burg_drake.core.grasps.outcome import Outcome, RealOutcome
 from burg_drake.evaluation.candidates.candidates import Candidates
 from burg_drake.evaluation.records.journal import decode

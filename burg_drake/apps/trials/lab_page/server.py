@@ -25,7 +25,7 @@ from http import HTTPStatus
 from typing import Any
 
 from burg_drake.apps.trials.lab_page.entry_requests import lab_entry, trial_number
-from burg_drake.apps.web import Answer, PageHandler, PageServer, address, picture_number
+from burg_drake.apps.web import Handler, PageHandler, PageServer, address, picture_number
 from burg_drake.core import LOCALHOST, BrowserToken, BurgError, RequestError, require_local_host
 from burg_drake.experiment.pages import (
     EntryConflict,
@@ -138,7 +138,7 @@ class LabHandler(PageHandler):
         self._require_browser(path, query)
         return path, query
 
-    def find(self, routes: Mapping[str, Answer], path: str) -> Answer:
+    def find(self, routes: Mapping[str, Handler], path: str) -> Handler:
         """Pictures have addresses of their own."""
         if self.command == "GET" and path.startswith("/picture/"):
             name = path.removeprefix("/picture/").removesuffix(".jpg")

@@ -6,7 +6,7 @@ from collections import Counter
 
 import numpy as np
 
-from burg_drake.core.grasps import Outcome, Stage
+from burg_drake.core.grasps import Outcome, Stage, shown_unit
 from burg_drake.core.terminal import format_percent
 from burg_drake.evaluation.records import Columns
 from burg_drake.evaluation.report.elements import (
@@ -64,12 +64,13 @@ def execution_section(summary: Summary, columns: Columns) -> Html | None:
     if "tracking_error" not in columns or not np.isfinite(columns["tracking_error"]).any():
         return None
     rows = []
-    for name, label, factor, unit in (
-        ("duration", "duration of the motion", 1.0, "s"),
-        ("tracking_error", "largest joint error", 1e3, "mrad"),
-        ("tracking_distance", "largest error of the grasp frame", 1e3, "mm"),
-        ("pushed", "largest push before the hand closed", 1e3, "mm"),
+    for name, label in (
+        ("duration", "duration of the motion"),
+        ("tracking_error", "largest joint error"),
+        ("tracking_distance", "largest error of the grasp frame"),
+        ("pushed", "largest push before the hand closed"),
     ):
+        unit, factor = shown_unit(name)
         values = columns[name][np.isfinite(columns[name])] * factor
         if len(values):
             figures = (np.median(values), np.quantile(values, 0.95), values.max())

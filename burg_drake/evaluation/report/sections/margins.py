@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import Array
-from burg_drake.core.grasps import Stage
+from burg_drake.core.grasps import Stage, shown_unit
 from burg_drake.evaluation.records import Columns
 from burg_drake.evaluation.report.elements import (
     LIFTED,
@@ -34,31 +34,28 @@ class Margin:
 
     Attributes:
         column: its name in the table.
-        title, unit: for the axis.
-        factor: from SI to the unit.
+        title: for the axis.
     """
 
     column: str
     title: str
-    unit: str
-    factor: float
 
 
-CLEARANCE = Margin("clearance", "room around the open hand", "mm", 1e3)
-DISTURBED = Margin("others_moved", "movement of other objects", "mm", 1e3)
+CLEARANCE = Margin("clearance", "room around the open hand")
+DISTURBED = Margin("others_moved", "movement of other objects")
 CHOSEN = (
     CLEARANCE,
-    Margin("slip", "slip in the hand", "mm", 1e3),
-    Margin("tilt", "tilt in the hand", "°", 180 / math.pi),
+    Margin("slip", "slip in the hand"),
+    Margin("tilt", "tilt in the hand"),
     DISTURBED,
 )
 """What tells most about a grasp: how exact it must be met, how firmly it holds, what it moves."""
 FURTHER = (
-    Margin("pad_force", "normal force of the weaker pad", "N", 1.0),
-    Margin("patch_area", "contact patch of the weaker pad", "mm²", 1e6),
-    Margin("arm_clearance", "room around the robot along its path", "mm", 1e3),
-    Margin("pushed", "push before the hand closed", "mm", 1e3),
-    Margin("tracking_distance", "error of the hand's path", "mm", 1e3),
+    Margin("pad_force", "normal force of the weaker pad"),
+    Margin("patch_area", "contact patch of the weaker pad"),
+    Margin("arm_clearance", "room around the robot along its path"),
+    Margin("pushed", "push before the hand closed"),
+    Margin("tracking_distance", "error of the hand's path"),
 )
 
 
@@ -112,7 +109,8 @@ def _charts(
 ) -> list[Html]:
     charts = []
     for margin in margins:
-        values = columns.get(margin.column, np.empty(0)) * margin.factor
+        _, factor = shown_unit(margin.column)
+        values = columns.get(margin.column, np.empty(0)) * factor
         known = np.isfinite(values)
         if known.any():
             charts.append(_chart(margin, values[known], groups[known], limits.get(margin)))
@@ -128,4 +126,5 @@ def _chart(
     }
     success = series.pop(LIFTED)
     failures = [series[k] for k in sorted(series)]
-    return mirrored_histogram(success, failures, title=margin.title, unit=margin.unit, limit=limit)
+    unit, _ = shown_unit(margin.column)
+    return mirrored_histogram(success, failures, title=margin.title, unit=unit, limit=limit)

@@ -15,7 +15,7 @@ MOST_PLOTS = 4
 
 
 def margin_section(judged: Judgement) -> Html | None:
-    """What margins tell about success; nothing where there are none."""
+    """What margins say about success; nothing where there are none."""
     defined = [c for c in judged.calibration if c.auroc.value is not None]
     found = sorted(defined, key=_informative, reverse=True)
     if not found:

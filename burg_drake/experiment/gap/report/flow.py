@@ -23,7 +23,6 @@ STYLE = """
 .scroll + .scroll { margin-top: 20px; }
 """
 Flow = Counter[tuple[Outcome, Outcome]]
-Place = tuple[float, float]
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,9 @@ from burg_drake.evaluation.report.elements import (
     table,
 )
 from burg_drake.experiment.gap.rejudged_files import TABLE_FILE
-from burg_drake.experiment.gap.rejudged_trials import CAUSES, Cause, Rejudged, Rejudging
+from burg_drake.experiment.gap.rejudged_trials import CAUSES, Rejudged, Rejudging, TrialCause
 
-HEADS: dict[Cause, str] = {
+HEADS: dict[TrialCause, str] = {
     "placement": "Explained by placement",
     "worsened": "Worsened",
     "physics": "Left to physics",
