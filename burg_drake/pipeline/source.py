@@ -32,11 +32,11 @@ class ObjectSource:
         inertia: Ixx, Iyy, Izz, Ixy, Ixz, Iyz about the centre of mass in the axes of O [kg m^2], in
             place of that of uniform density.
         wall_thickness: [m]. A closed surface becomes a hollow body whose mass is in its wall; an
-            open surface becomes a wall of this thickness (`meshes.Preparation` has the default).
+            open surface becomes a wall of this thickness (`Preparation` has the default).
         openings: what becomes of an open surface: a `wall`, or a solid with flat caps (`close`).
         friction: coefficient; `entry.DEFAULT_FRICTION` if None.
         scale: factor from the mesh's unit to metres.
-        pieces: convex pieces in O [m]; made by `decompose` if None.
+        pieces: convex pieces in O [m]; made by decomposition if None.
         contact: what touches others in simulation; chosen by the object's shape if None.
         rgba: colour, 0 to 1 each; by default what the mesh file says.
         description: for people.

@@ -1,4 +1,4 @@
-"""`burg-drake scene`: show, validate and settle; `scene_sample`, `scene_export` and `scene_import`
+"""`burg-drake scene`: show, validate and settle; `sample`, `export` and `importing`
 have the rest."""
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Intrinsics of a camera from images of a ChArUco target.
 
 `lens_fit` fits; here is which images and corners count, and which model of the lens they support.
-`calibration_check` tells how far the result can be trusted.
+`quality` tells how far the result can be trusted.
 """
 
 from __future__ import annotations

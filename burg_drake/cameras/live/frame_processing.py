@@ -1,5 +1,5 @@
 """What happens to each frame of a live view: where is the camera, draw the scene over it, measure
-how the objects stand. No threads and no web; `live_session` has the former."""
+how the objects stand. No threads and no web; `session` has the former."""
 
 from __future__ import annotations
 

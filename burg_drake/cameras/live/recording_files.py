@@ -38,7 +38,7 @@ class RecordingFiles:
 
     @property
     def table(self) -> Path:
-        """`NAME.csv`, see `recorded_poses`."""
+        """`NAME.csv`, see `recording_table`."""
         return self.video.with_suffix(".csv")
 
     @property

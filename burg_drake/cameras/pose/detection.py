@@ -2,7 +2,7 @@
 
 The steps of OpenCV's ArUco detector, with its tolerances, but for one board: at first with the one
 threshold window that finds nearly all markers, and with more where that finds few; cells of all
-candidates are read at once. Corners are good to some tenths of a pixel; `edge_refinement` makes the
+candidates are read at once. Corners are good to some tenths of a pixel; `refinement` makes the
 pose exact. Markers of other boards are looked for with OpenCV's detector itself.
 """
 

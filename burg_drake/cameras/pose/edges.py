@@ -1,7 +1,7 @@
 """The edges between black and white cells of a board's markers, and what lies around each.
 
 Every place where a cell of a marker, or the white around it, meets a cell of the other color gives
-an edge of one cell's length. `edge_refinement` looks for them in images.
+an edge of one cell's length. `edge_fit` looks for them in images.
 """
 
 from __future__ import annotations

@@ -51,7 +51,7 @@ FARTHEST = 1.5
 """Largest offset that a fit can be trusted with [pixels]."""
 MODEL_SD = 0.01
 """What an offset errs by in images without noise: cells and blur are not exactly as assumed
-[pixels]; the median in images of `synthetic`."""
+[pixels]; the median in images with exact truth."""
 ALIKE_SD = 0.006
 """Part of it that is alike for edges of one marker [pixels]: with it normalised errors of poses are
 about what they should be, with noise and without."""

@@ -72,7 +72,7 @@ def sample_scene(
         scene: the scene.
         station: gives the opening of the hand, its body, and the place of the arm.
         n: grasps for each instance; there are fewer where there are (almost) no more, and
-            `shortfall.shortfall` says why.
+            `sampling_shortfall.shortfall` says why.
         seed: of the random numbers.
         settings: how.
         only: names of free instances, or of objects for all their instances; all if None.

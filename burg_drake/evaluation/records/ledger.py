@@ -38,7 +38,7 @@ class SceneState:
         failed, interrupted: grasps that could not be simulated, and those of them whose worker was
             ended from outside.
         why: it failed.
-        missing: what is said of instances with fewer grasps than asked; see `run_notes.shortfalls`.
+        missing: what is said of instances with fewer grasps than asked; see `results.notes`.
     """
 
     scene: str

@@ -30,7 +30,7 @@ def ranked_run(run: Run, grasps: GraspSet) -> RankedGrasps:
 
     Args:
         run: the run.
-        grasps: what `run_grasps` made of it.
+        grasps: of the run, as a set.
     """
     row = {id: i for i, id in enumerate(run.candidates.id)}
     best = [row[id] for id in run.best(len(row))]

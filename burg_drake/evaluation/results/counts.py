@@ -154,7 +154,7 @@ class Summary:
         mode: what was asked about each grasp.
         pushes: what the arm's approaches pushed; None where no arm executed anything.
         lifts: where there is no room for the whole lift; None if there is wherever there is any.
-        notes: what is missing, and why, one sentence each; see `run_notes`.
+        notes: what is missing, and why, one sentence each; see `notes`.
         scenes: by scene, in a run over many, in their order.
     """
 

@@ -16,7 +16,7 @@ class Job:
 
     Attributes:
         key: names it among the jobs of a call.
-        make_judge: builds the judge; pickled by reference, see `executors.judge_all`.
+        make_judge: builds the judge; pickled by reference, see `single_job.judge_all`.
         candidates: the grasps.
     """
 

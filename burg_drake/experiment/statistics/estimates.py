@@ -128,7 +128,7 @@ MEASURES: Final[Mapping[str, Measure]] = {
     "predicted": _share("predicted success", (0, 1), (0, 1, 2, 3), "no trials"),
     "actual": _share("actual success", (0, 2), (0, 1, 2, 3), "no trials"),
 }
-"""All measures by the name of their field in `agreement.Agreement`.
+"""All measures by the name of their field in `confusion.Agreement`.
 
 `specificity` is the share of failures that were predicted, `predicted` and `actual` are shares of
 all trials."""

@@ -54,7 +54,7 @@ class ArmCollision:
 
     Attributes:
         checker: Drake's checker of the diagram as it is, for other questions. Configurations are
-            those of the whole plant, fingers included. Clones of it answer here: see `anchored`.
+            those of the whole plant, fingers included. Clones of it answer here: see `anchoring`.
         joints: the arm's joints from base to hand.
     """
 

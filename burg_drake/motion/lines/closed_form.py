@@ -81,7 +81,7 @@ class _Found:
 
 
 class _ClosedFormBatch:
-    """See `line_search.Lines`."""
+    """See `line_search.LineSearch`."""
 
     def __init__(self, search: ClosedFormLineSearch, X_AG: Array, clearance: Array) -> None:
         self._search, self._X_AG = search, X_AG
@@ -95,7 +95,7 @@ class _ClosedFormBatch:
         self._advance(np.arange(n))
 
     def propose(self, grasps: Sequence[int]) -> list[Chain | None]:
-        """See `Lines`."""
+        """See `LineSearch`."""
         found: dict[int, Chain | None] = {}
         left = list(grasps)
         while left:
@@ -111,7 +111,7 @@ class _ClosedFormBatch:
         return [found[g] for g in grasps]
 
     def refuse(self, grasp: int, chain: Chain, row: int | None) -> None:
-        """See `Lines`."""
+        """See `LineSearch`."""
         found: _Found = chain.place
         if row is None:
             place = found.place
@@ -124,13 +124,13 @@ class _ClosedFormBatch:
         self._failed[grasp] += 1
 
     def close(self, grasp: int, flip: int) -> None:
-        """See `Lines`."""
+        """See `LineSearch`."""
         self._closed[grasp, flip] = True
         for grid, i in self._grids[grasp]:
             grid.refused[:, i, flip] = True
 
     def failure(self, grasp: int) -> Failure:
-        """See `Lines`."""
+        """See `LineSearch`."""
         places, farthest = self._grids[grasp], float(self._farthest[grasp])
         return failure(self._search, self._X_AG[grasp], places, farthest)
 

@@ -104,7 +104,7 @@ class NumericLineSearch:
 
 
 class _NumericBatch:
-    """See `line_search.Lines`."""
+    """See `line_search.LineSearch`."""
 
     def __init__(self, search: NumericLineSearch, X_AG: Array, clearance: Array) -> None:
         self._search, self._X_AG = search, X_AG
@@ -114,7 +114,7 @@ class _NumericBatch:
         self._advance(list(range(len(X_AG))))
 
     def propose(self, grasps: Sequence[int]) -> list[Chain | None]:
-        """See `Lines`."""
+        """See `LineSearch`."""
         found: dict[int, Chain | None] = {}
         left = list(grasps)
         while left:
@@ -128,7 +128,7 @@ class _NumericBatch:
         return [found[g] for g in grasps]
 
     def refuse(self, grasp: int, chain: Chain, row: int | None) -> None:
-        """See `Lines`."""
+        """See `LineSearch`."""
         candidates, k = self._of[grasp], chain.place
         if row is None:
             candidates.open[k] = False
@@ -138,11 +138,11 @@ class _NumericBatch:
         candidates.block(k, stage, chain.q[row], chain.moved_W[row], 0.0)
 
     def close(self, grasp: int, flip: int) -> None:
-        """See `Lines`."""
+        """See `LineSearch`."""
         self._of[grasp].close(flip)
 
     def failure(self, grasp: int) -> Failure:
-        """See `Lines`."""
+        """See `LineSearch`."""
         search, candidates = self._search, self._of[grasp]
         if not len(candidates):
             return self._beyond_limits(grasp, search.at_grasp)

@@ -47,7 +47,7 @@ class SuccessiveLineSearch:
 
 
 class _SuccessiveBatch:
-    """See `line_search.Lines`."""
+    """See `line_search.LineSearch`."""
 
     def __init__(
         self, search: SuccessiveLineSearch, first: LineSearchBatch, X_AG: Array, clearance: Array

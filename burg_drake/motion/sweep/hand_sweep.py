@@ -38,7 +38,7 @@ class Sweep:
         blocker: (N,) name of the body that is; "" where the way is free.
         clearance: (N,) smallest signed distance on the way [m]. Where it is free, that of the hand
             from other bodies: a lower bound, exact where no cylinder is swept across its axis (see
-            `swept_shapes.SIDES`). Where not, minus the depth of the overlap with the blocker.
+            `geometry.swept.SIDES`). Where not, minus the depth of the overlap with the blocker.
         at: (N,) how far from the grasp that depth is met [m]; NaN where the way is free, or the
             overlap too short to be found.
     """

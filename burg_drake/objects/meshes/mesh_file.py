@@ -166,7 +166,7 @@ def read_mesh(path: Path) -> trimesh.Trimesh:
     """The triangles of a file; a scene of several bodies becomes one mesh.
 
     Raises:
-        MeshError: file missing, unreadable, without triangles, or too large (`mesh_bounds`).
+        MeshError: file missing, unreadable, without triangles, or too large.
     """
     _check_file(path)
     check_triangles(announced_triangles(path), str(path))

@@ -3,7 +3,7 @@
 viser opens its port by one call, `websockets.asyncio.server.serve`, in a thread of its own. That
 call is replaced while the server is constructed: it gets a socket that listens already, our
 `process_request`, and smaller limits. All of viser that is not public is used here and in
-`incoming`, and nowhere else.
+`messages`, and nowhere else.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ class Alignment:
         residual: root mean square that is left of what agrees; pixels, or metres for depth.
         measurements: number of those that agree.
         ambiguous: another place fits almost as well.
-        turnable: turns from here that fit as well [rad]; see `placement_turns`.
+        turnable: turns from here that fit as well [rad]; see `rotation_ambiguity`.
     """
 
     q: Array
