@@ -22,7 +22,7 @@ from burg_drake.ui.server.door import ServedPage, serve
 from burg_drake.ui.setup_page import SetupPage
 from tests.ui.page_client import until
 
-ONE_TRY = 3.0
+ONE_TRY = 0.7
 
 
 @dataclass
