@@ -60,7 +60,7 @@ def test_the_help_has_units_and_defaults() -> None:
     add_options(parser, Made)
     text = " ".join(parser.format_help().split())
     for part in (
-        "-c N, --count N how many (default: 3)",
+        "--count N how many (default: 3)",
         "--depth-mm MM how deep (default: 5)",
         "--turn-deg DEG how far round (default: 2)",
         "--share-percent PERCENT of all (default: 10)",
