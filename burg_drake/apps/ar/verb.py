@@ -65,7 +65,7 @@ def _add_options(parser: Parser) -> None:
         " burg-drake camera calibrate. Simulated cameras need none",
     )
     parser.add_argument(
-        "--fps", type=positive, metavar="N", help=("frame rate of the camera, in images per second")
+        "--fps", type=positive, metavar="N", help="frame rate of the camera, in images per second"
     )
     add_measured_board(parser)
     _add_view(parser)
@@ -90,7 +90,7 @@ def _add_results(parser: Any) -> None:
     results.add_argument(
         "--record",
         metavar="FILE",
-        help=("video (.mp4, .avi) of all frames, with a table of poses next to it"),
+        help="video (.mp4, .avi) of all frames, with a table of poses next to it",
     )
     results.add_argument(
         "--plain", action="store_true", help="recordings also get a video without overlay"
@@ -103,7 +103,7 @@ def _add_results(parser: Any) -> None:
     results.add_argument(
         "--check",
         action="store_true",
-        help=("at the end, measure how far objects are from their targets"),
+        help="at the end, measure how far objects are from their targets",
     )
     results.add_argument("--frames", type=positive_int, metavar="N", help="end after N frames")
     results.add_argument("--seconds", type=positive, metavar="N", help="end after N seconds")

@@ -59,7 +59,7 @@ def _add_convert(group: Any) -> None:
         "--to",
         choices=("burg", "ros"),
         default="burg",
-        help=("format to write (default: %(default)s)"),
+        help="format to write (default: %(default)s)",
     )
     convert.add_argument("-o", "--output", metavar="FILE", required=True, help="file to write")
 

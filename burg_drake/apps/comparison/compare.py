@@ -82,7 +82,7 @@ def _add_options(parser: Parser) -> None:
         metavar="N",
         type=seed,
         default=0,
-        help=("seed of the intervals (default: %(default)s)"),
+        help="seed of the intervals (default: %(default)s)",
     )
     parser.add_argument("--html", metavar="FILE", help="write one self-contained page")
     parser.add_argument("--json", action="store_true", help="print everything as JSON")

@@ -78,10 +78,10 @@ def _add_placement(parser: Parser) -> None:
     group.add_argument(
         "--frame",
         choices=tuple(FRAMES),
-        help=("frame of the poses in IN, if not the one of its format"),
+        help="frame of the poses in IN, if not the one of its format",
     )
     group.add_argument(
-        "--out-frame", choices=tuple(FRAMES), help=("frame of the poses in OUT, likewise")
+        "--out-frame", choices=tuple(FRAMES), help="frame of the poses in OUT, likewise"
     )
 
 

@@ -38,7 +38,7 @@ def add_given(parser: Parser, which: Any) -> None:
         "The format is recognised by the file's content; see `burg-drake grasps convert --help`.",
     )
     group.add_argument(
-        "--grasps-format", metavar="NAME", help=("format of the file (default: by its content)")
+        "--grasps-format", metavar="NAME", help="format of the file (default: by its content)"
     )
     add_gripper_link(group)
     group.add_argument(

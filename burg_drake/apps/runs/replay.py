@@ -61,7 +61,7 @@ def add_to(verbs: Any) -> None:
     )
     add_only(parser, "with --best, the best grasp")
     parser.add_argument(
-        "--scene", metavar="FILE", help=("file of the trial's scene, if it has moved")
+        "--scene", metavar="FILE", help="file of the trial's scene, if it has moved"
     )
     parser.add_argument("--station", metavar="FILE", help="file of its station, if it has moved")
     parser.add_argument(

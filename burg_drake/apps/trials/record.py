@@ -58,7 +58,7 @@ def add_to(group: Any) -> None:
     )
     robot = parser.add_argument_group("what the robot reported at the end")
     robot.add_argument(
-        "--width-mm", metavar="MM", type=not_negative, help=("distance between the pads")
+        "--width-mm", metavar="MM", type=not_negative, help="distance between the pads"
     )
     robot.add_argument("--effort-n", metavar="N", type=not_negative, help="gripping force")
     _add_photo(parser.add_argument_group("photo of the scene before the trial"))
@@ -77,14 +77,14 @@ def _add_photo(group: Any) -> None:
     group.add_argument(
         "--intrinsics",
         metavar="FILE",
-        help=("intrinsics of the camera, to measure where the objects are"),
+        help="intrinsics of the camera, to measure where the objects are",
     )
     group.add_argument("--depth", metavar="FILE", help="depth image of the same camera")
     group.add_argument(
         "--depth-unit",
         metavar="M",
         type=positive,
-        help=("unit of the depth image's numbers, in metres"),
+        help="unit of the depth image's numbers, in metres",
     )
     group.add_argument("--scene", metavar="SCENE", help="scene file (default: the run's copy)")
     add_measured_board(group)

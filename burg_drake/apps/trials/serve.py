@@ -68,7 +68,7 @@ def add_to(verbs: Any) -> None:
         ),
     )
     camera.add_argument(
-        "--fps", type=positive, metavar="N", help=("frame rate of the camera, in images per second")
+        "--fps", type=positive, metavar="N", help="frame rate of the camera, in images per second"
     )
     add_measured_board(camera)
 
