@@ -172,6 +172,7 @@ TEXTS = st.text(st.characters(exclude_categories=("Cs",), exclude_characters="\0
 PLAIN = st.text("abc: #'\"-{}[]&*!|>%@`,?\n\t~äß€ 7", max_size=60)
 
 
+@example(note="\xa0", second="", comment="", blank=0, newline="\n", first="note")
 @example(note="\x85", second="", comment="", blank=0, newline="\n", first="number")
 @example(note="a\u2028b\u2029", second="", comment="", blank=0, newline="\n", first="number")
 @settings(max_examples=25, deadline=None)

@@ -18,6 +18,8 @@ from burg_drake.experiment.trials.sheet import RealTrial, TrialSheet
 
 _BREAK = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
 """What YAML counts as the end of a line."""
+_SPACE = " \t\n\r\x85\u2028\u2029"
+"""What YAML counts as space around a value: a no-break space is part of it."""
 
 Edit = tuple[int, int, str]
 """Text from one offset to another, and what it becomes."""
@@ -71,7 +73,7 @@ class _Text:
             last = node.value[-1]
             return self.end(last[-1] if isinstance(last, tuple) else last)
         start, end = self.offset(node.start_mark), self.offset(node.end_mark)
-        return start + len(self.text[start:end].rstrip())
+        return start + len(self.text[start:end].rstrip(_SPACE))
 
     def line_start(self, offset: int) -> int:
         """Where the line of an offset begins."""
@@ -119,7 +121,7 @@ def _replaced(
     something else on them."""
     start, end = text.offset(key.start_mark), text.end(value)
     first, last = text.line_start(start), text.line_end(end)
-    alone = not (text.text[first:start] + text.text[end:last]).strip()
+    alone = not (text.text[first:start] + text.text[end:last]).strip(_SPACE)
     if default and alone and key.start_mark.line != trial.start_mark.line:
         return (first - len(text.newline), last, "")
     return (start, max(start, end), lines)
