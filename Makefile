@@ -8,7 +8,7 @@ DEMO := runs/demo$(if $(filter-out 100,$(N)),_$(N))
 EXAMPLES := $(sort $(wildcard examples/[0-9][0-9]_*.py))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast lint rules format types examples clean distclean
+.PHONY: help setup demo test test-all test-fast lint rules format types examples clean distclean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -29,10 +29,13 @@ demo: $(STAMP)  ## evaluate grasps on the built-in scene, replay the best one
 	@find $(DEMO) -maxdepth 1 -type f \( -name '*.html' -o -name '*.csv' -o -name '*.parquet' -o -name '*.md' \) | sort | sed 's/^/  /'
 
 test: $(STAMP)  ## build the wheel, install it, test the installed wheel (ARGS=... go to pytest)
+	@tools/setup/test_wheel.sh $(VENV) -m "not thorough" $(ARGS)
+
+test-all: $(STAMP)  ## as test, with what shows again what other tests show, for a release
 	@tools/setup/test_wheel.sh $(VENV) $(ARGS)
 
 test-fast: $(STAMP)  ## test the checkout, without physics, in a minute (ARGS=... go to pytest)
-	$(BIN)/python -m pytest -m "not physics" $(ARGS)
+	$(BIN)/python -m pytest -m "not physics and not thorough" $(ARGS)
 
 lint: rules format types  ## ruff and mypy
 

@@ -61,7 +61,7 @@ PHYSICS = tuple(
     )
 )
 """Folders and files of tests that build or step diagrams of Drake, render, or start programs."""
-WITHOUT_PHYSICS = "not physics"
+WITHOUT_PHYSICS = "not physics and not thorough"
 
 
 @functools.cache
@@ -71,6 +71,7 @@ def _is_physics(path: Path) -> bool:
 
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "physics: Drake, renderers, programs; see PHYSICS")
+    config.addinivalue_line("markers", "thorough: left out by `make test`; see tests/thorough.py")
     if gone := [str(path) for path in PHYSICS if not path.exists()]:
         raise pytest.UsageError(f"{__file__}: PHYSICS names {', '.join(gone)}; name it as it is")
 

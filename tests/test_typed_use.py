@@ -6,7 +6,6 @@ import json
 import re
 import subprocess
 import sys
-from functools import cache
 from pathlib import Path
 
 import pytest
@@ -19,7 +18,6 @@ Report = tuple[str, int, str, str]
 """File, line from 1, `error` or what else it is, message."""
 
 
-@cache
 def mypy() -> list[Report]:
     """What mypy reports, with the settings and the cache of `make lint`."""
     command = [sys.executable, "-m", "mypy", "--no-error-summary", RIGHT, WRONG]
@@ -29,7 +27,6 @@ def mypy() -> list[Report]:
     return [(Path(file).name, int(line), kind, text) for file, line, kind, text in lines]
 
 
-@cache
 def pyright() -> list[Report]:
     """What pyright reports of the package as this Python imports it."""
     command = [sys.executable, "-m", "pyright", "--pythonpath", sys.executable]
@@ -43,18 +40,12 @@ def pyright() -> list[Report]:
     ]
 
 
-CHECKERS = pytest.mark.parametrize("checker", [mypy, pyright], ids=["mypy", "pyright"])
+@pytest.mark.parametrize("checker", [mypy, pyright], ids=["mypy", "pyright"])
+def test_what_is_right_is_accepted_and_what_is_wrong_reported(checker) -> None:
+    reports = checker()
+    assert [report for report in reports if (report[0], report[2]) == (RIGHT.name, "error")] == []
 
-
-@CHECKERS
-def test_a_right_program_is_accepted(checker) -> None:
-    reports = [report for report in checker() if report[0] == RIGHT.name]
-    assert [report for report in reports if report[2] == "error"] == []
-
-
-@CHECKERS
-def test_types_are_known(checker) -> None:
-    revealed = [text for file, _, _, text in checker() if file == RIGHT.name]
+    revealed = [text for file, _, _, text in reports if file == RIGHT.name]
     types = [
         re.findall('"(.*)"', text)[-1] for text in revealed if text.startswith(("Rev", "Type"))
     ]
@@ -63,12 +54,9 @@ def test_types_are_known(checker) -> None:
     for one, name in zip(types, ("Run", "HandTrial", "GraspSet"), strict=True):
         assert name in one
 
-
-@CHECKERS
-def test_each_wrong_line_is_reported(checker) -> None:
     lines = WRONG.read_text("utf-8").splitlines()
     wrong = {number for number, line in enumerate(lines, 1) if "# wrong" in line}
-    reports = {
-        line: text for file, line, kind, text in checker() if (file, kind) == (WRONG.name, "error")
+    found = {
+        line: text for file, line, kind, text in reports if (file, kind) == (WRONG.name, "error")
     }
-    assert set(reports) == wrong, reports
+    assert set(found) == wrong, found

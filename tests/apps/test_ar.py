@@ -101,6 +101,7 @@ def test_script_without_a_pose(
     assert "burg-drake: no frame gave a pose: " in err and "marker" in err
 
 
+@pytest.mark.thorough
 def test_view_serves_for_a_while(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code = run(files, "--camera", str(files / "photo.png"), "--seconds", "0.5")
     out = capsys.readouterr().out
@@ -140,6 +141,7 @@ def test_intrinsics_are_needed_and_must_fit(
     assert "320 x 240 pixels, the intrinsics are of 640 x 480" in capsys.readouterr().err
 
 
+@pytest.mark.thorough
 def test_the_end_finishes_the_recording(files: Path, tmp_path: Path) -> None:
     take = tmp_path / "take.mp4"
     command = [sys.executable, "-m", "burg_drake.apps.cli", "ar", "tabletop_six"]
@@ -190,6 +192,7 @@ def test_a_recording_replaces_nothing(
     assert take.read_bytes() == video
 
 
+@pytest.mark.thorough
 def test_the_end_waits_for_a_placement_check(tmp_path: Path) -> None:
     (tmp_path / "two.yaml").write_text(TWO)
     session = FrameProcessor(load_scene(tmp_path / "two.yaml"), CAMERA)

@@ -102,6 +102,7 @@ def test_page_has_what_its_script_looks_for() -> None:
     assert all(f'id="{name}"' in page for name in wanted)
 
 
+@pytest.mark.thorough
 def test_pictures_follow_one_another(server: ViewServer) -> None:
     code, headers, jpeg = request(server, "GET", "/frame.jpg")
     until(lambda: request(server, "GET", "/frame.jpg")[0] == 200)

@@ -76,6 +76,7 @@ def test_photos_of_the_target_give_the_intrinsics(
     assert page.count("<svg") == 4 + 14
 
 
+@pytest.mark.thorough
 def test_live_views_are_taken_from_whatever_moves(
     photos: Path, tmp_path: Path, capsys: Capture
 ) -> None:

@@ -85,6 +85,7 @@ def test_a_photo_without_a_board_says_so(folder: Path, capsys: Capture) -> None:
     assert not (folder / "placement.yaml").exists()
 
 
+@pytest.mark.thorough
 def test_a_scaled_print_is_told_or_doubted(folder: Path, capsys: Capture) -> None:
     can = SCENE.replace(SCENE[SCENE.index("  - object: mug") : SCENE.index("  - object: can")], "")
     (folder / "two.yaml").write_text(can)
@@ -105,6 +106,7 @@ def test_a_scaled_print_is_told_or_doubted(folder: Path, capsys: Capture) -> Non
     assert np.linalg.norm(p_SC[1] - X_SC[:3, 3]) < 5e-4
 
 
+@pytest.mark.thorough
 def test_few_markers_are_doubted(folder: Path, capsys: Capture) -> None:
     scene = load_scene(folder / "two.yaml")
     X_SC = make_pose(np.diag([1.0, -1.0, -1.0]), (0.117, 0.12, 0.08))

@@ -37,6 +37,7 @@ def judged(folder: Path, *arguments: str) -> dict[str, np.ndarray]:
     return read_table(folder / "run" / "results.csv")
 
 
+@pytest.mark.thorough
 def test_a_network_s_grasps_seen_by_a_camera(tmp_path: Path, capsys: Capture) -> None:
     # the camera looks down on the board from 0.7 m; rows are written as graspnetAPI has them
     p_SC = (0.3, 0.2, 0.7)
@@ -64,6 +65,7 @@ def test_a_network_s_grasps_seen_by_a_camera(tmp_path: Path, capsys: Capture) ->
     )
 
 
+@pytest.mark.thorough
 def test_a_data_set_s_grasps_of_an_object(tmp_path: Path, capsys: Capture) -> None:
     # as ACRONYM has them: the hand's base, 103.4 mm before G, x along the closing direction
     path = tmp_path / "Box_3f2a_1.0.h5"

@@ -53,6 +53,7 @@ def test_a_scene(scene_file: Path, tmp_path: Path, capsys: Capture, suffix: str)
     assert words[-1] == ["wrote", "20", "grasps", "to", str(out)]
 
 
+@pytest.mark.thorough
 def test_evaluate_and_reach_judge_the_same_grasps(scene_file: Path, tmp_path: Path) -> None:
     assert sample(scene_file, "-n", 20, "--seed", 7, "-o", tmp_path / "grasps.h5") == 0
     scene, station = load_scene(scene_file), load_station("panda_tabletop")
@@ -64,6 +65,7 @@ def test_evaluate_and_reach_judge_the_same_grasps(scene_file: Path, tmp_path: Pa
     assert [f"mug-{id}" for id in reached["mug"].id] == given.id[:20]
 
 
+@pytest.mark.thorough
 def test_a_library_with_many_options(tmp_path: Path) -> None:
     faces = len(load_library("household").surface("mug").faces)
     np.save(tmp_path / "weights.npy", np.arange(float(faces)))
@@ -91,6 +93,7 @@ def test_a_library_with_many_options(tmp_path: Path) -> None:
     assert grasps.provenance["parts"]["can"]["weights"] is None
 
 
+@pytest.mark.thorough
 def test_clear_grasps_keep_a_margin(scene_file: Path, tmp_path: Path) -> None:
     """The screen itself, asked about the grasps of each file, is the oracle."""
     scene, station = load_scene(scene_file), load_station("panda_tabletop")

@@ -81,6 +81,7 @@ def test_in_the_scene_by_any_column(file: Path, scene_file: Path, capsys: Captur
     assert shown(capsys, file, *scene, "--color", "instance") == ["■ mug (8)", "■ bottle (4)"]
 
 
+@pytest.mark.thorough
 def test_choice(file: Path, capsys: Capture) -> None:
     library = ("--library", "household", "--color", "object")
     assert shown(capsys, file, *library, "--only", "bottle") == [

@@ -198,6 +198,7 @@ def free_port() -> int:
         return int(listener.getsockname()[1])
 
 
+@pytest.mark.thorough
 def test_no_entry_is_lost_or_doubled_when_the_server_is_killed(trials: Path) -> None:
     port = free_port()
     process = start(trials, port)

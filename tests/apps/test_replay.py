@@ -88,6 +88,7 @@ def replay(path: Path, *options: str) -> int:
     return main(["replay", str(path), "--no-wait", *options])
 
 
+@pytest.mark.thorough
 def test_what_stands_on_the_target_is_disturbed(run: Run) -> None:
     outcomes = [Outcome.LIFTED_DISTURBED, Outcome.COLLISION_CLUTTER, Outcome.NO_CONTACT]
     assert run.results["outcome"].tolist() == outcomes
@@ -149,6 +150,7 @@ def test_a_grasp_of_a_table(run: Run, tmp_path: Path, capsys: Capture) -> None:
     )
 
 
+@pytest.mark.thorough
 def test_a_scene_that_is_gone_or_changed(run: Run, row_file: Path, capsys: Capture) -> None:
     content = run.document.scene.content[:12]
     rewrite(row_file, scene="/nowhere/stack.yaml")
@@ -174,6 +176,7 @@ def test_a_scene_that_is_gone_or_changed(run: Run, row_file: Path, capsys: Captu
     assert "not as recorded" in captured.out
 
 
+@pytest.mark.thorough
 def test_a_trial_with_another_friction_is_replayed_with_it(
     run: Run, tmp_path: Path, capsys: Capture
 ) -> None:

@@ -160,6 +160,7 @@ def test_live_view_without_waiting(capsys: Capture) -> None:
     assert printed == "tabletop_close: not kept open; give --html FILE for a page that stays\n"
 
 
+@pytest.mark.thorough
 def test_live_view_ends_with_ctrl_c() -> None:
     with subprocess.Popen(
         [sys.executable, "-m", "burg_drake.apps.cli", "scene", "show", "tabletop_six"],

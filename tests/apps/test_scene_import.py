@@ -85,6 +85,7 @@ def test_a_library_is_found_from_the_scene(tmp_path: Path, monkeypatch: pytest.M
     assert (scene.name, scene.document.library, scene.library.name) == ("empty", "../mine", "mine")
 
 
+@pytest.mark.thorough
 def test_a_scene_with_furniture(tmp_path: Path, capsys: Capture) -> None:
     """From the documents of BURG-Toolkit to a station on which grasps can be judged."""
     burg_library, burg_scene = write_kitchen(tmp_path / "burg")

@@ -73,6 +73,7 @@ def test_check_of_a_station_without_an_arm(capsys: Capture) -> None:
     assert "none: the hand alone" in out and "reached" not in out
 
 
+@pytest.mark.thorough
 def test_check_with_a_scene(tmp_path: Path, capsys: Capture) -> None:
     """The board mostly out of reach. The rim of the bowl, 5 cm high and 16 cm wide, begins 0.98 m
     in front of the arm, whose shoulder is 0.333 m high."""

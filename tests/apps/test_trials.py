@@ -171,6 +171,7 @@ def test_an_old_buffer_is_seen_and_mended(sheet: Path, capsys: Capture) -> None:
     assert trials("show", sheet) == 0
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(
     bool(missing_render_libraries()), reason="the renderer's system libraries are missing"
 )

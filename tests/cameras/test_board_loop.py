@@ -225,6 +225,7 @@ def test_images_at_a_rate(station: Station) -> None:
     assert errors(loop, context)[0] < 1.0
 
 
+@pytest.mark.thorough
 def test_with_a_filter(scene: Scene, station: Station, loop: BoardLoop, context: Context) -> None:
     """The overlay gets the filtered pose, which follows a moved camera at the second image."""
     filtered = build_board_loop(
@@ -286,6 +287,7 @@ def test_bad_input(scene: Scene, station: Station, loop: BoardLoop, context: Con
         build_board_loop(tiny, station)
 
 
+@pytest.mark.thorough
 def test_camera_of_another_resolution(scene: Scene, station: Station) -> None:
     camera = Camera(
         X_WC=Pose.from_matrix(station.document.X_WS.matrix() @ looking(0.8, 65, 40, 0)),

@@ -16,6 +16,7 @@ from burg_drake.scene.document.markers import Markers
 from burg_drake.scene.document.scene import Board
 from tests.cameras.board_views import CAMERA, SMALL, error, view
 from tests.cameras.synthetic import FINE, ImageDegradation, board_depth, board_image, covers_of
+from tests.thorough import thorough
 
 BOARD = Board()
 LITTLE = Board(size=(0.3, 0.21))  # 4 x 3 markers
@@ -62,7 +63,7 @@ def test_gray_rgb_and_rgba_are_the_same_picture(poses: BoardPose, clean: np.ndar
     assert near(poses.estimate(clean[:, :, 1]), VIEW, 0.08, 0.008)
 
 
-@pytest.mark.parametrize(("share", "mm", "degrees"), [(0.55, 0.2, 0.016), (0.9, 0.8, 0.06)])
+@pytest.mark.parametrize(("share", "mm", "degrees"), [thorough(0.55, 0.2, 0.016), (0.9, 0.8, 0.06)])
 def test_hidden_markers_and_noise(
     poses: BoardPose, share: float, mm: float, degrees: float
 ) -> None:

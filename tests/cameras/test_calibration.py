@@ -194,6 +194,7 @@ def test_too_few_views_are_refused() -> None:
         calibrate_views(views, TARGET, model="radial5")
 
 
+@pytest.mark.thorough
 def test_views_without_tilt_are_known_to_tell_little() -> None:
     straight = calibrate_views(views_of(LENSES["radial4"], 12, 0.1, tilt=0.02), TARGET)
     tilted = calibrate_views(views_of(LENSES["radial4"], 15, 0.1), TARGET)

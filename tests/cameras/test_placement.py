@@ -18,6 +18,7 @@ from burg_drake.scene.document.scene import Scene, load_scene
 from burg_drake.system_libraries import missing_render_libraries
 from tests.cameras.placement_photo import Photo, ScenePhotographer
 from tests.cameras.placement_views import INTRINSICS, X_SC, looking
+from tests.thorough import thorough
 
 needs_renderer = pytest.mark.skipif(
     bool(missing_render_libraries()), reason="the renderer's system libraries are missing"
@@ -122,7 +123,7 @@ def test_inputs_that_cannot_be_used_are_named(scene: Scene) -> None:
 
 
 @needs_renderer
-@pytest.mark.parametrize("turn", [0.0, 150.0])
+@pytest.mark.parametrize("turn", [thorough(0.0), 150.0])
 def test_by_depth_a_turned_mug_is_not_measured_wrongly_nor_one_with_a_hidden_handle(
     turn: float,
 ) -> None:
@@ -153,6 +154,7 @@ def test_by_depth_a_turned_mug_is_not_measured_wrongly_nor_one_with_a_hidden_han
     assert "rotated by another" in hidden.reason or "another place" in hidden.reason
 
 
+@pytest.mark.thorough
 @needs_renderer
 def test_a_slender_object_turned_far_is_found() -> None:
     scene, name = scene_of("screwdriver"), "screwdriver"

@@ -17,6 +17,7 @@ from burg_drake.core.frames import make_pose, rot_z
 from burg_drake.scene.document.scene import Board
 from tests.cameras.placement_views import looking
 from tests.cameras.synthetic import ImageDegradation, board_image
+from tests.thorough import thorough
 
 BOARD = Board()
 INTRINSICS = Intrinsics(width=320, height=240, focal=(600.0, 600.0), center=(159.5, 119.5))
@@ -51,7 +52,8 @@ def aligner(image: np.ndarray) -> SilhouetteAligner:
 
 
 @pytest.mark.parametrize(
-    "look", [ImageDegradation(noise=2.0), ImageDegradation(blur=1.0, noise=4.0, gain=0.7)]
+    "look",
+    [thorough(ImageDegradation(noise=2.0)), ImageDegradation(blur=1.0, noise=4.0, gain=0.7)],
 )
 def test_a_plate_is_found_and_measured(look: ImageDegradation) -> None:
     size = (0.12, 0.07)

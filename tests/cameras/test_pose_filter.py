@@ -14,6 +14,7 @@ from burg_drake.cameras.pose.estimate import BoardEstimate
 from burg_drake.cameras.systems.pose_filter import PoseFilter, Track
 from burg_drake.core.errors import InvalidInputError
 from tests.cameras.board_views import error, view
+from tests.thorough import thorough
 
 TRUTH = view((0.29, 0.2), 0.75, 25.0, 40.0, 15.0)
 MOVED = view((0.30, 0.2), 0.75, 25.0, 40.0, 15.0)  # 10 mm
@@ -29,7 +30,7 @@ def noisy(truth: np.ndarray, rng: np.random.Generator) -> BoardEstimate:
     return BoardEstimate(X_SC=X_SC, valid=True, covariance=COVARIANCE)
 
 
-@pytest.mark.parametrize("window", [1.0, 16.0])
+@pytest.mark.parametrize("window", [thorough(1.0), 16.0])
 def test_noise_falls_with_the_square_root_of_the_window(window: float) -> None:
     rng = np.random.default_rng(1)
     pose_filter = PoseFilter(0.1, window=window)

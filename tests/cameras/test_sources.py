@@ -280,6 +280,7 @@ def until_lost(source: FrameSource) -> CameraLost:
     raise AssertionError("the camera is not lost")
 
 
+@pytest.mark.thorough
 def test_a_lost_camera_comes_back(streamer: Streamer) -> None:
     port = streamer.server_port
     with open_source(streamer.address) as source:
@@ -300,6 +301,7 @@ def test_a_lost_camera_comes_back(streamer: Streamer) -> None:
         again.unplug()
 
 
+@pytest.mark.thorough
 def test_a_camera_that_comes_back_with_other_images_stays_lost(streamer: Streamer) -> None:
     port = streamer.server_port
     with open_source(streamer.address) as source:

@@ -66,6 +66,7 @@ def session(station: Station, tmp_path_factory: pytest.TempPathFactory) -> Compo
     return ComposeSession.open("household", station, folder=tmp_path_factory.mktemp("scenes"))
 
 
+@pytest.mark.thorough
 @settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(actions)
 def test_all_steps_are_undone_and_redone_and_recovered(

@@ -59,6 +59,7 @@ def test_killed_sessions_go_on_where_they_were(station: Station, tmp_path: Path)
         assert session.undo().undo_label == "add bowl"
 
 
+@pytest.mark.thorough
 def test_with_a_full_disk_editing_goes_on_and_the_old_file_stays(tmp_path: Path) -> None:
     process = start("household", tmp_path, "full")
     assert process.stdout is not None

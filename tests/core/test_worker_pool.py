@@ -125,6 +125,7 @@ def test_who_is_suspect_is_tried_again_alone_in_a_fresh_process(tmp_path: Path) 
         assert isinstance(pool.submit_task(once).exception(PATIENCE), WorkerDied)
 
 
+@pytest.mark.thorough
 def test_a_worker_that_is_ended_by_others_is_replaced() -> None:
     """As the system does when memory runs out: while it is idle, and while it works."""
     with WorkerPool(1) as pool:
@@ -241,6 +242,7 @@ def test_tasks_that_nobody_waits_for() -> None:
         assert pool.processes != [process]
 
 
+@pytest.mark.thorough
 def test_shutdown_finishes_or_gives_up_what_waits() -> None:
     pool = WorkerPool(1)
     futures = [pool.submit(jobs.slow, k, 0.1) for k in range(4)]

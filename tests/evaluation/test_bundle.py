@@ -69,6 +69,7 @@ def test_the_bytes_follow_from_the_content_alone(tmp_path: Path) -> None:
     assert make_bundle(load_scene(tmp_path / "a/two.yaml"), station).name != names[0]
 
 
+@pytest.mark.thorough
 def test_packages_travel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An arm's model that names meshes of a package, which no worker has."""
     package = tmp_path / "ws/my_robot"

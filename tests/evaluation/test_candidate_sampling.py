@@ -148,6 +148,7 @@ def test_what_does_not_fit(scene: Scene, station: Station) -> None:
 # --- the hand's own body --------------------------------------------------------------------------
 
 
+@pytest.mark.thorough
 def test_clear_grasps_of_a_scene_touch_nothing_by_drakes_own_query(station: Station) -> None:
     scene = load_scene("tabletop_six")
     names = ["mug", "screwdriver"]

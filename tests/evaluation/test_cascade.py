@@ -180,6 +180,7 @@ def test_a_killed_run_goes_on_where_it_was(
     assert read_table(run.table_path)["id"].tolist() == run.candidates.id
 
 
+@pytest.mark.thorough
 def test_grasps_whose_workers_were_ended_are_tried_again(
     scene: Scene, station: Station, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -218,6 +219,7 @@ def test_grasps_whose_workers_were_ended_are_tried_again(
     assert [stretch.judged for stretch in run.document.stretches] == [30, 1, 1, 1]
 
 
+@pytest.mark.thorough
 def test_an_interrupt_keeps_what_is_done(scene: Scene, tmp_path: Path) -> None:
     process = start(scene, tmp_path / "run", tmp_path / "log")
     wait_for_lines(tmp_path / "run" / "journal.jsonl", 10)

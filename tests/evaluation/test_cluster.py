@@ -104,6 +104,7 @@ def test_jobs_are_judged_as_they_are_here(cluster: Cluster, tmp_path: Path) -> N
     assert len({process for _, process in built}) == 2
 
 
+@pytest.mark.thorough
 def test_faults_cost_only_the_grasps_that_cause_them(cluster: Cluster) -> None:
     kinds = ("segfault", "killed", "spin", "memory")
     how = dict(zip(executed(len(kinds)), kinds, strict=True))
@@ -122,6 +123,7 @@ def test_faults_cost_only_the_grasps_that_cause_them(cluster: Cluster) -> None:
     assert [how[id] for id in interrupted] == ["killed"]  # as if memory had run out
 
 
+@pytest.mark.thorough
 def test_a_bad_job_does_not_end_the_others(cluster: Cluster) -> None:
     jobs = [Job("bad", refuse, grasps(1, "bad")), Job("good", Make(KnownJudge()), grasps(5))]
     failed: list[JobFailed] = []
@@ -132,6 +134,7 @@ def test_a_bad_job_does_not_end_the_others(cluster: Cluster) -> None:
         list(cluster.executor.judge(jobs[:1]))
 
 
+@pytest.mark.thorough
 def test_lost_workers_cost_nothing_but_a_grasp_at_which_several_are_lost(
     cluster: Cluster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -147,6 +150,7 @@ def test_lost_workers_cost_nothing_but_a_grasp_at_which_several_are_lost(
     assert verdict.reason == "2 workers of the cluster were lost at it, one after the other"
 
 
+@pytest.mark.thorough
 def test_leaving_early_ends_the_children(cluster: Cluster, tmp_path: Path) -> None:
     log = tmp_path / "built"
     job = Job("job", MakeAndTell(KnownJudge(pause=0.05), log, "job"), grasps(400))
@@ -229,6 +233,7 @@ with connect_cluster("local:1") as executor:
 """
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(not os.path.exists("/proc/self/task"), reason="looks for processes in /proc")
 def test_a_killed_driver_leaves_nothing_behind(tmp_path: Path) -> None:
     log = tmp_path / "built"
@@ -244,6 +249,7 @@ def test_a_killed_driver_leaves_nothing_behind(tmp_path: Path) -> None:
     wait_for(lambda: not any(map(is_alive, processes)))
 
 
+@pytest.mark.thorough
 def test_a_scheduler_that_is_not_there_is_said_soon(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("burg_drake.evaluation.cluster.dask_executor.REACH", 1.0)
     start = time.monotonic()
@@ -255,6 +261,7 @@ def test_a_scheduler_that_is_not_there_is_said_soon(monkeypatch: pytest.MonkeyPa
     assert time.monotonic() - start < 5.0
 
 
+@pytest.mark.thorough
 def test_a_scheduler_that_dies_is_said_in_one_line(
     cluster: Cluster, scene: Scene, station: Station
 ) -> None:
@@ -275,6 +282,7 @@ def test_a_scheduler_that_dies_is_said_in_one_line(
     assert answers
 
 
+@pytest.mark.thorough
 def test_a_scheduler_that_dies_at_the_start_is_said_in_one_line(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

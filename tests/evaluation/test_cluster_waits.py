@@ -91,6 +91,7 @@ def test_workers_that_never_come_are_told_of(monkeypatch: pytest.MonkeyPatch) ->
         list(DaskExecutor(client).judge([job]))
 
 
+@pytest.mark.thorough
 def test_jobs_that_come_when_all_workers_are_lost_are_judged_later() -> None:
     first, second = (Job(name, Make(KnownJudge()), grasps(3, name)) for name in ("a", "b"))
     answers: list[Any] = []
@@ -175,6 +176,7 @@ def test_a_scene_that_does_not_arrive_is_told_of(
     assert len(attempts) == (1 if error else 3)
 
 
+@pytest.mark.thorough
 def test_who_listens_and_stays_silent_is_no_scheduler(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("burg_drake.evaluation.cluster.dask_executor.REACH", 0.3)
     with socket.create_server(("127.0.0.1", 0)) as silent:

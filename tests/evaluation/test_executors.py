@@ -67,6 +67,7 @@ def test_deaths_cost_only_the_grasps_that_cause_them() -> None:
     assert others == {id: expected(id) for id in judged if id not in failed}
 
 
+@pytest.mark.thorough
 def test_a_death_while_screening_costs_only_the_grasp_that_causes_it() -> None:
     died = "the worker process was ended by SIGSEGV"
     expect = {
@@ -105,6 +106,7 @@ def test_a_death_that_does_not_come_again_leaves_no_trace(tmp_path) -> None:
     assert judged == {c.id: expected(c.id) for c in grasps(10)}
 
 
+@pytest.mark.thorough
 def test_deaths_without_end_end_the_run() -> None:
     make = Make(CrashingJudge(how=tuple((c.id, "segfault") for c in grasps(40))))
     judged = []
@@ -114,6 +116,7 @@ def test_deaths_without_end_end_the_run() -> None:
     assert len(set(judged)) == len(judged) == 2  # none of them is lost
 
 
+@pytest.mark.thorough
 def test_a_replacement_that_dies_while_starting_is_replaced(tmp_path) -> None:
     judge = CrashingJudge(how=(("cube-0002", "segfault"),))
     make = DieOnStart(judge, tmp_path / "twice", n=(2, 4))  # each time after a crash of the grasp
@@ -146,6 +149,7 @@ def test_a_grasp_that_takes_too_long_is_settled() -> None:
             assert verdict.outcome is expected(id)
 
 
+@pytest.mark.thorough
 def test_a_slow_grasp_is_not_one_that_takes_too_long() -> None:
     judge = KnownJudge(pause=0.6)
     ids = {c.id for c in grasps(20) if expected(c.id).stage is Stage.EXECUTED}

@@ -204,6 +204,7 @@ reach(sys.argv[3], "panda_tabletop", grasps, plans=sys.argv[2], workers=1)
 """
 
 
+@pytest.mark.thorough
 def test_a_killed_call_is_gone_on_with(
     judged: GraspSet, plans: Path, scene: Scene, station: Station, tmp_path: Path
 ) -> None:
@@ -246,6 +247,7 @@ def test_a_plan_that_fails_leaves_the_answer(
     assert {path.name for path in tmp_path.iterdir()} == {taken.name, "journal.jsonl", "plans.yaml"}
 
 
+@pytest.mark.thorough
 def test_what_cannot_be_answered_has_no_outcome(
     judged: GraspSet, scene: Scene, station: Station, monkeypatch: pytest.MonkeyPatch
 ) -> None:

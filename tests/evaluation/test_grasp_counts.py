@@ -115,6 +115,7 @@ def test_grasps_do_not_depend_on_place(panda: Station) -> None:
     assert ((tipped @ lying.X_OG)[:, 2, 2] < 0.0).all()
 
 
+@pytest.mark.thorough
 def test_the_arm_and_obstacles_are_named(panda: Station) -> None:
     """A mug at the arm's foot is out of its reach; beside a wall of the station, that is named."""
     arm = panda.document.arm

@@ -57,6 +57,7 @@ def test_jobs_are_asked_for_when_they_are_needed() -> None:
     assert asked == list("abc")
 
 
+@pytest.mark.thorough
 def test_a_job_that_cannot_be_done_does_not_end_the_others() -> None:
     crashing = CrashingJudge(how=tuple((c.id, "segfault") for c in grasps("worse", 4)))
     jobs = [
@@ -85,6 +86,7 @@ def test_a_job_that_cannot_be_done_does_not_end_the_others() -> None:
         list(LocalExecutor(1).judge(jobs[1:2]))
 
 
+@pytest.mark.thorough
 def test_workers_that_have_no_job_left_help_with_one(tmp_path: Path) -> None:
     log = tmp_path / "built"
     jobs = [

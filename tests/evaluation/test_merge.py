@@ -24,6 +24,7 @@ from burg_drake.evaluation.store.campaign_folder import Campaign
 from burg_drake.evaluation.store.run_folder import Run, load_run
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.document.station_document import Station
+from tests.thorough import thorough
 
 pytestmark = pytest.mark.usefixtures("pages")
 
@@ -81,7 +82,7 @@ def test_shards_of_one_scene(
     assert executor.judged == 5 and same(whole.results, rest.results)
 
 
-@pytest.mark.parametrize("count", [2, 4])  # scenes as wholes, and grasps of each
+@pytest.mark.parametrize("count", [2, thorough(4)])  # scenes as wholes, and grasps of each
 def test_shards_of_many_scenes(
     count: int,
     scenes: list[Path],
@@ -111,6 +112,7 @@ def test_shards_of_many_scenes(
     assert same(whole.results, rest.results) and 0 < executor.judged < 40
 
 
+@pytest.mark.thorough
 def test_interrupted_copies(
     scenes: list[Path], whole: Campaign, station: Station, tmp_path: Path, known_judge: None
 ) -> None:
@@ -215,6 +217,7 @@ def interrupt(*_, **__) -> None:
     raise KeyboardInterrupt
 
 
+@pytest.mark.thorough
 def test_what_is_united_cannot_be_written_meanwhile(
     scenes: list[Path], scene: Scene, station: Station, tmp_path: Path, known_judge: None
 ) -> None:

@@ -80,6 +80,7 @@ def test_the_report_says_how_to_ask_for_it_again(run: Run) -> None:
     np.testing.assert_array_equal([float(w) for w in words[at + 5 : at + 8]], MOTION.lift_direction)
 
 
+@pytest.mark.thorough
 def test_the_lift_for_which_the_arm_has_room_is_executed_and_repeated(tmp_path: Path) -> None:
     """Under the roof of the shelf there is no room for the whole lift; the row alone tells how far
     the hand was lifted, and the arm is not asked again."""

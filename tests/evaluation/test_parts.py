@@ -55,6 +55,7 @@ def refresh(campaign: Campaign) -> PartWriter:
     return writer
 
 
+@pytest.mark.thorough
 def test_damage(campaign: Campaign) -> None:
     parts = sorted((campaign.path / "parts").iterdir())
     assert len(parts) > 1
@@ -108,6 +109,7 @@ def test_journals_count(campaign: Campaign) -> None:
         require_true(campaign)
 
 
+@pytest.mark.thorough
 def test_grown_journals_and_later_verdicts(campaign: Campaign) -> None:
     journal = campaign.folder("moved") / JOURNAL_FILE
     data = journal.read_bytes()
@@ -164,6 +166,7 @@ def test_what_nobody_touched_is_not_read(campaign: Campaign, monkeypatch) -> Non
     assert read and max(read) <= 64
 
 
+@pytest.mark.thorough
 def test_kills_at_every_byte(
     scenes: list[Path], whole: Campaign, station: Station, tmp_path: Path, known_judge: None
 ) -> None:

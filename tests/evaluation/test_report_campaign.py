@@ -164,6 +164,7 @@ def test_without_its_report_a_scene_has_a_command(campaign: Campaign) -> None:
     assert line == f"burg-drake report {campaign.folder(worst)}"
 
 
+@pytest.mark.thorough
 def test_a_thousand_scenes_stay_a_readable_page(
     campaign: Campaign, monkeypatch: pytest.MonkeyPatch
 ) -> None:

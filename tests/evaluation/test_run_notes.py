@@ -54,6 +54,7 @@ def test_an_object_without_clear_grasps_is_explained_wherever_the_run_is_shown(
     assert note in " ".join(console.file.getvalue().split())
 
 
+@pytest.mark.thorough
 def test_nothing_executed_is_explained(judged_here: None, tmp_path: Path) -> None:
     out = tmp_path / "run"
     options = {"mode": "hand", "only": ["screwdriver"], "workers": 1, "progress": False}

@@ -30,6 +30,7 @@ def test_what_the_arm_does_not_get_to(panda: Station) -> None:
     assert within_reach(PAIR, moved) == ("far",)
 
 
+@pytest.mark.thorough
 def test_others_do_not_matter_to_reach(panda: Station) -> None:
     """A can between four boxes is within reach, though none of its grasps is clear."""
     walls = (

@@ -113,6 +113,7 @@ def test_parts_are_not_counted_again(whole: Campaign, tmp_path: Path, monkeypatc
     assert read_status(campaign.path) == told
 
 
+@pytest.mark.thorough
 def test_of_a_campaign_that_is_killed(
     scenes: list[Path],
     whole: Campaign,

@@ -39,6 +39,7 @@ def start(path: Path, *numbers: int) -> subprocess.Popen[str]:
     return subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
 
 
+@pytest.mark.thorough
 def test_writers_at_once_lose_nothing(tmp_path: Path) -> None:
     path = write_sheet(tmp_path, 40)
     writers = [start(path, *range(1 + k, 41, 2)) for k in range(2)]

@@ -152,6 +152,7 @@ def test_a_test_that_nothing_passes_ends_soon():
     assert grasps.provenance["rays"] < PATIENCE
 
 
+@pytest.mark.thorough
 def test_what_one_grasp_in_300_passes_is_found():
     def rare(X_OG: np.ndarray) -> np.ndarray:
         return (1e6 * X_OG[:, 0, 3]).astype(int) % 300 == 0
@@ -204,6 +205,7 @@ def test_diverse_grasps_pass_the_test():
     assert len(grasps) == 50 and front(grasps.X_OG).all()
 
 
+@pytest.mark.thorough
 def test_where_there_are_few_the_diverse_are_these():
     """Two of 20,000, and so few more that sampling ends."""
     edge = np.sort(grasp(lumpy(), n=TEST_PATIENCE).X_OG[:, 0, 3])[-2]

@@ -13,6 +13,7 @@ from trimesh import creation
 
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.grasping.sampling.contact_pairs import FINGER_CLEARANCE, MIN_WIDTH
+from tests.thorough import thorough
 
 POINTS = 4000  # on all faces together, alike on each
 RINGS, AZIMUTHS = 3, 6  # of lines through each point
@@ -195,10 +196,10 @@ def uneven(mesh) -> np.ndarray:
 @pytest.mark.parametrize(
     ("mesh", "friction", "opening", "weighted"),
     [
-        (box(0.03, 0.05, 0.04), 0.4, (0.0, 0.08), False),
+        thorough(box(0.03, 0.05, 0.04), 0.4, (0.0, 0.08), False),
         (wedge(), 0.5, (0.031, 0.045), True),
-        (channel(), 0.4, (0.0, 0.03), True),
-        (creation.icosahedron().apply_scale(0.02), 0.6, (0.0, 0.08), True),
+        thorough(channel(), 0.4, (0.0, 0.03), True),
+        thorough(creation.icosahedron().apply_scale(0.02), 0.6, (0.0, 0.08), True),
     ],
     ids=["box", "weighted wedge", "weighted channel", "weighted icosahedron"],
 )

@@ -14,6 +14,7 @@ import trimesh
 from scipy import ndimage
 
 from burg_drake.objects.library.document import load_library
+from tests.thorough import thorough
 
 pytest.importorskip("manifold3d")
 
@@ -141,7 +142,7 @@ def test_vessels_are_hollow(name, radius, floor):
 
 
 @pytest.mark.parametrize(
-    ("name", "axis", "level", "count"), [("scissors", 2, 0.0057, 2), ("mug", 1, 0.0, 1)]
+    ("name", "axis", "level", "count"), [thorough("scissors", 2, 0.0057, 2), ("mug", 1, 0.0, 1)]
 )
 def test_fingers_fit_through_the_handles(name, axis, level, count):
     shape, cell = SHAPES[name], 0.0035

@@ -11,8 +11,14 @@ from burg_drake.motion.reach.arm_reach import ArmReach
 from burg_drake.motion.workspace.reachability import ReachabilitySettings, map_reachability
 from burg_drake.motion.workspace.station_check import empty_scene
 from burg_drake.station.document.station_document import load_station
+from tests.thorough import thorough
 
-WITH_ARM = [n for n in builtin_names("stations") if load_station(n).document.arm is not None]
+LIKE_ANOTHER = {"panda_bin", "panda_offset", "panda_pedestal"}
+WITH_ARM = [
+    thorough(name) if name in LIKE_ANOTHER else name
+    for name in builtin_names("stations")
+    if load_station(name).document.arm is not None
+]
 COARSE = ReachabilitySettings(
     spacing=0.12, heights=(0.05,), tilts_deg=(0.0, 45.0), headings=(1, 4), yaws=2
 )

@@ -98,6 +98,7 @@ def test_beyond_the_arm_there_is_no_ik(search: ClosedFormLineSearch) -> None:
     assert lines.failure(0).outcome is Outcome.NO_IK
 
 
+@pytest.mark.thorough
 def test_beyond_a_joint_limit_the_excess_is_no_larger_than_that_of_a_known_posture(
     search: ClosedFormLineSearch,
 ) -> None:

@@ -21,6 +21,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.motion.proximity.cover import cover_body
+from tests.thorough import thorough
 
 X_BP = RigidTransform(RollPitchYaw(0.3, -0.7, 1.1), [0.1, -0.2, 0.3])
 
@@ -77,7 +78,9 @@ def test_balls_cover_the_shape_and_stick_out_little(shape: Shape, overshoot: flo
     assert np.all(balls.outer <= depth + overshoot + 1e-6)
 
 
-@pytest.mark.parametrize("shape", [Box(0.5, 0.4, 0.5), Cylinder(0.3, 1.2), Box(1.6, 3.6, 0.04)])
+@pytest.mark.parametrize(
+    "shape", [Box(0.5, 0.4, 0.5), Cylinder(0.3, 1.2), thorough(Box(1.6, 3.6, 0.04))]
+)
 def test_large_shapes_take_few_balls_of_limited_size(shape: Shape) -> None:
     """A mobile base covered as finely as a finger would take tens of gigabytes."""
     _graph, inspector, geometry = one_geometry(shape)

@@ -224,6 +224,7 @@ def test_dense_samples_in_drake_agree(
     assert len(seen) == 4
 
 
+@pytest.mark.thorough
 def test_dense_samples_in_drake_agree_on_the_way_back_and_aside(
     shelf: tuple[Scene, Station], swept_away: HandSweep, clearance: HandClearance
 ) -> None:
@@ -335,6 +336,7 @@ def test_ways_of_no_length_are_the_grasp_itself(
         )
 
 
+@pytest.mark.thorough
 def test_an_empty_hand(swept: HandSweep, shelf: tuple[Scene, Station]) -> None:
     """All bodies count, on either way."""
     for name, X in random_grasps(*shelf, 10):

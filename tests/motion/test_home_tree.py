@@ -113,6 +113,7 @@ def length(path: np.ndarray) -> float:
     return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 
 
+@pytest.mark.thorough
 def test_no_way_fails_an_audit(station_case: Panda) -> None:
     found = [station_case.tree.connect(goals) for goals in station_case.goals]
     assert len(found) >= 8
@@ -126,6 +127,7 @@ def test_no_way_fails_an_audit(station_case: Panda) -> None:
         assert audit(station_case.edges, path, LEVERS)
 
 
+@pytest.mark.thorough
 def test_answers_do_not_depend_on_what_was_asked_before(table: Panda) -> None:
     asked = table.goals[:8]
     other = panda({}).tree
@@ -140,6 +142,7 @@ def test_answers_do_not_depend_on_what_was_asked_before(table: Panda) -> None:
         assert a[0] == b[0] and np.array_equal(a[1], b[1])
 
 
+@pytest.mark.thorough
 def test_shortcuts_are_shorter_and_pass_the_audit(station_case: Panda) -> None:
     before = after = 0.0
     for goals in station_case.goals[6:7]:
@@ -185,6 +188,7 @@ def test_out_of_a_narrow_shaft(tmp_path: Path) -> None:
     assert answer is not None and audit(edges, answer[1], np.ones(3))
 
 
+@pytest.mark.thorough
 def test_no_way_into_a_closed_box(tmp_path: Path) -> None:
     closed = {
         "front": box((0.55, -0.25, 0.0), (0.57, 0.25, 0.7)),

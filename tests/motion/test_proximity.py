@@ -17,6 +17,7 @@ from burg_drake.scene.document.scene import Scene, SceneDocument, load_scene
 from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.diagram.station_diagram import StationDiagram
 from burg_drake.station.document.station_document import Obstacle, Station, load_station
+from tests.thorough import thorough
 
 SHELF = {
     "back": Obstacle(X_WB=Pose((0.71, 0.0, 0.2)), size=(0.02, 0.68, 0.4)),
@@ -68,7 +69,7 @@ def configurations(name: str, n: int, seed: int = 0) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    "name", ["panda_tabletop", "panda_offset", "panda_wsg", "shelf", "ur5e_tabletop"]
+    "name", ["panda_tabletop", thorough("panda_offset"), "panda_wsg", "shelf", "ur5e_tabletop"]
 )
 def test_what_is_proven_is_what_drake_finds(name: str) -> None:
     """And little is left to ask Drake about."""

@@ -178,6 +178,7 @@ def on_line(
     return float((beside + 0.1 * turned).max())
 
 
+@pytest.mark.thorough
 def test_configurations_are_free_in_a_fresh_diagram(
     verdicts: list[tuple[np.ndarray, Reach]], scene: Scene, station: Station
 ) -> None:
@@ -201,6 +202,7 @@ def test_configurations_are_free_in_a_fresh_diagram(
     assert checked > 100
 
 
+@pytest.mark.thorough
 def test_free_configurations_are_found_again(scene: Scene, station: Station) -> None:
     arm = ArmReach(scene, station, settings=AT_ONCE)
     rng = np.random.default_rng(11)
@@ -213,6 +215,7 @@ def test_free_configurations_are_found_again(scene: Scene, station: Station) -> 
     assert sum(arm._tree.connect(q[None]) is not None for q in missed) <= 1
 
 
+@pytest.mark.thorough
 def test_what_the_numeric_search_reaches_the_closed_form_reaches(
     scene: Scene, station: Station, verdicts: list[tuple[np.ndarray, Reach]]
 ) -> None:

@@ -44,6 +44,7 @@ def layer(back: Station) -> ReachLayer:
     return reach_from_above(back, BOARD, spacing=0.04, yaws=2)
 
 
+@pytest.mark.thorough
 def test_points_are_as_when_asked_alone(layer: ReachLayer, back: Station) -> None:
     """Whole motions of some points, also of such as were not asked."""
     assert 0.2 < layer.covered < 0.9

@@ -19,6 +19,8 @@ from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.diagram.station_diagram import instance_pose
 from burg_drake.station.document.station_document import Station, load_station
 
+pytestmark = pytest.mark.thorough
+
 DOWN = np.diag([1.0, -1.0, -1.0])
 
 

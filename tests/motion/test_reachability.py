@@ -89,6 +89,7 @@ def test_orientations() -> None:
     assert apart.min() > 0.1  # all different, however the fingers are put
 
 
+@pytest.mark.thorough
 def test_nothing_is_reached_beyond_the_span() -> None:
     """Half of the board is out of reach of an arm that stands 40 cm back."""
     station = load_station("panda_tabletop")
@@ -112,6 +113,7 @@ def test_objects_are_in_the_way(six: Scene, shelf_map: ReachabilityMap) -> None:
     assert shelf_map.reached.mean() < 0.95 * empty.reached.mean()
 
 
+@pytest.mark.thorough
 def test_a_point_does_not_depend_on_the_others(shelf_map: ReachabilityMap, six: Scene) -> None:
     low = replace(COARSE, heights=COARSE.heights[:1])
     alone = map_reachability(six, load_station("panda_shelf"), settings=low)

@@ -22,6 +22,7 @@ from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.diagram.station_diagram import StationDiagram
 from burg_drake.station.document.station_document import load_station
 from tests.motion.gantry import gantry_diagram
+from tests.thorough import thorough
 
 
 @cache
@@ -48,6 +49,7 @@ def test_pairs_are_those_of_drakes_checker() -> None:
     assert found == expected
 
 
+@pytest.mark.thorough
 def test_only_pairs_that_cannot_meet_are_left_out() -> None:
     """Of those left out, Drake finds no overlap at 1500 configurations; others in tables meet."""
     built = diagram("panda_tabletop")
@@ -110,7 +112,7 @@ def pair(
     ("station", "first", "second"),
     [
         ("panda_tabletop", "panda_link5", "panda_hand"),
-        ("ur5e_tabletop", "shoulder_link", "forearm_link"),
+        thorough("ur5e_tabletop", "shoulder_link", "forearm_link"),
         ("gantry", "x_link", "panda_hand"),
     ],
 )

@@ -81,6 +81,7 @@ def test_noise_of_a_scan_is_forgiven() -> None:
     assert abs(X[2, 2]) > np.cos(np.deg2rad(0.5))
 
 
+@pytest.mark.thorough
 def test_household_objects_that_are_primitives_and_that_are_not() -> None:
     library = load_library("household")
     expected = {"box": "box", "can": "cylinder", "marble": "sphere"}

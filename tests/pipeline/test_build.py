@@ -315,6 +315,7 @@ def test_permissions_are_those_of_other_files(meshes: Path, tmp_path: Path) -> N
     assert (tmp_path / "lib/box").stat().st_mode & 0o777 == 0o777 & ~umask
 
 
+@pytest.mark.thorough
 def test_another_coacd_version_cuts_again_what_it_cut(
     meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

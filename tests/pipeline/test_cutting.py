@@ -35,6 +35,7 @@ def test_a_finer_cut_by_itself(tmp_path: Path, ring: trimesh.Trimesh) -> None:
     assert "pieces" not in again.seconds["ring"]  # but those of the first build
 
 
+@pytest.mark.thorough
 def test_a_threshold_that_was_asked_for_stays(tmp_path: Path, ring: trimesh.Trimesh) -> None:
     """Build and check say the same of what comes of it."""
     source = ObjectSource(

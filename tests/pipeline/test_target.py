@@ -134,6 +134,7 @@ def test_one_build_at_a_time(tmp_path: Path) -> None:
     assert not (tmp_path / "lib" / LOCK_FILE).exists()
 
 
+@pytest.mark.thorough
 def test_the_lock_of_a_killed_build_is_free(tmp_path: Path) -> None:
     script = (
         "import os, sys; from burg_drake.pipeline.target import opened_for_build\n"

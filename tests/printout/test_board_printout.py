@@ -19,6 +19,7 @@ from burg_drake.printout.drawings import FINENESS
 from burg_drake.scene.document.markers import MarkerLayout, Markers, marker_dictionary
 from burg_drake.scene.document.scene import Board, Instance, Scene, load_scene
 from tests.printout.paper import rasterised, words
+from tests.thorough import thorough
 
 BURG = Board(markers=Markers(dictionary="4X4_250", side=0.057, spacing=0.019, count=(7, 5)))
 
@@ -72,9 +73,9 @@ def measured_corners(image: np.ndarray, layout: MarkerLayout, dpi: int) -> dict[
 @pytest.mark.parametrize(
     ("scene", "page", "dpi", "tolerance"),
     [
-        ("tabletop_twelve", "A4", 200, 1.5e-4),
+        thorough("tabletop_twelve", "A4", 200, 1.5e-4),
         ("tabletop_six", "letter", 150, 2e-4),
-        ("burg", "A3", 150, 2e-4),
+        thorough("burg", "A3", 150, 2e-4),
     ],
 )
 def test_every_marker_of_every_page(scene: str, page: str, dpi: int, tolerance: float) -> None:
@@ -94,6 +95,7 @@ def test_every_marker_of_every_page(scene: str, page: str, dpi: int, tolerance: 
     assert sorted(seen) == layout.ids.tolist()
 
 
+@pytest.mark.thorough
 def test_a_printer_that_scales() -> None:
     """What is drawn larger by 100/98 along x and 100/99 along y has its true size when the printer
     makes it smaller by as much; rulers, too."""

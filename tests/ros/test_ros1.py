@@ -200,6 +200,7 @@ def stamps(trial: Trial, name: str) -> list[list[int]]:
 WITH_BOARD = [name for name in STEPS if name not in LOST]
 
 
+@pytest.mark.thorough
 def test_two_nodes_in_a_real_ros(
     tmp_path: Path,
     picture: NDArray[np.uint8],

@@ -32,6 +32,7 @@ from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.document.arm_control import ARM_STIFFNESS
 from burg_drake.station.document.grasp_motion import GraspMotion
 from burg_drake.station.document.station_document import Obstacle
+from tests.thorough import thorough
 
 WHOLE = replace(QUICK, whole_trial=True)
 SWAP = np.diag([-1.0, -1.0, 1.0, 1.0])
@@ -124,7 +125,7 @@ def exact(result: TrialResult) -> dict[str, str]:
     [
         (CENTRE, {}),
         (from_above(0.066, y=0.01, yaw=0.1), {"friction": 0.02}),
-        (from_above(0.06, y=-0.03), {"mass": 0.9}),
+        thorough(from_above(0.06, y=-0.03), {"mass": 0.9}),
         (from_above(0.16), {}),
         (from_above(0.03), {}),
     ],
@@ -142,6 +143,7 @@ def test_ends_as_the_hand_alone_does(arm_trial, hand_trial, X_OG: Array, overrid
         assert result.margins.tilt == pytest.approx(alone.margins.tilt, abs=0.02)
 
 
+@pytest.mark.thorough
 def test_goes_back_and_then_up_as_the_hand_alone_does(
     arm_trial, whole_trial, box_scene: Scene
 ) -> None:
@@ -207,6 +209,7 @@ def test_a_transfer_is_executed_and_looked_at_so_often_that_nothing_passes(
 # --- statics ------------------------------------------------------------------------------------
 
 
+@pytest.mark.thorough
 def test_the_load_turns_the_joints_against_their_servos(whole_trial: ArmTrial) -> None:
     """Held at rest: stiffness times deviation balances the box's weight, by virtual work. On the
     way the lag is as large as `largest_lag` says."""
@@ -341,6 +344,7 @@ def test_a_link_is_stopped_by_what_is_fixed(box_scene: Scene) -> None:
     assert execute(trial, CENTRE).outcome is Outcome.LIFTED
 
 
+@pytest.mark.thorough
 def test_a_roof_stops_the_lift(box_scene: Scene) -> None:
     roof = Obstacle(X_WB=Pose((0.41, 0.2, 0.35)), size=(0.025, 0.1, 0.02))
     trial = ArmTrial(box_scene, make_arm_station(obstacles={"roof": roof}), engine=QUICK)
@@ -350,6 +354,7 @@ def test_a_roof_stops_the_lift(box_scene: Scene) -> None:
     assert 0.05 < result.margins.lift < 0.15
 
 
+@pytest.mark.thorough
 def test_what_is_fixed_is_met_while_the_target_is_held(box_scene: Scene) -> None:
     """The arm is told to turn about its base after the lift."""
     pole = Obstacle(X_WB=Pose((0.3, 0.35, 0.5)), size=(0.04, 0.04, 0.4))

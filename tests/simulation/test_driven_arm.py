@@ -29,6 +29,7 @@ from burg_drake.station.diagram.station_diagram import StationDiagram
 from burg_drake.station.document.arm_control import ArmControl
 from burg_drake.station.document.engine import ENGINES
 from burg_drake.station.document.station_document import Station
+from tests.thorough import thorough
 
 MakeScene = Callable[..., Scene]
 ASIDE, BELOW = 0.015, 0.02
@@ -106,7 +107,7 @@ def test_a_held_box_hangs_on_wrist_and_joints(built: StationDiagram, limit: floa
     assert force == pytest.approx(limit, rel=0.01)
 
 
-@pytest.mark.parametrize(("kind", "lag"), [("impedance", 2e-3), ("inverse_dynamics", 4e-3)])
+@pytest.mark.parametrize(("kind", "lag"), [("impedance", 2e-3), thorough("inverse_dynamics", 4e-3)])
 def test_a_plan_is_played_and_lifts_the_box(
     scene: Scene, station: Station, plan: Plan, kind: str, lag: float
 ) -> None:
@@ -229,6 +230,7 @@ def test_plans_that_cannot_be_played(built: StationDiagram, plan: Plan) -> None:
     )
 
 
+@pytest.mark.thorough
 def test_trials_follow_an_inverse_dynamics_controller(
     scene: Scene, station: Station, plan: Plan
 ) -> None:

@@ -228,6 +228,7 @@ def test_bystanders_do_not_change_a_trial_and_are_not_moved(make_scene, box_tria
     np.testing.assert_allclose(margins(watched)[:5], margins(alone)[:5], atol=1e-4)
 
 
+@pytest.mark.thorough
 def test_neighbour_on_top_goes_up_with_the_target(make_scene) -> None:
     block = Instance(object="block", X_SO=Pose((0.3, 0.235, BOX[2])))
     trial = HandTrial(make_scene(("box", 0.3, 0.2, 0.0), block), make_station(), engine=QUICK)

@@ -94,6 +94,7 @@ def test_a_slow_shake_is_borne_as_far_as_statics_says(trial: HandTrial) -> None:
     assert shaken["z"] == pytest.approx(LIMITS["+z"], rel=0.03)
 
 
+@pytest.mark.thorough
 def test_a_fast_shake_is_borne_better_than_a_slow_one(trial: HandTrial) -> None:
     """In a shorter period the box slides less far before it is carried back."""
     grip = grip_of(trial)

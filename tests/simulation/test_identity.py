@@ -72,6 +72,7 @@ def test_trials_differ_from_each_other(alone) -> None:
     assert float.fromhex(alone["carries the block"]["moved on_top"]) > 0.1
 
 
+@pytest.mark.thorough
 def test_in_a_batch(scene: Scene, alone) -> None:
     """After each other and after itself; backwards they are executed in another process, below."""
     trial = HandTrial(scene, make_station(), engine=QUICK)
@@ -79,6 +80,7 @@ def test_in_a_batch(scene: Scene, alone) -> None:
         assert execute(trial, name) == alone[name], name
 
 
+@pytest.mark.thorough
 def test_after_a_trial_that_failed(scene: Scene, alone, monkeypatch: pytest.MonkeyPatch) -> None:
     """The state turns into NaN in the middle of a trial, after which no more can be told."""
     trial = HandTrial(scene, make_station(), engine=QUICK)

@@ -157,6 +157,7 @@ def test_a_roly_poly_rights_itself(tmp_path: Path) -> None:
     assert pose.residual is not None and pose.residual < np.deg2rad(6.0)  # facets of the ball
 
 
+@pytest.mark.thorough
 def test_where_it_ends_up_is_not_a_known_pose(tmp_path: Path) -> None:
     plate = trimesh.creation.box((0.1, 0.04, 0.1 * np.tan(0.5 * TILT)))
     found = confirm(tmp_path, plate, {0.25: -X, 0.75: -Y})  # both are edges, neither stands
@@ -178,6 +179,7 @@ def test_shares_that_are_lost(tmp_path: Path) -> None:
     assert "(40.0 %) topples" in found.notes[0]
 
 
+@pytest.mark.thorough
 def test_mass_and_friction_do_not_matter(tmp_path: Path) -> None:
     box = trimesh.creation.box((0.1, 0.06, 0.04))
     light = confirm(tmp_path / "light", box, mass=0.02, friction=0.05)

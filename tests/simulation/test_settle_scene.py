@@ -72,6 +72,7 @@ def test_the_board_may_lie_anywhere(stack: Scene, settled_stack: Scene) -> None:
         np.testing.assert_allclose(difference, np.eye(4), atol=2e-3)
 
 
+@pytest.mark.thorough
 def test_a_heap_of_household_objects(tmp_path) -> None:
     """What leans on others may creep on, and is named then."""
     library = load_library("household")

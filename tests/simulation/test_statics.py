@@ -28,6 +28,7 @@ from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.scene.document.scene import Scene
 from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.station.document.engine import ENGINES
+from tests.thorough import thorough
 
 STIFFNESS = 1e7 / 0.0076
 """Modulus of the pads over their thickness from the middle to the front [N/m^3]."""
@@ -99,7 +100,8 @@ def box_grasp(trial: HandTrial) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("engine", "tolerance"), [("reference", 0.02), ("standard", 0.01), ("screening", 0.01)]
+    ("engine", "tolerance"),
+    [("reference", 0.02), ("standard", 0.01), thorough("screening", 0.01)],
 )
 def test_smallest_friction_that_holds(slow_trials, engine: str, tolerance: float) -> None:
     """2 mu N = m g, with the commanded force."""
@@ -111,7 +113,7 @@ def test_smallest_friction_that_holds(slow_trials, engine: str, tolerance: float
     assert held.margins.pad_force == pytest.approx(FORCE, rel=0.01)
 
 
-@pytest.mark.parametrize("engine", ["standard", "screening"])
+@pytest.mark.parametrize("engine", ["standard", thorough("screening")])
 def test_largest_mass_that_is_held(slow_trials, engine: str) -> None:
     """2 mu N = m g."""
     lost, held = (
@@ -168,7 +170,7 @@ def bar_trials(make_scene: Callable[..., Scene]) -> dict[str, HandTrial]:
 BAR_FRICTION = limit_friction(*PAD, LEVER) * BAR_MASS * GRAVITY / (2 * FORCE)
 
 
-@pytest.mark.parametrize(("engine", "tolerance"), [("standard", 0.06), ("screening", 0.12)])
+@pytest.mark.parametrize(("engine", "tolerance"), [("standard", 0.06), thorough("screening", 0.12)])
 def test_smallest_friction_that_keeps_a_bar_level(bar_trials, engine, tolerance) -> None:
     """Of what is above 1, the pad's eight triangles make 0.03, as they stand for the whole patch
     with their middles; the rest is creep, as Drake's friction is slightly viscous."""

@@ -37,6 +37,7 @@ def both(make_scene, *instances, X_OG=CENTRE, **obstacles) -> tuple[TrialResult,
     return early, whole
 
 
+@pytest.mark.thorough
 def test_a_shelf_above_the_end_of_the_target_turns_it_in_the_hand(make_scene) -> None:
     """It covers the box beyond the hand, which itself passes."""
     early, whole = both(make_scene, ("box", 0.3, 0.2, 0.0), obstacles=shelf(0.25, 0.235))
@@ -71,6 +72,7 @@ def test_a_block_that_stands_a_hair_above_another_goes_with_it(make_scene) -> No
         assert result.displacements["above"] > 0.0005
 
 
+@pytest.mark.thorough
 def test_a_shelf_above_all_is_no_obstacle(make_scene) -> None:
     early, _ = both(make_scene, ("box", 0.3, 0.2, 0.0), obstacles=shelf(0.60, 0.1))
     assert early.outcome is Outcome.LIFTED
@@ -89,6 +91,7 @@ def test_a_neighbour_that_lies_on_a_shelf_in_the_way_is_knocked_down(make_scene)
     assert early.displacements["block"] > 0.01
 
 
+@pytest.mark.thorough
 def test_a_neighbour_beside_the_way_stays_asleep(make_scene) -> None:
     block = Instance(object="block", X_SO=Pose((0.3, 0.29, 0.20)))
     early, _ = both(

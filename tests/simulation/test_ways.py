@@ -18,6 +18,7 @@ from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.diagram.floating_hand import FloatingHand
 from burg_drake.station.document.grasp_motion import GraspMotion
 from burg_drake.station.document.station_document import Obstacle
+from tests.thorough import thorough
 
 WHOLE = replace(QUICK, whole_trial=True)
 IN_THE_AIR = Instance(object="box", X_SO=Pose((0.3, 0.2, 0.6)))
@@ -72,7 +73,7 @@ def test_a_lift_in_two_parts_is_as_long_as_both(make_scene, box_trial: HandTrial
 
 
 @pytest.mark.parametrize(
-    "u", [(0, 1, 0), (0, -1, 1), (0, 0, -1)], ids=["sideways", "tilted", "down"]
+    "u", [(0, 1, 0), (0, -1, 1), thorough((0, 0, -1))], ids=["sideways", "tilted", "down"]
 )
 def test_friction_bears_weight_and_acceleration(make_scene, u: tuple[float, ...]) -> None:
     """2 mu N = m |g z + a u|, where the hand accelerates by a along u and brakes by as much."""
@@ -91,6 +92,7 @@ def test_friction_bears_weight_and_acceleration(make_scene, u: tuple[float, ...]
     assert lost.margins.slip > 0.004
 
 
+@pytest.mark.thorough
 def test_what_is_decided_on_a_tilted_way_is_confirmed_by_the_whole_trial(make_scene) -> None:
     motion = GraspMotion(lift_height=0.2, lift_direction=(0.5, 0.0, 0.5))
     scene, station = make_scene(IN_THE_AIR), make_station()

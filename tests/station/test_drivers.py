@@ -21,6 +21,7 @@ from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.diagram.mounted_hand import MountedHand
 from burg_drake.station.diagram.station_diagram import StationDiagram
 from burg_drake.station.document.station_document import Arm, Obstacle, Station, load_station
+from tests.thorough import thorough
 
 BLOCK = 0.04
 """Width of a fixed block between the pads at home [m]."""
@@ -136,7 +137,7 @@ def test_the_desired_state_goes_to_the_servos_as_it_is(free: StationDiagram) -> 
         assert runs[0].read(port).tolist() == runs[1].read(port).tolist(), port
 
 
-@pytest.mark.parametrize("reference", ["panda_tabletop", "panda_wsg"])
+@pytest.mark.parametrize("reference", ["panda_tabletop", thorough("panda_wsg")])
 def test_the_hand_goes_to_a_distance(empty: Scene, reference: str) -> None:
     free = build_station_diagram(empty, load_station(reference), drivers=True)
     hand = free.station.hand
@@ -173,7 +174,7 @@ def between_fingers(built: StationDiagram, run: Run) -> float:
 # --- measurements -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("limit", [4.0, 40.0])
+@pytest.mark.parametrize("limit", [thorough(4.0), 40.0])
 def test_the_pads_press_with_the_limit(blocked: StationDiagram, limit: float) -> None:
     """What they press with is what the contact says; and they got there at full speed."""
     run = Run(blocked, hand__position=[0.0], hand__force_limit=[limit])

@@ -23,6 +23,7 @@ from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.diagram.station_diagram import StationDiagram
 from burg_drake.station.document.arm_control import ACCELERATION_KP, ArmControl
 from burg_drake.station.document.station_document import Station, StationDocument, load_station
+from tests.thorough import thorough
 
 GRAVITY = 9.81
 LIMITS = np.array([87.0] * 4 + [12.0] * 3)
@@ -105,7 +106,7 @@ def test_torques_are_those_of_drakes_controller(built: StationDiagram) -> None:
         assert (np.abs(torque[:4]) < LIMITS[:4]).any()
 
 
-@pytest.mark.parametrize("reference", ["panda_tabletop", "ur5e_tabletop"])
+@pytest.mark.parametrize("reference", ["panda_tabletop", thorough("ur5e_tabletop")])
 def test_tracking_error_is_the_acceleration_over_the_gain(empty: Scene, reference: str) -> None:
     """What the controller does not know of a motion is its acceleration: as a driven oscillator it
     lags by no more than that over kp, and half a step of its speed."""
@@ -152,6 +153,7 @@ def test_torques_and_feedforward_are_limited(built: StationDiagram) -> None:
     assert measured == pytest.approx(expected, abs=1e-9)
 
 
+@pytest.mark.thorough
 def test_gains_of_joint_servos(empty: Scene) -> None:
     """A torque turns each joint by itself over its stiffness."""
     kp, torque = np.array([400.0, 500, 600, 700, 800, 900, 1000]), np.full(7, 3.0)

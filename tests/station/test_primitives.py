@@ -59,6 +59,7 @@ def test_nothing_overlaps_on_the_table(scene: Scene) -> None:
     assert not any(depth > 1e-6 for depth in found.values()), found
 
 
+@pytest.mark.thorough
 def test_they_come_to_rest_where_they_are(scene: Scene) -> None:
     """Nothing wobbles, rolls away, or sinks in by more than facets and the table's give; what lies
     may rock on the nearest of Drake's facets, of which there are 26."""

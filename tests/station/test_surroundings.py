@@ -17,6 +17,7 @@ from burg_drake.scene.document.scene import Instance, SceneDocument, load_scene,
 from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.document.engine import ENGINES
 from burg_drake.station.document.station_document import load_station
+from tests.thorough import thorough
 
 OBJECT_FRICTION, GRAVITY = 0.24, 9.81
 
@@ -32,7 +33,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory):
     return load_scene(folder / "s.yaml")
 
 
-@pytest.mark.parametrize(("engine", "share"), [("reference", 0.03), ("standard", 0.08)])
+@pytest.mark.parametrize(("engine", "share"), [thorough("reference", 0.03), ("standard", 0.08)])
 def test_thrown_brick_is_braked_by_friction_alone(scene, engine: str, share: float) -> None:
     """`screening` is left out: at 5 ms sliding on the table is braked too much."""
     station = load_station("panda_tabletop")

@@ -124,6 +124,7 @@ def test_what_moves_together_does_not_meet_itself(check: SceneCheck, scene: Make
     )
 
 
+@pytest.mark.thorough
 def test_mug_and_bowl_touch_there_and_not_before(
     check: SceneCheck, scene: MakeScene, station: Station
 ) -> None:

@@ -72,6 +72,7 @@ def answer(
         connection.close()
 
 
+@pytest.mark.thorough
 def test_the_page_opens_in_a_browser(door: ServedPage, page) -> None:
     page.goto(f"{door.url}?websocket=ws://127.0.0.1:9/&darkMode")  # a trap, and an option of viser
     page.get_by_text("Nothing here yet.").wait_for()
@@ -156,6 +157,7 @@ def test_a_page_of_another_site_cannot_connect(door: ServedPage, page, elsewhere
     assert page.evaluate(fetch, f"http://{address}/") == "refused"
 
 
+@pytest.mark.thorough
 def test_a_page_of_another_site_can_connect_to_viser_itself(page, elsewhere: str) -> None:
     """A canary: if viser refuses that one day, less of the door is needed."""
     server = viser.ViserServer(host="127.0.0.1", port=7400, verbose=False)
@@ -178,6 +180,7 @@ def test_a_door_that_lets_others_in_does_not_open(monkeypatch: pytest.MonkeyPatc
         pass
 
 
+@pytest.mark.thorough
 def test_a_token_opens_the_page_in_one_browser(open_to_all: ServedPage, page, browser) -> None:
     door = open_to_all
     admitted: list[str] = []
@@ -240,6 +243,7 @@ def test_the_terminal_stays_clean(capfd: pytest.CaptureFixture[str]) -> None:
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.thorough
 def test_a_browser_without_webgl_is_told(door: ServedPage, playwright, chromium: str) -> None:
     browser = playwright.chromium.launch(
         executable_path=chromium, args=["--no-sandbox", "--disable-3d-apis"]
@@ -251,6 +255,7 @@ def test_a_browser_without_webgl_is_told(door: ServedPage, playwright, chromium:
     browser.close()
 
 
+@pytest.mark.thorough
 def test_a_browser_without_scripts_is_told(door: ServedPage, browser) -> None:
     with browser.new_context(java_script_enabled=False) as context:
         page = context.new_page()

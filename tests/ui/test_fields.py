@@ -48,6 +48,7 @@ def settle(page: SetupPage) -> None:
     assert page.actions.queue.idle(PATIENCE)
 
 
+@pytest.mark.thorough
 def test_a_scene_is_saved_to_its_file_whatever_the_scene_is_called(page: SetupPage) -> None:
     session = page.actions.session
     path = session.folder / "my_scene.yaml"
@@ -56,6 +57,7 @@ def test_a_scene_is_saved_to_its_file_whatever_the_scene_is_called(page: SetupPa
     assert [p for p in Path(session.folder).iterdir() if p.suffix == ".yaml"] == [path]
 
 
+@pytest.mark.thorough
 def test_what_is_typed_is_one_step_and_what_is_refused_is_set_back(page: SetupPage) -> None:
     session = page.actions.session
     session.do(AddObject("marble"))
@@ -83,6 +85,7 @@ def test_what_is_typed_is_one_step_and_what_is_refused_is_set_back(page: SetupPa
     assert session.undo().document == before
 
 
+@pytest.mark.thorough
 def test_while_somebody_types_nothing_changes_the_field(page: SetupPage) -> None:
     session = page.actions.session
     session.select([next(iter(session.view.instances))])

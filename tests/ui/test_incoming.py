@@ -72,6 +72,7 @@ def closed(client: ClientConnection) -> tuple[int, str]:
     return caught.value.rcvd.code, caught.value.rcvd.reason
 
 
+@pytest.mark.thorough
 def test_a_browser_uploads_what_is_small_enough(
     door: ServedPage, button, page, tmp_path: Path
 ) -> None:
@@ -174,6 +175,7 @@ def test_new_pages_hear_of_no_old_uploads(
         assert b"Load a photo" in replay and b"FileTransferPartAck" not in replay
 
 
+@pytest.mark.thorough
 def test_a_flood_is_paced(
     door: ServedPage, button, client: ClientConnection, caplog: pytest.LogCaptureFixture
 ) -> None:

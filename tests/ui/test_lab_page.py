@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
 from playwright.sync_api import Page, expect
 
 from burg_drake.core.grasps.outcome import RealOutcome
@@ -71,6 +72,7 @@ def test_clicks_survive_the_death_of_the_server(page: Page, trials: Path) -> Non
         server.close()
 
 
+@pytest.mark.thorough
 def test_what_is_refused_for_good_can_be_dropped(page: Page, trials: Path) -> None:
     """Somebody has removed another trial from the file; then it comes back."""
     port = free_port()

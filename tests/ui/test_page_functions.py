@@ -64,6 +64,7 @@ def client(page: SetupPage, opened: tuple[SetupPage, ServedPage]) -> Iterator[Pa
         yield client
 
 
+@pytest.mark.thorough
 def test_a_random_configuration_is_one_step(session: ComposeSession, client: PageClient) -> None:
     empty = session.do(SetBoard(Board()))
     client.give(FILL, "Objects", 4)
@@ -138,6 +139,7 @@ def test_the_board_has_the_size_that_was_chosen(
     until(lambda: not client.shown(BOARD, "Width, depth [mm]"), "no fields")
 
 
+@pytest.mark.thorough
 def test_objects_have_the_colours_that_were_chosen(
     session: ComposeSession, client: PageClient
 ) -> None:
@@ -174,6 +176,7 @@ def test_objects_have_the_colours_that_were_chosen(
     until(lambda: colors() == [None] * 3, "as they look")
 
 
+@pytest.mark.thorough
 def test_grasps_are_counted_again_after_a_move(session: ComposeSession, client: PageClient) -> None:
     session.do(AddObject("can", position=(0.12, 0.15)))
     session.do(AddObject("mug", position=(0.3, 0.15)))
@@ -218,6 +221,7 @@ def test_reach_is_laid_on_the_board_and_taken_away(
     until(lambda: client.text(REACH) == "", "no words")
 
 
+@pytest.mark.thorough
 def test_a_photo_of_the_board_is_laid_under_the_objects(
     session: ComposeSession, client: PageClient
 ) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import pytest
 
 from burg_drake import load_station
 from burg_drake.cameras.rectification.top_view import BoardPicture
@@ -47,6 +48,7 @@ def test_the_boards_picture_has_its_markers_where_they_are_printed() -> None:
         np.testing.assert_allclose(found[0], expected, atol=2.0)
 
 
+@pytest.mark.thorough
 def test_a_live_picture_is_the_board_rectified_until_there_is_no_more(tmp_path: Path) -> None:
     board = Board()
     corners = np.array([[300, 250], [1100, 180], [1200, 720], [180, 800]], dtype=np.float32)

@@ -117,6 +117,7 @@ def setup(page: Any, tmp_path: Path) -> Iterator[Setup]:
         built.close()
 
 
+@pytest.mark.thorough
 def test_a_scene_is_composed_checked_and_saved(setup: Setup, tmp_path: Path) -> None:
     setup.open()
     setup.click("box")
@@ -173,6 +174,7 @@ def test_a_scene_is_composed_checked_and_saved(setup: Setup, tmp_path: Path) -> 
     assert list(setup.view.instances) == ["box", "can"]
 
 
+@pytest.mark.thorough
 def test_two_pages_show_the_same_and_come_back_after_a_kill(setup: Setup, tmp_path: Path) -> None:
     setup.open()
     with setup.tab.context.new_page() as other:

@@ -16,6 +16,7 @@ from burg_drake.station.document.station_document import load_station
 from burg_drake.visualization.scenes.scene import open_meshcat
 from burg_drake.visualization.scenes.station import BINS, MAP_PATH, show_station, tiles
 from burg_drake.visualization.style.legend import ColorBar, LegendEntry
+from tests.thorough import thorough
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +71,7 @@ def test_a_station_without_an_arm_and_obstacles(meshcat: Meshcat) -> None:
     ]
 
 
-@pytest.mark.parametrize("name", ["panda_bin", "panda_tabletop", "wsg_tabletop"])
+@pytest.mark.parametrize("name", [thorough("panda_bin"), "panda_tabletop", "wsg_tabletop"])
 def test_cameras_and_board_are_in_view(name: str) -> None:
     station, meshcat = load_station(name), open_meshcat()
     show_station(empty_scene(), station, meshcat)

@@ -60,6 +60,7 @@ def ladder(run: Run, by_hand: GapSteps) -> GapSteps:
     return replace(found, steps=(*found.steps, by_hand.steps[1]))
 
 
+@pytest.mark.thorough
 def test_without_noise_displaced_scenes_repeat_the_run_to_the_bit(by_hand: GapSteps) -> None:
     hand, (run,) = by_hand.first, by_hand.steps[1].runs
     assert hand is not run and run.document.scene.content == hand.document.scene.content
@@ -68,6 +69,7 @@ def test_without_noise_displaced_scenes_repeat_the_run_to_the_bit(by_hand: GapSt
         assert differences(hand.verdicts[id], run.verdicts[id]) == []
 
 
+@pytest.mark.thorough
 def test_reach_has_the_bits_of_a_run_of_its_own(ladder: GapSteps) -> None:
     """The oracle is the judge that nobody has shortened."""
     hand, reach = (step.runs[0] for step in ladder.steps[:2])

@@ -234,6 +234,7 @@ def test_the_folder_goes_on_and_tells_all(run: Run, sheet: TrialSheet, found: Re
     assert rows["cause"].tolist() == ["physics", "placement", "physics"]
 
 
+@pytest.mark.thorough
 def test_a_row_replays_in_the_scene_as_measured(
     found: Rejudging, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

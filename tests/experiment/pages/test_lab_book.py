@@ -49,6 +49,7 @@ def entry(lab: LabBook, number: int, outcome: str | None, **more: object) -> Lab
     return replace(made, **more)  # type: ignore[arg-type]
 
 
+@pytest.mark.thorough
 def test_the_same_entry_counts_once(lab: LabBook, trials: Path) -> None:
     slipped = entry(lab, 2, "slipped", note="wet", width_mm=12.5)
     for _ in range(3):  # the acknowledgement was lost twice
@@ -207,6 +208,7 @@ def test_a_check_that_fails_says_why(
     assert "Traceback" in capsys.readouterr().err
 
 
+@pytest.mark.thorough
 def test_an_outcome_that_comes_while_a_check_is_at_work(
     lab: LabBook, trials: Path, over: LabCamera, monkeypatch: pytest.MonkeyPatch
 ) -> None:

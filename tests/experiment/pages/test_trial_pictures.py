@@ -66,6 +66,7 @@ def test_the_target_has_a_rim(runs: TriedRuns, pictures: TrialPictures) -> None:
     assert orange[~near].sum() < 0.1 * orange[near].sum()
 
 
+@pytest.mark.thorough
 def test_pictures_follow_from_the_grasps_alone(
     runs: TriedRuns, pictures: TrialPictures, by_rays: TrialPictures
 ) -> None:
