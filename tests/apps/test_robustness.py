@@ -128,7 +128,6 @@ def test_it_says_at_once_how_long_it_takes(copied: Run, tmp_path: Path) -> None:
     assert 2 * trial < noise < 10 * trial < both < 60 * trial
 
 
-@pytest.mark.thorough
 def test_two_workers_and_no_journal_give_the_same_bits(copied: Run, tmp_path: Path) -> None:
     """Of the tests that take less time: four tasks, each of which either worker may take."""
     out = tmp_path / "two.csv"

@@ -242,7 +242,6 @@ def test_tasks_that_nobody_waits_for() -> None:
         assert pool.processes != [process]
 
 
-@pytest.mark.thorough
 def test_shutdown_finishes_or_gives_up_what_waits() -> None:
     pool = WorkerPool(1)
     futures = [pool.submit(jobs.slow, k, 0.1) for k in range(4)]

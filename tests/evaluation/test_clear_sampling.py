@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 import trimesh
 
 from burg_drake.core.arrays import Array
@@ -39,7 +38,6 @@ def pad_angles(mesh: trimesh.Trimesh, grasps: GraspSet) -> Array:
     return angles
 
 
-@pytest.mark.thorough
 def test_pads_meet_the_object_where_the_grasp_is() -> None:
     """On the wall of a mug beside its handle a pad meets the handle first, at up to 92 degrees;
     elsewhere one edge of a pad meets the curved wall, and the mug turns until it lies flat. The

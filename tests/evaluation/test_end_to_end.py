@@ -140,7 +140,6 @@ def test_files_are_there_and_agree(run: Run) -> None:
     assert stages.count(Stage.CLEAR) == 3 and stages.count(Stage.REACHABLE) == 1
 
 
-@pytest.mark.thorough
 def test_the_same_again_in_another_process_and_order(run: Run, tmp_path: Path) -> None:
     again = evaluate(
         run.document.scene.path,

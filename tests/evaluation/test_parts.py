@@ -55,7 +55,6 @@ def refresh(campaign: Campaign) -> PartWriter:
     return writer
 
 
-@pytest.mark.thorough
 def test_damage(campaign: Campaign) -> None:
     parts = sorted((campaign.path / "parts").iterdir())
     assert len(parts) > 1

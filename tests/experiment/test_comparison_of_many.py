@@ -26,7 +26,6 @@ from tests.evaluation.known_scene import write_scene
 pytest.importorskip("pyarrow")
 
 
-@pytest.mark.thorough
 def test_many_scenes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     document, paths = write_scene(tmp_path).document, []
     for k, name in enumerate(("here", "there")):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from burg_drake.core.documents.schema import Pose
 from burg_drake.generation.heap import pile
@@ -21,7 +20,6 @@ BESIDE = -3.0
 """x in S of what hangs beside the table [m]."""
 
 
-@pytest.mark.thorough
 def test_what_falls_off_the_table_is_dropped_once_more(
     household: ObjectLibrary, tabletop: Station
 ) -> None:

@@ -37,7 +37,6 @@ def grasps(scene: Scene, count: int) -> tuple[list[str], np.ndarray]:
     return names, np.array(X_WO) @ np.array(X_OG)
 
 
-@pytest.mark.thorough
 def test_verdicts_do_not_depend_on_the_cache(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

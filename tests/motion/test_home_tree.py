@@ -22,6 +22,7 @@ from burg_drake.motion.transit.object_postures import postures_over_objects
 from burg_drake.scene.document.scene import load_scene
 from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.document.station_document import Obstacle, Station, load_station
+from tests.thorough import thorough
 
 GOALS = 8
 """Poses of the hand that are to be reached in each station."""
@@ -95,7 +96,7 @@ def table() -> Panda:
     return panda({})
 
 
-@pytest.fixture(scope="module", params=["table", "shelf"])
+@pytest.fixture(scope="module", params=["table", thorough("shelf")])
 def station_case(request: pytest.FixtureRequest, table: Panda) -> Panda:
     return table if request.param == "table" else panda(SHELF)
 
@@ -113,7 +114,6 @@ def length(path: np.ndarray) -> float:
     return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 
 
-@pytest.mark.thorough
 def test_no_way_fails_an_audit(station_case: Panda) -> None:
     found = [station_case.tree.connect(goals) for goals in station_case.goals]
     assert len(found) >= 8
@@ -127,7 +127,6 @@ def test_no_way_fails_an_audit(station_case: Panda) -> None:
         assert audit(station_case.edges, path, LEVERS)
 
 
-@pytest.mark.thorough
 def test_answers_do_not_depend_on_what_was_asked_before(table: Panda) -> None:
     asked = table.goals[:8]
     other = panda({}).tree
@@ -188,7 +187,6 @@ def test_out_of_a_narrow_shaft(tmp_path: Path) -> None:
     assert answer is not None and audit(edges, answer[1], np.ones(3))
 
 
-@pytest.mark.thorough
 def test_no_way_into_a_closed_box(tmp_path: Path) -> None:
     closed = {
         "front": box((0.55, -0.25, 0.0), (0.57, 0.25, 0.7)),

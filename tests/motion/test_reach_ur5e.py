@@ -19,8 +19,6 @@ from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.diagram.station_diagram import instance_pose
 from burg_drake.station.document.station_document import Station, load_station
 
-pytestmark = pytest.mark.thorough
-
 DOWN = np.diag([1.0, -1.0, -1.0])
 
 
@@ -56,6 +54,7 @@ def verdicts(scene: Scene, station: Station, grasps: tuple[list[str], np.ndarray
     return ArmReach(scene, station).check_all(*grasps)
 
 
+@pytest.mark.thorough
 def test_motions_are_free_and_whole(
     scene: Scene, station: Station, grasps: tuple[list[str], np.ndarray], verdicts: list[Reach]
 ) -> None:

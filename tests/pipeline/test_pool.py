@@ -43,7 +43,6 @@ class Fatal(trimesh.Trimesh):
         trimesh.Trimesh.faces.fset(self, values)
 
 
-@pytest.mark.thorough
 def test_errors_and_a_worker_that_dies_cost_one_object_each(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

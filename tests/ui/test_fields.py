@@ -48,7 +48,6 @@ def settle(page: SetupPage) -> None:
     assert page.actions.queue.idle(PATIENCE)
 
 
-@pytest.mark.thorough
 def test_a_scene_is_saved_to_its_file_whatever_the_scene_is_called(page: SetupPage) -> None:
     session = page.actions.session
     path = session.folder / "my_scene.yaml"

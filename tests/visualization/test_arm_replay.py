@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from eye import VIEWS, in_view, messages
 
 from burg_drake.core.frames import grasp_from_axes, transform_points
@@ -23,7 +22,6 @@ X_OG = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 """Across the narrow side of the household box, from above."""
 
 
-@pytest.mark.thorough
 def test_the_arm_is_recorded_from_home_on() -> None:
     scene, station = tabletop("box"), load_station("panda_tabletop")
     found = plan(scene, station, "box", X_OG, width=0.06)
