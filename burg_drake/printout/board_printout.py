@@ -87,6 +87,10 @@ class Printout:
     settings: PrintSettings
     warnings: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        pages, kib = len(self.tiling.tiles), len(self.pdf) / 1024
+        return f"Printout({pages} pages of {self.settings.page}, {kib:.0f} KiB)"
+
     def p_PQ(self, page: int, p_SQ: Array) -> Array:
         """Points of the board on a page of the document.
 

@@ -90,7 +90,7 @@ def test_as_a_process() -> None:
     assert done.returncode == 2
     assert done.stdout == ""
     names = ", ".join(builtin_names("scenes"))
-    assert done.stderr == f"burg-drake: error: nowhere does not exist; known: {names}\n"
+    assert done.stderr == f"burg-drake: error: scene nowhere does not exist; known: {names}\n"
 
 
 @pytest.mark.parametrize("arguments", [[], ["scene"], ["nonsense"], ["evaluate", "--sead", "1"]])

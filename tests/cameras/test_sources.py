@@ -418,5 +418,5 @@ def test_a_simulated_camera_needs_its_scene_and_name() -> None:
     for name in ("nowhere/board", "nowhere"):
         with pytest.raises(UnknownNameError) as raised:
             open_source(f"sim:{name}", scene=scene)
-        start = f"station of sim:{name}: nowhere does not exist; known: "
+        start = f"station of sim:{name}: station nowhere does not exist; known: "
         assert str(raised.value).startswith(start)

@@ -17,6 +17,8 @@ from burg_drake.core.paths.packages import NO_PACKAGES, PACKAGE_REFERENCE, Packa
 BURG_DRAKE = "burg_drake"
 """The package that the installed data are."""
 PACKAGE_URI = f"package://{BURG_DRAKE}/"
+WORDS = {"scenes": "scene", "stations": "station", "models": "library", "models/hands": "hand"}
+"""What people call one of each kind."""
 
 
 @cache
@@ -77,7 +79,8 @@ def resolve(
         return located.resolve()
     where = f" (relative to {base})" if base is not None and not path.is_absolute() else ""
     known = f"; {nearest(path.stem, builtin_names(kind))}" if kind else ""
-    raise UnknownNameError(f"{text} does not exist{where}{known}")
+    what = f"{WORDS[kind]} " if kind and base is None else ""  # documents name the entry
+    raise UnknownNameError(f"{what}{text} does not exist{where}{known}")
 
 
 def expanded(text: str) -> Path:

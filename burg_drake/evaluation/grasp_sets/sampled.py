@@ -50,6 +50,7 @@ def sample_grasps(
         UnknownNameError: no such instance or object, or a mesh file is missing.
     """
     chosen = settings or SamplingSettings()
+    only = (only,) if isinstance(only, str) else only
     station = as_station(station)
     if isinstance(source, ObjectLibrary):
         scene, library = None, source

@@ -63,6 +63,9 @@ class ObjectLibrary:
     document: LibraryDocument
     root: Path
 
+    def __repr__(self) -> str:
+        return f"ObjectLibrary({self.name!r}, {len(self.objects)} objects, {str(self.root)!r})"
+
     @property
     def name(self) -> str:
         """The library's name."""

@@ -86,6 +86,10 @@ class Scene:
     library: ObjectLibrary
     path: Path
 
+    def __repr__(self) -> str:
+        fixed = f", {len(self.background)} in the background" if self.background else ""
+        return f"Scene({self.name!r}, {len(self.instances)} objects{fixed}, {str(self.path)!r})"
+
     @property
     def name(self) -> str:
         """The scene's name."""

@@ -227,6 +227,10 @@ class Station:
     hand_path: Path | None = None
     packages: Packages = NO_PACKAGES
 
+    def __repr__(self) -> str:
+        arm = f", arm {self.arm_model.stem!r}" if self.arm_model else ""
+        return f"Station({self.name!r}, hand {self.hand.name!r}{arm}, {str(self.path)!r})"
+
     @property
     def name(self) -> str:
         """The station's name."""
