@@ -3,6 +3,7 @@ program in a process of its own, with a folder for files, by `test_one_record`."
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.util
 import json
 import math
@@ -71,7 +72,9 @@ def look_for_it(folder: Path) -> None:
         columns = table.trial_columns([judged], origin, instances=["box"])
         assert ("wobble" in columns) == (mode != "hand")
     names = list(columns)
-    assert names[names.index("pushed") + 1] == "wobble"
+    declared = [one.name for one in dataclasses.fields(Margins)]
+    before = declared[declared.index("wobble") - 1]
+    assert names[names.index(before) + 1] == "wobble"
     for suffix in (".csv", ".parquet"):
         path = (folder / "results").with_suffix(suffix)
         table_file.write_table(path, columns)
