@@ -29,11 +29,12 @@ from burg_drake.evaluation.run import (
     EvaluationSettings,
     GraspsLike,
     Request,
+    evaluate_scenes,
     finish_run,
     open_grasps,
     open_run,
     require_judged,
-    require_sound as _require_sound,
+    require_sound,
 )
 from burg_drake.evaluation.stages import StationJudgeFactory
 from burg_drake.evaluation.store import (
@@ -139,11 +140,7 @@ def evaluate(
     require_writer(request.settings.table)
     if isinstance(scene, (Scene, str, Path)):
         return _evaluate_one(scene, request, Path(out), executor, progress)
-    from burg_drake.evaluation.run import evaluate_scenes
-
-    return evaluate_scenes(
-        scene, request, Path(out), executor, StationJudgeFactory, _require_sound, progress
-    )
+    return evaluate_scenes(scene, request, Path(out), executor, progress)
 
 
 def _evaluate_one(
@@ -159,7 +156,7 @@ def _evaluate_one(
     given = request.given(scene)
     require_run_folder(folder)
     if not (folder / RUN_FILE).exists():
-        _require_sound(scene, station, mode)
+        require_sound(scene, station, mode)
     if given is not None:
         given_candidates(scene, given)  # refuses what does not fit before the folder is made
     writable_folder(folder)
