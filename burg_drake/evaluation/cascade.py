@@ -18,7 +18,6 @@ from typing import overload
 from burg_drake.core import InvalidInputError
 from burg_drake.core.files import remove_unfinished, writable_folder
 from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
-from burg_drake.core.workers import default_workers
 from burg_drake.evaluation.candidates import given_candidates
 from burg_drake.evaluation.records import (
     Journal,
@@ -133,7 +132,7 @@ def evaluate(
     settings = settings or EvaluationSettings()
     station = as_station(station)
     if executor is None:
-        executor = LocalExecutor(default_workers() if workers is None else workers)
+        executor = LocalExecutor.of_this_machine(workers)
     elif workers is not None:
         raise InvalidInputError("give workers or an executor, which has its own, not both")
     request = Request.of(station, settings, grasps, retry_failed=retry_failed)
