@@ -92,6 +92,25 @@ def look_for_it(folder: Path) -> None:
     assert vars(as_result(other).margins)["wobble"] == 0.5
 
 
+def look_for_it_where_people_read() -> None:
+    """Fails where reports or replays do not show the margins."""
+    from burg_drake.core.grasps import Margins, Outcome, Stage, Verdict
+    from burg_drake.evaluation.replay import arm_figures
+    from burg_drake.evaluation.report.sections import FURTHER, further_margins
+    from burg_drake.simulation.trials.result import TrialResult
+    from burg_drake.visualization.scenes import describe
+
+    assert {"wobble", "detour"} <= set(FURTHER)
+    values = {"wobble": np.array([0.1, 0.2]), "detour": np.array([0.1, 0.2])}
+    page = str(further_margins(values, np.zeros(2, dtype=np.int8)))
+    assert "wobble [°]" in page and "detour [mm]" in page
+    found = Margins(**{"slip": 0.001, "wobble": np.deg2rad(3.0)})
+    told = describe(TrialResult(outcome=Outcome.LIFTED, margins=found))
+    assert told == ["lifted", "slip 1.0 mm, wobble 3.0 deg"]
+    verdict = Verdict(Outcome.LIFTED, Stage.EXECUTED, margins={"wobble": 1.0, "detour": 0.25})
+    assert arm_figures(verdict) == ["detour 250.0 mm"]
+
+
 def look_for_that_of_the_arm() -> None:
     """Fails where the margin that the arm's screen measures is missing, or taken for a trial's."""
     from burg_drake.core.grasps import Margins, Outcome, Stage, Verdict
@@ -112,4 +131,5 @@ def look_for_that_of_the_arm() -> None:
 if __name__ == "__main__":
     declare()
     look_for_it(Path(sys.argv[1]))
+    look_for_it_where_people_read()
     look_for_that_of_the_arm()
