@@ -33,7 +33,7 @@ from known_judge import Make, TimedJudge
 
 from burg_drake.evaluation.candidates.candidates import Candidate
 from burg_drake.evaluation.cluster.dask_executor import connect_cluster
-from burg_drake.evaluation.workers.executor import Executor, Job, LocalExecutor
+from burg_drake.evaluation.workers import Executor, Job, LocalExecutor
 
 SLOWEST = 1800.0
 """An attempt that takes longer has hung [s]."""

@@ -38,7 +38,7 @@ from burg_drake.evaluation.cluster.local_nodes import LocalNodes
 from burg_drake.evaluation.cluster.node import LOOPBACK, NO_WEB
 from burg_drake.evaluation.cluster.sent_job import MOST
 from burg_drake.evaluation.stages.judge import judge_grasp
-from burg_drake.evaluation.workers.executor import Job
+from burg_drake.evaluation.workers import Job
 from burg_drake.evaluation.workers.limits import WorkerLimits
 
 IDLE = 10.0

@@ -134,10 +134,9 @@ def judged_here() -> Iterator[None]:
     from burg_drake.evaluation.workers import JudgePool
 
     with pytest.MonkeyPatch.context() as patch:
-        for user in ("executor", "single_job"):
-            patch.setattr(
-                f"burg_drake.evaluation.workers.{user}.JudgePool", _pool_or_this_process(JudgePool)
-            )
+        patch.setattr(
+            "burg_drake.evaluation.workers.executor.JudgePool", _pool_or_this_process(JudgePool)
+        )
         yield
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from burg_drake.apps.cli import main
-from burg_drake.evaluation.workers.executor import LocalExecutor
+from burg_drake.evaluation.workers import LocalExecutor
 from burg_drake.system_libraries import missing_render_libraries
 from tests.evaluation.inline_executor import Inline
 from tests.pages import PAGES, blocks

@@ -18,7 +18,6 @@ from typing import overload
 from burg_drake.core import InvalidInputError
 from burg_drake.core.files import remove_unfinished, writable_folder
 from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
-from burg_drake.core.workers import default_workers
 from burg_drake.evaluation.candidates import given_candidates
 from burg_drake.evaluation.records import (
     Journal,
@@ -29,11 +28,12 @@ from burg_drake.evaluation.run import (
     EvaluationSettings,
     GraspsLike,
     Request,
+    evaluate_scenes,
     finish_run,
     open_grasps,
     open_run,
     require_judged,
-    require_sound as _require_sound,
+    require_sound,
 )
 from burg_drake.evaluation.stages import StationJudgeFactory
 from burg_drake.evaluation.store import (
@@ -132,18 +132,14 @@ def evaluate(
     settings = settings or EvaluationSettings()
     station = as_station(station)
     if executor is None:
-        executor = LocalExecutor(default_workers() if workers is None else workers)
+        executor = LocalExecutor.of_this_machine(workers)
     elif workers is not None:
         raise InvalidInputError("give workers or an executor, which has its own, not both")
     request = Request.of(station, settings, grasps, retry_failed=retry_failed)
     require_writer(request.settings.table)
     if isinstance(scene, (Scene, str, Path)):
         return _evaluate_one(scene, request, Path(out), executor, progress)
-    from burg_drake.evaluation.run import evaluate_scenes
-
-    return evaluate_scenes(
-        scene, request, Path(out), executor, StationJudgeFactory, _require_sound, progress
-    )
+    return evaluate_scenes(scene, request, Path(out), executor, progress)
 
 
 def _evaluate_one(
@@ -159,7 +155,7 @@ def _evaluate_one(
     given = request.given(scene)
     require_run_folder(folder)
     if not (folder / RUN_FILE).exists():
-        _require_sound(scene, station, mode)
+        require_sound(scene, station, mode)
     if given is not None:
         given_candidates(scene, given)  # refuses what does not fit before the folder is made
     writable_folder(folder)

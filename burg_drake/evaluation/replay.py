@@ -12,12 +12,14 @@ from burg_drake.core import (
 from burg_drake.core.grasps import (
     ARM_SCREEN_MARGINS,
     LIFT_HEIGHT,
+    MARGINS,
+    TRIAL_MARGINS,
     VERDICT_FIELDS,
     Margins,
     Mode,
     Stage,
     Verdict,
-    shown_number,
+    shown_figures,
 )
 from burg_drake.evaluation.records import (
     RecordedTrial,
@@ -145,16 +147,9 @@ def _bits(value: float | str) -> str:
 
 def arm_figures(verdict: Verdict) -> list[str]:
     """What the screen of the arm has measured, as lines for people; none if it was not asked."""
-    figures = [
-        f"{label} {shown_number(name, verdict.margins[name], digits)}"
-        for label, name, digits in (
-            ("arm clearance", "arm_clearance", 1),
-            ("beyond a joint limit by", "joint_excess", 1),
-            ("planned motion", "duration", 2),
-        )
-        if name in verdict.margins
-    ]
-    return [", ".join(figures)] if figures else []
+    of_arm = [n for n in MARGINS if n not in TRIAL_MARGINS and n != LIFT_HEIGHT]
+    figures = shown_figures(verdict.margins, of_arm)
+    return [figures] if figures else []
 
 
 def motion_figures(trial: RecordedTrial, origin: TrialOrigin) -> list[str]:

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import pickle
+
 from burg_drake.core.grasps.outcome import Outcome, Stage
 
 
@@ -59,3 +61,8 @@ def test_each_outcome_is_decided_by_one_stage():
     }
     assert sum(map(len, by_stage.values())) == len(Outcome)
     assert Outcome.LIFTED in by_stage[Stage.EXECUTED]
+
+
+def test_each_outcome_says_what_it_means():
+    assert len({outcome.meaning for outcome in Outcome if outcome.meaning}) == len(Outcome)
+    assert pickle.loads(pickle.dumps(Outcome.NO_IK)) is Outcome("no_ik") is Outcome.NO_IK

@@ -242,8 +242,10 @@ class DieOnStart:
 def install(setattr: Callable[[str, Any], None], log: Path | None = None, pause: float = 0) -> None:
     """Replaces the simulation of `evaluate` in this process by `KnownJudge`."""
     judge = Make(KnownJudge(log, pause))
-    setattr("burg_drake.evaluation.cascade.StationJudgeFactory", lambda *_: judge)
-    setattr("burg_drake.evaluation.cascade._require_sound", lambda *_: None)
+    for module in ("cascade", "run.many_scenes"):
+        setattr(f"burg_drake.evaluation.{module}.StationJudgeFactory", lambda *_: judge)
+    for module in ("cascade", "run.scene_tasks"):
+        setattr(f"burg_drake.evaluation.{module}.require_sound", lambda *_: None)
     # of many scenes, too: processes of their own would not know of this
     setattr("burg_drake.evaluation.run.scene_processes.preparers", lambda workers: 0)
     # the chart of the arm's reach takes longer than all else

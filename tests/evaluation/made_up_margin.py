@@ -3,6 +3,7 @@ program in a process of its own, with a folder for files, by `test_one_record`."
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.util
 import json
 import math
@@ -71,7 +72,9 @@ def look_for_it(folder: Path) -> None:
         columns = table.trial_columns([judged], origin, instances=["box"])
         assert ("wobble" in columns) == (mode != "hand")
     names = list(columns)
-    assert names[names.index("pushed") + 1] == "wobble"
+    declared = [one.name for one in dataclasses.fields(Margins)]
+    before = declared[declared.index("wobble") - 1]
+    assert names[names.index(before) + 1] == "wobble"
     for suffix in (".csv", ".parquet"):
         path = (folder / "results").with_suffix(suffix)
         table_file.write_table(path, columns)
@@ -87,6 +90,25 @@ def look_for_it(folder: Path) -> None:
     (found,) = differences(verdict, other)
     assert str(found) == "wobble: recorded 0.25, now 0.5"
     assert vars(as_result(other).margins)["wobble"] == 0.5
+
+
+def look_for_it_where_people_read() -> None:
+    """Fails where reports or replays do not show the margins."""
+    from burg_drake.core.grasps import Margins, Outcome, Stage, Verdict
+    from burg_drake.evaluation.replay import arm_figures
+    from burg_drake.evaluation.report.sections import FURTHER, further_margins
+    from burg_drake.simulation.trials.result import TrialResult
+    from burg_drake.visualization.scenes import describe
+
+    assert {"wobble", "detour"} <= set(FURTHER)
+    values = {"wobble": np.array([0.1, 0.2]), "detour": np.array([0.1, 0.2])}
+    page = str(further_margins(values, np.zeros(2, dtype=np.int8)))
+    assert "wobble [°]" in page and "detour [mm]" in page
+    found = Margins(**{"slip": 0.001, "wobble": np.deg2rad(3.0)})
+    told = describe(TrialResult(outcome=Outcome.LIFTED, margins=found))
+    assert told == ["lifted", "slip 1.0 mm, wobble 3.0 deg"]
+    verdict = Verdict(Outcome.LIFTED, Stage.EXECUTED, margins={"wobble": 1.0, "detour": 0.25})
+    assert arm_figures(verdict) == ["detour 250.0 mm"]
 
 
 def look_for_that_of_the_arm() -> None:
@@ -109,4 +131,5 @@ def look_for_that_of_the_arm() -> None:
 if __name__ == "__main__":
     declare()
     look_for_it(Path(sys.argv[1]))
+    look_for_it_where_people_read()
     look_for_that_of_the_arm()

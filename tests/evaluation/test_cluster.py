@@ -22,7 +22,7 @@ from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.core.workers.processes import start_worker
 from burg_drake.evaluation.candidates.candidates import Candidate
 from burg_drake.evaluation.stages.station_judge import StationJudgeFactory
-from burg_drake.evaluation.workers.executor import Job, JobFailed
+from burg_drake.evaluation.workers import Job, JobFailed
 from burg_drake.evaluation.workers.limits import WorkerLimits
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.document.engine import ENGINES
@@ -223,7 +223,7 @@ import numpy as np
 from known_judge import KnownJudge, MakeAndTell
 from burg_drake.evaluation.candidates.candidates import Candidate
 from burg_drake.evaluation.cluster.dask_executor import connect_cluster
-from burg_drake.evaluation.workers.executor import Job
+from burg_drake.evaluation.workers import Job
 grasps = [Candidate(str(k), "cube", np.eye(4)) for k in range(400)]
 with connect_cluster("local:1") as executor:
     job = Job("job", MakeAndTell(KnownJudge(pause=0.05), Path({log!r}), "job"), grasps)

@@ -19,7 +19,7 @@ from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.candidates.candidates import Candidate
 from burg_drake.evaluation.stages.judge import judge_grasp
 from burg_drake.evaluation.stages.station_judge import StationJudgeFactory
-from burg_drake.evaluation.workers.executor import Job
+from burg_drake.evaluation.workers import Job
 from burg_drake.evaluation.workers.limits import WorkerLimits
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.document.engine import ENGINES

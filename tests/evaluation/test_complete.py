@@ -15,7 +15,7 @@ from inline_executor import Inline
 from burg_drake.apps.cli import main
 from burg_drake.core.errors import SimulationError
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.workers.executor import Job, OnFailure
+from burg_drake.evaluation.workers import Job, OnFailure
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.document.station_document import Station
 
@@ -58,7 +58,8 @@ def test_the_command_does_not_end_as_if_all_were_well(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr("burg_drake.evaluation.cascade.LocalExecutor", lambda workers: Short())
+    local = "burg_drake.evaluation.cascade.LocalExecutor.of_this_machine"
+    monkeypatch.setattr(local, lambda workers: Short())
     call = ["evaluate", "tabletop_six", "-n", "1", "--mode", "hand", "--blind", "--quiet"]
     assert main([*call, "-o", str(tmp_path / "run")]) == 2
     assert re.search(r"\d of \d grasps have come back without a verdict", capsys.readouterr().err)

@@ -13,7 +13,7 @@ from known_judge import CrashingJudge, KnownJudge, Make, MakeAndTell, die, expec
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.candidates.candidates import Candidate
-from burg_drake.evaluation.workers.executor import Job, JobFailed, LocalExecutor
+from burg_drake.evaluation.workers import Job, JobFailed, LocalExecutor
 from burg_drake.evaluation.workers.limits import WorkerLimits
 
 

@@ -144,17 +144,17 @@ def test_a_scene_that_cannot_be_judged_does_not_stop_the_others(
     def judge(scene: Scene, *_):
         return refuse if scene.name == "moved" else made(scene)
 
-    from burg_drake.evaluation import cascade
+    from burg_drake.evaluation.run import many_scenes, scene_tasks
 
-    made, sound = cascade.StationJudgeFactory, cascade._require_sound
-    monkeypatch.setattr("burg_drake.evaluation.cascade._require_sound", unsound)
-    monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", judge)
+    made, sound = many_scenes.StationJudgeFactory, scene_tasks.require_sound
+    monkeypatch.setattr("burg_drake.evaluation.run.scene_tasks.require_sound", unsound)
+    monkeypatch.setattr("burg_drake.evaluation.run.many_scenes.StationJudgeFactory", judge)
     campaign = run_all(scenes, station, tmp_path / "all")
     assert campaign.failed == {"cubes": "two cubes overlap", "moved": "no such model"}
     assert not campaign.complete and campaign.run("three").complete
     assert summarize(campaign).notes == ("2 scenes could not be judged: cubes, moved",)
-    monkeypatch.setattr("burg_drake.evaluation.cascade._require_sound", sound)
-    monkeypatch.setattr("burg_drake.evaluation.cascade.StationJudgeFactory", made)
+    monkeypatch.setattr("burg_drake.evaluation.run.scene_tasks.require_sound", sound)
+    monkeypatch.setattr("burg_drake.evaluation.run.many_scenes.StationJudgeFactory", made)
     mended = run_all(scenes, station, tmp_path / "all", executor=(executor := Inline()))
     assert mended.complete and not mended.failed and executor.judged == 25
 

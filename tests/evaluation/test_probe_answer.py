@@ -35,6 +35,7 @@ def kept(answer: ProbeAnswer) -> ProbeAnswer:
 )
 def test_a_journal_keeps_an_answer(answer: ProbeAnswer) -> None:
     assert kept(answer) == answer
+    assert answer.failed == (answer.outcome is Outcome.SIMULATION_FAILED)
 
 
 def test_a_repeat_that_fails_is_counted_and_a_test_that_fails_is_named() -> None:

@@ -7,7 +7,10 @@ from .column_meanings import (
     INPUT_PREFIX as INPUT_PREFIX,
     column_metadata as column_metadata,
     describe as describe,
+    shown_axis as shown_axis,
+    shown_figures as shown_figures,
     shown_number as shown_number,
+    shown_title as shown_title,
     shown_unit as shown_unit,
 )
 from .csv_metadata_file import (
@@ -46,9 +49,11 @@ from .verdict_columns import (
     PUSHED as PUSHED,
     SMALLER_IS_BETTER as SMALLER_IS_BETTER,
     TRIAL_FINDINGS as TRIAL_FINDINGS,
+    TRIAL_MARGINS as TRIAL_MARGINS,
     VERDICT_FIELDS as VERDICT_FIELDS,
     fields_in as fields_in,
     joined_findings as joined_findings,
+    shown_order as shown_order,
 )
 from .verdict_field import (
     TableShape as TableShape,

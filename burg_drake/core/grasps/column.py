@@ -23,18 +23,24 @@ SHOWN_UNITS: Mapping[str, tuple[str, float]] = {
 
 @dataclass(frozen=True)
 class Column:
-    """Meaning of a column.
+    """Meaning of a column, and how people read its numbers.
 
     Attributes:
         unit: `TEXT`, `PLAIN`, or a unit such as m, rad, N, s; `g` is the standard gravity of
             9.81 m/s2, and `weights` are those of the object.
         description: what its values are, in which frame.
         own_unit: for people, where it is not the usual one of its unit, and the factor to it.
+        title: what people call it in a line or the head of a table; its name if empty.
+        axis: what they call it at an axis, where there is room for more; the title if empty.
+        digits: decimals of its numbers in the unit for people.
     """
 
     unit: str
     description: str
     own_unit: tuple[str, float] | None = None
+    title: str = ""
+    axis: str = ""
+    digits: int = 1
 
     @property
     def shown(self) -> tuple[str, float]:

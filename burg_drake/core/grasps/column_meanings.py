@@ -6,8 +6,9 @@ prints it, and a test holds the two together.
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from burg_drake.core.grasps.column import PLAIN, TEXT, Column
@@ -178,7 +179,40 @@ def shown_unit(name: str) -> tuple[str, float]:
     return ("", 1.0) if column is None else column.shown
 
 
-def shown_number(name: str, value: float, digits: int) -> str:
-    """A value of a column in a line for people, such as `12.3 mm`."""
-    unit, factor = shown_unit(name)
-    return f"{value * factor:.{digits}f} {unit.replace('°', 'deg')}"
+def shown_title(name: str) -> str:
+    """What people call a column in a line or the head of a table."""
+    column = describe(name)
+    return (column and column.title) or name.replace("_", " ")
+
+
+def shown_axis(name: str) -> str:
+    """What people call a column at an axis."""
+    column = describe(name)
+    return (column and column.axis) or shown_title(name)
+
+
+def shown_number(name: str, value: float, digits: int | None = None) -> str:
+    """A value of a column with its unit for people, such as `12.3 mm` or `2.0°`; `-` if there is
+    none.
+
+    Args:
+        name: of the column.
+        value: in the unit of the column.
+        digits: decimals, if not those that the column declares.
+    """
+    if math.isnan(value):
+        return "-"
+    column = describe(name) or Column(PLAIN, "")
+    unit, factor = column.shown
+    number = f"{value * factor:.{column.digits if digits is None else digits}f}"
+    return f"{number}{unit}" if unit == "°" else f"{number} {unit}".rstrip()
+
+
+def shown_figures(values: Mapping[str, float], names: Iterable[str]) -> str:
+    """Those of some columns that have a value, as a line for a terminal that may not know the sign
+    of degrees, such as `slip 1.2 mm, tilt 2.0 deg`."""
+    return ", ".join(
+        f"{shown_title(name)} {shown_number(name, values[name]).replace('°', ' deg')}"
+        for name in names
+        if math.isfinite(values.get(name, math.nan))
+    )

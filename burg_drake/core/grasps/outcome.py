@@ -18,58 +18,66 @@ class Stage(StrEnum):
 
 
 class Outcome(StrEnum):
-    """Why a grasp ended. `LIFTED` alone is success."""
+    """Why a grasp ended. `LIFTED` alone is success.
 
-    COLLISION_TARGET = "collision_target"
-    """The open hand overlaps the target at the grasp."""
-    COLLISION_TABLE = "collision_table"
-    """The open hand overlaps the table."""
-    COLLISION_CLUTTER = "collision_clutter"
-    """The open hand overlaps another object of the scene."""
-    COLLISION_BACKGROUND = "collision_background"
-    """The open hand overlaps a fixed body of the scene or station."""
-    HAND_COLLISION_APPROACH = "hand_collision_approach"
-    """On the straight segment from pregrasp to grasp the open hand overlaps something."""
-    HAND_COLLISION_RETREAT = "hand_collision_retreat"
-    """On the straight segment back the hand, or the target in it, overlaps something."""
-    HAND_COLLISION_LIFT = "hand_collision_lift"
-    """On the lift the hand, or the target in it, overlaps something."""
-    NO_IK = "no_ik"
-    """No arm configuration puts the hand at the grasp and at the pregrasp, whatever the joint
-    limits."""
-    JOINT_LIMIT = "joint_limit"
-    """Configurations exist, but each is beyond a joint limit."""
-    ARM_COLLISION = "arm_collision"
-    """Configurations exist, but in each found the arm collides."""
-    APPROACH_LINE = "approach_line"
-    """Grasp and pregrasp are reached, but the arm cannot take the hand straight from one to the
-    other."""
-    RETREAT_LINE = "retreat_line"
-    """The arm cannot take the hand straight back from the grasp."""
-    LIFT_LINE = "lift_line"
-    """The arm cannot take the hand along the lift."""
-    NO_PATH = "no_path"
-    """No collision-free path from the home posture to a pregrasp was found."""
-    NO_CONTACT = "no_contact"
-    """The fingers closed and never touched the target."""
-    ONE_FINGER = "one_finger"
-    """The fingers stopped with only one of them on the target."""
-    CLOSED_EMPTY = "closed_empty"
-    """The target was touched, but escaped while the fingers closed."""
-    SLIPPED = "slipped"
-    """Both fingers held the target and lost it during the lift."""
-    BLOCKED = "blocked"
-    """During its motion the hand or the arm met something fixed."""
-    DROPPED = "dropped"
-    """The target was lifted and lost while being held."""
-    LIFTED = "lifted"
-    """Both fingers still hold the target at the end, and nothing else was disturbed."""
-    LIFTED_DISTURBED = "lifted_disturbed"
-    """Both fingers still hold the target at the end, but another object was moved on the way."""
-    SIMULATION_FAILED = "simulation_failed"
-    """Drake could not step the trial; the reason is stored with the result."""
-    REACHABLE = "reachable"
-    """The arm can execute the grasp, and no trial was asked for."""
+    Attributes:
+        meaning: what it says of the grasp, in a few words.
+    """
+
+    _value_: str
+    meaning: str
+
+    def __new__(cls, value: str, meaning: str = "") -> Outcome:
+        """A member by its value, which is stored, and its meaning."""
+        outcome = str.__new__(cls, value)
+        outcome._value_, outcome.meaning = value, meaning
+        return outcome
+
+    COLLISION_TARGET = "collision_target", "at the grasp the open hand is in the object itself"
+    COLLISION_TABLE = "collision_table", "at the grasp the open hand is in the table"
+    COLLISION_CLUTTER = "collision_clutter", "at the grasp the open hand is in another object"
+    COLLISION_BACKGROUND = (
+        "collision_background",
+        "at the grasp the open hand is in something fixed",
+    )
+    HAND_COLLISION_APPROACH = (
+        "hand_collision_approach",
+        "on the straight approach the open hand meets something",
+    )
+    HAND_COLLISION_RETREAT = (
+        "hand_collision_retreat",
+        "on the straight retreat the hand or the object in it meets something",
+    )
+    HAND_COLLISION_LIFT = (
+        "hand_collision_lift",
+        "on the lift the hand or the object in it meets something",
+    )
+    NO_IK = "no_ik", "no arm configuration puts the hand there, whatever the joint limits"
+    JOINT_LIMIT = "joint_limit", "there are such configurations, but all are beyond a joint limit"
+    ARM_COLLISION = "arm_collision", "within the limits, in each that was found the arm collides"
+    APPROACH_LINE = (
+        "approach_line",
+        "the arm can be at both ends of the approach, but cannot follow it",
+    )
+    RETREAT_LINE = "retreat_line", "the arm cannot follow the straight retreat"
+    LIFT_LINE = "lift_line", "the arm cannot follow the lift"
+    NO_PATH = "no_path", "no path from the home posture to the pregrasp was found"
+    NO_CONTACT = "no_contact", "the fingers closed and never touched the object"
+    ONE_FINGER = "one_finger", "the fingers stopped with only one of them on the object"
+    CLOSED_EMPTY = "closed_empty", "the object was touched, but escaped while the fingers closed"
+    SLIPPED = "slipped", "both fingers held the object, and lost it during the lift"
+    BLOCKED = "blocked", "during its motion the hand or the arm met something fixed"
+    DROPPED = "dropped", "the object was lifted, and lost while it was held"
+    LIFTED = "lifted", "both fingers hold the object to the end, and nothing else was moved"
+    LIFTED_DISTURBED = (
+        "lifted_disturbed",
+        "the object is held to the end, but another one was moved",
+    )
+    SIMULATION_FAILED = (
+        "simulation_failed",
+        "the trial could not be simulated; the results have the reason",
+    )
+    REACHABLE = "reachable", "the arm can execute the grasp, and no trial was asked for"
 
     @property
     def held(self) -> bool:

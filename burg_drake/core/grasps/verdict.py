@@ -42,22 +42,41 @@ class Margins:
         "how deep the open hand overlaps what it collides with; 0 if clear",
         smaller_is_better=True,
     )
-    clearance: float = margin("m", "signed distance of the open hand from what is nearest to it")
+    clearance: float = margin(
+        "m",
+        "signed distance of the open hand from what is nearest to it",
+        axis="room around the open hand",
+    )
     slip: float = margin(
         "m",
         "displacement of the target in the hand since the grip, at the origin of G",
         smaller_is_better=True,
+        axis="slip in the hand",
     )
     tilt: float = margin(
-        "rad", "rotation of the target in the hand since the grip", smaller_is_better=True
+        "rad",
+        "rotation of the target in the hand since the grip",
+        smaller_is_better=True,
+        axis="tilt in the hand",
     )
-    pad_force: float = margin("N", "normal force of the weaker pad along the closing direction")
-    patch_area: float = margin("m2", "contact patch of the pad with the smaller one")
+    pad_force: float = margin(
+        "N",
+        "normal force of the weaker pad along the closing direction",
+        axis="normal force of the weaker pad",
+    )
+    patch_area: float = margin(
+        "m2",
+        "contact patch of the pad with the smaller one",
+        title="patch",
+        axis="contact patch of the weaker pad",
+        digits=0,
+    )
     lift: float = margin(
         "m",
         "how far the target's centre of mass rose, or moved along the straight segments of"
         " another motion; if the trial was decided early, including the rest of the path, which"
         " is free by geometry",
+        digits=0,
     )
     lift_height: float = margin(
         "m",
@@ -65,7 +84,10 @@ class Margins:
         stage=Stage.REACHABLE,
     )
     others_moved: float = margin(
-        "m", "largest displacement of any other object's centre of mass", smaller_is_better=True
+        "m",
+        "largest displacement of any other object's centre of mass",
+        smaller_is_better=True,
+        axis="movement of other objects",
     )
     end_time: float = margin(
         "s",
@@ -77,6 +99,7 @@ class Margins:
         "smallest clearance of the robot along its path, or signed distance of what blocks it",
         mode="reach",
         stage=Stage.REACHABLE,
+        axis="room around the robot along its path",
     )
     joint_excess: float = margin(
         "rad",
@@ -84,8 +107,16 @@ class Margins:
         mode="reach",
         stage=Stage.REACHABLE,
         smaller_is_better=True,
+        title="beyond a joint limit by",
     )
-    duration: float = margin("s", "duration of the planned motion", mode="arm", stage=Stage.PLANNED)
+    duration: float = margin(
+        "s",
+        "duration of the planned motion",
+        mode="arm",
+        stage=Stage.PLANNED,
+        title="planned motion",
+        digits=2,
+    )
     tracking_error: float = margin(
         "rad",
         "largest deviation of a joint from its command",
@@ -98,6 +129,7 @@ class Margins:
         "largest deviation of the origin of G from its commanded position",
         mode="arm",
         smaller_is_better=True,
+        axis="error of the hand's path",
     )
     pushed: float = margin(
         "m",
@@ -105,6 +137,8 @@ class Margins:
         " its fall once it is touched",
         mode="arm",
         smaller_is_better=True,
+        title="pushed before closing",
+        axis="push before the hand closed",
     )
 
     def __eq__(self, other: object) -> bool:

@@ -38,6 +38,8 @@ ARM_SCREEN_MARGINS = tuple(
     one.name for one in fields(Margins) if one.metadata["stage"] is Stage.REACHABLE
 )
 """Margins that the arm's screen measures."""
+TRIAL_MARGINS = tuple(Margins().of_trial())
+"""Margins that a trial measures."""
 CPU_COLUMNS = {stage: name for stage, (name, _, _) in CPU_TIMES.items()}
 """Columns of the CPU time of each stage."""
 PREFIXES = {one.name: one.prefix for one in VERDICT_FIELDS if isinstance(one, InstancesField)}
@@ -48,6 +50,12 @@ MOVED, PUSHED = PREFIXES["displacements"], PREFIXES["pushed"]
 def fields_in(mode: Mode, part: VerdictPart) -> list[VerdictField]:
     """The fields that a part of a row has in tables of a mode."""
     return [one for one in VERDICT_FIELDS if one.part == part and asks(mode, one.mode)]
+
+
+def shown_order(first: Sequence[str], names: Sequence[str], *, without: Sequence[str]) -> list[str]:
+    """Names in an order for people: the first ones, then the others, so that a new one is shown
+    without being named; those aside that are shown elsewhere, or to nobody."""
+    return [*first, *(name for name in names if name not in {*first, *without})]
 
 
 def joined_findings(stages: Sequence[Findings]) -> dict[str, Any]:

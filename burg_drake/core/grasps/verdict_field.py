@@ -248,17 +248,20 @@ def margin(
     stage: Stage = Stage.EXECUTED,
     smaller_is_better: bool = False,
     own_unit: tuple[str, float] | None = None,
+    title: str = "",
+    axis: str = "",
+    digits: int = 1,
 ) -> Any:
     """A margin: NaN where it was not measured.
 
     Args:
-        unit, meaning, own_unit: see `Column`.
+        unit, meaning, own_unit, title, axis, digits: see `Column`.
         mode: the first mode in which it is measured.
         stage: the last one that measures it; `EXECUTED` of what a trial measures.
         smaller_is_better: whether a grasp is the better the smaller it is.
     """
     metadata = {
-        "column": Column(unit, meaning, own_unit),
+        "column": Column(unit, meaning, own_unit, title, axis, digits),
         "mode": mode,
         "stage": stage,
         "smaller_is_better": smaller_is_better,

@@ -5,6 +5,7 @@ from .processes import (
     default_workers as default_workers,
     exit_cause as exit_cause,
     start_worker as start_worker,
+    worker_count as worker_count,
 )
 from .tasks import (
     Session as Session,

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.workers.dispatcher import Dispatcher
-from burg_drake.core.workers.processes import default_workers
+from burg_drake.core.workers.processes import worker_count
 from burg_drake.core.workers.tasks import Task, WorkerFuture
 from burg_drake.core.workers.worker_process import PendingTask, Worker
 
@@ -43,9 +43,7 @@ class WorkerPool(Executor):
         Raises:
             InvalidInputError: workers is below 1.
         """
-        self.workers = default_workers() if workers is None else workers
-        if self.workers < 1:
-            raise InvalidInputError(f"workers is {self.workers}; give 1 or more")
+        self.workers = worker_count(workers)
         self._retries = retries
         self._places = [Worker(k, max(1, kept_sessions), own_group) for k in range(self.workers)]
         self._numbers = itertools.count()

@@ -14,6 +14,8 @@ import threading
 import time
 from multiprocessing.connection import Connection, Pipe
 
+from burg_drake.core.errors import InvalidInputError
+
 FROM_OUTSIDE = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP)
 """Signals that end a process from outside: the system when memory runs out, a batch system, a user.
 All others (SIGSEGV, SIGABRT) are of its own making, and would come again."""
@@ -30,6 +32,18 @@ def default_workers() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def worker_count(workers: int | None) -> int:
+    """A number of workers that was asked for; as many as there are processors if None.
+
+    Raises:
+        InvalidInputError: it is below 1.
+    """
+    count = default_workers() if workers is None else workers
+    if count < 1:
+        raise InvalidInputError(f"workers is {count}; give 1 or more")
+    return count
 
 
 def start_worker(module: str, *arguments: bool) -> tuple[subprocess.Popen[bytes], Connection]:

@@ -3,32 +3,21 @@
 from __future__ import annotations
 
 import functools
-import platform
 from collections.abc import Mapping
-from importlib import metadata
 from pathlib import Path
 
 import burg_drake
-from burg_drake.core import ClusterError, content_hash
-
-PACKAGES = ("drake", "numpy", "scipy", "trimesh")
-"""Packages that decide about verdicts."""
+from burg_drake.core import ClusterError, content_hash, software_versions
 
 
 @functools.cache
 def software() -> dict[str, str]:
     """Versions by name; of burg_drake also a hash of its code, as releases under way differ."""
-    found = {"python": platform.python_version(), "burg_drake": burg_drake.__version__}
-    for name in PACKAGES:
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:  # a Drake that was built from source has no metadata
-            found[name] = "unknown"
     package = Path(burg_drake.__file__).parent
     files = sorted(package.rglob("*.py"))
     names = [file.relative_to(package).as_posix() for file in files]
-    found["code of burg_drake"] = content_hash(names, files)[:12]
-    return found
+    code = content_hash(names, files)[:12]
+    return {**software_versions(with_platform=False), "code of burg_drake": code}
 
 
 def require_same(workers: Mapping[str, Mapping[str, str] | BaseException]) -> None:

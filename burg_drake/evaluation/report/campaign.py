@@ -76,7 +76,7 @@ def campaign_page(campaign: Campaign) -> str:
     document, summary = campaign.document, summarize(campaign)
     number = len(campaign.names)
     title = f"{format_count(number)} scene{'' if number == 1 else 's'} on {document.station.name}"
-    names = {m.column for m in (*CHOSEN, *FURTHER)} | {*MARGINS_ASKED, *TEXTS, *POSES, "id"}
+    names = {*CHOSEN, *FURTHER, *MARGINS_ASKED, *TEXTS, *POSES, "id"}
     stored = campaign.rows(sorted(names))
     outcomes = _members(stored, "outcome", [outcome.value for outcome in Outcome])
     groups = groups_of_codes(outcomes)
@@ -147,8 +147,7 @@ def _tried(
     """Margins of grasps that came to a trial, and their groups."""
     stages = [stage.value for stage in Stage]
     tried = _members(stored, "stage", stages) == stages.index(Stage.EXECUTED)
-    names = {margin.column for margin in (*CHOSEN, *FURTHER)}
-    return {name: stored.column(name)[tried] for name in names}, groups[tried]
+    return {name: stored.column(name)[tried] for name in (*CHOSEN, *FURTHER)}, groups[tried]
 
 
 def _rows(campaign: Campaign, stored: StoredRows, outcomes: NDArray[np.int8]) -> CauseRows:

@@ -45,7 +45,7 @@ class ProbeJudge:
         """The answer to a probe.
 
         Args:
-            test: one of `probes.TESTS`.
+            test: one of `settings.TESTS`.
             grasp: as it is tried.
 
         Returns:

@@ -75,7 +75,11 @@ def gathered(
 ) -> GraspRobustness:
     """What the answers to the probes of a grasp say of it; see `GraspRobustness`."""
     by_test = {answer.test: answer for answer in answers if answer.test != "noise"}
-    repeats = Counter(answer.outcome for answer in answers if answer.test == "noise")
+    repeats = Counter(
+        answer.outcome
+        for answer in answers
+        if answer.test == "noise" and answer.outcome is not None
+    )
     tug, shake, friction_min = (by_test.get(test) for test in ("tug", "shake", "friction"))
     return GraspRobustness(
         id,

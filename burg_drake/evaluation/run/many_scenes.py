@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 
@@ -40,6 +40,7 @@ from burg_drake.evaluation.run.scene_judging import SceneJudging, is_finished
 from burg_drake.evaluation.run.scene_list import Scenes, read_scenes, require_used
 from burg_drake.evaluation.run.scene_processes import SceneProcesses
 from burg_drake.evaluation.run.scene_tasks import Prepare, Preparer, SceneOutputs
+from burg_drake.evaluation.stages import StationJudgeFactory
 from burg_drake.evaluation.store import (
     LOCK_FILE,
     SCENES_FOLDER,
@@ -53,16 +54,12 @@ from burg_drake.evaluation.store import (
 from burg_drake.evaluation.workers import Executor, Job, JobFailed
 from burg_drake.scene.document import Scene, SceneLike
 
-MakeJudge = Callable[..., Callable[[], Any]]
-
 
 def evaluate_scenes(
     references: Sequence[SceneLike],
     request: Request,
     folder: Path,
     executor: Executor,
-    make_judge: MakeJudge,
-    check: Callable[..., None],
     progress: bool | Listener,
 ) -> Campaign:
     """Judges grasps of many scenes; see `evaluate`.
@@ -72,8 +69,6 @@ def evaluate_scenes(
         request: what is asked about each.
         folder: of the run.
         executor: who judges.
-        make_judge: makes the factory of a scene's judge.
-        check: refuses a scene that cannot be judged.
         progress: see `evaluate`.
     """
     require_arrow("a run over many scenes")
@@ -96,7 +91,7 @@ def evaluate_scenes(
         campaign = Campaign(folder, document)
         if before is None or document != before.document:
             save_campaign(campaign)
-        call = _Call(campaign, scenes, request, executor, make_judge, check, reporter)
+        call = _Call(campaign, scenes, request, executor, reporter)
         judged = call.run()
         renew_report(judged)
         require_scenes_judged(judged)
@@ -132,8 +127,6 @@ class _Call:
     scenes: Scenes
     request: Request
     executor: Executor
-    make_judge: MakeJudge
-    check: Callable[..., None]
     reporter: Reporter
 
     def __post_init__(self) -> None:
@@ -158,7 +151,7 @@ class _Call:
         )
         with ExitStack() as stack:
             processes = stack.enter_context(
-                SceneProcesses(Preparer(self.each, self.check), keeping, self.executor.workers)
+                SceneProcesses(Preparer(self.each), keeping, self.executor.workers)
             )
             if left:
                 self._judge(left, processes)
@@ -233,7 +226,7 @@ class _Call:
         if judging.known:
             self.pace.skip(judging.known, note=self._note())
         request = self.request
-        factory = self.make_judge(
+        factory = StationJudgeFactory(
             scene, request.station, request.engine, request.mode, request.motion
         )
         return Job(item.name, factory, judging.left)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from burg_drake.core import SimulationError
 from burg_drake.core.files import remove_unfinished, writable_folder
-from burg_drake.core.grasps import Mode
 from burg_drake.evaluation.records import JOURNAL_FILE, Journal, TableFormat
 from burg_drake.evaluation.run.preparation import finish_run, open_run, require_sound
 from burg_drake.evaluation.run.request import Request
@@ -20,7 +19,6 @@ from burg_drake.evaluation.store import (
     require_run_folder,
 )
 from burg_drake.scene.document import Scene, as_scene
-from burg_drake.station.document import Station
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,11 +60,9 @@ class Preparer:
 
     Attributes:
         request: what is asked.
-        check: refuses a scene that cannot be judged.
     """
 
     request: Request
-    check: Callable[[Scene, Station, Mode], None] = require_sound
 
     def __call__(self, work: Prepare) -> Scene | None:
         """Makes the folder of a scene's run; returns the scene, or None if there are no grasps.
@@ -80,7 +76,7 @@ class Preparer:
             return None
         require_run_folder(work.folder)
         if not (work.folder / RUN_FILE).exists():
-            self.check(scene, request.station, request.mode)
+            require_sound(scene, request.station, request.mode)
         given = request.given(scene)
         remove_unfinished(writable_folder(work.folder))
         with Journal(work.folder / JOURNAL_FILE):

@@ -49,8 +49,8 @@ class HandJudge(StationJudge):
         """Builds the diagrams that all grasps share; see `build_judge`."""
         from burg_drake.simulation.trials import HandTrial
 
-        motion = settings.motion or station.document.motion
         self._trial = HandTrial(scene, station, engine=engine, settings=settings)
+        motion = self._trial.motion
         X_WO = {name: self._trial.diagram.X_WO(name) for name in scene.instances}
         room = _room(scene, station, motion) if mode == "hand" else None
         screens = [hand_screen(self._trial.clearance, X_WO, room)]
@@ -79,9 +79,9 @@ class ArmJudge(StationJudge):
         from burg_drake.simulation.trials import ArmTrial
 
         hand, X_WO = hand_alone(scene, station)
-        reach = arm_reach(scene, station, settings.motion or station.document.motion)
-        self._planner = Planner(reach)
         self._trial = ArmTrial(scene, station, engine=engine, settings=settings, clearance=hand)
+        reach = arm_reach(scene, station, self._trial.motion)
+        self._planner = Planner(reach)
         super().__init__(
             [hand_screen(hand, X_WO), arm_screen(reach, X_WO, motions=True)],
             [(Stage.PLANNED, self._time), (Stage.EXECUTED, self._execute)],
@@ -122,7 +122,6 @@ def build_judge(
     from burg_drake.simulation.trials import TrialSettings
 
     settings = TrialSettings() if settings is None else settings
-    settings = replace(settings, motion=settings.motion or station.document.motion)
     if mode == "arm":
         return ArmJudge(scene, station, engine=engine, settings=settings)
     return HandJudge(scene, station, engine=engine, mode=mode, settings=settings)

@@ -10,15 +10,12 @@ from collections.abc import Generator, Iterable
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from burg_drake.core import InvalidInputError
 from burg_drake.core.grasps import Verdict
-from burg_drake.core.workers import default_workers
+from burg_drake.core.workers import worker_count
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.workers.job import Job, JobFailed, OnFailure
+from burg_drake.evaluation.workers.job import Job, OnFailure
 from burg_drake.evaluation.workers.limits import WorkerLimits
 from burg_drake.evaluation.workers.pool import JudgePool
-
-__all__ = ["Executor", "Job", "JobFailed", "LocalExecutor", "OnFailure"]
 
 
 class Executor(Protocol):
@@ -64,13 +61,18 @@ class LocalExecutor:
     limits: WorkerLimits = field(default_factory=WorkerLimits)
 
     def __post_init__(self) -> None:
-        if self.workers < 1:
-            raise InvalidInputError(f"workers is {self.workers}; give 1 or more")
+        worker_count(self.workers)  # refuses what is below 1
 
     @classmethod
-    def of_this_machine(cls) -> LocalExecutor:
-        """One process a processor."""
-        return cls(default_workers())
+    def of_this_machine(
+        cls, workers: int | None = None, limits: WorkerLimits | None = None
+    ) -> LocalExecutor:
+        """So many processes, one a processor if None; the usual limits if None.
+
+        Raises:
+            InvalidInputError: workers is below 1.
+        """
+        return cls(worker_count(workers), limits or WorkerLimits())
 
     def judge(
         self, jobs: Iterable[Job | None], on_failure: OnFailure | None = None

@@ -1,18 +1,16 @@
-"""Judges the grasps of one job in worker processes of this machine; see `pool`."""
+"""Judges the grasps of one job in worker processes of this machine; see `executor`."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
 
-from burg_drake.core import InvalidInputError
 from burg_drake.core.grasps import Verdict
-from burg_drake.core.workers import default_workers
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.stages import Judge
+from burg_drake.evaluation.workers.executor import LocalExecutor
 from burg_drake.evaluation.workers.job import Job
 from burg_drake.evaluation.workers.limits import WorkerLimits
-from burg_drake.evaluation.workers.pool import JudgePool
 
 
 def judge_all(
@@ -41,11 +39,7 @@ def judge_all(
         SimulationError: workers die while the judge is built, or at `WorkerLimits.hopeless` grasps
             in a row.
     """
-    count = default_workers() if workers is None else workers
-    if count < 1:
-        raise InvalidInputError(f"workers is {count}; give 1 or more")
-    pool = JudgePool(count, limits or WorkerLimits())
-    with closing(pool.run([Job("", make_judge, candidates)])) as answers:
+    executor = LocalExecutor.of_this_machine(workers, limits)
+    with closing(executor.judge([Job("", make_judge, candidates)])) as answers:
         for _, candidate, verdict in answers:
             yield candidate, verdict
-    pool.release()

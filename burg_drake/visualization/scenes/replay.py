@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatAnimation
 
 from burg_drake.core import Array
-from burg_drake.core.grasps import shown_number
+from burg_drake.core.grasps import TRIAL_MARGINS, shown_figures, shown_order
 from burg_drake.simulation.trials import HandTrial, TrialResult
 from burg_drake.station.diagram import FloatingHand
 from burg_drake.visualization.meshcat import aim_at
@@ -25,6 +23,19 @@ SHOWN = 5e-5
 """Displacements from here on are told [m]."""
 CLEAR_VIEW = 0.10
 """How far other objects should be beside the line of sight [m]."""
+
+
+TOLD = shown_order(
+    ("lift", "slip", "tilt", "pad_force", "patch_area", "others_moved", "pushed", "tracking_error"),
+    TRIAL_MARGINS,
+    without=(
+        "overlap",  # told with what the hand is in
+        "clearance",  # of the open hand, before anything moves
+        "end_time",  # seen
+        "tracking_distance",  # as the error of the joints
+    ),
+)
+"""Margins of a trial, in the order in which people are told."""
 
 
 def record_trial(
@@ -116,23 +127,10 @@ def describe(result: TrialResult) -> list[str]:
         lines[0] += f" ({result.blocker}{depth})"
     if result.reason:
         lines.append(result.reason)
-    figures = [
-        f"{label} {shown_number(name, getattr(margins, name), digits)}"
-        for label, name, digits in (
-            ("lift", "lift", 0),
-            ("slip", "slip", 1),
-            ("tilt", "tilt", 1),
-            ("pad force", "pad_force", 1),
-            ("patch", "patch_area", 0),
-            ("others moved", "others_moved", 1),
-            ("pushed before closing", "pushed", 1),
-            ("tracking error", "tracking_error", 1),
-        )
-        if math.isfinite(getattr(margins, name))
-    ]
+    figures = shown_figures(margins.of_trial(), TOLD)
     moved = sorted(result.displacements.items(), key=lambda item: -item[1])
     pushed = [f"{name} {far * 1e3:.1f} mm" for name, far in moved if far >= SHOWN]
-    lines += [", ".join(figures)] if figures else []
+    lines += [figures] if figures else []
     lines += [f"touched against the plan: {result.touched}"] if result.touched else []
     return lines + ([f"moved {', '.join(pushed)}"] if pushed else [])
 

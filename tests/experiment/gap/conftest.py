@@ -16,7 +16,7 @@ from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.stages.judge import judge_grasp
 from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.evaluation.workers.executor import Job, OnFailure
+from burg_drake.evaluation.workers import Job, OnFailure
 
 ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 """Across the narrow side of the household box, from above."""

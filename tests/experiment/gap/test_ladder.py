@@ -21,7 +21,7 @@ from burg_drake.evaluation.replay import differences
 from burg_drake.evaluation.stages.judge import judge_grasp
 from burg_drake.evaluation.stages.station_judge import build_judge
 from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.evaluation.workers.executor import Job
+from burg_drake.evaluation.workers import Job
 from burg_drake.experiment.gap.changes import gap_changes
 from burg_drake.experiment.gap.measurement import measure_gap
 from burg_drake.experiment.gap.placement_noise import PlacementNoise

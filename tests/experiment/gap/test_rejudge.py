@@ -23,7 +23,7 @@ from burg_drake.evaluation.records.journal import decode
 from burg_drake.evaluation.records.table_file import read_table
 from burg_drake.evaluation.replay import differences
 from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.evaluation.workers.executor import Job, JobFailed, OnFailure
+from burg_drake.evaluation.workers import Job, JobFailed, OnFailure
 from burg_drake.experiment.gap.measured_places import measured_scene, upright
 from burg_drake.experiment.gap.rejudged_trials import Rejudging, runs_for
 from burg_drake.experiment.gap.rejudging import rejudge

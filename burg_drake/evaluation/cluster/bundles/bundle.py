@@ -29,7 +29,7 @@ from burg_drake.scene.document import Scene, SceneDocument
 from burg_drake.station.document import Hand, Station, StationDocument, world_content
 
 PLACES, SCENE, STATION, HAND = "places.json", "scene.yaml", "station.yaml", "hand.yaml"
-TOPS = LIBRARY_TOP, HAND_TOP, ARM_TOP = "library.d", "hand.d", "arm.d"
+LIBRARY_TOP, HAND_TOP, ARM_TOP = "library.d", "hand.d", "arm.d"
 """Folders in a bundle; a package has one of its own name, and no package has a name with a dot."""
 LONG_AGO = (1980, 1, 1, 0, 0, 0)
 

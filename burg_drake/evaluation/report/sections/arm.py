@@ -17,7 +17,6 @@ from burg_drake.evaluation.report.elements import (
     section,
     table,
 )
-from burg_drake.evaluation.report.sections.causes import MEANING
 from burg_drake.evaluation.results import Summary
 
 OF_ARM = tuple(o for o in Outcome if o.stage in (Stage.REACHABLE, Stage.PLANNED))
@@ -41,7 +40,7 @@ def arm_section(summary: Summary, columns: Columns) -> Html | None:
             ]
             name = element("th", outcome.value.replace("_", " "), scope="row")
             way = element("td", _blockers(columns, outcome))
-            rows.append(element("tr", name, *cells, element("td", MEANING.get(outcome, "")), way))
+            rows.append(element("tr", name, *cells, element("td", outcome.meaning), way))
     share = f" ({format_percent(planned / clear)})" if clear else ""
     text = (
         f"Of {clear} grasps at which the open hand is clear, the arm can execute"

@@ -18,33 +18,8 @@ from burg_drake.evaluation.report.sections.outcomes import label
 from burg_drake.evaluation.store import Texts, member_codes, texts_of
 from burg_drake.visualization.style import group_of
 
-MEANING = {
-    Outcome.COLLISION_TARGET: "at the grasp the open hand is in the object itself",
-    Outcome.COLLISION_TABLE: "at the grasp the open hand is in the table",
-    Outcome.COLLISION_CLUTTER: "at the grasp the open hand is in another object",
-    Outcome.COLLISION_BACKGROUND: "at the grasp the open hand is in something fixed",
-    Outcome.HAND_COLLISION_APPROACH: "on the straight approach the open hand meets something",
-    Outcome.HAND_COLLISION_RETREAT: (
-        "on the straight retreat the hand or the object in it meets something"
-    ),
-    Outcome.HAND_COLLISION_LIFT: "on the lift the hand or the object in it meets something",
-    Outcome.NO_IK: "no arm configuration puts the hand there, whatever the joint limits",
-    Outcome.JOINT_LIMIT: "there are such configurations, but all are beyond a joint limit",
-    Outcome.ARM_COLLISION: "within the limits, in each that was found the arm collides",
-    Outcome.APPROACH_LINE: "the arm can be at both ends of the approach, but cannot follow it",
-    Outcome.RETREAT_LINE: "the arm cannot follow the straight retreat",
-    Outcome.LIFT_LINE: "the arm cannot follow the lift",
-    Outcome.NO_PATH: "no path from the home posture to the pregrasp was found",
-    Outcome.NO_CONTACT: "the fingers closed and never touched the object",
-    Outcome.ONE_FINGER: "the fingers stopped with only one of them on the object",
-    Outcome.CLOSED_EMPTY: "the object was touched, but escaped while the fingers closed",
-    Outcome.SLIPPED: "both fingers held the object, and lost it during the lift",
-    Outcome.BLOCKED: "during its motion the hand or the arm met something fixed",
-    Outcome.DROPPED: "the object was lifted, and lost while it was held",
-    Outcome.LIFTED_DISTURBED: "the object is held to the end, but another one was moved",
-    Outcome.SIMULATION_FAILED: "the trial could not be simulated; the results have the reason",
-}
-"""Every outcome but success, in a few words."""
+NO_FAILURE = (Outcome.LIFTED, Outcome.REACHABLE)
+"""Outcomes without a cause to look for."""
 TYPICAL_BY = (
     ("overlap", ("collision_",)),
     ("joint_excess", ("joint_limit",)),
@@ -117,7 +92,7 @@ def causes_of(rows: CauseRows) -> list[Cause]:
     found = []
     for place, outcome in enumerate(Outcome):
         mine = np.flatnonzero(rows.outcomes == place).astype(np.int64)
-        if len(mine) and outcome in MEANING:
+        if len(mine) and outcome not in NO_FAILURE:
             objects = rows.objects.most_common(mine, NAMED)
             blockers = rows.blockers.most_common(mine, NAMED)
             typical = typical_row(rows.margins, mine, outcome)
@@ -167,7 +142,7 @@ def _entry(cause: Cause, whole: int, replay: str) -> Html:
                 "span", f"{format_count(cause.number)} ({format_percent(cause.number / whole)})"
             ),
         ),
-        element("p", f"{MEANING[cause.outcome]}; {'; '.join(where)}"),
+        element("p", f"{cause.outcome.meaning}; {'; '.join(where)}"),
         command(replay),
     )
 

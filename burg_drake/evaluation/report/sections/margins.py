@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import Array
-from burg_drake.core.grasps import Stage, shown_unit
+from burg_drake.core.grasps import (
+    LIFT_HEIGHT,
+    MARGINS,
+    Stage,
+    shown_axis,
+    shown_order,
+    shown_unit,
+)
 from burg_drake.evaluation.records import Columns
 from burg_drake.evaluation.report.elements import (
     LIFTED,
@@ -27,36 +33,20 @@ from burg_drake.evaluation.report.elements import (
 )
 from burg_drake.visualization.style import GROUPS
 
-
-@dataclass(frozen=True)
-class Margin:
-    """A column of numbers as people read it.
-
-    Attributes:
-        column: its name in the table.
-        title: for the axis.
-    """
-
-    column: str
-    title: str
-
-
-CLEARANCE = Margin("clearance", "room around the open hand")
-DISTURBED = Margin("others_moved", "movement of other objects")
-CHOSEN = (
-    CLEARANCE,
-    Margin("slip", "slip in the hand"),
-    Margin("tilt", "tilt in the hand"),
-    DISTURBED,
-)
+DISTURBED = "others_moved"
+CHOSEN = ("clearance", "slip", "tilt", DISTURBED)
 """What tells most about a grasp: how exact it must be met, how firmly it holds, what it moves."""
-FURTHER = (
-    Margin("pad_force", "normal force of the weaker pad"),
-    Margin("patch_area", "contact patch of the weaker pad"),
-    Margin("arm_clearance", "room around the robot along its path"),
-    Margin("pushed", "push before the hand closed"),
-    Margin("tracking_distance", "error of the hand's path"),
+FURTHER = shown_order(
+    ("pad_force", "patch_area", "arm_clearance", "pushed", "tracking_distance"),
+    MARGINS,
+    without=(
+        *CHOSEN,
+        *("overlap", "joint_excess"),  # 0 of all that was executed
+        *("lift", LIFT_HEIGHT, "end_time"),  # follow from what was asked for
+        *("duration", "tracking_error"),  # in the section about the arm
+    ),
 )
+"""All others that differ between executed grasps."""
 
 
 def margin_section(
@@ -97,34 +87,32 @@ def tried_margins(
 ) -> tuple[dict[str, Array], NDArray[np.int8]]:
     """What `margin_section` asks for, of a table of results and its groups (N,)."""
     tried = columns["stage"] == Stage.EXECUTED.value
-    names = [margin.column for margin in (*CHOSEN, *FURTHER) if margin.column in columns]
+    names = [name for name in (*CHOSEN, *FURTHER) if name in columns]
     return {name: columns[name][tried] for name in names}, groups[tried]
 
 
 def _charts(
-    margins: Sequence[Margin],
+    margins: Sequence[str],
     columns: Mapping[str, Array],
     groups: NDArray[np.int8],
-    limits: dict[Margin, Limit],
+    limits: Mapping[str, Limit],
 ) -> list[Html]:
     charts = []
     for margin in margins:
-        _, factor = shown_unit(margin.column)
-        values = columns.get(margin.column, np.empty(0)) * factor
+        _, factor = shown_unit(margin)
+        values = columns.get(margin, np.empty(0)) * factor
         known = np.isfinite(values)
         if known.any():
             charts.append(_chart(margin, values[known], groups[known], limits.get(margin)))
     return charts
 
 
-def _chart(
-    margin: Margin, values: np.ndarray, groups: NDArray[np.int8], limit: Limit | None
-) -> Html:
+def _chart(margin: str, values: np.ndarray, groups: NDArray[np.int8], limit: Limit | None) -> Html:
     series = {
         k: Series(values[groups == k], STYLES[GROUPS[k].name], GROUPS[k].name)
         for k in {LIFTED, *present(groups)}
     }
     success = series.pop(LIFTED)
     failures = [series[k] for k in sorted(series)]
-    unit, _ = shown_unit(margin.column)
-    return mirrored_histogram(success, failures, title=margin.title, unit=unit, limit=limit)
+    unit, _ = shown_unit(margin)
+    return mirrored_histogram(success, failures, title=shown_axis(margin), unit=unit, limit=limit)

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-import math
 import shlex
 
+from burg_drake.core.grasps import shown_number, shown_title
 from burg_drake.evaluation.report.elements import Html, command, element, folded, table
 from burg_drake.evaluation.store import Run
 
 BEST = 3
 """Rows for each object in the table of best grasps."""
+BEST_MARGINS = {
+    "clearance": 1,
+    "slip": 2,
+    "tilt": 2,
+    "pad_force": 1,
+    "patch_area": 0,
+    "others_moved": 2,
+}
+"""Columns of that table, by which grasps compare, with decimals that tell best ones apart."""
 FAILURES = 50
 """Rows of the table of failures."""
 
@@ -19,26 +28,10 @@ def best_section(run: Run) -> Html | None:
     best = run.best(BEST, each=True)
     if not best:
         return None
-    head = [
-        "grasp",
-        "object",
-        "clearance",
-        "slip",
-        "tilt",
-        "pad force",
-        "patch",
-        "others moved",
-    ]
+    head = ["grasp", "object", *map(shown_title, BEST_MARGINS)]
     rows = []
     for row in map(run.row, best):
-        cells = [
-            f"{row['clearance'] * 1e3:.1f} mm",
-            f"{row['slip'] * 1e3:.2f} mm",
-            f"{math.degrees(row['tilt']):.2f}°",
-            f"{row['pad_force']:.1f} N",
-            "-" if math.isnan(row["patch_area"]) else f"{row['patch_area'] * 1e6:.0f} mm²",
-            f"{row['others_moved'] * 1e3:.2f} mm",
-        ]
+        cells = [shown_number(name, row[name], digits) for name, digits in BEST_MARGINS.items()]
         rows.append(
             element(
                 "tr",
@@ -56,7 +49,7 @@ def best_section(run: Run) -> Html | None:
         " and pushed others least, then those with the larger contact patch. Any grasp can be"
         " watched by its id, from here or from its row of the table alone:",
         command(line),
-        table(head, rows, numbers=(2, 3, 4, 5, 6, 7)),
+        table(head, rows, numbers=range(2, len(head))),
     )
 
 
