@@ -89,16 +89,16 @@ def _unexecuted_note(name: str, columns: Columns, mine: np.ndarray, motion: Gras
 
 def _other_motion(outcome: Outcome, motion: GraspMotion) -> str:
     """Another motion of the hand that may avoid an outcome; "" if there is none."""
-    ways = []
+    advice = []
     if outcome in NO_LIFT and motion.shortest >= motion.lift_height:
-        ways.append("a shorter lift (least_lift)")
+        advice.append("a shorter lift (least_lift)")
     elif outcome in NO_LIFT and motion.shortest > 0.0:
-        ways.append("a smaller least_lift")
+        advice.append("a smaller least_lift")
     if outcome in NO_LIFT and not motion.retreat:
-        ways.append("a retreat first")
+        advice.append("a retreat first")
     if outcome in NO_RETREAT:
-        ways.append("a shorter retreat")
-    return " or ".join(ways)
+        advice.append("a shorter retreat")
+    return " or ".join(advice)
 
 
 def unclear_notes(
