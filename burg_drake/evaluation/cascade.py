@@ -21,12 +21,12 @@ from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter
 from burg_drake.core.workers import default_workers
 from burg_drake.evaluation.candidates import given_candidates
 from burg_drake.evaluation.records import (
+    EvaluationSettings,
     Journal,
     begun_now,
     require_writer,
 )
 from burg_drake.evaluation.run import (
-    EvaluationSettings,
     GraspsLike,
     Request,
     finish_run,

@@ -16,8 +16,8 @@ from burg_drake.apps.cli import main
 from burg_drake.apps.options.arguments import Parser
 from burg_drake.apps.options.declared import add_options, settings_from
 from burg_drake.core.settings import DEGREES, KEY, MILLIMETRES, PERCENT, THOUSANDTHS, setting
+from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.robustness.settings import RobustnessSettings
-from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.experiment.gap.placement_noise import PlacementNoise
 from burg_drake.grasping.similarity.neighbour_search import Tolerance
 from burg_drake.simulation.robustness.settings import Noise

@@ -69,7 +69,7 @@ def add_to(verbs: Any) -> None:
 
 def _add_options(parser: Parser) -> None:
     from burg_drake.core.grasps import MODES
-    from burg_drake.evaluation.run import EvaluationSettings
+    from burg_drake.evaluation.records import EvaluationSettings
     from burg_drake.station.document import DEFAULT_ENGINE
 
     parser.add_argument(
@@ -170,7 +170,7 @@ def _measure(
     cluster: Executor | None,
 ) -> GapSteps:
     from burg_drake.core.workers import default_workers
-    from burg_drake.evaluation.run import EvaluationSettings
+    from burg_drake.evaluation.records import EvaluationSettings
     from burg_drake.evaluation.workers import LocalExecutor
     from burg_drake.experiment.gap import GapSettings, PlacementNoise, measure_gap
     from burg_drake.scene.document import load_scene

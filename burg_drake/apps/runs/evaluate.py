@@ -65,7 +65,7 @@ def add_to(verbs: Any) -> None:
 
 
 def _add_options(parser: Parser) -> None:
-    from burg_drake.evaluation.run import EvaluationSettings
+    from burg_drake.evaluation.records import EvaluationSettings
 
     parser.add_argument(
         "scenes",

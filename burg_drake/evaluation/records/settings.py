@@ -13,7 +13,8 @@ from burg_drake.station.document import DEFAULT_ENGINE, ENGINES
 
 if TYPE_CHECKING:
     from burg_drake.core.grasps import Mode
-    from burg_drake.evaluation.records import Shard, TableFormat
+    from burg_drake.evaluation.records.run_document import TableFormat
+    from burg_drake.evaluation.records.shard import Shard
     from burg_drake.station.document import Engine, GraspMotion
 
 
