@@ -58,6 +58,7 @@ from .settings import (
     Setting as Setting,
     ShownUnit as ShownUnit,
     declared as declared,
+    option_of as option_of,
     setting as setting,
 )
 from .statistics import (

@@ -84,3 +84,8 @@ def setting(default: Any = MISSING, help: str = "", **more: Any) -> Any:
 def declared(settings: type) -> dict[str, tuple[Field[Any], Setting]]:
     """The fields of a settings dataclass that say something about themselves, by name."""
     return {f.name: (f, f.metadata[KEY]) for f in fields(settings) if KEY in f.metadata}
+
+
+def option_of(settings: type, name: str) -> str:
+    """The long option of a declared field, such as `--lift-mm`."""
+    return declared(settings)[name][1].option(name)

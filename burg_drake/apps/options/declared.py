@@ -13,14 +13,14 @@ from dataclasses import MISSING, Field
 from typing import Any, TypeVar
 
 from burg_drake.apps.options.arguments import LARGEST_SEED, MOST, number, whole
-from burg_drake.core import Setting, declared, shown
+from burg_drake.core import Setting, declared, option_of, shown
 
 Settings = TypeVar("Settings")
 
 
 def destination(settings: type, name: str) -> str:
     """What the parsed arguments call a field."""
-    return declared(settings)[name][1].option(name)[2:].replace("-", "_")
+    return option_of(settings, name)[2:].replace("-", "_")
 
 
 def add_options(

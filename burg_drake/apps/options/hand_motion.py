@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from burg_drake.apps.options.arguments import Parser
 from burg_drake.apps.options.declared import add_options, given_fields
-from burg_drake.core import FieldError, InvalidInputError
+from burg_drake.core import FieldError, InvalidInputError, option_of
 
 if TYPE_CHECKING:
     from burg_drake.station.document import GraspMotion, Station
@@ -49,10 +49,9 @@ def chosen_motion(arguments: argparse.Namespace, station: Station) -> GraspMotio
 
 def motion_option(field: str) -> str:
     """The option of a field of `GraspMotion`."""
-    from burg_drake.core import declared
     from burg_drake.station.document import GraspMotion
 
-    return declared(GraspMotion)[field][1].option(field)
+    return option_of(GraspMotion, field)
 
 
 def require_standoff_of_arm(arguments: argparse.Namespace, mode: str) -> None:
