@@ -21,6 +21,7 @@ from .arguments import (
     print_scale as print_scale,
     scene_names as scene_names,
     seed as seed,
+    two_numbers as two_numbers,
 )
 from .camera import chosen_intrinsics as chosen_intrinsics
 from .cluster import (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 import textwrap
 from collections.abc import Callable
 from typing import Any, NoReturn
@@ -236,6 +237,14 @@ def whole(text: str, low: int, high: int) -> int:
             f"{quoted(text)} is not a whole number from {low} to {high}"
         )
     return value
+
+
+def two_numbers(text: str) -> tuple[int, int]:
+    """`AxB` of whole numbers from 1."""
+    found = re.fullmatch(r"([1-9]\d*)[x×]([1-9]\d*)", text.strip().lower())
+    if found is None:
+        raise argparse.ArgumentTypeError(f"{quoted(text)} is not two whole numbers, such as 8x11")
+    return int(found[1]), int(found[2])
 
 
 def seed(text: str) -> int:

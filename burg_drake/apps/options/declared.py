@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import MISSING, Field
 from typing import Any, TypeVar
 
-from burg_drake.apps.options.arguments import LARGEST_SEED, MOST, number, whole
+from burg_drake.apps.options.arguments import LARGEST_SEED, MOST, number, two_numbers, whole
 from burg_drake.core import Setting, declared, option_of, shown
 
 Settings = TypeVar("Settings")
@@ -47,8 +47,7 @@ def add_options(
         else:
             options |= {"default": None if unset else default, **_value_options(field, declaration)}
             if default is not None and "(default" not in declaration.help:
-                text = f"{default:g}" if isinstance(default, float) else default
-                options["help"] += f" (default: {text})"
+                options["help"] += f" (default: {_written(default)})"
         option = declaration.option(name)
         parser.add_argument(*declaration.flags, option, **options)
 
@@ -71,6 +70,13 @@ def shown_value(field: Field[Any], declaration: Setting) -> Any:
     if declaration.unit is None or value is None:
         return value
     return float(f"{declaration.unit.from_si(value):.12g}")
+
+
+def _written(value: Any) -> str:
+    """A default as people would type it."""
+    if isinstance(value, tuple):
+        return "x".join(map(str, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def settings_from(
@@ -107,6 +113,8 @@ def _parser_of(field: Field[Any], declaration: Setting) -> Callable[[str], Any]:
         low, high = int(declaration.low or 0), declaration.high or MOST
         most = LARGEST_SEED if field.name == "seed" else int(high)
         return lambda text: whole(text, low, most)
+    if field.type == "tuple[int, int]":
+        return two_numbers
     if kind in ("float", "Vector3"):
         return lambda text: in_range(text, declaration)
     return str
