@@ -52,6 +52,7 @@ from .frames import (
 )
 from .settings import (
     DEGREES as DEGREES,
+    LARGEST_SEED as LARGEST_SEED,
     MILLIMETRES as MILLIMETRES,
     PERCENT as PERCENT,
     THOUSANDTHS as THOUSANDTHS,

@@ -30,6 +30,8 @@ class ShownUnit:
     from_si: Callable[[float], float]
 
 
+LARGEST_SEED = (1 << 64) - 1
+"""Documents have seeds of at most 64 bits."""
 MILLIMETRES = ShownUnit("mm", lambda x: 1e-3 * x, lambda x: 1e3 * x)
 THOUSANDTHS = ShownUnit("mm", lambda x: x / 1000.0, lambda x: 1000.0 * x)
 """Millimetres by division, as motions and gaps have been written to files: it may differ from the

@@ -10,18 +10,9 @@ from .arguments import (
     add_station as add_station,
     add_verb as add_verb,
     add_workers as add_workers,
-    coefficient as coefficient,
     examples as examples,
-    friction as friction,
-    named_positive as named_positive,
-    not_negative as not_negative,
-    number as number,
-    positive as positive,
-    positive_int as positive_int,
     print_scale as print_scale,
     scene_names as scene_names,
-    seed as seed,
-    two_numbers as two_numbers,
 )
 from .camera import chosen_intrinsics as chosen_intrinsics
 from .cluster import (
@@ -74,4 +65,15 @@ from .sampling import (
     grasps_per_object as grasps_per_object,
     print_shortfalls as print_shortfalls,
     require_sampled as require_sampled,
+)
+from .values import (
+    coefficient as coefficient,
+    friction as friction,
+    named_positive as named_positive,
+    not_negative as not_negative,
+    number as number,
+    positive as positive,
+    positive_int as positive_int,
+    seed as seed,
+    two_numbers as two_numbers,
 )

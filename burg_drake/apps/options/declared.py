@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import MISSING, Field
 from typing import Any, TypeVar
 
-from burg_drake.apps.options.arguments import LARGEST_SEED, MOST, number, two_numbers, whole
+from burg_drake.apps.options.values import MOST, number, two_numbers, whole
 from burg_drake.core import Setting, declared, option_of, shown
 
 Settings = TypeVar("Settings")
@@ -110,9 +110,8 @@ def _parser_of(field: Field[Any], declaration: Setting) -> Callable[[str], Any]:
     """What reads the value of an option."""
     kind = str(field.type).partition(" ")[0]
     if kind == "int":
-        low, high = int(declaration.low or 0), declaration.high or MOST
-        most = LARGEST_SEED if field.name == "seed" else int(high)
-        return lambda text: whole(text, low, most)
+        low, high = int(declaration.low or 0), int(declaration.high or MOST)
+        return lambda text: whole(text, low, high)
     if field.type == "tuple[int, int]":
         return two_numbers
     if kind in ("float", "Vector3"):
