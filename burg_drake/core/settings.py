@@ -46,7 +46,8 @@ class Setting:
 
     Attributes:
         help: what it means, for people, without a full stop; another field in braces, such as
-            `{lift_height}`, is told by its option.
+            `{lift_height}`, is told by its option. Of a field that is true by default: what it
+            means that it is false, which its option makes it.
         unit: that people give it in; None if that is the field's own.
         name: of the option, without dashes; the field's and the unit's name if empty.
         flags: short names of the option, such as `-n`.

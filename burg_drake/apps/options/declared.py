@@ -1,7 +1,8 @@
 """Options made of settings dataclasses, and settings made of options.
 
 A field that is declared by `core.settings.setting` becomes an option of its name, unit, range,
-default and help; `settings_from` brings what was given back into the dataclass, in SI.
+default and help; `settings_from` brings what was given back into the dataclass, in SI. The option
+of a field that is true by default, such as `--no-settle`, makes it false.
 """
 
 from __future__ import annotations
@@ -95,7 +96,7 @@ def settings_from(
 def given_fields(arguments: argparse.Namespace, settings: type) -> dict[str, Any]:
     """The values of fields, in SI, that options give."""
     given: dict[str, Any] = {}
-    for name, (_, declaration) in declared(settings).items():
+    for name, (field, declaration) in declared(settings).items():
         value = getattr(arguments, destination(settings, name), None)
         if value is None:
             continue
@@ -103,6 +104,8 @@ def given_fields(arguments: argparse.Namespace, settings: type) -> dict[str, Any
         given[name] = value if unit is None else unit.to_si(value)
         if isinstance(value, list):
             given[name] = tuple(value)
+        elif field.default is True:
+            given[name] = not value
     return given
 
 

@@ -64,7 +64,7 @@ class SceneRecipe:
     )
     seed: int = setting(0, high=LARGEST_SEED)
     station: str = "panda_tabletop"
-    settle: bool = True
+    settle: bool = setting(True, "leave objects as they were placed", name="no_settle")
     attempts: int = setting(ATTEMPTS, "scenes that are drawn until one is accepted", low=1)
     within_reach: bool = setting(False, "the arm can grasp every object where it is")
     clear_grasps: int = setting(
