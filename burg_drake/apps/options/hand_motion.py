@@ -44,7 +44,7 @@ def chosen_motion(arguments: argparse.Namespace, station: Station) -> GraspMotio
         return replace(station.document.motion, **given)  # type: ignore[arg-type]
     except FieldError as error:
         options = ", ".join(motion_option(field) for field in given)
-        raise InvalidInputError(f"{options}: {error}") from error
+        raise InvalidInputError(f"{error} ({options})") from error
 
 
 def motion_option(field: str) -> str:
