@@ -18,6 +18,7 @@ from burg_drake.apps.options import (
     add_options,
     add_quiet,
     add_sampling,
+    add_station,
     add_verb,
     add_workers,
     chosen_cluster,
@@ -79,10 +80,10 @@ def _add_options(parser: Parser) -> None:
         f" {scene_names()}",
     )
     parser.add_argument("-o", "--output", metavar="GAP", required=True, help="folder for the steps")
-    parser.add_argument(
-        "--station",
-        metavar="STATION",
-        help=f"with a scene: station file or built-in name (default: {DEFAULT_STATION})",
+    add_station(
+        parser,
+        f"with a scene: station file or built-in name (default: {DEFAULT_STATION})",
+        default=None,
     )
     parser.add_argument(
         "--mode",

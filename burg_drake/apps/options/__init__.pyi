@@ -14,7 +14,12 @@ from .arguments import (
     print_scale as print_scale,
     scene_names as scene_names,
 )
-from .camera import chosen_intrinsics as chosen_intrinsics
+from .camera import (
+    add_depth_unit as add_depth_unit,
+    add_intrinsics as add_intrinsics,
+    add_live_camera as add_live_camera,
+    chosen_intrinsics as chosen_intrinsics,
+)
 from .cluster import (
     add_cluster as add_cluster,
     chosen_cluster as chosen_cluster,

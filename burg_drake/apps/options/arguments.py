@@ -155,14 +155,19 @@ def print_scale(arguments: argparse.Namespace) -> tuple[float, float]:
     return x / RULER_MM, y / RULER_MM
 
 
-def add_station(parser: Parser) -> None:
-    """The option --station."""
-    parser.add_argument(
-        "--station",
-        metavar="STATION",
-        default=DEFAULT_STATION,
-        help="station file or built-in name (default: %(default)s)",
-    )
+def add_station(
+    parser: Any,
+    help: str = "station file or built-in name (default: %(default)s)",
+    default: str | None = DEFAULT_STATION,
+) -> None:
+    """The option --station.
+
+    Args:
+        parser: gets it.
+        help: what it means to the verb.
+        default: None where something else tells the station, or there need not be one.
+    """
+    parser.add_argument("--station", metavar="STATION", default=default, help=help)
 
 
 def add_only(parser: Parser, what: str) -> None:
