@@ -24,7 +24,7 @@ import burg_drake as burg
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.core.grasps.outcome import Outcome, RealOutcome
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.run.settings import EvaluationSettings
+from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.experiment.trials.sheet import (
     ObjectPlace,

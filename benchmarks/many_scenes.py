@@ -28,11 +28,11 @@ from burg_drake.evaluation.candidates.candidates import Candidates
 from burg_drake.evaluation.records.journal import encode
 from burg_drake.evaluation.records.ledger import Ledger, SceneState
 from burg_drake.evaluation.records.run_document import run_hash
+from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.records.shard import Shard
 from burg_drake.evaluation.run.many_scenes import _document
 from burg_drake.evaluation.run.request import Request
 from burg_drake.evaluation.run.scene_list import read_scenes
-from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.campaign_folder import Campaign, load_campaign, save_campaign
 from burg_drake.evaluation.store.part_writer import PartWriter
 from burg_drake.evaluation.store.run_folder import JOURNAL_FILE, create_run

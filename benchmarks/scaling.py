@@ -18,7 +18,7 @@ import numpy as np
 
 from burg_drake.core.grasps import CPU_COLUMNS
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.run.settings import EvaluationSettings
+from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.store.loading import read_results
 
 

@@ -34,7 +34,7 @@ from .evaluation.feasibility import (
 from .evaluation.grasp_sets.sampled import (
     sample_grasps as sample_grasps,
 )
-from .evaluation.run.settings import (
+from .evaluation.records.settings import (
     EvaluationSettings as EvaluationSettings,
 )
 from .evaluation.store.campaign_folder import (

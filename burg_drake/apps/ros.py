@@ -6,7 +6,14 @@ import argparse
 import signal
 from typing import Any, NoReturn
 
-from burg_drake.apps.options import Parser, add_measured_board, add_scene, add_verb, print_scale
+from burg_drake.apps.options import (
+    Parser,
+    add_intrinsics,
+    add_measured_board,
+    add_scene,
+    add_verb,
+    print_scale,
+)
 
 DEFAULT_IMAGE = "/camera/image_raw"
 
@@ -40,9 +47,7 @@ def _add_options(parser: Parser) -> None:
         default="",
         help="the camera's intrinsics (default: camera_info next to the images)",
     )
-    parser.add_argument(
-        "--intrinsics", metavar="FILE", help="take the intrinsics from a file, not from a topic"
-    )
+    add_intrinsics(parser, "take the intrinsics from a file, not from a topic")
     parser.add_argument(
         "--rectified",
         action="store_true",

@@ -52,12 +52,14 @@ from .frames import (
 )
 from .settings import (
     DEGREES as DEGREES,
+    LARGEST_SEED as LARGEST_SEED,
     MILLIMETRES as MILLIMETRES,
     PERCENT as PERCENT,
     THOUSANDTHS as THOUSANDTHS,
     Setting as Setting,
     ShownUnit as ShownUnit,
     declared as declared,
+    option_of as option_of,
     setting as setting,
 )
 from .statistics import (

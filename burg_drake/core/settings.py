@@ -30,6 +30,8 @@ class ShownUnit:
     from_si: Callable[[float], float]
 
 
+LARGEST_SEED = (1 << 64) - 1
+"""Documents have seeds of at most 64 bits."""
 MILLIMETRES = ShownUnit("mm", lambda x: 1e-3 * x, lambda x: 1e3 * x)
 THOUSANDTHS = ShownUnit("mm", lambda x: x / 1000.0, lambda x: 1000.0 * x)
 """Millimetres by division, as motions and gaps have been written to files: it may differ from the
@@ -44,7 +46,8 @@ class Setting:
 
     Attributes:
         help: what it means, for people, without a full stop; another field in braces, such as
-            `{lift_height}`, is told by its option.
+            `{lift_height}`, is told by its option. Of a field that is true by default: what it
+            means that it is false, which its option makes it.
         unit: that people give it in; None if that is the field's own.
         name: of the option, without dashes; the field's and the unit's name if empty.
         flags: short names of the option, such as `-n`.
@@ -84,3 +87,8 @@ def setting(default: Any = MISSING, help: str = "", **more: Any) -> Any:
 def declared(settings: type) -> dict[str, tuple[Field[Any], Setting]]:
     """The fields of a settings dataclass that say something about themselves, by name."""
     return {f.name: (f, f.metadata[KEY]) for f in fields(settings) if KEY in f.metadata}
+
+
+def option_of(settings: type, name: str) -> str:
+    """The long option of a declared field, such as `--lift-mm`."""
+    return declared(settings)[name][1].option(name)

@@ -20,12 +20,12 @@ from burg_drake.core.files import remove_unfinished, writable_folder
 from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.evaluation.candidates import given_candidates
 from burg_drake.evaluation.records import (
+    EvaluationSettings,
     Journal,
     begun_now,
     require_writer,
 )
 from burg_drake.evaluation.run import (
-    EvaluationSettings,
     GraspsLike,
     Request,
     evaluate_scenes,

@@ -57,8 +57,8 @@ class PrintSettings:
         5e-3, "what the printer leaves white on all sides", unit=MILLIMETRES, low=0
     )
     measured: tuple[float, float] = (0.1, 0.1)
-    height_map: bool = True
-    names: bool = True
+    height_map: bool = setting(True, "print the markers alone", name="no_height_map")
+    names: bool = setting(True, "do not print the objects' names", name="no_names")
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.margin <= 0.05:

@@ -11,7 +11,7 @@ import trimesh
 from burg_drake.core.frames import grasp_from_axes, make_pose
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.run.settings import EvaluationSettings
+from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.station.document.engine import Engine
 

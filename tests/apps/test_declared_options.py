@@ -16,8 +16,8 @@ from burg_drake.apps.cli import main
 from burg_drake.apps.options.arguments import Parser
 from burg_drake.apps.options.declared import add_options, settings_from
 from burg_drake.core.settings import DEGREES, KEY, MILLIMETRES, PERCENT, THOUSANDTHS, setting
+from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.robustness.settings import RobustnessSettings
-from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.experiment.gap.placement_noise import PlacementNoise
 from burg_drake.grasping.similarity.neighbour_search import Tolerance
 from burg_drake.simulation.robustness.settings import Noise
@@ -33,6 +33,9 @@ class Made:
     turn: float = setting(math.radians(2.0), "how far round", unit=DEGREES, low=0)
     share: float = setting(0.1, "of all", unit=PERCENT, above=0)
     fast: bool = setting(False, "hurry")
+    level: bool = setting(True, "leave it as it stands", name="no_level")
+    size: tuple[int, int] = setting((8, 11), "columns and rows", metavar="CxR")
+    number: int = setting(0, "of the draw", high=(1 << 64) - 1)
     kind: str = setting("round", "which", choices=("round", "square"))
     hidden: float = 1.0
 
@@ -53,6 +56,8 @@ def test_values_come_back_in_si() -> None:
     assert parsed(*words.split()) == Made(
         count=5, depth=1e-3 * 9, turn=math.radians(90), share=0.5, fast=True, kind="square"
     )
+    words = f"--no-level --size 3x4 --number {(1 << 64) - 1}"
+    assert parsed(*words.split()) == Made(level=False, size=(3, 4), number=(1 << 64) - 1)
 
 
 def test_the_help_has_units_and_defaults() -> None:
@@ -65,6 +70,8 @@ def test_the_help_has_units_and_defaults() -> None:
         "--turn-deg DEG how far round (default: 2)",
         "--share-percent PERCENT of all (default: 10)",
         "--fast hurry",
+        "--no-level leave it as it stands",
+        "--size CxR columns and rows (default: 8x11)",
         "--kind {round,square} which (default: round)",
     ):
         assert part in text
@@ -75,6 +82,8 @@ def test_the_help_has_units_and_defaults() -> None:
     ("words", "message"),
     [
         ("-c 0", "'0' is not a whole number from 1 to 10000000"),
+        (f"--number {1 << 64}", f"'{1 << 64}' is not a whole number from 0 to {(1 << 64) - 1}"),
+        ("--size 3", "'3' is not two whole numbers"),
         ("--depth-mm 51", "51 is not a length from 0 to 50 mm"),
         ("--depth-mm deep", "'deep' is not a finite number"),
         ("--turn-deg -1", "-1 is below 0"),

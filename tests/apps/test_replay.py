@@ -19,9 +19,9 @@ from burg_drake.core.frames import grasp_from_axes, make_pose, rotation_from_rpy
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.records.table import table_row, trial_columns
 from burg_drake.evaluation.records.table_file import read_table, write_table
-from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.station.document.engine import ENGINES

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.run.settings import EvaluationSettings
+from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.store.campaign_folder import Campaign
 from burg_drake.evaluation.store.run_folder import Run, load_run
 from burg_drake.scene.document.scene import Scene

@@ -13,6 +13,7 @@ from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.records.origin import read_origin
+from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.records.table import table_row
 from burg_drake.evaluation.records.table_file import read_table
 from burg_drake.evaluation.records.trial import read_trial
@@ -20,7 +21,6 @@ from burg_drake.evaluation.replay import as_result, decisive_mode, differences, 
 from burg_drake.evaluation.results.counts import Pushes, pushes
 from burg_drake.evaluation.results.summary import summarize
 from burg_drake.evaluation.results.summary_tables import summary_view
-from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.station.document.station_document import load_station
 from tests.evaluation.composed import tabletop

@@ -21,8 +21,8 @@ from burg_drake.evaluation.candidates.scene_frame import in_frame
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.grasp_sets.candidate_files import NoSceneIdsError, read_grasps
 from burg_drake.evaluation.grasp_sets.run_set import run_grasps
+from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.records.table_file import read_table
-from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.formats.common.grasp_format import PANDA
 from burg_drake.formats.grasp_files import write_grasp_file
 from burg_drake.scene.document.scene import Scene

@@ -24,10 +24,10 @@ from burg_drake.core.terminal.progress import Progress
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.grasp_sets.candidate_files import read_grasps
 from burg_drake.evaluation.records.journal import read_journal
+from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.records.table import TEXT
 from burg_drake.evaluation.records.table_file import read_table
 from burg_drake.evaluation.report.sections.reproduction import reproduce_command
-from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run, load_run
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.document.station_document import Station

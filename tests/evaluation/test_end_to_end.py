@@ -19,8 +19,8 @@ from burg_drake.core.frames import grasp_from_axes, inverse
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.records.table_file import read_table
-from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run, load_run
 from burg_drake.pipeline.build import ObjectSource, build_library
 from burg_drake.scene.document.scene import Instance, SceneDocument, load_scene, save_scene

@@ -16,7 +16,7 @@ from burg_drake.evaluation.grasp_sets.candidate_files import read_grasps
 from burg_drake.evaluation.grasp_sets.exchange import read_in_frame
 from burg_drake.evaluation.grasp_sets.input import hand_of, hand_reference, read_input
 from burg_drake.evaluation.grasp_sets.sampled import sample_grasps
-from burg_drake.evaluation.run.settings import EvaluationSettings
+from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.formats.common.conversion import write_each_object
 from burg_drake.formats.common.grasp_format import PANDA

@@ -9,7 +9,7 @@ import pytest
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.feasibility import reach
-from burg_drake.evaluation.run.settings import EvaluationSettings
+from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.stages.mode import mode_for
 from burg_drake.station.document.station_document import Station, load_station
 

@@ -15,13 +15,13 @@ from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.records.journal import read_journal
 from burg_drake.evaluation.records.origin import read_origin
+from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.records.table import table_row
 from burg_drake.evaluation.records.table_file import read_table
 from burg_drake.evaluation.records.trial import read_trial
 from burg_drake.evaluation.replay import differences, rerun
 from burg_drake.evaluation.report.sections.reproduction import reproduce_command
 from burg_drake.evaluation.results.summary import summarize
-from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.station.document.grasp_motion import GraspMotion
 from burg_drake.station.document.station_document import load_station

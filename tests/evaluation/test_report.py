@@ -13,13 +13,13 @@ from page_reading import part, read_page
 
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.report.elements.blocks import Html, element, join
 from burg_drake.evaluation.report.elements.charts import Series, histogram, nice_step
 from burg_drake.evaluation.report.elements.style import STYLES, style_sheet
 from burg_drake.evaluation.report.page import report_page
 from burg_drake.evaluation.report.sections.outcomes import STOPPED
 from burg_drake.evaluation.results.summary import summarize
-from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
 
 

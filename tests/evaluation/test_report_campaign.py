@@ -19,6 +19,7 @@ from burg_drake.core.documents.schema import Pose
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.core.statistics import clustered_interval, wilson_interval
 from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.report.campaign import campaign_page, write_campaign_report
 from burg_drake.evaluation.report.elements.style import STYLES
 from burg_drake.evaluation.report.sections.causes import causes_of, rows_of_run
@@ -26,7 +27,6 @@ from burg_drake.evaluation.report.sections.outcomes import worst_first
 from burg_drake.evaluation.report.sections.scenes import ranked_chart
 from burg_drake.evaluation.results.counts import OutcomeCounts
 from burg_drake.evaluation.results.summary import summarize
-from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.campaign_folder import Campaign, load_campaign
 from burg_drake.evaluation.store.stored_rows import StoredRows
 from burg_drake.scene.document.scene import Scene

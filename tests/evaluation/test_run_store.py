@@ -17,9 +17,9 @@ from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.core.paths.references import portable_reference
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.records.run_document import RunDocument, run_hash
+from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.records.table_file import read_table
 from burg_drake.evaluation.report import write_report
-from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run, load_run
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.document.station_document import Station, load_station

@@ -16,12 +16,12 @@ from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.core.statistics import wilson_interval
 from burg_drake.core.terminal.number_text import format_duration
 from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.results.summary import (
     OutcomeCounts,
     summarize,
 )
 from burg_drake.evaluation.results.summary_tables import summary_view
-from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
 
 

@@ -13,7 +13,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.feasibility import reach
-from burg_drake.evaluation.run.settings import EvaluationSettings
+from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.motion.workspace.usable_arm import require_usable_arm
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.document.station_document import Obstacle, Station, load_station

@@ -12,9 +12,9 @@ from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.records.table_file import write_table
 from burg_drake.evaluation.run import preparation
-from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.store.campaign_folder import Campaign
 from burg_drake.experiment.comparison.comparing import compare
 from burg_drake.scene.document.scene import save_scene

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import (
     Parser,
+    add_live_camera,
     add_measured_board,
     add_options,
     add_page,
@@ -58,15 +59,7 @@ def _add_options(parser: Parser) -> None:
         help="number of a camera, address of a stream, video, image, folder or pattern of images,"
         " or sim:STATION/CAMERA (default: %(default)s)",
     )
-    parser.add_argument(
-        "--intrinsics",
-        metavar="FILE",
-        help="intrinsics of the camera, our document or a camera_info file of ROS; see"
-        " burg-drake camera calibrate. Simulated cameras need none",
-    )
-    parser.add_argument(
-        "--fps", type=positive, metavar="N", help="frame rate of the camera, in images per second"
-    )
+    add_live_camera(parser)
     add_measured_board(parser)
     _add_view(parser)
     _add_results(parser)

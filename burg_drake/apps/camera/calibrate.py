@@ -8,8 +8,8 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.camera.intrinsics_text import print_intrinsics
-from burg_drake.apps.camera.target import add_board, given_target, two_numbers
-from burg_drake.apps.options import Parser, add_verb, positive_int
+from burg_drake.apps.camera.target import add_board, given_target
+from burg_drake.apps.options import Parser, add_verb, positive_int, two_numbers
 
 if TYPE_CHECKING:
     from burg_drake.cameras.calibration import Calibration, CharucoTarget, CharucoView

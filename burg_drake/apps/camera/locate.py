@@ -8,6 +8,7 @@ from typing import Any
 
 from burg_drake.apps.options import (
     Parser,
+    add_intrinsics,
     add_measured_board,
     add_scene,
     add_station,
@@ -38,9 +39,7 @@ def _add_options(parser: Parser) -> None:
         help="image of the board, or a folder or pattern of images; the mean of several from the"
         " same place is better than one",
     )
-    parser.add_argument(
-        "--intrinsics", metavar="FILE", required=True, help="intrinsics of the camera"
-    )
+    add_intrinsics(parser, required=True)
     add_measured_board(parser)
     add_station(parser)
     parser.add_argument(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import re
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import Parser, add_measured_board, add_options, add_verb, settings_from
@@ -29,11 +28,7 @@ def _add_options(target: Parser) -> None:
     from burg_drake.printout import PrintSettings
 
     target.add_argument("-o", "--output", metavar="FILE", required=True, help="PDF to write")
-    target.add_argument(
-        "--page",
-        default=PrintSettings.page,
-        help="A4, A3, letter, ... or WxH in mm (default: %(default)s)",
-    )
+    add_options(target, PrintSettings, "page")
     add_measured_board(
         target,
         "what the rulers of 100 mm of an earlier print measured, for a printer that scales",
@@ -45,15 +40,7 @@ def add_board(parser: Any) -> None:
     """The options about the board."""
     from burg_drake.cameras.calibration import CharucoTarget
 
-    columns, rows = CharucoTarget.squares
     board = parser.add_argument_group("the board", "what `burg-drake camera target` printed")
-    board.add_argument(
-        "--squares",
-        metavar="CxR",
-        type=two_numbers,
-        default=CharucoTarget.squares,
-        help=f"columns and rows (default: {columns}x{rows})",
-    )
     add_options(board, CharucoTarget)
 
 
@@ -61,7 +48,7 @@ def given_target(arguments: argparse.Namespace) -> CharucoTarget:
     """The board that the options tell."""
     from burg_drake.cameras.calibration import CharucoTarget
 
-    return settings_from(arguments, CharucoTarget, squares=arguments.squares)
+    return settings_from(arguments, CharucoTarget)
 
 
 def run_target(arguments: argparse.Namespace) -> int:
@@ -72,7 +59,7 @@ def run_target(arguments: argparse.Namespace) -> int:
 
     require_pdf(arguments.output)
     x, y = arguments.measured_mm
-    settings = PrintSettings(page=arguments.page, measured=(1e-3 * x, 1e-3 * y))
+    settings = settings_from(arguments, PrintSettings, measured=(1e-3 * x, 1e-3 * y))
     target = given_target(arguments)
     paper = write_target(target, arguments.output, settings)
     columns, rows = target.squares
@@ -81,11 +68,3 @@ def run_target(arguments: argparse.Namespace) -> int:
         f" {paper.name}; print at 100 %, glue it onto something flat"
     )
     return 0
-
-
-def two_numbers(text: str) -> tuple[int, int]:
-    """`AxB` of whole numbers from 1."""
-    found = re.fullmatch(r"([1-9]\d*)[x×]([1-9]\d*)", text.strip().lower())
-    if found is None:
-        raise argparse.ArgumentTypeError(f"{text!r} is not two whole numbers, such as 8x11")
-    return int(found[1]), int(found[2])

@@ -18,6 +18,7 @@ from burg_drake.apps.options import (
     add_options,
     add_quiet,
     add_sampling,
+    add_station,
     add_verb,
     add_workers,
     chosen_cluster,
@@ -69,7 +70,7 @@ def add_to(verbs: Any) -> None:
 
 def _add_options(parser: Parser) -> None:
     from burg_drake.core.grasps import MODES
-    from burg_drake.evaluation.run import EvaluationSettings
+    from burg_drake.evaluation.records import EvaluationSettings
     from burg_drake.station.document import DEFAULT_ENGINE
 
     parser.add_argument(
@@ -79,10 +80,10 @@ def _add_options(parser: Parser) -> None:
         f" {scene_names()}",
     )
     parser.add_argument("-o", "--output", metavar="GAP", required=True, help="folder for the steps")
-    parser.add_argument(
-        "--station",
-        metavar="STATION",
-        help=f"with a scene: station file or built-in name (default: {DEFAULT_STATION})",
+    add_station(
+        parser,
+        f"with a scene: station file or built-in name (default: {DEFAULT_STATION})",
+        default=None,
     )
     parser.add_argument(
         "--mode",
@@ -170,7 +171,7 @@ def _measure(
     cluster: Executor | None,
 ) -> GapSteps:
     from burg_drake.core.workers import default_workers
-    from burg_drake.evaluation.run import EvaluationSettings
+    from burg_drake.evaluation.records import EvaluationSettings
     from burg_drake.evaluation.workers import LocalExecutor
     from burg_drake.experiment.gap import GapSettings, PlacementNoise, measure_gap
     from burg_drake.scene.document import load_scene

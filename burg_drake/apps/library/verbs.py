@@ -142,9 +142,7 @@ def _add_ycb_options(ycb: Parser) -> None:
 def _add_import_options(parser: Parser, without: str = "") -> None:
     _add_output(parser)
     _add_named_values(parser)
-    parser.add_argument(
-        "--density", metavar="KG/M3", type=positive, help=f"for objects without a mass{without}"
-    )
+    _add_density(parser, without)
     _add_effort(parser)
 
 
@@ -220,13 +218,17 @@ def _add_named_values(parser: Parser) -> None:
     )
 
 
+def _add_density(parser: Parser, without: str = "") -> None:
+    parser.add_argument(
+        "--density", metavar="KG/M3", type=positive, help=f"for objects without a mass{without}"
+    )
+
+
 def _add_common_values(parser: Parser) -> None:
     from burg_drake.objects.library import CONTACT_KINDS
     from burg_drake.objects.meshes import UNITS, Openings
 
-    parser.add_argument(
-        "--density", metavar="KG/M3", type=positive, help="for objects without a mass"
-    )
+    _add_density(parser)
     scale = parser.add_mutually_exclusive_group()
     scale.add_argument("--unit", choices=list(UNITS), help="unit of the meshes (default: m)")
     scale.add_argument(

@@ -10,19 +10,16 @@ from .arguments import (
     add_station as add_station,
     add_verb as add_verb,
     add_workers as add_workers,
-    coefficient as coefficient,
     examples as examples,
-    friction as friction,
-    named_positive as named_positive,
-    not_negative as not_negative,
-    number as number,
-    positive as positive,
-    positive_int as positive_int,
     print_scale as print_scale,
     scene_names as scene_names,
-    seed as seed,
 )
-from .camera import chosen_intrinsics as chosen_intrinsics
+from .camera import (
+    add_depth_unit as add_depth_unit,
+    add_intrinsics as add_intrinsics,
+    add_live_camera as add_live_camera,
+    chosen_intrinsics as chosen_intrinsics,
+)
 from .cluster import (
     add_cluster as add_cluster,
     chosen_cluster as chosen_cluster,
@@ -73,4 +70,15 @@ from .sampling import (
     grasps_per_object as grasps_per_object,
     print_shortfalls as print_shortfalls,
     require_sampled as require_sampled,
+)
+from .values import (
+    coefficient as coefficient,
+    friction as friction,
+    named_positive as named_positive,
+    not_negative as not_negative,
+    number as number,
+    positive as positive,
+    positive_int as positive_int,
+    seed as seed,
+    two_numbers as two_numbers,
 )

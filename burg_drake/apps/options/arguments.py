@@ -1,22 +1,18 @@
-"""Arguments that several verbs share, and what values they accept."""
+"""Parsers of verbs, and the arguments that many of them share."""
 
 from __future__ import annotations
 
 import argparse
-import math
 import textwrap
 from collections.abc import Callable
 from typing import Any, NoReturn
 
-from burg_drake.core import did_you_mean, nearest, quoted, shown
+from burg_drake.apps.options.values import measured_mm, renaming, workers
+from burg_drake.core import did_you_mean, nearest, quoted
 
 DEFAULT_STATION = "panda_tabletop"
 RULER_MM = 100.0
 """Length of the printed rulers."""
-MOST = 10_000_000
-"""What is counted: grasps, trials, rows."""
-MOST_WORKERS = 1024
-LARGEST_SEED = (1 << 64) - 1
 
 
 class Parser(argparse.ArgumentParser):
@@ -159,14 +155,19 @@ def print_scale(arguments: argparse.Namespace) -> tuple[float, float]:
     return x / RULER_MM, y / RULER_MM
 
 
-def add_station(parser: Parser) -> None:
-    """The option --station."""
-    parser.add_argument(
-        "--station",
-        metavar="STATION",
-        default=DEFAULT_STATION,
-        help="station file or built-in name (default: %(default)s)",
-    )
+def add_station(
+    parser: Any,
+    help: str = "station file or built-in name (default: %(default)s)",
+    default: str | None = DEFAULT_STATION,
+) -> None:
+    """The option --station.
+
+    Args:
+        parser: gets it.
+        help: what it means to the verb.
+        default: None where something else tells the station, or there need not be one.
+    """
+    parser.add_argument("--station", metavar="STATION", default=default, help=help)
 
 
 def add_only(parser: Parser, what: str) -> None:
@@ -213,106 +214,3 @@ def add_workers(
         default: None lets the library choose.
     """
     parser.add_argument("--workers", metavar="N", type=workers, default=default, help=help)
-
-
-def positive_int(text: str) -> int:
-    """A whole number from 1 that can be counted to."""
-    return whole(text, 1, MOST)
-
-
-def workers(text: str) -> int:
-    """A number of processes."""
-    return whole(text, 1, MOST_WORKERS)
-
-
-def whole(text: str, low: int, high: int) -> int:
-    """A whole number within bounds."""
-    try:
-        value = int(text)
-    except ValueError:  # also of 4,300 digits
-        value = low - 1
-    if not low <= value <= high:
-        raise argparse.ArgumentTypeError(
-            f"{quoted(text)} is not a whole number from {low} to {high}"
-        )
-    return value
-
-
-def seed(text: str) -> int:
-    """A whole number from 0 with at most 64 bits, as documents have it."""
-    return whole(text, 0, LARGEST_SEED)
-
-
-def port(text: str) -> int:
-    """A port that needs no privileges; Drake's Meshcat takes those from 1024."""
-    return whole(text, 1024, 65535)
-
-
-def positive(text: str) -> float:
-    """A finite number above 0."""
-    value = number(text)
-    if value <= 0.0:
-        raise argparse.ArgumentTypeError(f"{shown(text)} is not above 0")
-    return value
-
-
-def not_negative(text: str) -> float:
-    """A finite number from 0."""
-    value = number(text)
-    if value < 0.0:
-        raise argparse.ArgumentTypeError(f"{shown(text)} is below 0")
-    return value
-
-
-def number(text: str) -> float:
-    """A finite number."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"{quoted(text)} is not a finite number")
-    return value
-
-
-def named_positive(text: str) -> tuple[str, float]:
-    """`NAME=VALUE` with a value above 0."""
-    name, equals, value = text.rpartition("=")
-    if not equals or not name:
-        raise argparse.ArgumentTypeError(f"{quoted(text)} is not NAME=VALUE, such as mug=0.118")
-    try:
-        return name, positive(value)
-    except argparse.ArgumentTypeError as error:
-        raise argparse.ArgumentTypeError(f"{name}: {error}") from error
-
-
-def friction(text: str) -> tuple[str, float]:
-    """`NAME=MU`, or `MU` for all (then the name is empty), with a coefficient from 0."""
-    name, _, value = text.rpartition("=")
-    return name, coefficient(value)
-
-
-def coefficient(text: str) -> float:
-    """A friction coefficient from 0."""
-    mu = number(text)
-    if mu < 0.0:
-        raise argparse.ArgumentTypeError(f"{shown(text)} is not a friction coefficient from 0")
-    return mu
-
-
-def renaming(text: str) -> tuple[str, str]:
-    """`THEIRS=OURS`, or `OURS` for all (then the first name is empty)."""
-    theirs, _, ours = text.rpartition("=")
-    if not ours:
-        raise argparse.ArgumentTypeError(f"{quoted(text)} is not THEIRS=OURS, such as Mug_3f2a=mug")
-    return theirs, ours
-
-
-def measured_mm(text: str) -> tuple[float, float]:
-    """`X` or `X,Y`: what printed rulers of 100 mm measure along x and y [mm]."""
-    values = [positive(part) for part in text.split(",")]
-    if len(values) > 2:
-        raise argparse.ArgumentTypeError(
-            f"{quoted(text)} is not X or X,Y, such as 98.5 or 98.5,99.2"
-        )
-    return values[0], values[-1]

@@ -1,14 +1,51 @@
-"""The camera that a verb looks through, and what is known of its optics."""
+"""Options about the camera that a verb looks through: its optics, its pictures, their depth."""
 
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from burg_drake.apps.options.values import positive
 from burg_drake.core import InvalidInputError
 
 if TYPE_CHECKING:
     from burg_drake.cameras.optics import Intrinsics
+
+
+def add_intrinsics(
+    parser: Any, help: str = "intrinsics of the camera", *, required: bool = False
+) -> None:
+    """The option --intrinsics.
+
+    Args:
+        parser: gets it.
+        help: what it means to the verb.
+        required: the verb can do nothing without.
+    """
+    parser.add_argument("--intrinsics", metavar="FILE", required=required, help=help)
+
+
+def add_live_camera(parser: Any) -> None:
+    """The options --intrinsics and --fps, of verbs that follow what a camera sees."""
+    add_intrinsics(
+        parser,
+        "intrinsics of the camera, our document or a camera_info file of ROS; see burg-drake"
+        " camera calibrate. Simulated cameras need none",
+    )
+    parser.add_argument(
+        "--fps", type=positive, metavar="N", help="frame rate of the camera, in images per second"
+    )
+
+
+def add_depth_unit(parser: Any) -> None:
+    """The option --depth-unit, of verbs that take a depth image."""
+    parser.add_argument(
+        "--depth-unit",
+        metavar="M",
+        type=positive,
+        help="unit of the depth image's numbers in metres"
+        " (default: 0.001 for whole numbers, 1 for others)",
+    )
 
 
 def chosen_intrinsics(arguments: argparse.Namespace) -> Intrinsics:

@@ -1,7 +1,8 @@
 """Options made of settings dataclasses, and settings made of options.
 
 A field that is declared by `core.settings.setting` becomes an option of its name, unit, range,
-default and help; `settings_from` brings what was given back into the dataclass, in SI.
+default and help; `settings_from` brings what was given back into the dataclass, in SI. The option
+of a field that is true by default, such as `--no-settle`, makes it false.
 """
 
 from __future__ import annotations
@@ -12,15 +13,15 @@ from collections.abc import Callable
 from dataclasses import MISSING, Field
 from typing import Any, TypeVar
 
-from burg_drake.apps.options.arguments import LARGEST_SEED, MOST, number, whole
-from burg_drake.core import Setting, declared, shown
+from burg_drake.apps.options.values import MOST, number, two_numbers, whole
+from burg_drake.core import Setting, declared, option_of, shown
 
 Settings = TypeVar("Settings")
 
 
 def destination(settings: type, name: str) -> str:
     """What the parsed arguments call a field."""
-    return declared(settings)[name][1].option(name)[2:].replace("-", "_")
+    return option_of(settings, name)[2:].replace("-", "_")
 
 
 def add_options(
@@ -47,8 +48,7 @@ def add_options(
         else:
             options |= {"default": None if unset else default, **_value_options(field, declaration)}
             if default is not None and "(default" not in declaration.help:
-                text = f"{default:g}" if isinstance(default, float) else default
-                options["help"] += f" (default: {text})"
+                options["help"] += f" (default: {_written(default)})"
         option = declaration.option(name)
         parser.add_argument(*declaration.flags, option, **options)
 
@@ -73,6 +73,13 @@ def shown_value(field: Field[Any], declaration: Setting) -> Any:
     return float(f"{declaration.unit.from_si(value):.12g}")
 
 
+def _written(value: Any) -> str:
+    """A default as people would type it."""
+    if isinstance(value, tuple):
+        return "x".join(map(str, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
 def settings_from(
     arguments: argparse.Namespace, settings: type[Settings], **others: Any
 ) -> Settings:
@@ -89,7 +96,7 @@ def settings_from(
 def given_fields(arguments: argparse.Namespace, settings: type) -> dict[str, Any]:
     """The values of fields, in SI, that options give."""
     given: dict[str, Any] = {}
-    for name, (_, declaration) in declared(settings).items():
+    for name, (field, declaration) in declared(settings).items():
         value = getattr(arguments, destination(settings, name), None)
         if value is None:
             continue
@@ -97,6 +104,8 @@ def given_fields(arguments: argparse.Namespace, settings: type) -> dict[str, Any
         given[name] = value if unit is None else unit.to_si(value)
         if isinstance(value, list):
             given[name] = tuple(value)
+        elif field.default is True:
+            given[name] = not value
     return given
 
 
@@ -104,9 +113,10 @@ def _parser_of(field: Field[Any], declaration: Setting) -> Callable[[str], Any]:
     """What reads the value of an option."""
     kind = str(field.type).partition(" ")[0]
     if kind == "int":
-        low, high = int(declaration.low or 0), declaration.high or MOST
-        most = LARGEST_SEED if field.name == "seed" else int(high)
-        return lambda text: whole(text, low, most)
+        low, high = int(declaration.low or 0), int(declaration.high or MOST)
+        return lambda text: whole(text, low, high)
+    if field.type == "tuple[int, int]":
+        return two_numbers
     if kind in ("float", "Vector3"):
         return lambda text: in_range(text, declaration)
     return str

@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.options.arguments import Parser, renaming
+from burg_drake.apps.options.arguments import Parser
 from burg_drake.apps.options.grasp_file import (
     FRAMES,
     add_camera_options,
     add_gripper_link,
     gripper_for,
 )
+from burg_drake.apps.options.values import renaming
 from burg_drake.core import InvalidInputError
 
 if TYPE_CHECKING:

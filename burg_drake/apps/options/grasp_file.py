@@ -6,7 +6,7 @@ import argparse
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.options.arguments import DEFAULT_STATION, Parser
+from burg_drake.apps.options.arguments import DEFAULT_STATION, Parser, add_station
 
 if TYPE_CHECKING:
     from burg_drake.formats.common import Gripper
@@ -93,11 +93,10 @@ def gripper_for(
 
 def add_file_station(parser: Parser) -> None:
     """The option --station, of verbs whose files may name one."""
-    parser.add_argument(
-        "--station",
-        metavar="STATION",
-        help="station file or built-in name (default: what the file names, else"
-        f" {DEFAULT_STATION})",
+    add_station(
+        parser,
+        f"station file or built-in name (default: what the file names, else {DEFAULT_STATION})",
+        default=None,
     )
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from burg_drake.apps.options.arguments import Parser
 from burg_drake.apps.options.declared import add_options, given_fields
-from burg_drake.core import FieldError, InvalidInputError
+from burg_drake.core import FieldError, InvalidInputError, option_of
 
 if TYPE_CHECKING:
     from burg_drake.station.document import GraspMotion, Station
@@ -44,15 +44,14 @@ def chosen_motion(arguments: argparse.Namespace, station: Station) -> GraspMotio
         return replace(station.document.motion, **given)  # type: ignore[arg-type]
     except FieldError as error:
         options = ", ".join(motion_option(field) for field in given)
-        raise InvalidInputError(f"{options}: {error}") from error
+        raise InvalidInputError(f"{error} ({options})") from error
 
 
 def motion_option(field: str) -> str:
     """The option of a field of `GraspMotion`."""
-    from burg_drake.core import declared
     from burg_drake.station.document import GraspMotion
 
-    return declared(GraspMotion)[field][1].option(field)
+    return option_of(GraspMotion, field)
 
 
 def require_standoff_of_arm(arguments: argparse.Namespace, mode: str) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from burg_drake.apps.options.arguments import Parser, port
+from burg_drake.apps.options.arguments import Parser
+from burg_drake.apps.options.values import port
 
 
 def add_view(parser: Parser) -> None:

@@ -22,7 +22,7 @@ def add_sampling(parser: Parser, default: int, which: Any = None) -> None:
         default: number of grasps for each object.
         which: group in which the number of grasps is an alternative, such as to grasps of a file.
     """
-    from burg_drake.evaluation.run import EvaluationSettings
+    from burg_drake.evaluation.records import EvaluationSettings
 
     add_options(
         which or parser, EvaluationSettings, "grasps_per_object", unset=True, shown_default=default

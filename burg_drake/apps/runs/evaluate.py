@@ -33,6 +33,7 @@ from burg_drake.apps.runs.settings import requested_settings
 
 if TYPE_CHECKING:
     from burg_drake.evaluation.store import Run
+    from burg_drake.station.document import GraspMotion
 
 DEFAULT_OUTPUT = "runs"
 DEFAULT_GRASPS = 100
@@ -65,7 +66,7 @@ def add_to(verbs: Any) -> None:
 
 
 def _add_options(parser: Parser) -> None:
-    from burg_drake.evaluation.run import EvaluationSettings
+    from burg_drake.evaluation.records import EvaluationSettings
 
     parser.add_argument(
         "scenes",
@@ -103,13 +104,7 @@ def _add_options(parser: Parser) -> None:
 
 def run_evaluate(arguments: argparse.Namespace) -> int:
     """Evaluates; 1 if some grasps could not be simulated."""
-    from burg_drake.evaluation import evaluate
-    from burg_drake.evaluation.records import motion_text
-    from burg_drake.evaluation.stages import mode_for
-    from burg_drake.motion.workspace import require_usable_arm
-    from burg_drake.scene.document import load_scene, scene_references
-    from burg_drake.station.checks import require_valid_scene
-    from burg_drake.station.document import GraspMotion, load_station
+    from burg_drake.scene.document import scene_references
 
     require_file(arguments)
     require_sampled(arguments)
@@ -117,7 +112,19 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
     if len(references) > 1 or Path(arguments.scenes[0]).is_dir():
         with chosen_cluster(arguments) as executor:
             return evaluate_many(arguments, references, executor=executor)
-    scene = load_scene(references[0])
+    return _evaluate_one(arguments, references[0])
+
+
+def _evaluate_one(arguments: argparse.Namespace, reference: str) -> int:
+    """Evaluates one scene."""
+    from burg_drake.evaluation import evaluate
+    from burg_drake.evaluation.stages import mode_for
+    from burg_drake.motion.workspace import require_usable_arm
+    from burg_drake.scene.document import load_scene
+    from burg_drake.station.checks import require_valid_scene
+    from burg_drake.station.document import load_station
+
+    scene = load_scene(reference)
     station = load_station(arguments.station)
     mode = mode_for(station, arguments.mode)
     require_standoff_of_arm(arguments, mode)
@@ -141,6 +148,15 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
             retry_failed=arguments.retry_failed,
             progress=not arguments.quiet,
         )
+    _print_run(run, motion)
+    return 1 if run.failures else 0
+
+
+def _print_run(run: Run, motion: GraspMotion) -> None:
+    """The tables of a run, where its files are, and what has failed."""
+    from burg_drake.evaluation.records import motion_text
+    from burg_drake.station.document import GraspMotion
+
     print_summary(run)
     if run.document.shard:
         print(f"shard   {run.document.shard}; burg-drake merge unites all of them")
@@ -155,8 +171,6 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
             f" {how_to_retry(len(run.interrupted), len(run.failures))}",
             file=sys.stderr,
         )
-        return 1
-    return 0
 
 
 def print_summary(run: Run) -> None:

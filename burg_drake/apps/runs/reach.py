@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from burg_drake.core.grasps import GraspSet
     from burg_drake.evaluation.store import PlanOutput
     from burg_drake.scene.document import Scene
-    from burg_drake.station.document import Station
+    from burg_drake.station.document import GraspMotion, Station
 
 DEFAULT_GRASPS = 100
 """Sampled for each object, unless grasps are given."""
@@ -114,27 +114,13 @@ def _add_options(parser: Parser) -> None:
 
 def run_reach(arguments: argparse.Namespace) -> int:
     """Asks, prints tables and writes what is wanted; 1 if that failed for some grasps."""
-    from burg_drake.core.grasps import Outcome
     from burg_drake.evaluation import reach
-    from burg_drake.evaluation.candidates import chosen_instances
-    from burg_drake.evaluation.records import motion_text
-    from burg_drake.evaluation.results import missing_grasps_note, short_lifts
     from burg_drake.motion.workspace import require_usable_arm
     from burg_drake.scene.document import load_scene
     from burg_drake.station.checks import require_valid_scene
-    from burg_drake.station.document import GraspMotion, load_station
+    from burg_drake.station.document import load_station
 
-    require_file(arguments)
-    require_sampled(arguments)
-    if arguments.plan_format and not arguments.plans:
-        raise InvalidInputError("--plan-format is for plan files; add --plans DIR")
-    if arguments.retry_failed and not arguments.plans:
-        raise InvalidInputError("--retry-failed is for plan files; add --plans DIR")
-    if arguments.only_reachable and arguments.output is None:
-        raise InvalidInputError("--only-reachable is for the output file; add -o OUT")
-    if arguments.plans:
-        require_writable(Path(arguments.plans) / "plan")
-        arguments.after_interrupt = "; run the same command to continue"
+    _require_sound(arguments)
     output = _output(arguments)
     scene, station = load_scene(arguments.scene), load_station(arguments.station)
     require_valid_scene(scene, station)
@@ -154,9 +140,45 @@ def run_reach(arguments: argparse.Namespace) -> int:
         workers=arguments.workers,
         progress=not arguments.quiet,
     )
-    answered = judged.column("outcome") != ""
+    _print_answers(judged, scene, motion, arguments)
+    reachable = _reachable(judged)
+    if arguments.plans is not None:
+        print(f"{(reachable & ~_unplanned(judged)).sum()} plans are in {arguments.plans}")
+    if output is not None:
+        _write(judged.select(reachable) if arguments.only_reachable else judged, output, station)
+    return _report_failures(judged, arguments)
+
+
+def _require_sound(arguments: argparse.Namespace) -> None:
+    """Refuses options without those that they belong to, and a folder that cannot be written to.
+
+    Raises:
+        InvalidInputError: names the option or the folder.
+    """
+    require_file(arguments)
+    require_sampled(arguments)
+    if arguments.plan_format and not arguments.plans:
+        raise InvalidInputError("--plan-format is for plan files; add --plans DIR")
+    if arguments.retry_failed and not arguments.plans:
+        raise InvalidInputError("--retry-failed is for plan files; add --plans DIR")
+    if arguments.only_reachable and arguments.output is None:
+        raise InvalidInputError("--only-reachable is for the output file; add -o OUT")
+    if arguments.plans:
+        require_writable(Path(arguments.plans) / "plan")
+        arguments.after_interrupt = "; run the same command to continue"
+
+
+def _print_answers(
+    judged: GraspSet, scene: Scene, motion: GraspMotion, arguments: argparse.Namespace
+) -> None:
+    """The tables, and what one has to know to read them."""
+    from burg_drake.evaluation.candidates import chosen_instances
+    from burg_drake.evaluation.records import motion_text
+    from burg_drake.evaluation.results import missing_grasps_note, short_lifts
+    from burg_drake.station.document import GraspMotion
+
     names = [scene.instance(n).object for n in chosen_instances(scene, arguments.only)]
-    print_tables(judged.select(answered), names, motion)
+    print_tables(judged.select(_answered(judged)), names, motion)
     if arguments.grasps is not None and (
         note := missing_grasps_note(names, judged.object.tolist())
     ):
@@ -166,16 +188,32 @@ def run_reach(arguments: argparse.Namespace) -> int:
     lifts = short_lifts(judged.column("lift_height"), motion.lift_height)
     if lifts is not None:
         print(lifts)
-    yes = judged.column("outcome") == Outcome.REACHABLE
-    unplanned = yes & (judged.column("reason") != "")
-    if arguments.plans is not None:
-        print(f"{(yes & ~unplanned).sum()} plans are in {arguments.plans}")
-    if output is not None:
-        _write(judged.select(yes) if arguments.only_reachable else judged, output, station)
+
+
+def _answered(judged: GraspSet) -> Any:
+    """(N,) bool, which grasps could be judged."""
+    return judged.column("outcome") != ""
+
+
+def _reachable(judged: GraspSet) -> Any:
+    """(N,) bool, which grasps the arm can execute."""
+    from burg_drake.core.grasps import Outcome
+
+    return judged.column("outcome") == Outcome.REACHABLE
+
+
+def _unplanned(judged: GraspSet) -> Any:
+    """(N,) bool, which of those have no plan though one was wanted."""
+    return _reachable(judged) & (judged.column("reason") != "")
+
+
+def _report_failures(judged: GraspSet, arguments: argparse.Namespace) -> int:
+    """Says of which grasps the computation has failed; 1 if there are any."""
+    answered, unplanned = _answered(judged), _unplanned(judged)
     failed = judged.select(~answered)
     retry = f"; {how_to_retry(0, len(failed))}" if arguments.plans else ""
     _print_failures(failed, "could not be judged", len(judged), retry)
-    _print_failures(judged.select(unplanned), "have no plan", int(yes.sum()))
+    _print_failures(judged.select(unplanned), "have no plan", int(_reachable(judged).sum()))
     return 0 if answered.all() and not unplanned.any() else 1
 
 

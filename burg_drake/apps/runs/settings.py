@@ -9,7 +9,7 @@ from burg_drake.apps.options import grasps_per_object, settings_from
 
 if TYPE_CHECKING:
     from burg_drake.core.grasps import Mode
-    from burg_drake.evaluation.run import EvaluationSettings
+    from burg_drake.evaluation.records import EvaluationSettings
     from burg_drake.station.document import GraspMotion
 
 
@@ -17,7 +17,7 @@ def requested_settings(
     arguments: argparse.Namespace, mode: Mode, motion: GraspMotion
 ) -> EvaluationSettings:
     """The settings that options ask for, on a station that has this mode and motion."""
-    from burg_drake.evaluation.run import EvaluationSettings
+    from burg_drake.evaluation.records import EvaluationSettings
 
     return settings_from(
         arguments,

@@ -6,7 +6,7 @@ import argparse
 import sys
 from typing import Any
 
-from burg_drake.apps.options import Parser, add_scene, add_verb
+from burg_drake.apps.options import Parser, add_scene, add_station, add_verb
 
 
 def add_to(group: Any) -> None:
@@ -38,11 +38,11 @@ def _add_options(parser: Parser) -> None:
         required=True,
         help="new folder, or an earlier export, which is replaced",
     )
-    parser.add_argument(
-        "--station",
-        metavar="STATION",
-        help="station file or built-in name: its table and obstacles are exported, too, in its"
-        " world (default: the objects alone, in the frame of the board)",
+    add_station(
+        parser,
+        "station file or built-in name: its table and obstacles are exported, too, in its world"
+        " (default: the objects alone, in the frame of the board)",
+        default=None,
     )
 
 

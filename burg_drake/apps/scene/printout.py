@@ -46,8 +46,7 @@ def _add_options(parser: Parser) -> None:
         "measured length of the printed 100 mm rulers, along x and y of the page; the print is"
         " scaled to compensate",
     )
-    parser.add_argument("--no-height-map", action="store_true", help="print the markers alone")
-    parser.add_argument("--no-names", action="store_true", help="do not print the objects' names")
+    add_options(parser, PrintSettings, "height_map", "names")
 
 
 def require_pdf(path: str) -> None:
@@ -66,13 +65,7 @@ def run_printout(arguments: argparse.Namespace) -> int:
 
     require_pdf(arguments.output)
     x, y = arguments.measured_mm
-    settings = settings_from(
-        arguments,
-        PrintSettings,
-        measured=(x * 1e-3, y * 1e-3),
-        height_map=not arguments.no_height_map,
-        names=not arguments.no_names,
-    )
+    settings = settings_from(arguments, PrintSettings, measured=(x * 1e-3, y * 1e-3))
     scene = load_scene(arguments.scene)
     require_writable(arguments.output)
     printout = print_board(scene, settings)

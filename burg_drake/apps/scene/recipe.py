@@ -87,8 +87,7 @@ def _add_layout(parser: Any) -> None:
     )
     how.add_argument("--packed", action="store_true", help="side by side, as dense as it gets")
     how.add_argument("--heap", action="store_true", help="dropped on the middle of the board")
-    add_options(group, SceneRecipe, "tries", "fewer")
-    group.add_argument("--no-settle", action="store_true", help="leave objects as they were placed")
+    add_options(group, SceneRecipe, "tries", "fewer", "settle")
 
 
 def _add_rules(parser: Any) -> None:
@@ -124,7 +123,6 @@ def recipe_of(
         board=Board(size=board_extents(arguments.size, upright=arguments.portrait)),
         layout=layout or "random",
         station=station_reference(arguments.station, station, folder),
-        settle=not arguments.no_settle,
     )
 
 

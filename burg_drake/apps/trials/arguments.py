@@ -26,6 +26,20 @@ def add_moved(parser: Parser) -> None:
     )
 
 
+def add_show_simulated(parser: Parser, more: str = "") -> None:
+    """The option --show-simulated, of verbs that operators look at.
+
+    Args:
+        parser: gets it.
+        more: is hidden, too, after "the simulated outcomes".
+    """
+    parser.add_argument(
+        "--show-simulated",
+        action="store_true",
+        help=f"show the simulated outcomes{more}; hidden by default, so that operators are blind",
+    )
+
+
 def _moved(text: str) -> tuple[str, str]:
     key, equals, folder = text.partition("=")
     if not key or not equals or not folder:

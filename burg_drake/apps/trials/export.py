@@ -7,7 +7,14 @@ import sys
 from collections import Counter
 from typing import TYPE_CHECKING, Any, get_args
 
-from burg_drake.apps.options import Parser, add_quiet, add_retry_failed, add_verb, add_workers
+from burg_drake.apps.options import (
+    Parser,
+    add_quiet,
+    add_retry_failed,
+    add_station,
+    add_verb,
+    add_workers,
+)
 from burg_drake.apps.trials.arguments import add_moved, add_sheet
 from burg_drake.core import shown
 
@@ -50,9 +57,7 @@ def _add_options(parser: Parser) -> None:
         help="JSON laid out as ROS's JointTrajectory, or tables; load_plan in Python reads both"
         " (default: %(default)s)",
     )
-    parser.add_argument(
-        "--station", metavar="STATION", help="station with the arm (default: that of each run)"
-    )
+    add_station(parser, "station with the arm (default: that of each run)", default=None)
     add_moved(parser)
     add_workers(parser)
     add_retry_failed(parser, "trials")

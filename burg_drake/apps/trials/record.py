@@ -9,10 +9,11 @@ from datetime import date, datetime
 from typing import TYPE_CHECKING, Any, Literal
 
 from burg_drake.apps.options import (
+    add_depth_unit,
+    add_intrinsics,
     add_measured_board,
     add_verb,
     not_negative,
-    positive,
     print_scale,
 )
 from burg_drake.apps.trials.arguments import add_moved, add_sheet
@@ -74,18 +75,9 @@ def add_to(group: Any) -> None:
 
 def _add_photo(group: Any) -> None:
     group.add_argument("--photo", metavar="FILE", help="photo of the scene; copied to photos/")
-    group.add_argument(
-        "--intrinsics",
-        metavar="FILE",
-        help="intrinsics of the camera, to measure where the objects are",
-    )
+    add_intrinsics(group, "intrinsics of the camera, to measure where the objects are")
     group.add_argument("--depth", metavar="FILE", help="depth image of the same camera")
-    group.add_argument(
-        "--depth-unit",
-        metavar="M",
-        type=positive,
-        help="unit of the depth image's numbers, in metres",
-    )
+    add_depth_unit(group)
     group.add_argument("--scene", metavar="SCENE", help="scene file (default: the run's copy)")
     add_measured_board(group)
     group.add_argument(

@@ -11,15 +11,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import (
+    add_live_camera,
     add_measured_board,
     add_page,
     add_verb,
     chosen_intrinsics,
-    positive,
     print_scale,
 )
 from burg_drake.apps.terminal import terminated_as_interrupted, wait_for_interrupt
-from burg_drake.apps.trials.arguments import add_moved, add_sheet
+from burg_drake.apps.trials.arguments import add_moved, add_sheet, add_show_simulated
 
 if TYPE_CHECKING:
     from burg_drake.experiment.pages import LabBook, LabCamera
@@ -47,11 +47,7 @@ def add_to(verbs: Any) -> None:
         parser,
         "tablets on the network can open it, each by an address with a token that is printed",
     )
-    parser.add_argument(
-        "--show-simulated",
-        action="store_true",
-        help="show the simulated outcomes; hidden by default, so that operators are blind",
-    )
+    add_show_simulated(parser)
     camera = parser.add_argument_group("camera")
     camera.add_argument(
         "--camera",
@@ -60,16 +56,7 @@ def add_to(verbs: Any) -> None:
         " or sim:STATION/CAMERA: the page shows the scene over its picture, and how far objects"
         " stand from their places",
     )
-    camera.add_argument(
-        "--intrinsics",
-        metavar="FILE",
-        help=(
-            "intrinsics of the camera; see burg-drake camera calibrate. Simulated cameras need none"
-        ),
-    )
-    camera.add_argument(
-        "--fps", type=positive, metavar="N", help="frame rate of the camera, in images per second"
-    )
+    add_live_camera(camera)
     add_measured_board(camera)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import add_verb
-from burg_drake.apps.trials.arguments import add_moved, add_sheet
+from burg_drake.apps.trials.arguments import add_moved, add_sheet, add_show_simulated
 
 if TYPE_CHECKING:
     from burg_drake.experiment.pages import TriedRuns
@@ -30,11 +30,7 @@ def add_to(verbs: Any) -> None:
     add_sheet(parser)
     add_moved(parser)
     parser.add_argument("-o", "--output", metavar="FILE", required=True, help="page to write")
-    parser.add_argument(
-        "--show-simulated",
-        action="store_true",
-        help="show the simulated outcomes; hidden by default, so that operators are blind",
-    )
+    add_show_simulated(parser)
     parser.add_argument("--no-printouts", action="store_true", help="write no printed boards")
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import add_verb
-from burg_drake.apps.trials.arguments import add_sheet
+from burg_drake.apps.trials.arguments import add_sheet, add_show_simulated
 
 if TYPE_CHECKING:
     from burg_drake.experiment.trials import MissingValues, RealTrial, TrialSheet
@@ -29,12 +29,7 @@ def add_to(group: Any) -> None:
     )
     add_sheet(parser)
     parser.add_argument("--all", action="store_true", help="print a line for each trial as well")
-    parser.add_argument(
-        "--show-simulated",
-        action="store_true",
-        help="show the simulated outcomes and, until trials have begun, the notes on the"
-        " selection; hidden by default, so that operators are blind",
-    )
+    add_show_simulated(parser, " and, until trials have begun, the notes on the selection")
 
 
 def run_show(arguments: argparse.Namespace) -> int:

@@ -46,7 +46,7 @@ class CharucoTarget:
             number of rows, the upper left square is white.
     """
 
-    squares: tuple[int, int] = (8, 11)
+    squares: tuple[int, int] = setting((8, 11), "columns and rows", metavar="CxR")
     square: float = setting(
         0.020, "side of a square", unit=MILLIMETRES, metavar="SQUARE_MM", above=0
     )

@@ -9,7 +9,7 @@ import numpy as np
 from reportlab.pdfgen.canvas import Canvas
 
 from burg_drake.cameras.calibration.target import CharucoTarget
-from burg_drake.core import Array, InvalidInputError
+from burg_drake.core import Array, InvalidInputError, option_of
 from burg_drake.core.files import atomic_write
 from burg_drake.printout import (
     BLACK,
@@ -117,16 +117,20 @@ def _draw_squares(pen: Pen, target: CharucoTarget, origin: Array) -> None:
 def _draw_words(pen: Pen, target: CharucoTarget, paper: Paper) -> None:
     left, base = paper.lower[0] + 0.108, paper.margin
     columns, rows = target.squares
-    command = (
-        f"--squares {columns}x{rows} --square-mm {1e3 * target.square:g}"
-        f" --marker-mm {1e3 * target.marker:g} --dictionary {target.dictionary}"
-    )
+    values = {
+        "squares": f"{columns}x{rows}",
+        "square": f"{1e3 * target.square:g}",
+        "marker": f"{1e3 * target.marker:g}",
+        "dictionary": target.dictionary,
+    }
+    words = [f"{option_of(CharucoTarget, name)} {value}" for name, value in values.items()]
+    words += [option_of(CharucoTarget, "legacy")] if target.legacy else []
     pen.text(left, base + 9.0e-3, "Calibration target", 9.0, font=BOLD, color=INK)
     for k, line in enumerate(
         (
             "Print at 100 %, glue onto something flat and stiff, then",
             "burg-drake camera calibrate PHOTOS -o K.yaml",
-            command + (" --legacy" if target.legacy else ""),
+            " ".join(words),
         )
     ):
         pen.text(left, base + 5.9e-3 - 2.75e-3 * k, line, 5.5)

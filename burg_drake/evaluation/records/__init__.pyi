@@ -60,6 +60,7 @@ from .run_document import (
     require_same_run as require_same_run,
     run_hash as run_hash,
 )
+from .settings import EvaluationSettings as EvaluationSettings
 from .shard import (
     Shard as Shard,
     as_shard as as_shard,

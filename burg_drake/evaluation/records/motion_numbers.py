@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields
 
-from burg_drake.core import declared
+from burg_drake.core import declared, option_of
 from burg_drake.station.document import GraspMotion
 
 DIRECTION = "lift_direction"
@@ -58,8 +58,8 @@ def motion_text(motion: GraspMotion) -> str:
 def motion_options(motion: GraspMotion, usual: GraspMotion) -> list[str]:
     """Words of a command line that ask for a motion where a station's usual one is another."""
     words: list[str] = []
-    for name, (_, declaration) in declared(GraspMotion).items():
-        option = declaration.option(name)
+    for name in declared(GraspMotion):
+        option = option_of(GraspMotion, name)
         value = getattr(motion, name)
         if value == getattr(usual, name):
             continue

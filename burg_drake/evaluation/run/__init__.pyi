@@ -11,4 +11,3 @@ from .request import (
     Request as Request,
 )
 from .scene_judging import is_finished as is_finished
-from .settings import EvaluationSettings as EvaluationSettings

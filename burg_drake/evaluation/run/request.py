@@ -19,6 +19,7 @@ from burg_drake.core.paths import PACKAGE_URI, portable_reference
 from burg_drake.evaluation.candidates import INSTANCE, chosen_instances, on_chosen
 from burg_drake.evaluation.grasp_sets import by_names
 from burg_drake.evaluation.records import (
+    EvaluationSettings,
     Grasps,
     Library,
     RunDocument,
@@ -27,7 +28,6 @@ from burg_drake.evaluation.records import (
     input_of,
     numbers,
 )
-from burg_drake.evaluation.run.settings import EvaluationSettings
 from burg_drake.evaluation.stages import arm_settings, mode_for
 from burg_drake.scene.document import Scene
 from burg_drake.station.document import Engine, GraspMotion, Station, engine_preset

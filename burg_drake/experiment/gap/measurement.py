@@ -35,6 +35,7 @@ from burg_drake.evaluation import evaluate
 from burg_drake.evaluation.candidates import Candidates
 from burg_drake.evaluation.records import (
     JOURNAL_FILE,
+    EvaluationSettings,
     Grasps,
     Journal,
     Lock,
@@ -44,7 +45,7 @@ from burg_drake.evaluation.records import (
     require_same_run,
     run_hash,
 )
-from burg_drake.evaluation.run import EvaluationSettings, GraspsLike
+from burg_drake.evaluation.run import GraspsLike
 from burg_drake.evaluation.stages import arm_settings, mode_for
 from burg_drake.evaluation.store import (
     RUN_FILE,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import get_args
 
-from burg_drake.core import InvalidInputError, nearest, quoted, setting
+from burg_drake.core import LARGEST_SEED, InvalidInputError, nearest, quoted, setting
 from burg_drake.experiment.trials import Among, Balance, Selection, Success
 
 MARGIN = "margin:"
@@ -64,7 +64,7 @@ class SelectionSettings:
     blocks: int = setting(
         1, "blocks for the trials of a scene; each scene has one before any has its second", low=1
     )
-    seed: int = setting(0, "seed of selection and order")
+    seed: int = setting(0, "seed of selection and order", high=LARGEST_SEED)
 
     def __post_init__(self) -> None:
         kinds = [name for name in get_args(Balance) if name != "margin"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar, get_args
 
-from burg_drake.core import content_hash, setting
+from burg_drake.core import LARGEST_SEED, content_hash, setting
 from burg_drake.core.documents import dump_document, require_ranges
 from burg_drake.scene.document.board import Board
 from burg_drake.scene.document.layout import TRIES, LayoutName, PoseChoice
@@ -15,7 +15,7 @@ ATTEMPTS = 100
 
 RANGES = {
     "count": (1, 1000),
-    "seed": (0, (1 << 64) - 1),
+    "seed": (0, LARGEST_SEED),
     "tries": (1, 1_000_000),
     "attempts": (1, 100_000),
     "clear_grasps": (0, 1_000_000),
@@ -62,9 +62,9 @@ class SceneRecipe:
     fewer: bool = setting(
         False, "accept a scene in which not all objects found a place; they are reported"
     )
-    seed: int = setting(0)
+    seed: int = setting(0, high=LARGEST_SEED)
     station: str = "panda_tabletop"
-    settle: bool = True
+    settle: bool = setting(True, "leave objects as they were placed", name="no_settle")
     attempts: int = setting(ATTEMPTS, "scenes that are drawn until one is accepted", low=1)
     within_reach: bool = setting(False, "the arm can grasp every object where it is")
     clear_grasps: int = setting(

@@ -13,7 +13,7 @@ from burg_drake.core.grasps import Verdict
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.candidates.candidates import Candidate
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.run.settings import EvaluationSettings
+from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.stages.judge import judge_grasp
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.evaluation.workers import Job, OnFailure

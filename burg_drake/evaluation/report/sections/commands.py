@@ -6,9 +6,17 @@ import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+from burg_drake.core import option_of
 from burg_drake.core.documents import load_document
-from burg_drake.evaluation.records import CampaignDocument, RunDocument, motion_in, motion_options
+from burg_drake.evaluation.records import (
+    CampaignDocument,
+    EvaluationSettings,
+    RunDocument,
+    motion_in,
+    motion_options,
+)
 from burg_drake.evaluation.store import GRASPS_FILE, STATION_FILE, Campaign, Run
 from burg_drake.station.document import StationDocument
 
@@ -20,13 +28,12 @@ def reproduce_command(run: Run) -> str:
     """The command line that makes this run; for given grasps their file is among the run's."""
     document = run.document
     words = ["burg-drake", "evaluate", document.scene.path, "--station", document.station.path]
-    words += ["--mode", document.mode]
+    words += _words(mode=document.mode)
     if document.grasps.per_object is None:
         words += ["--grasps", str(run.path / GRASPS_FILE)]
     else:
         words += _sampling(document)
     words += _settings(document, run.path / STATION_FILE)
-    words += ["--shard", document.shard] if document.shard else []
     return shlex.join([*words, "-o", str(run.path)])
 
 
@@ -36,10 +43,10 @@ def reproduce_campaign_command(campaign: Campaign) -> str:
     document = campaign.document
     if document.grasps.per_object is None:
         return document.command
-    words = ["--station", document.station.path, "--mode", document.mode, *_sampling(document)]
+    words = ["--station", document.station.path, *_words(mode=document.mode)]
+    words += _sampling(document)
     begun = (place.folder / STATION_FILE for place in campaign.places)
     words += _settings(document, next((path for path in begun if path.is_file()), None))
-    words += ["--shard", document.shard] if document.shard else []
     scenes = _scenes([entry.path for entry in document.scenes])
     return f"burg-drake evaluate {scenes} {shlex.join([*words, '-o', str(campaign.path)])}"
 
@@ -56,14 +63,16 @@ def _scenes(paths: Sequence[str]) -> str:
 
 def _sampling(document: RunDocument | CampaignDocument) -> list[str]:
     grasps = document.grasps
-    words = ["--grasps-per-object", str(grasps.per_object)]
-    words += ["--approach-angle", str(grasps.approach_angle_deg)]
-    words += ["--blind"] if grasps.blind else []
+    words = _words(
+        grasps_per_object=grasps.per_object,
+        approach_angle_deg=grasps.approach_angle_deg,
+        blind=grasps.blind,
+    )
     return words + [word for name in grasps.only for word in ("--only", name)]
 
 
 def _settings(document: RunDocument | CampaignDocument, station: Path | None) -> list[str]:
-    """Motion, engine, seed and format of the table; `station` is a copy of the document."""
+    """Motion, engine, seed, format of the table and share; `station` is a copy of the document."""
     motion = motion_in(document.trial)
     words: list[str] = []
     if station is not None:
@@ -71,5 +80,20 @@ def _settings(document: RunDocument | CampaignDocument, station: Path | None) ->
         if document.mode == "hand":  # which does not begin before the grasp
             motion = replace(motion, standoff=usual.standoff)
         words += motion_options(motion, usual)
-    words += ["--engine", document.engine.name, "--seed", str(document.seed)]
-    return words if document.table == "csv" else [*words, "--table", document.table]
+    words += _words(engine=document.engine.name, seed=document.seed)
+    if document.table != EvaluationSettings.table:
+        words += _words(table=document.table)
+    return words + (_words(shard=document.shard) if document.shard else [])
+
+
+def _words(**values: Any) -> list[str]:
+    """The options of fields of `EvaluationSettings` with their values; those that take none stand
+    for true."""
+    words: list[str] = []
+    for name, value in values.items():
+        option = option_of(EvaluationSettings, name)
+        if isinstance(value, bool):
+            words += [option] if value else []
+        else:
+            words += [option, str(value)]
+    return words

@@ -6,14 +6,15 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from burg_drake.core import InvalidInputError, setting
+from burg_drake.core import LARGEST_SEED, InvalidInputError, setting
 from burg_drake.core.grasps import MODES
 from burg_drake.evaluation.candidates import DEFAULT_APPROACH_ANGLE_DEG
 from burg_drake.station.document import DEFAULT_ENGINE, ENGINES
 
 if TYPE_CHECKING:
     from burg_drake.core.grasps import Mode
-    from burg_drake.evaluation.records import Shard, TableFormat
+    from burg_drake.evaluation.records.run_document import TableFormat
+    from burg_drake.evaluation.records.shard import Shard
     from burg_drake.station.document import Engine, GraspMotion
 
 
@@ -82,7 +83,7 @@ class EvaluationSettings:
         choices=tuple(ENGINES),
     )
     motion: GraspMotion | None = None
-    seed: int = setting(0, "seed of the sampling")
+    seed: int = setting(0, "seed of the sampling", high=LARGEST_SEED)
     shard: Shard | str | None = setting(
         None,
         "judge a share of the work, such as 2/8, on one of several machines: every N-th scene, or"

@@ -1,0 +1,127 @@
+"""What values options accept: each function reads the text of one, or says what is wrong with it.
+
+All raise `argparse.ArgumentTypeError`, which the parser reports with the option's name.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+
+from burg_drake.core import LARGEST_SEED, quoted, shown
+
+MOST = 10_000_000
+"""What is counted: grasps, trials, rows."""
+MOST_WORKERS = 1024
+
+
+def positive_int(text: str) -> int:
+    """A whole number from 1 that can be counted to."""
+    return whole(text, 1, MOST)
+
+
+def workers(text: str) -> int:
+    """A number of processes."""
+    return whole(text, 1, MOST_WORKERS)
+
+
+def whole(text: str, low: int, high: int) -> int:
+    """A whole number within bounds."""
+    try:
+        value = int(text)
+    except ValueError:  # also of 4,300 digits
+        value = low - 1
+    if not low <= value <= high:
+        raise argparse.ArgumentTypeError(
+            f"{quoted(text)} is not a whole number from {low} to {high}"
+        )
+    return value
+
+
+def two_numbers(text: str) -> tuple[int, int]:
+    """`AxB` of whole numbers from 1."""
+    found = re.fullmatch(r"([1-9]\d*)[x×]([1-9]\d*)", text.strip().lower())
+    if found is None:
+        raise argparse.ArgumentTypeError(f"{quoted(text)} is not two whole numbers, such as 8x11")
+    return int(found[1]), int(found[2])
+
+
+def seed(text: str) -> int:
+    """A whole number from 0 with at most 64 bits, as documents have it."""
+    return whole(text, 0, LARGEST_SEED)
+
+
+def port(text: str) -> int:
+    """A port that needs no privileges; Drake's Meshcat takes those from 1024."""
+    return whole(text, 1024, 65535)
+
+
+def positive(text: str) -> float:
+    """A finite number above 0."""
+    value = number(text)
+    if value <= 0.0:
+        raise argparse.ArgumentTypeError(f"{shown(text)} is not above 0")
+    return value
+
+
+def not_negative(text: str) -> float:
+    """A finite number from 0."""
+    value = number(text)
+    if value < 0.0:
+        raise argparse.ArgumentTypeError(f"{shown(text)} is below 0")
+    return value
+
+
+def number(text: str) -> float:
+    """A finite number."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{quoted(text)} is not a finite number")
+    return value
+
+
+def named_positive(text: str) -> tuple[str, float]:
+    """`NAME=VALUE` with a value above 0."""
+    name, equals, value = text.rpartition("=")
+    if not equals or not name:
+        raise argparse.ArgumentTypeError(f"{quoted(text)} is not NAME=VALUE, such as mug=0.118")
+    try:
+        return name, positive(value)
+    except argparse.ArgumentTypeError as error:
+        raise argparse.ArgumentTypeError(f"{name}: {error}") from error
+
+
+def friction(text: str) -> tuple[str, float]:
+    """`NAME=MU`, or `MU` for all (then the name is empty), with a coefficient from 0."""
+    name, _, value = text.rpartition("=")
+    return name, coefficient(value)
+
+
+def coefficient(text: str) -> float:
+    """A friction coefficient from 0."""
+    mu = number(text)
+    if mu < 0.0:
+        raise argparse.ArgumentTypeError(f"{shown(text)} is not a friction coefficient from 0")
+    return mu
+
+
+def renaming(text: str) -> tuple[str, str]:
+    """`THEIRS=OURS`, or `OURS` for all (then the first name is empty)."""
+    theirs, _, ours = text.rpartition("=")
+    if not ours:
+        raise argparse.ArgumentTypeError(f"{quoted(text)} is not THEIRS=OURS, such as Mug_3f2a=mug")
+    return theirs, ours
+
+
+def measured_mm(text: str) -> tuple[float, float]:
+    """`X` or `X,Y`: what printed rulers of 100 mm measure along x and y [mm]."""
+    values = [positive(part) for part in text.split(",")]
+    if len(values) > 2:
+        raise argparse.ArgumentTypeError(
+            f"{quoted(text)} is not X or X,Y, such as 98.5 or 98.5,99.2"
+        )
+    return values[0], values[-1]
