@@ -24,7 +24,7 @@ def add_to(verbs: Any) -> None:
 
 
 def run_merge(arguments: argparse.Namespace) -> int:
-    """Unites runs and prints what is in them; 1 if grasps could not be simulated."""
+    """Merges runs and prints what is in them; 1 if grasps could not be simulated."""
     from burg_drake.apps.runs.campaign import campaign_exit_code, print_campaign
     from burg_drake.apps.runs.evaluate import print_summary
     from burg_drake.evaluation.merge import merge_folders
