@@ -28,7 +28,7 @@ from burg_drake.scene.document.scene import Scene
 from burg_drake.simulation.trials.arm_trial import ArmTrial
 from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.simulation.trials.result import TrialResult
-from burg_drake.station.document.engine import Engine, engine_preset
+from burg_drake.station.document.engine import Engine, as_engine
 from burg_drake.station.document.station_document import Station
 
 SAMPLED = 400
@@ -85,7 +85,7 @@ def main() -> None:
     parser.add_argument("scene", nargs="?", default="tabletop_six")
     stations = ["panda_tabletop", "panda_bin", "panda_shelf"]
     parser.add_argument("--stations", nargs="+", default=stations)
-    parser.add_argument("--engines", nargs="+", type=engine_preset, default=["standard"])
+    parser.add_argument("--engines", nargs="+", type=as_engine, default=["standard"])
     parser.add_argument("--grasps", type=int, default=8, help="to execute, for each object")
     parser.add_argument("--whole", action="store_true", help="simulate every trial to its end")
     arguments = parser.parse_args()
@@ -96,7 +96,7 @@ def main() -> None:
         planned = list(plans(scene, station, arguments.grasps))
         print(f"{len(planned)} plans on {name}", flush=True)
         for preset in arguments.engines:
-            engine = engine_preset(preset) if isinstance(preset, str) else preset
+            engine = as_engine(preset)
             engine = replace(engine, whole_trial=arguments.whole or engine.whole_trial)
             for share in (1.0, SLIPPERY):
                 rows = list(execute(scene, station, engine, planned, share))

@@ -41,7 +41,7 @@ from burg_drake.evaluation.grasp_sets.scored import scored_set
 from burg_drake.evaluation.records.rows import best_rows
 from burg_drake.grasping.quality.metrics import METRICS
 from burg_drake.simulation.robustness.perturbation import success_rate
-from burg_drake.station.document.engine import engine_preset
+from burg_drake.station.document.engine import as_engine
 
 REPEATS, PICKED = 20, 5
 SMALLER_IS_BETTER = (
@@ -121,8 +121,7 @@ def measured(
     grasps = sample_grasps(scene, station, 4 * arguments.n, seed=arguments.seed, settings=settings)
     grasps = scored_set(grasps, scene.library, station, scene).with_columns(sampler=grasps.score)
     exact, quick = (
-        burg.HandTrial(scene, station, engine=engine_preset(name))
-        for name in ("standard", "screening")
+        burg.HandTrial(scene, station, engine=as_engine(name)) for name in ("standard", "screening")
     )
     instance = grasps.column(INSTANCE)
     queues = {name: list(np.flatnonzero(instance == name)) for name in scene.instances}

@@ -33,7 +33,7 @@ from burg_drake.core.frames import make_pose
 from burg_drake.core.grasps.outcome import Stage
 from burg_drake.scene.document.scene import Instance, Scene
 from burg_drake.simulation.trials.result import TrialResult
-from burg_drake.station.document.engine import engine_preset
+from burg_drake.station.document.engine import as_engine
 from burg_drake.station.document.station_document import Station
 
 SCENES = ("tabletop_six", "tabletop_close")
@@ -146,7 +146,7 @@ def told(result: TrialResult) -> str:
 
 def make_trial(scene: Scene, station: Station, engine: str, lock: bool) -> burg.HandTrial:
     """Trials of a scene."""
-    return burg.HandTrial(scene, station, engine=engine_preset(engine), lock=lock)
+    return burg.HandTrial(scene, station, engine=as_engine(engine), lock=lock)
 
 
 def only(scene: Scene, name: str) -> Scene:

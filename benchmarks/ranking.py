@@ -29,7 +29,7 @@ from burg_drake.evaluation.grasp_sets.sampled import sample_grasps
 from burg_drake.evaluation.grasp_sets.scored import scored_set
 from burg_drake.grasping.quality.metrics import METRICS, score_of
 from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.engine import engine_preset
+from burg_drake.station.document.engine import as_engine
 from burg_drake.station.document.station_document import Station
 
 SAMPLER = "sampler's score"
@@ -69,7 +69,7 @@ def main() -> None:
 
 def execute(grasps: GraspSet, scene: Scene, station: Station, factor: float) -> NDArray[np.str_]:
     """Outcomes (N,) with so many times the mass."""
-    trial = burg.HandTrial(scene, station, engine=engine_preset("screening"))
+    trial = burg.HandTrial(scene, station, engine=as_engine("screening"))
     outcomes = []
     for name, X_OG in zip(grasps.column(INSTANCE).tolist(), grasps.X_OG, strict=True):
         mass = factor * scene.entry(name).mass_properties.mass

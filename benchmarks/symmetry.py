@@ -28,7 +28,7 @@ import burg_drake as burg
 from burg_drake.core.arrays import Array
 from burg_drake.core.frames import swap_fingers
 from burg_drake.simulation.trials.result import TrialResult
-from burg_drake.station.document.engine import engine_preset
+from burg_drake.station.document.engine import as_engine
 
 SCENES = ("tabletop_six", "tabletop_close")
 PEER = {"swapped": 0.088, "turned": 0.056}
@@ -103,7 +103,7 @@ def main() -> None:
 def judge(work: Work) -> Tally:
     """Executes the grasps of one object."""
     scene, station = burg.load_scene(work.scene), burg.load_station(work.station)
-    engine = engine_preset(work.engine)
+    engine = as_engine(work.engine)
     here = burg.HandTrial(scene, hand_only(station), engine=engine)
     moved = hand_only(station, np.deg2rad(work.turn), *SHIFT)
     there = burg.HandTrial(scene, moved, engine=engine)
@@ -132,7 +132,7 @@ def judge(work: Work) -> Tally:
 def judged_with_other_friction(work: Work, X_OG: Array, friction: float) -> Iterator[burg.Outcome]:
     """Outcomes of the reference at a lower, at the same and at a higher friction."""
     scene, station = burg.load_scene(work.scene), hand_only(burg.load_station(work.station))
-    trial = burg.HandTrial(scene, station, engine=engine_preset("reference"))
+    trial = burg.HandTrial(scene, station, engine=as_engine("reference"))
     for factor in (FRICTION_CHANGES[0], 1.0, FRICTION_CHANGES[1]):
         yield trial.run(work.instance, X_OG, friction=factor * friction).outcome
 

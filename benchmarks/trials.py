@@ -27,7 +27,7 @@ from peer_pybullet import Peer, is_installed
 import burg_drake as burg
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.engine import ENGINES, engine_preset
+from burg_drake.station.document.engine import ENGINES, as_engine
 from burg_drake.station.document.station_document import Station
 
 PUBLISHED_EXECUTED, PUBLISHED_REJECTED = 0.45, 0.07
@@ -111,7 +111,7 @@ class Bench:
 
     def __init__(self, scene: Scene, station: Station, engines: Sequence[str]) -> None:
         self._trials = {
-            name: burg.HandTrial(scene, station, engine=engine_preset(name)) for name in engines
+            name: burg.HandTrial(scene, station, engine=as_engine(name)) for name in engines
         }
         self._peer = Peer(scene, station) if is_installed() else None
 

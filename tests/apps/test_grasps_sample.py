@@ -162,7 +162,7 @@ def test_nothing_is_sampled_in_vain(
 ) -> None:
     from burg_drake.evaluation.candidates import sampling
 
-    monkeypatch.delattr(sampling, "sample_scene")
+    monkeypatch.delattr(sampling, "sample_on_scene")
     (tmp_path / "file").write_text("")
     for out, message in (
         (("x.h5", "--to", "acronym"), "the grasps are of 2 objects (bottle, mug)"),

@@ -13,7 +13,7 @@ from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.candidates.sampling import (
     sample_candidates,
     sample_library,
-    sample_scene,
+    sample_on_scene,
 )
 from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
 from burg_drake.evaluation.grasp_sets.sampled import sampled_set
@@ -29,7 +29,7 @@ BLIND = SamplingSettings(blind=True)
 def on_scene(scene, station, n=30, seed=0, only=None, **settings) -> dict[str, GraspSet]:
     """Blind unless told otherwise: the objects of the small scene are nothing to Drake."""
     how = SamplingSettings(**{"blind": True, **settings})
-    return dict(sample_scene(scene, station, n, seed, how, only))
+    return dict(sample_on_scene(scene, station, n, seed, how, only))
 
 
 def turned(scene: Scene, **rpy_deg: tuple[float, float, float]) -> Scene:
@@ -179,7 +179,7 @@ def test_clear_grasps_of_a_library_touch_nothing_of_the_object(station: Station)
 
 def test_a_set_says_how_it_was_made(scene: Scene, station: Station) -> None:
     settings = SamplingSettings(blind=True, diverse=2, weights={"bar": np.ones(12)})
-    sampled = dict(sample_scene(scene, station, 10, 5, settings))
+    sampled = dict(sample_on_scene(scene, station, 10, 5, settings))
     grasps = sampled_set(sampled, scene.library, scene, station, 10, 5, settings)
     assert grasps.column("instance").tolist() == [i for i in sampled for _ in range(10)]
     told = grasps.provenance

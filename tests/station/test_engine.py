@@ -5,19 +5,29 @@ from __future__ import annotations
 import pytest
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.station.document.engine import ENGINES, Engine, engine_preset
+from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.station.document.engine import ENGINES, Engine, as_engine
 
 
 def test_presets_go_by_their_own_names_and_get_coarser() -> None:
     assert list(ENGINES) == [engine.name for engine in ENGINES.values()]
-    steps = [engine_preset(name).time_step for name in ("reference", "standard", "screening")]
+    steps = [as_engine(name).time_step for name in ("reference", "standard", "screening")]
     assert steps == sorted(steps) and len(set(steps)) == 3
     assert {engine.contact_approximation for engine in ENGINES.values()} == {"lagged"}
 
 
+def test_an_engine_goes_by_its_name_wherever_one_is_taken() -> None:
+    own = Engine(name="mine", time_step=0.004)
+    assert as_engine(own) is own
+    built = build_station_diagram(
+        "tabletop_six", "panda_tabletop", robot="none", engine="screening"
+    )
+    assert built.engine is ENGINES["screening"]
+
+
 def test_unknown_preset() -> None:
     with pytest.raises(UnknownNameError) as error:
-        engine_preset("standart")
+        as_engine("standart")
     assert str(error.value) == (
         "engine 'standart' does not exist; did you mean 'standard'? Known: reference, screening,"
         " standard"

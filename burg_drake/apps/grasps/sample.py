@@ -145,13 +145,13 @@ def _sample(
 ) -> tuple[dict[str, GraspSet], dict[str, float]]:
     """Grasps, and how long they took [s], by instance or object."""
     from burg_drake.core.terminal import Progress, ProgressMeter, Reporter
-    from burg_drake.evaluation.candidates import sample_library, sample_scene
+    from burg_drake.evaluation.candidates import sample_library, sample_on_scene
 
     seed, only = arguments.seed, arguments.only
     if source.scene is None:
         stream = sample_library(source.library, station, n, seed, settings, only)
     else:
-        stream = sample_scene(source.scene, station, n, seed, settings, only)
+        stream = sample_on_scene(source.scene, station, n, seed, settings, only)
     sampled, seconds = {}, {}
     total = len(_objects(only, source))
     with Reporter(not arguments.quiet) as reporter:

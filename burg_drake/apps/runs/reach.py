@@ -256,7 +256,7 @@ def sampled_grasps(
 ) -> dict[str, GraspSet]:
     """Grasps by instance as the options ask for them; says what is missing."""
     from burg_drake.core.terminal import Progress, ProgressMeter, Reporter
-    from burg_drake.evaluation.candidates import SamplingSettings, chosen_instances, sample_scene
+    from burg_drake.evaluation.candidates import SamplingSettings, chosen_instances, sample_on_scene
 
     settings = SamplingSettings(approach_angle_deg=arguments.approach_angle, blind=arguments.blind)
     count, seed = grasps_per_object(arguments), arguments.seed
@@ -264,7 +264,7 @@ def sampled_grasps(
     total = len(chosen_instances(scene, arguments.only))
     with Reporter(not arguments.quiet) as reporter:
         pace = ProgressMeter(reporter.show, Progress("sampling", total=total, unit="objects"))
-        for name, grasps in sample_scene(scene, station, count, seed, settings, arguments.only):
+        for name, grasps in sample_on_scene(scene, station, count, seed, settings, arguments.only):
             sampled[name] = grasps
             pace.step(note=name)
     print_shortfalls(sampled, count)

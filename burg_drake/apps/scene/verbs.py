@@ -161,7 +161,7 @@ def run_settle(arguments: argparse.Namespace) -> int:
     from burg_drake.scene.document import load_scene
     from burg_drake.simulation.settling import settle_scene
     from burg_drake.station.checks import check_scene
-    from burg_drake.station.document import engine_preset, load_station
+    from burg_drake.station.document import load_station
 
     require_writable(arguments.output)
     scene = load_scene(arguments.scene)
@@ -173,7 +173,7 @@ def run_settle(arguments: argparse.Namespace) -> int:
         settled = settle_scene(
             scene,
             station,
-            engine=engine_preset(arguments.engine),
+            engine=arguments.engine,
             time_limit=arguments.time_limit,
             progress=lambda time, moving: pace.step(time, note=f"{moving} moving"),
         )

@@ -16,7 +16,7 @@ from burg_drake.core.errors import InvalidInputError, UnknownNameError, listing,
 from burg_drake.core.files import reporting_read_errors
 from burg_drake.core.frames import FARTHEST, canonical_fingers, check_pose
 from burg_drake.core.grasps.identifiers import identifiers
-from burg_drake.core.grasps.storage import FIXED, FIXED_COLUMNS, read_grasp_file, write_grasp_file
+from burg_drake.core.grasps.storage import FIXED, FIXED_COLUMNS, read_arrays, write_arrays
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,7 +212,7 @@ class GraspSet:
             InvalidInputError: another suffix, or the place cannot be written to.
         """
         fixed = {name: getattr(self, name) for name in FIXED}
-        write_grasp_file(path, self.provenance, fixed, dict(self.columns))
+        write_arrays(path, self.provenance, fixed, dict(self.columns))
 
     @classmethod
     def load(cls, path: str | Path) -> GraspSet:
@@ -223,7 +223,7 @@ class GraspSet:
         """
         path = Path(path)
         with reporting_read_errors(path, "a grasp set written by burg_drake"):
-            provenance, fixed, columns = read_grasp_file(path)
+            provenance, fixed, columns = read_arrays(path)
             grasps = cls(**fixed, provenance=provenance, columns=columns)
             require_valid(grasps)
             return grasps

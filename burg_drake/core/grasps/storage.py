@@ -48,7 +48,7 @@ PREFIX = "column:"
 SetColumns = dict[str, NDArray[Any]]
 
 
-def write_grasp_file(
+def write_arrays(
     path: str | Path, provenance: Mapping[str, Any], fixed: SetColumns, columns: SetColumns
 ) -> None:
     """Writes a set of N grasps; see `GraspSet.save`.
@@ -71,8 +71,8 @@ def write_grasp_file(
     atomic_write(path, write(header, fixed, columns))
 
 
-def read_grasp_file(path: Path) -> tuple[dict[str, Any], SetColumns, SetColumns]:
-    """Provenance, fixed arrays and further columns, as `write_grasp_file` takes them.
+def read_arrays(path: Path) -> tuple[dict[str, Any], SetColumns, SetColumns]:
+    """Provenance, fixed arrays and further columns, as `write_arrays` takes them.
 
     Raises:
         ValueError: or another of `core.files.READ_ERRORS`, where the file is not as it was written.

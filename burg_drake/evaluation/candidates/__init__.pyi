@@ -14,7 +14,7 @@ from .instance_names import (
 from .sampling import (
     sample_candidates as sample_candidates,
     sample_library as sample_library,
-    sample_scene as sample_scene,
+    sample_on_scene as sample_on_scene,
 )
 from .sampling_settings import (
     DEFAULT_APPROACH_ANGLE_DEG as DEFAULT_APPROACH_ANGLE_DEG,

@@ -50,12 +50,12 @@ def sample_candidates(
     settings: SamplingSettings | None = None,
     only: Iterable[str] | None = None,
 ) -> Candidates:
-    """Samples antipodal grasps as candidates of a run; see `sample_scene`."""
-    stream = sample_scene(scene, station, n, seed, settings or SamplingSettings(), only)
+    """Samples antipodal grasps as candidates of a run; see `sample_on_scene`."""
+    stream = sample_on_scene(scene, station, n, seed, settings or SamplingSettings(), only)
     return join_candidates(dict(stream))
 
 
-def sample_scene(
+def sample_on_scene(
     scene: Scene,
     station: Station,
     n: int,
@@ -126,7 +126,7 @@ def sample_library(
     Args:
         library: the library.
         station: gives the opening of the hand and its body.
-        n, seed, settings: as for `sample_scene`.
+        n, seed, settings: as for `sample_on_scene`.
         objects: names in the library; all if None.
 
     Returns:

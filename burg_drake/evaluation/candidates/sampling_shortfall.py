@@ -38,7 +38,7 @@ def shortfall(name: str, asked: int, provenance: Mapping[str, Any], found: int) 
     Args:
         name: of the instance or object.
         asked: number of grasps.
-        provenance: what `sample_scene` or `sample_library` says of its grasps.
+        provenance: what `sample_on_scene` or `sample_library` says of its grasps.
         found: number of grasps.
     """
     if found >= asked:

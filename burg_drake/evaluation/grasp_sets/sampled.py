@@ -14,7 +14,7 @@ from burg_drake.evaluation.candidates import (
     INSTANCE,
     SamplingSettings,
     sample_library,
-    sample_scene,
+    sample_on_scene,
 )
 from burg_drake.evaluation.grasp_sets.provenance import object_files, set_documents
 from burg_drake.objects.library import ObjectLibrary
@@ -60,7 +60,7 @@ def sample_grasps(
     stream = (
         sample_library(library, station, n, seed, chosen, only)
         if scene is None
-        else sample_scene(scene, station, n, seed, chosen, only)
+        else sample_on_scene(scene, station, n, seed, chosen, only)
     )
     sampled = dict(stream)
     if not sampled:
@@ -86,7 +86,7 @@ def sampled_set(
             more.
         library: has the objects.
         scene: where they stand, if anywhere; the set then has the column `instance`.
-        station, n, seed, settings: what `sample_scene` or `sample_library` was called with.
+        station, n, seed, settings: what `sample_on_scene` or `sample_library` was called with.
 
     Returns:
         The grasps, with all that it takes to sample them again: the documents and the content that

@@ -30,7 +30,7 @@ from burg_drake.evaluation.records import (
 )
 from burg_drake.evaluation.stages import arm_settings, mode_for
 from burg_drake.scene.document import Scene
-from burg_drake.station.document import Engine, GraspMotion, Station, engine_preset
+from burg_drake.station.document import Engine, GraspMotion, Station, as_engine
 
 ByInstance = Mapping[str, GraspSet]
 GraspsLike = GraspSet | ByInstance | Callable[[Scene], ByInstance]
@@ -79,7 +79,7 @@ class Request:
         return cls(
             station=station,
             settings=settings,
-            engine=engine_preset(engine) if isinstance(engine, str) else engine,
+            engine=as_engine(engine),
             mode=mode_for(station, settings.mode),
             motion=settings.motion or station.document.motion,
             shard=as_shard(settings.shard),

@@ -27,7 +27,7 @@ def stillness(
     station: StationLike,
     *,
     duration: float = STILL_DURATION,
-    engine: Engine = ENGINES["reference"],
+    engine: Engine | str = ENGINES["reference"],
 ) -> Mapping[str, Displacement]:
     """Simulates a scene as it stands, without the robot, and tells how far each object moves.
 

@@ -69,7 +69,7 @@ def settle_scene(
     scene: SceneLike,
     station: StationLike,
     *,
-    engine: Engine = ENGINES[SETTLING_ENGINE],
+    engine: Engine | str = ENGINES[SETTLING_ENGINE],
     time_limit: float = SETTLING_TIME,
     progress: Callable[[float, int], None] | None = None,
 ) -> SettledScene:

@@ -45,7 +45,7 @@ class ArmTrial(GraspTrial):
     Args:
         scene: the scene.
         station: a station with an arm.
-        engine: time step and contact settings.
+        engine: time step and contact settings, or the name of a preset.
         settings: phases of a trial; all ways are the plan's, so that `motion` and `lift_time` do
             not count.
         transfer: begin at the home posture, and go to the pregrasp first. As the arm is fast there,
@@ -70,7 +70,7 @@ class ArmTrial(GraspTrial):
         scene: SceneLike,
         station: StationLike,
         *,
-        engine: Engine = ENGINES["standard"],
+        engine: Engine | str = ENGINES["standard"],
         settings: TrialSettings = DEFAULT_TRIAL,
         transfer: bool = False,
         clearance: HandClearance | None = None,
@@ -86,7 +86,7 @@ class ArmTrial(GraspTrial):
         assert arm is not None
         self._X_WA = arm.X_WA.matrix()
         self._kinematics = ArmKinematics.of(diagram)
-        self.steps_per_check = max(1, round(settings.poll / engine.time_step))
+        self.steps_per_check = max(1, round(settings.poll / diagram.engine.time_step))
         self._lift_clearance = cache(partial(ArmLiftClearance, diagram))
 
     def run(

@@ -41,7 +41,7 @@ class HandTrial(GraspTrial):
     Args:
         scene: the scene.
         station: table, board pose and hand.
-        engine: time step and contact settings.
+        engine: time step and contact settings, or the name of a preset.
         settings: phases of a trial.
         motion: where the hand goes, if not as the settings or else the station say; the way to the
             grasp does not count, as the hand begins there.
@@ -63,7 +63,7 @@ class HandTrial(GraspTrial):
         scene: SceneLike,
         station: StationLike,
         *,
-        engine: Engine = ENGINES["standard"],
+        engine: Engine | str = ENGINES["standard"],
         settings: TrialSettings = DEFAULT_TRIAL,
         motion: GraspMotion | None = None,
         lock: bool = True,

@@ -48,7 +48,7 @@ from burg_drake.station.control import export_driven_ports, export_ports
 from burg_drake.station.diagram.ball_contact import separate_ball_contact
 from burg_drake.station.diagram.leaning import soften_touching
 from burg_drake.station.diagram.station_diagram import StationDiagram, instance_pose
-from burg_drake.station.document import ENGINES, Engine, StationLike, as_station
+from burg_drake.station.document import ENGINES, Engine, StationLike, as_engine, as_station
 from burg_drake.station.world import (
     Robot,
     add_board,
@@ -71,7 +71,7 @@ def build_station_diagram(
     station: StationLike,
     *,
     robot: Robot = "arm",
-    engine: Engine = ENGINES["standard"],
+    engine: Engine | str = ENGINES["standard"],
     meshcat: Meshcat | None = None,
     drivers: bool = False,
     cameras: bool | str | Sequence[str] = False,
@@ -88,7 +88,7 @@ def build_station_diagram(
             joint `lift` along world z between the frames `lift_base` (in the world) and
             `lift_mount` (on the hand), which are set per grasp through the Context; before that
             the hand is above the board, pointing down. `none` leaves the robot out.
-        engine: time step and contact settings.
+        engine: time step and contact settings, or the name of a preset.
         meshcat: where to show the diagram live, if anywhere.
         drivers: let positions, widths or a plan command the robot, and measure what it feels; see
             the ports above. Needs an arm.
@@ -105,12 +105,12 @@ def build_station_diagram(
         the arm is in its home posture.
 
     Raises:
-        UnknownNameError: no such `robot` or camera.
+        UnknownNameError: no such `robot`, engine or camera.
         InvalidInputError: an object's model cannot be loaded, `arm` without an arm in the station,
             a home posture that does not fit the arm, or two things of the same name.
         MissingDependencyError: cameras without the renderer's system libraries.
     """
-    scene, station = as_scene(scene), as_station(station)
+    scene, station, engine = as_scene(scene), as_station(station), as_engine(engine)
     if drivers and (robot != "arm" or weld_objects):
         raise InvalidInputError("drivers need robot='arm', and objects that are not welded")
     if robot not in get_args(Robot):

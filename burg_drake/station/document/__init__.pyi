@@ -9,7 +9,7 @@ from .engine import (
     DEFAULT_ENGINE as DEFAULT_ENGINE,
     ENGINES as ENGINES,
     Engine as Engine,
-    engine_preset as engine_preset,
+    as_engine as as_engine,
 )
 from .grasp_motion import GraspMotion as GraspMotion
 from .gripper_document import (

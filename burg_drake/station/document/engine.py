@@ -61,12 +61,14 @@ ENGINES = {
 DEFAULT_ENGINE = "standard"
 
 
-def engine_preset(name: str) -> Engine:
-    """A preset by name.
+def as_engine(engine: Engine | str) -> Engine:
+    """An engine as it is, or a preset by its name.
 
     Raises:
         UnknownNameError: no such preset.
     """
-    if name not in ENGINES:
-        raise UnknownNameError(f"engine {name!r} does not exist; {nearest(name, ENGINES)}")
-    return ENGINES[name]
+    if isinstance(engine, Engine):
+        return engine
+    if engine not in ENGINES:
+        raise UnknownNameError(f"engine {engine!r} does not exist; {nearest(str(engine), ENGINES)}")
+    return ENGINES[engine]
