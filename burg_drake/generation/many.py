@@ -43,7 +43,7 @@ class SamplingInputs:
 class SceneTask:
     """A scene to sample: where, and its number."""
 
-    inputs: SamplingInputs
+    kitchen: SamplingInputs
     number: int
 
 
@@ -92,8 +92,8 @@ def sample_scenes(
     require_possible(recipe, library, station)
     ingredients = provenance_of(recipe, library, station)
     with SceneFolder(folder, ingredients) as opened:
-        inputs = _prepared_inputs(ingredients, library, station, opened.path)
-        todo = [SceneTask(inputs, number) for number in range(count) if number not in opened.rows]
+        kitchen = _kitchen(ingredients, library, station, opened.path)
+        todo = [SceneTask(kitchen, number) for number in range(count) if number not in opened.rows]
         if known is not None:
             known(count - len(todo))
         new: list[int] = []
@@ -121,12 +121,12 @@ def sample_scene(work: SceneTask) -> SampledScene:
         Exception: what cannot be simulated is one failure.
     """
     try:
-        return _sampler(work.inputs).sample(work.number, work.inputs.folder)
+        return _sampler(work.kitchen).sample(work.number, work.kitchen.folder)
     except SystemExit as error:  # DRAKE_DEMAND ends this way
         raise SimulationError(f"Drake gave up: {error}") from error
 
 
-def _prepared_inputs(
+def _kitchen(
     ingredients: SamplingProvenance, library: ObjectLibrary, station: Station, folder: Path
 ) -> SamplingInputs:
     contents = (ingredients.library_content, ingredients.station_content)
@@ -134,18 +134,18 @@ def _prepared_inputs(
 
 
 @lru_cache(maxsize=1)
-def _sampler(inputs: SamplingInputs) -> SceneSampler:
+def _sampler(kitchen: SamplingInputs) -> SceneSampler:
     """The sampler that a process keeps from scene to scene.
 
     Raises:
         InvalidInputError: library or station are not any more what they were.
     """
-    library, station = load_library(inputs.library), load_station(inputs.station)
-    sampler = SceneSampler(inputs.recipe, library, station)
+    library, station = load_library(kitchen.library), load_station(kitchen.station)
+    sampler = SceneSampler(kitchen.recipe, library, station)
     there = sampler.provenance
     for what, found, path, content in (
-        ("library", there.library_content, library.root, inputs.contents[0]),
-        ("station", there.station_content, station.path, inputs.contents[1]),
+        ("library", there.library_content, library.root, kitchen.contents[0]),
+        ("station", there.station_content, station.path, kitchen.contents[1]),
     ):
         if found != content:
             raise InvalidInputError(f"the {what} {path} was changed meanwhile; sample again")

@@ -247,7 +247,7 @@ def require_same_shard(folder: Path, there: str, here: str) -> None:
         asked = f"shard {here}" if here else "no shard"
         raise InvalidInputError(
             f"{folder} holds {held}, and {asked} is given; choose another folder; burg-drake"
-            " merge joins shards"
+            " merge unites shards"
         ).about("out")
 
 

@@ -27,7 +27,7 @@ from burg_drake.evaluation.store import Campaign, StoredRows
 OUTCOMES = tuple(Outcome)
 ALL_STAGES = tuple(Stage)
 Text = TypeVar("Text", bound=str)
-MOST_NAMED = 5
+TOLD = 5
 """Scenes of which it is told what is missing, and why."""
 
 
@@ -110,7 +110,7 @@ def _notes(campaign: Campaign) -> tuple[str, ...]:
     if failed := list(campaign.failed):
         notes.append(f"{len(failed)} scenes could not be judged: {listing(failed)}")
     short = [n for n in campaign.names if n in states and states[n].missing]
-    notes += [f"scene {name}: {states[name].missing}" for name in short[:MOST_NAMED]]
-    if len(short) > MOST_NAMED:
-        notes.append(f"{len(short) - MOST_NAMED} more scenes have fewer grasps than asked for")
+    notes += [f"scene {name}: {states[name].missing}" for name in short[:TOLD]]
+    if len(short) > TOLD:
+        notes.append(f"{len(short) - TOLD} more scenes have fewer grasps than asked for")
     return tuple(notes)

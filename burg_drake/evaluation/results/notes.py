@@ -89,16 +89,16 @@ def _unexecuted_note(name: str, columns: Columns, mine: np.ndarray, motion: Gras
 
 def _other_motion(outcome: Outcome, motion: GraspMotion) -> str:
     """Another motion of the hand that may avoid an outcome; "" if there is none."""
-    advice = []
+    ways = []
     if outcome in NO_LIFT and motion.shortest >= motion.lift_height:
-        advice.append("a shorter lift (least_lift)")
+        ways.append("a shorter lift (least_lift)")
     elif outcome in NO_LIFT and motion.shortest > 0.0:
-        advice.append("a smaller least_lift")
+        ways.append("a smaller least_lift")
     if outcome in NO_LIFT and not motion.retreat:
-        advice.append("a retreat first")
+        ways.append("a retreat first")
     if outcome in NO_RETREAT:
-        advice.append("a shorter retreat")
-    return " or ".join(advice)
+        ways.append("a shorter retreat")
+    return " or ".join(ways)
 
 
 def unclear_notes(
