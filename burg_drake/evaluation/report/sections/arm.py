@@ -40,8 +40,10 @@ def arm_section(summary: Summary, columns: Columns) -> Html | None:
                 for cell in (count, format_percent(count / clear))
             ]
             name = element("th", outcome.value.replace("_", " "), scope="row")
-            way = element("td", _blockers(columns, outcome))
-            rows.append(element("tr", name, *cells, element("td", MEANING.get(outcome, "")), way))
+            blockers = element("td", _blockers(columns, outcome))
+            rows.append(
+                element("tr", name, *cells, element("td", MEANING.get(outcome, "")), blockers)
+            )
     share = f" ({format_percent(planned / clear)})" if clear else ""
     text = (
         f"Of {clear} grasps at which the open hand is clear, the arm can execute"
