@@ -25,9 +25,9 @@ class Planner:
     """Plans grasps of one scene.
 
     Attributes:
-        reach: finds the ways.
+        reach: finds the paths.
         limits: of the arm.
-        settings: how fast, how close to the ways.
+        settings: how fast, how close to the paths.
     """
 
     def __init__(self, reach: ArmReach, *, settings: TimingSettings | None = None) -> None:

@@ -143,7 +143,7 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
         )
     print_summary(run)
     if run.document.shard:
-        print(f"shard   {run.document.shard}; burg-drake merge unites all of them")
+        print(f"shard   {run.document.shard}; merge all of them with burg-drake merge")
     if motion != GraspMotion():
         print(f"motion  {motion_text(motion)}")
     print(f"table   {run.table_path}")
