@@ -79,7 +79,7 @@ class ArmCarrier:
         return self._touches.first
 
     def approach(self) -> None:
-        """Follows the approach."""
+        """Follows the path to the grasp."""
         self._follow(self._approach)
 
     def close(self) -> None:
