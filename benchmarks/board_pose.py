@@ -5,7 +5,8 @@
 Images of `tests.cameras.synthetic` with exact truth: random views of the default board from
 0.5 to 1 m, up to 50 degrees off the vertical, turned at random. First as the targets have it:
 clean, with 55 % of the markers hidden, and with 90 % (both with noise of 4 of 256 levels and a blur
-of 0.6 pixels), at 640 x 480 and 1280 x 720. Then a sweep of what else spoils images, at 640 x 480.
+of 0.6 pixels), at 640 x 480 and 1280 x 720. Then a sweep of what else degrades images, at
+640 x 480.
 
 Columns: `camera` is the distance of the estimated from the true position of the camera in S, and
 the angle between their rotations; `board` the distance of the markers' centres from their true

@@ -2,7 +2,7 @@
 
     python benchmarks/settling.py [--scenes N] [--heaps N] [--drift N]
 
-Settles scenes of six household objects at random on A3 (`--scenes`), and piles up heaps of ten on
+Settles scenes of six household objects at random on A3 (`--scenes`), and drops heaps of ten on
 A2, on the table and in a bin (`--heaps`), in one process. Prints the CPU time of each, what it went
 into, what moves on or rolled away, and what `scene validate` says; then simulates the first
 `--drift` of each kind for 5 s by the `reference` engine and prints how far objects moved. Times
@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from burg_drake.core.frames import inverse
-from burg_drake.generation import heap as piling
+from burg_drake.generation import heap as heaps
 from burg_drake.objects.library.document import ObjectLibrary, load_library
 from burg_drake.scene.arrangement.arranging import arrange, choose
 from burg_drake.scene.arrangement.object_shapes import ObjectShapes
@@ -33,7 +33,7 @@ from burg_drake.station.document.station_document import Station, load_station
 A2, A3 = Board(size=(0.594, 0.420)), Board(size=(0.420, 0.297))
 KINDS: tuple[tuple[str, str, LayoutName, int, Board], ...] = (
     ("six on A3", "panda_tabletop", "random", 6, A3),
-    ("pile of ten", "panda_tabletop", "heap", 10, A2),
+    ("heap of ten", "panda_tabletop", "heap", 10, A2),
     ("bin of ten", "panda_bin", "heap", 10, A2),
 )
 spent: Counter[str] = Counter()
@@ -49,7 +49,7 @@ def main() -> None:
     for stage in ("build_station_diagram", "fall", "creep", "relax"):
         setattr(settling, stage, timed(stage, getattr(settling, stage)))
     for stage in ("land", "build_station_diagram", "creep", "relax"):
-        setattr(piling, stage, timed(stage, getattr(piling, stage)))
+        setattr(heaps, stage, timed(stage, getattr(heaps, stage)))
     library = load_library("household")
     shapes = ObjectShapes(library)
     for kind, station_name, layout, count, board in KINDS:
@@ -116,10 +116,10 @@ def settle(
     spent.clear()
     start = time.process_time()
     if layout == "heap":
-        piled = piling.pile(scene, station, check, shapes, np.random.default_rng(seed))
-        scene, rests = piled.scene, not piled.faulty
-        remarks = [f"amiss: {', '.join(piled.faulty)}"] if piled.faulty else []
-        what = f"dropped once more {piled.drops} times"
+        settled = heaps.settle_heap(scene, station, check, shapes, np.random.default_rng(seed))
+        scene, rests = settled.scene, not settled.faulty
+        remarks = [f"amiss: {', '.join(settled.faulty)}"] if settled.faulty else []
+        what = f"dropped once more {settled.drops} times"
     else:
         settled = settling.settle_scene(scene, station)
         scene, rests = settled.scene, settled.at_rest

@@ -1,4 +1,4 @@
-"""Piles up a heap: what came to lie beyond the board, or creeps, is dropped once more.
+"""Brings a heap to rest: what came to lie beyond the board, or creeps, is dropped once more.
 
 All objects fall and are relaxed with a quarter of the friction, and kept on the board; what creeps
 after that is relaxed with less and less. What still does, or is where a scene may have nothing,
@@ -55,7 +55,7 @@ class SettledHeap:
     drops: int
 
 
-def pile(
+def settle_heap(
     scene: Scene,
     station: Station,
     check: SceneCheck,
@@ -74,7 +74,7 @@ def pile(
     Raises:
         SimulationError: Drake cannot step the scene.
     """
-    settler = _PileSettler(station, check, shapes)
+    settler = _HeapSettler(station, check, shapes)
     falling: Collection[str] = scene.instances
     margin = min(MARGIN, MARGIN_SHARE * min(scene.board.size))
     for drops in range(DROPS + 1):
@@ -94,8 +94,8 @@ def pile(
 
 
 @dataclass(frozen=True)
-class _PileSettler:
-    """Where a heap lies."""
+class _HeapSettler:
+    """Brings one heap to rest, and says what is wrong with it."""
 
     station: Station
     check: SceneCheck

@@ -43,7 +43,7 @@ class SamplingInputs:
 class SceneTask:
     """A scene to sample: where, and its number."""
 
-    kitchen: SamplingInputs
+    inputs: SamplingInputs
     number: int
 
 
@@ -90,10 +90,10 @@ def sample_scenes(
     """
     station = as_station(station)
     require_possible(recipe, library, station)
-    ingredients = provenance_of(recipe, library, station)
-    with SceneFolder(folder, ingredients) as opened:
-        kitchen = _kitchen(ingredients, library, station, opened.path)
-        todo = [SceneTask(kitchen, number) for number in range(count) if number not in opened.rows]
+    provenance = provenance_of(recipe, library, station)
+    with SceneFolder(folder, provenance) as opened:
+        inputs = _sampling_inputs(provenance, library, station, opened.path)
+        todo = [SceneTask(inputs, number) for number in range(count) if number not in opened.rows]
         if known is not None:
             known(count - len(todo))
         new: list[int] = []
@@ -121,31 +121,31 @@ def sample_scene(work: SceneTask) -> SampledScene:
         Exception: what cannot be simulated is one failure.
     """
     try:
-        return _sampler(work.kitchen).sample(work.number, work.kitchen.folder)
+        return _sampler(work.inputs).sample(work.number, work.inputs.folder)
     except SystemExit as error:  # DRAKE_DEMAND ends this way
         raise SimulationError(f"Drake gave up: {error}") from error
 
 
-def _kitchen(
-    ingredients: SamplingProvenance, library: ObjectLibrary, station: Station, folder: Path
+def _sampling_inputs(
+    provenance: SamplingProvenance, library: ObjectLibrary, station: Station, folder: Path
 ) -> SamplingInputs:
-    contents = (ingredients.library_content, ingredients.station_content)
-    return SamplingInputs(ingredients.recipe, library.root, station.path, contents, folder)
+    contents = (provenance.library_content, provenance.station_content)
+    return SamplingInputs(provenance.recipe, library.root, station.path, contents, folder)
 
 
 @lru_cache(maxsize=1)
-def _sampler(kitchen: SamplingInputs) -> SceneSampler:
+def _sampler(inputs: SamplingInputs) -> SceneSampler:
     """The sampler that a process keeps from scene to scene.
 
     Raises:
         InvalidInputError: library or station are not any more what they were.
     """
-    library, station = load_library(kitchen.library), load_station(kitchen.station)
-    sampler = SceneSampler(kitchen.recipe, library, station)
+    library, station = load_library(inputs.library), load_station(inputs.station)
+    sampler = SceneSampler(inputs.recipe, library, station)
     there = sampler.provenance
     for what, found, path, content in (
-        ("library", there.library_content, library.root, kitchen.contents[0]),
-        ("station", there.station_content, station.path, kitchen.contents[1]),
+        ("library", there.library_content, library.root, inputs.contents[0]),
+        ("station", there.station_content, station.path, inputs.contents[1]),
     ):
         if found != content:
             raise InvalidInputError(f"the {what} {path} was changed meanwhile; sample again")

@@ -21,7 +21,7 @@ from burg_drake.core import (
 from burg_drake.evaluation.records import (
     HASH_DIGITS,
 )
-from burg_drake.generation.heap import pile
+from burg_drake.generation.heap import settle_heap
 from burg_drake.generation.rules import broken_rule, require_rules
 from burg_drake.objects.library import ObjectLibrary, load_library
 from burg_drake.scene.arrangement import ObjectRequest, ObjectShapes, arrange, choose
@@ -166,9 +166,9 @@ class SceneSampler:
         if found:
             return found, scene
         if self.recipe.settle and self.recipe.layout == "heap":
-            piled = pile(scene, self.station, self._check, self._shapes, rng)
-            scene = piled.scene
-            if piled.faulty:
+            heap = settle_heap(scene, self.station, self._check, self._shapes, rng)
+            scene = heap.scene
+            if heap.faulty:
                 return self._faults(scene) or MOVING, scene
         elif self.recipe.settle:
             settled = settle_scene(scene, self.station)

@@ -25,9 +25,9 @@ class Planner:
     """Plans grasps of one scene.
 
     Attributes:
-        reach: finds the ways.
+        reach: finds the paths.
         limits: of the arm.
-        settings: how fast, how close to the ways.
+        settings: how fast, how close to the paths.
     """
 
     def __init__(self, reach: ArmReach, *, settings: TimingSettings | None = None) -> None:
@@ -101,10 +101,10 @@ class Planner:
             limit_margin=self.reach.settings.limit_margin,
         )
         low, high = hand.opening
-        witness_path = high - (low if np.isnan(width) else width)
+        finger_travel = high - (low if np.isnan(width) else width)
         return replace(
             plan,
-            close_time=witness_path / 2.0 / hand.closing_speed + GRIP_TIME,
+            close_time=finger_travel / 2.0 / hand.closing_speed + GRIP_TIME,
             opening=high,
             width=width,
             origin=replace(self._origin, instance=instance, X_WG=witness.X_WG),

@@ -56,7 +56,7 @@ def mesh(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def scene_file(tmp_path: Path) -> Path:
-    """A sound scene, to be spoilt."""
+    """A sound scene, to be damaged."""
     path = tmp_path / "scene.yaml"
     path.write_text(SCENE)
     return path

@@ -64,7 +64,7 @@ UNSOUND = {
 }
 
 
-def spoil(scene_file: Path, edit: tuple[str, str]) -> Path:
+def edit_scene(scene_file: Path, edit: tuple[str, str]) -> Path:
     text = scene_file.read_text()
     assert edit[0] in text
     scene_file.write_text(text.replace(*edit, 1))
@@ -85,7 +85,7 @@ def test_built_in_scenes_are_sound(name: str, capsys: Capture) -> None:
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_mistakes(verb: list[str], mistake: str, scene_file: Path, capsys: Capture) -> None:
     edit, message = MISTAKES[mistake]
-    spoil(scene_file, edit)
+    edit_scene(scene_file, edit)
     options = ["-o", str(scene_file.parent / "run")] if verb == ["evaluate"] else []
     assert main([*verb, str(scene_file), *options]) == 2
     (line,) = capsys.readouterr().err.splitlines()
@@ -104,7 +104,7 @@ def test_mistakes(verb: list[str], mistake: str, scene_file: Path, capsys: Captu
 @pytest.mark.parametrize("fault", UNSOUND)
 def test_unsound_scenes(fault: str, scene_file: Path, capsys: Capture) -> None:
     edit, message = UNSOUND[fault]
-    spoil(scene_file, edit)
+    edit_scene(scene_file, edit)
     assert main(["scene", "validate", str(scene_file)]) == 1
     assert f"error: {message}" in capsys.readouterr().out
     run = scene_file.parent / "run"
@@ -116,7 +116,7 @@ def test_unsound_scenes(fault: str, scene_file: Path, capsys: Capture) -> None:
 
 def test_an_unsound_scene_is_shown_with_a_warning(scene_file: Path, capsys: Capture) -> None:
     edit, message = UNSOUND["out of bounds"]
-    spoil(scene_file, edit)
+    edit_scene(scene_file, edit)
     page = scene_file.parent / "pages" / "scene.html"
     assert main(["scene", "show", str(scene_file), "--html", str(page)]) == 0
     captured = capsys.readouterr()
@@ -129,7 +129,7 @@ def test_an_unsound_scene_is_shown_with_a_warning(scene_file: Path, capsys: Capt
 
 
 def test_hovering_is_only_a_warning(scene_file: Path, capsys: Capture) -> None:
-    spoil(scene_file, ("[0.12, 0.11, 0.0]", "[0.12, 0.11, 0.05]"))
+    edit_scene(scene_file, ("[0.12, 0.11, 0.0]", "[0.12, 0.11, 0.05]"))
     assert main(["scene", "validate", str(scene_file)]) == 0
     assert capsys.readouterr().out == (
         "warning: 'mug' hovers 50.0 mm above the board; it will fall when simulated\n"

@@ -35,7 +35,7 @@ COLORS = np.array([[235, 235, 232], [22, 22, 24], [128, 112, 96], [70, 96, 120]]
 
 @dataclass(frozen=True, kw_only=True)
 class ImageDegradation:
-    """What spoils an image.
+    """What degrades an image.
 
     Attributes:
         blur: standard deviation of a Gaussian blur [pixels].
@@ -97,7 +97,7 @@ def degraded(
 
     Args:
         image: (H, W, 3).
-        look: what spoils it.
+        look: what degrades it.
         rng: for noise.
 
     Raises:

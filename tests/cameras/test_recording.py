@@ -101,7 +101,7 @@ def test_nothing_recorded_leaves_nothing(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_spoilt_video_is_told(tmp_path: Path) -> None:
+def test_a_damaged_video_is_reported(tmp_path: Path) -> None:
     recording = Recording(tmp_path / "a.avi", CAMERA, SCENE)
     for i in range(5):
         recording.add(plate(50), SEEN, 0.1 * i, plate(0))

@@ -1,4 +1,4 @@
-"""Synthetic images: edges lie where closed form puts them, and what spoils images does."""
+"""Synthetic images: edges, light, blur and noise are what closed form says."""
 
 from __future__ import annotations
 

@@ -306,7 +306,7 @@ def rewritten(path: Path, **changed: object) -> Path:
     return path
 
 
-def spoilt(index: int, value: float, row: int = 0, column: int = 0) -> np.ndarray:
+def corrupted(index: int, value: float, row: int = 0, column: int = 0) -> np.ndarray:
     X = grasps(12).X_OG
     X[index, row, column] = value
     return X
@@ -319,11 +319,11 @@ ids = grasps(12).id
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"X_OG": spoilt(7, np.nan)}, r"X_OG\[7\] has NaN or infinite numbers"),
-        ({"X_OG": spoilt(3, np.inf, 1, 3)}, r"X_OG\[3\] has NaN or infinite numbers"),
-        ({"X_OG": spoilt(5, 3.0)}, r"X_OG\[5\] is not a rigid transform"),
-        ({"X_OG": spoilt(2, 1e200)}, r"X_OG\[2\] is not a rigid transform"),
-        ({"X_OG": spoilt(1, 0.5, 3, 3)}, r"X_OG\[1\] has a last row other than 0 0 0 1"),
+        ({"X_OG": corrupted(7, np.nan)}, r"X_OG\[7\] has NaN or infinite numbers"),
+        ({"X_OG": corrupted(3, np.inf, 1, 3)}, r"X_OG\[3\] has NaN or infinite numbers"),
+        ({"X_OG": corrupted(5, 3.0)}, r"X_OG\[5\] is not a rigid transform"),
+        ({"X_OG": corrupted(2, 1e200)}, r"X_OG\[2\] is not a rigid transform"),
+        ({"X_OG": corrupted(1, 0.5, 3, 3)}, r"X_OG\[1\] has a last row other than 0 0 0 1"),
         ({"X_OG": np.zeros((12, 3, 4))}, r"X_OG has shape \(12, 3, 4\); expected \(N, 4, 4\)"),
         ({"width": np.full(12, np.inf)}, r"width\[0\] is inf"),
         ({"width": np.full(12, 1e300)}, r"width\[0\] is 1e\+300; give metres"),

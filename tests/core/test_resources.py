@@ -55,7 +55,8 @@ def test_messages_list_what_exists(root: Path, tmp_path: Path):
         return str(caught.value)
 
     assert message("tabletop_sx", "scenes") == (
-        "scene tabletop_sx does not exist; did you mean 'tabletop_six'? Known: close_six, tabletop_six"
+        "scene tabletop_sx does not exist; did you mean 'tabletop_six'?"
+        " Known: close_six, tabletop_six"
     )
     assert message("lib", "models", tmp_path) == (
         f"lib does not exist (relative to {tmp_path}); known: household"

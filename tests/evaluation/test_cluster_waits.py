@@ -106,13 +106,13 @@ def test_jobs_that_come_when_all_workers_are_lost_are_judged_later() -> None:
     with cluster(1) as (made, client):
         alone = 0
 
-        def tend() -> None:
+        def maintain() -> None:
             nonlocal alone
             alone += lost.is_set()
             if alone == 2:  # one look has seen nobody
                 made.scale(1)
 
-        for answer in DaskExecutor(client, tend=tend).judge(jobs()):
+        for answer in DaskExecutor(client, maintain=maintain).judge(jobs()):
             answers.append(answer)
             if len(answers) == 3:
                 made.scale(0)

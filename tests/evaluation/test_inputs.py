@@ -19,7 +19,7 @@ def run(own_run: Run) -> Run:
     return own_run
 
 
-def spoil(path: Path) -> None:
+def move_an_object(path: Path) -> None:
     path.write_text(path.read_text().replace("0.35", "0.36"))
 
 
@@ -31,7 +31,7 @@ def test_documents_are_where_they_were(run: Run, scene: Scene, tmp_path: Path) -
 
 
 def test_the_copies_of_the_run_serve_its_own_table(run: Run, scene: Scene, tmp_path: Path) -> None:
-    spoil(scene.path)
+    move_an_object(scene.path)
     origin = origin_of(run.document)
     assert find_inputs(origin, "row 1", run.path).scene.content == scene.content
     with pytest.raises(InvalidInputError, match=r"three.yaml has content"):
@@ -62,7 +62,7 @@ def test_a_lost_station_is_said_with_the_scene(run: Run, scene: Scene, tmp_path:
 
 
 def test_a_changed_scene_is_taken_by_force_only(run: Run, scene: Scene, tmp_path: Path) -> None:
-    spoil(scene.path)
+    move_an_object(scene.path)
     origin = origin_of(run.document)
     with pytest.raises(InvalidInputError, match=f"or replay on {scene.path} by force"):
         find_inputs(origin, "row 1", tmp_path)

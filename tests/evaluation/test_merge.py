@@ -15,8 +15,8 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.files.atomic import UNFINISHED
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.merge import united_run
-from burg_drake.evaluation.merge.runs import unite
+from burg_drake.evaluation.merge import merged_run
+from burg_drake.evaluation.merge.runs import merge_folders
 from burg_drake.evaluation.records.journal import JOURNAL_FILE, decode, encode
 from burg_drake.evaluation.records.shard import Shard
 from burg_drake.evaluation.report.page import report_page
@@ -65,14 +65,14 @@ def test_shards_of_one_scene(
         assert shard.results["id"].tolist() == whole.candidates.id[k::3]
         assert f"shard {k + 1}/3:" in (shard.path / "results.csv-metadata.json").read_text()
     assert "This is shard 3 of 3" in report_page(shards[2])
-    merged = unite([shard.path for shard in reversed(shards)], tmp_path / "merged")
+    merged = merge_folders([shard.path for shard in reversed(shards)], tmp_path / "merged")
     assert merged.notes == () and isinstance(merged.result, Run)
     assert same(whole.results, merged.result.results) and merged.result.complete
     assert merged.result.scene().content == scene.content
     nothing = Inline()
     run_one(scene, station, tmp_path / "merged", executor=nothing)
     assert nothing.judged == 0
-    two = unite([shards[0].path, shards[2].path], tmp_path / "two")
+    two = merge_folders([shards[0].path, shards[2].path], tmp_path / "two")
     assert two.notes == (
         "5 grasps are not judged",
         "shards that were not given: 2/3",
@@ -96,15 +96,15 @@ def test_shards_of_many_scenes(
         shard = run_all(scenes, station, tmp_path / f"s{k}", shard=f"{k}/{count}")
         assert shard.complete and len(shard.document.scenes) == 3
         folders.append(shard.path)
-    merged = unite(folders, tmp_path / "merged")
+    merged = merge_folders(folders, tmp_path / "merged")
     assert merged.notes == () and isinstance(merged.result, Campaign)
     assert same(whole.results, merged.result.results) and merged.result.complete
     nothing = Inline()
     again = run_all(scenes, station, tmp_path / "merged", executor=nothing)
     assert nothing.judged == 0 and same(whole.results, again.results)
-    part = unite(folders[1:], tmp_path / "part")
+    part = merge_folders(folders[1:], tmp_path / "part")
     if count == 2:
-        alone = ("only shard 2/2 was given, so the united run is only that shard",)
+        alone = ("only shard 2/2 was given, so the merged run is only that shard",)
         assert part.notes == alone and part.result.complete
         return
     assert f"shards that were not given: 1/{count}" in part.notes
@@ -119,7 +119,7 @@ def test_interrupted_copies(
     for name, seed, stop in (("a", 1, 22), ("b", 2, 31)):
         with pytest.raises(KeyboardInterrupt):
             run_all(scenes, station, tmp_path / name, executor=Inline(seed, stop))
-    merged = unite([tmp_path / "a", tmp_path / "b"], tmp_path / "ab")
+    merged = merge_folders([tmp_path / "a", tmp_path / "b"], tmp_path / "ab")
     assert merged.missing + len(merged.result.results["id"]) == 40 and merged.missing <= 9
     run_all(scenes, station, tmp_path / "ab")
     assert same(whole.results, Campaign(tmp_path / "ab", merged.result.document).results)
@@ -136,9 +136,9 @@ def test_verdicts_give_way(
     id = change(load_run(tmp_path / "failed"), **broken)
     change(load_run(tmp_path / "slow"), cpu={})
     names = ("interrupted", "failed", "slow")
-    merged = unite([tmp_path / name for name in names], tmp_path / "three")
+    merged = merge_folders([tmp_path / name for name in names], tmp_path / "three")
     assert same(merged.result.results, whole.results)
-    merged = unite([tmp_path / name for name in names[:2]], tmp_path / "two").result
+    merged = merge_folders([tmp_path / name for name in names[:2]], tmp_path / "two").result
     assert merged.failures == [id] and merged.interrupted == []
     outcome = load_run(tmp_path / "other").verdicts[id].outcome
     instead = Outcome.DROPPED if outcome is not Outcome.DROPPED else Outcome.LIFTED
@@ -149,7 +149,7 @@ def test_verdicts_give_way(
         " leave it out"
     )
     with pytest.raises(InvalidInputError) as error:
-        unite([whole.path, tmp_path / "other"], tmp_path / "no")
+        merge_folders([whole.path, tmp_path / "other"], tmp_path / "no")
     assert str(error.value) == message.replace(" and as ", " and ", 1)
     assert not (tmp_path / "no").exists() and not list(tmp_path.glob(".no.*"))
 
@@ -162,13 +162,13 @@ def test_refusals(
     many = run_all(scenes, station, tmp_path / "many", grasps_per_object=1)
     for paths, out, message in (
         ([a.path, b.path], "c", "(seed is 0 there, 1 here); only shards and copies of one run"),
-        ([a.path, many.path], "c", "many one of many; only runs of the same can be united"),
+        ([a.path, many.path], "c", "many one of many; only runs of the same can be merged"),
         ([a.path], "b", "b is there already; choose another folder"),
         ([tmp_path / "nothing"], "c", "holds no run (run.yaml is missing)"),
         ([], "c", "no runs are given; give the folders of one or more"),
     ):
         with pytest.raises(InvalidInputError) as error:
-            unite(paths, tmp_path / out)
+            merge_folders(paths, tmp_path / out)
         assert message in str(error.value)
 
 
@@ -179,7 +179,7 @@ def test_a_merge_that_was_killed_leaves_nothing(
     left = tmp_path / ".b.0123456789abcdef"
     left.mkdir()
     (left / JOURNAL_FILE).write_bytes(b"half")
-    unite([run.path], tmp_path / "b")
+    merge_folders([run.path], tmp_path / "b")
     assert not left.exists() and same(load_run(tmp_path / "b").results, run.results)
 
 
@@ -194,17 +194,17 @@ def test_the_same_merge_finishes_what_was_killed(
         run_all(scenes, station, tmp_path / f"many{k}", **few, shard=f"{k}/3").path for k in (1, 2)
     ]
     for paths, where in ((halves, "finish_run"), (shards, "PartWriter")):
-        whole = unite(paths, tmp_path / f"whole_{where}")
+        whole = merge_folders(paths, tmp_path / f"whole_{where}")
         out = tmp_path / where
         with pytest.MonkeyPatch.context() as patch, pytest.raises(KeyboardInterrupt):
             patch.setattr(f"burg_drake.evaluation.merge.finishing.{where}", interrupt)
-            unite(paths, out)
+            merge_folders(paths, out)
         assert not (out / "report.html").exists()
         (note,) = out.glob(".merge.*")
         assert UNFINISHED.fullmatch(note.name)  # `evaluate` removes it
         with pytest.raises(InvalidInputError, match="is there already; choose another folder"):
-            unite(paths[:1], out)
-        merged = unite(reversed(paths), out)
+            merge_folders(paths[:1], out)
+        merged = merge_folders(reversed(paths), out)
         assert same(merged.result.results, whole.result.results)
         assert merged.notes == tuple(n.replace(f"whole_{where}", where) for n in whole.notes)
         files = [
@@ -218,7 +218,7 @@ def interrupt(*_, **__) -> None:
 
 
 @pytest.mark.thorough
-def test_what_is_united_cannot_be_written_meanwhile(
+def test_what_is_merged_cannot_be_written_meanwhile(
     scenes: list[Path], scene: Scene, station: Station, tmp_path: Path, known_judge: None
 ) -> None:
     one = run_one(scene, station, tmp_path / "one", grasps_per_object=1)
@@ -242,17 +242,17 @@ def test_what_is_united_cannot_be_written_meanwhile(
                 call(given, station, out, grasps_per_object=1)
         return copytree(*arguments, **options)
 
-    choose, copytree = united_run.choose, shutil.copytree
+    choose, copytree = merged_run.choose, shutil.copytree
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(united_run, "choose", look)
-        unite([one.path], tmp_path / "a")
+        patch.setattr(merged_run, "choose", look)
+        merge_folders([one.path], tmp_path / "a")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
             shutil,
             "copytree",
             lambda a, b, **o: look_at_many(a, b, **o) if a.name == "cubes" else copytree(a, b, **o),
         )
-        unite([many.path], tmp_path / "b")
+        merge_folders([many.path], tmp_path / "b")
     assert len(tried) == 2
     run_one(scene, station, one.path, grasps_per_object=1)
     run_all(scenes, station, many.path, grasps_per_object=1)
@@ -262,7 +262,7 @@ def test_reports_of_scenes_do_not_name_the_old_folder(
     scenes: list[Path], station: Station, tmp_path: Path, known_judge: None, reports: None
 ) -> None:
     old = run_all(scenes[:1], station, tmp_path / "old", grasps_per_object=1)
-    unite([old.path], tmp_path / "new")
+    merge_folders([old.path], tmp_path / "new")
     for path in (tmp_path / "new").rglob("report.html"):
         assert f"{tmp_path}/new" in path.read_text() and f"{tmp_path}/old" not in path.read_text()
     assert len(list((tmp_path / "new").rglob("report.html"))) == 2

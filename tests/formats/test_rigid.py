@@ -47,7 +47,7 @@ def test_four_decimals_become_the_nearest_rotation_with_a_note(poses: Array) -> 
 
 
 @pytest.mark.parametrize(
-    ("spoil", "said"),
+    ("corrupt", "said"),
     [
         (lambda X: X.__setitem__((3, 0, 0), np.nan), r"file: key\[3\] has NaN or infinite"),
         (lambda X: X.__setitem__((3, 2, 3), np.inf), r"file: key\[3\] has NaN or infinite"),
@@ -57,8 +57,8 @@ def test_four_decimals_become_the_nearest_rotation_with_a_note(poses: Array) -> 
         (lambda X: X.__setitem__((3, slice(0, 3), 0), -X[3, :3, 0]), r"\[3\] is a mirror image"),
     ],
 )
-def test_what_is_not_rigid_is_refused(poses: Array, spoil, said: str) -> None:  # type: ignore[no-untyped-def]
-    spoil(poses)
+def test_what_is_not_rigid_is_refused(poses: Array, corrupt, said: str) -> None:  # type: ignore[no-untyped-def]
+    corrupt(poses)
     with pytest.raises(InvalidInputError, match=said):
         nearest_rigid(poses, "file: key")
 

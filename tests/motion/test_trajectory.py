@@ -300,14 +300,14 @@ def test_files_that_are_no_plans(plan: Plan, tmp_path: Path) -> None:
         plan.to_csv(tmp_path)
 
 
-Spoil = Callable[[dict[str, Any]], object]
+Damage = Callable[[dict[str, Any]], object]
 
 
 def points(document: dict[str, Any]) -> list[dict[str, Any]]:
     return document["joint_trajectory"]["points"]
 
 
-DAMAGES: list[tuple[Spoil, str]] = [
+DAMAGES: list[tuple[Damage, str]] = [
     (lambda d: d.pop("rate"), "'rate' is not as it was written"),
     (lambda d: d.update(rate=0), "'rate' is not as it was written"),
     (lambda d: d.update(hand=3), "'hand' is not as it was written"),
@@ -368,12 +368,12 @@ DAMAGES: list[tuple[Spoil, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("spoil", "what"), DAMAGES, ids=[what for _, what in DAMAGES])
-def test_a_damaged_plan_is_refused(plan: Plan, tmp_path: Path, spoil: Spoil, what: str) -> None:
+@pytest.mark.parametrize(("damage", "what"), DAMAGES, ids=[what for _, what in DAMAGES])
+def test_a_damaged_plan_is_refused(plan: Plan, tmp_path: Path, damage: Damage, what: str) -> None:
     path = tmp_path / "plan.json"
     plan.to_json(path)
     document = json.loads(path.read_text())
-    spoil(document)
+    damage(document)
     path.write_text(json.dumps(document))
     with pytest.raises(InvalidInputError) as error:
         load_plan(path)
@@ -432,12 +432,12 @@ def test_phases_cover_all_points(plan: Plan, tmp_path: Path) -> None:
     plan.to_json(path)
     document = json.loads(path.read_text())
     (_, end), (_, last) = document["phases"]["close"], document["phases"]["lift"]
-    for spoilt, wanted in (
+    for damaged, wanted in (
         ([end, last - 3], f"{end} to {last - 3}"),
         ([end + 1, last], f"{end + 1} to {last}"),
         ([end, last + 1], f"{end} to {last + 1}"),
     ):
-        path.write_text(json.dumps(document | {"phases": document["phases"] | {"lift": spoilt}}))
+        path.write_text(json.dumps(document | {"phases": document["phases"] | {"lift": damaged}}))
         with pytest.raises(InvalidInputError) as error:
             load_plan(path)
         assert str(error.value) == (

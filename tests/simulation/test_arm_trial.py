@@ -431,7 +431,7 @@ def test_after_a_trial_that_failed(
     """The state turns into NaN in the middle of a trial, after which no more can be told."""
     advance = Execution.advance
 
-    def spoil(execution: Execution, steps: int | None = None) -> float:
+    def corrupt(execution: Execution, steps: int | None = None) -> float:
         now = advance(execution, steps)
         if now > 1.0:
             state = arm_trial.context.get_mutable_discrete_state().get_mutable_vector()
@@ -439,7 +439,7 @@ def test_after_a_trial_that_failed(
         return now
 
     with monkeypatch.context() as patch:
-        patch.setattr(Execution, "advance", spoil)
+        patch.setattr(Execution, "advance", corrupt)
         failed = execute(arm_trial, CENTRE)
     assert failed.outcome is Outcome.SIMULATION_FAILED
     assert failed.reason

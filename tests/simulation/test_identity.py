@@ -86,7 +86,7 @@ def test_after_a_trial_that_failed(scene: Scene, alone, monkeypatch: pytest.Monk
     trial = HandTrial(scene, make_station(), engine=QUICK)
     advance = Execution.advance
 
-    def spoil(execution: Execution) -> float:
+    def corrupt(execution: Execution) -> float:
         now = advance(execution)
         if now > 0.03:
             state = trial.context.get_mutable_discrete_state().get_mutable_vector()
@@ -94,7 +94,7 @@ def test_after_a_trial_that_failed(scene: Scene, alone, monkeypatch: pytest.Monk
         return now
 
     with monkeypatch.context() as patch:
-        patch.setattr(Execution, "advance", spoil)
+        patch.setattr(Execution, "advance", corrupt)
         failed = trial.run("box", from_above(0.065))
     assert failed.outcome is Outcome.SIMULATION_FAILED
     assert failed.reason

@@ -17,7 +17,7 @@ def test_range_of_well_behaved_numbers_is_theirs() -> None:
     assert scale.beyond(np.linspace(0.0, 1.0, 101)) == (0, 0)
 
 
-def test_outliers_do_not_spoil_the_range() -> None:
+def test_outliers_do_not_widen_the_range() -> None:
     numbers = np.concatenate([np.linspace(0.0, 1.0, 1000), [1e6, -1e9, 4e5]])
     scale = scale_of(numbers)
     assert -0.2 <= scale.lower <= 0.05 and 0.95 <= scale.upper <= 1.2

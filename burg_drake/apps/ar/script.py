@@ -20,13 +20,13 @@ def finish(live: LiveSession, actions: ViewActions, *, check: bool, snapshot: st
         check: measure how far objects are off.
         snapshot: folder for a snapshot, if one is wanted.
     """
-    sight, counts = live.last_located, live.counts
-    if sight is None:
+    located, counts = live.last_located, live.counts
+    if located is None:
         return
     if counts.frames > 1:
         print(f"{live.source.name}: {counts.valid} of {counts.frames} frames gave a pose")
-    estimate = sight.estimate
-    print(f"{sight.frame.name}: {pose_line(estimate, live.processor.scene.board)}")
+    estimate = located.estimate
+    print(f"{located.frame.name}: {pose_line(estimate, live.processor.scene.board)}")
     if estimate.valid:
         x, y, z = 1e3 * estimate.X_SC[:3, 3]
         print(
@@ -35,11 +35,11 @@ def finish(live: LiveSession, actions: ViewActions, *, check: bool, snapshot: st
         )
     placement = None
     if check and estimate.valid:
-        placement = live.processor.check(sight)
+        placement = live.processor.check(located)
         for line in placement_lines(placement, live.processor.style):
             print(line)
     if snapshot is not None:
-        actions.snapshot(snapshot, live.picture_of(sight, placement))
+        actions.snapshot(snapshot, live.picture_of(located, placement))
 
 
 def placement_exit_code(live: LiveSession) -> int:

@@ -139,12 +139,12 @@ def _cells(placement: Placement) -> list[str]:
     """What a placement says, in millimetres and degrees."""
     if placement.displacement is None or placement.displacement_sd is None:
         return ["-"] * 6 + [f"not seen: {placement.reason}"]
-    x, y = (1e3 * way for way in placement.displacement)
-    way = [format_number(value, 1) for value in (math.hypot(x, y), x, y)]
+    x, y = (1e3 * d for d in placement.displacement)
+    distances = [format_number(value, 1) for value in (math.hypot(x, y), x, y)]
     turn = [None if a is None else math.degrees(a) for a in (placement.angle, placement.angle_sd)]
     deviation = format_number(1e3 * max(placement.displacement_sd), 1)
     remark = f"uncertain: {placement.reason}" if placement.reason else ""
-    return [*way, deviation, *(format_number(value, 1) for value in turn), remark]
+    return [*distances, deviation, *(format_number(value, 1) for value in turn), remark]
 
 
 def _write_overlay(path: str, check: PlacementCheck, scene: Any, photo: Any) -> None:

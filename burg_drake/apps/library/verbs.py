@@ -27,7 +27,7 @@ format of masses.yaml: 'NAME: KG' lines, NAME a mesh file without its suffix
   mug: 0.118
   cracker_box: 0.411
 
-format of objects.yaml, with all that can be said of an object:
+format of objects.yaml, which takes every setting of an object:
   version: 1
   defaults: {unit: mm, friction: 0.4}
   objects:

@@ -76,7 +76,7 @@ def print_campaign(campaign: Campaign) -> None:
     Console().print(summary_view(summary))
     _scene_table(summary).show()
     if campaign.document.shard:
-        print(f"shard   {campaign.document.shard}; burg-drake merge joins all of them")
+        print(f"shard   {campaign.document.shard}; merge all of them with burg-drake merge")
     scenes = f"{campaign.path}/scenes/NAME"
     if any(campaign.folder(name).joinpath(REPORT_FILE).exists() for name in campaign.names):
         print(f"runs    {scenes}, each with a table and a report")

@@ -159,7 +159,7 @@ def _print_run(run: Run, motion: GraspMotion) -> None:
 
     print_summary(run)
     if run.document.shard:
-        print(f"shard   {run.document.shard}; burg-drake merge joins all of them")
+        print(f"shard   {run.document.shard}; merge all of them with burg-drake merge")
     if motion != GraspMotion():
         print(f"motion  {motion_text(motion)}")
     print(f"table   {run.table_path}")

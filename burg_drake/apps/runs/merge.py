@@ -14,12 +14,12 @@ def add_to(verbs: Any) -> None:
         verbs,
         "merge",
         run_merge,
-        "unite shards of a run, or copies of it that were interrupted",
+        "merge shards of a run, or copies of it that were interrupted",
         "burg-drake merge runs/shard* -o runs/whole",
     )
     parser.add_argument("runs", metavar="RUN", nargs="+", help="folder of a run")
     parser.add_argument(
-        "-o", "--output", metavar="RUN", required=True, help="folder for the united run"
+        "-o", "--output", metavar="RUN", required=True, help="folder for the merged run"
     )
 
 
@@ -27,10 +27,10 @@ def run_merge(arguments: argparse.Namespace) -> int:
     """Merges runs and prints what is in them; 1 if grasps could not be simulated."""
     from burg_drake.apps.runs.campaign import campaign_exit_code, print_campaign
     from burg_drake.apps.runs.evaluate import print_summary
-    from burg_drake.evaluation.merge import unite
+    from burg_drake.evaluation.merge import merge_folders
     from burg_drake.evaluation.store import Campaign
 
-    merged = unite(arguments.runs, arguments.output)
+    merged = merge_folders(arguments.runs, arguments.output)
     result = merged.result
     if isinstance(result, Campaign):
         print_campaign(result)

@@ -87,6 +87,6 @@ def outcome_table(
         blockers = Counter(grasps.column("blocker")[mask].tolist()).most_common(BLOCKERS)
         counts = [format_count(n) if (n := by_object[name][outcome]) else "·" for name in names]
         share = format_percent(total[outcome] / len(grasps))
-        way = ", ".join(f"{name} ({format_count(n)})" for name, n in blockers)
-        table.row(outcome.value, *counts, format_count(total[outcome]), share, way)
+        in_the_way = ", ".join(f"{name} ({format_count(n)})" for name, n in blockers)
+        table.row(outcome.value, *counts, format_count(total[outcome]), share, in_the_way)
     return table

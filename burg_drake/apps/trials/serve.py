@@ -72,10 +72,10 @@ def run_serve(arguments: argparse.Namespace) -> int:
         camera = _camera(arguments, lab) if arguments.camera else None
         if camera is not None:
             closing.callback(camera.close)
-        shelf = PictureCache(runs)
+        pictures = PictureCache(runs)
         server = LabServer(
             lab,
-            shelf,
+            pictures,
             camera,
             host=arguments.host,
             port=arguments.port,
@@ -84,7 +84,7 @@ def run_serve(arguments: argparse.Namespace) -> int:
         server.on_admitted = lambda peer: _print_line(
             f"{peer} opened the page; for another browser: {server.url}"
         )
-        closing.callback(shelf.close)
+        closing.callback(pictures.close)
         server.start()
         closing.callback(server.close)
         print(f"{len(runs.sheet.trials)} trials: open {server.url} in a browser", flush=True)

@@ -124,8 +124,8 @@ class MarkerDetector:
             return corners
         # Contours run through the middles of dark pixels, half a pixel inside.
         side = corners - np.roll(corners, 1, axis=1)
-        way = side / np.sqrt((side**2).sum(axis=2, keepdims=True))
-        corners = corners + 0.5 * (way - np.roll(way, -1, axis=1))
+        direction = side / np.sqrt((side**2).sum(axis=2, keepdims=True))
+        corners = corners + 0.5 * (direction - np.roll(direction, -1, axis=1))
         cell = side_lengths(corners).min() / self._cells
         share, least, most = CORNER_WINDOW
         half = int(np.clip(np.rint(share * cell), least, most))

@@ -63,9 +63,9 @@ def view_edges(
     g = np.einsum("ni,nij->nj", normal, by_S)
     # p_CE = R_SC^T (p_SE - p_SC): a rotation w and translation d give R_SC^T (q x w - d).
     motion = np.hstack([cross(g, q_S), -g])
-    stretch = g[:, 1] * edges.p_SE[which, 1] - g[:, 0] * edges.p_SE[which, 0]
+    aspect = g[:, 1] * edges.p_SE[which, 1] - g[:, 0] * edges.p_SE[which, 0]
     growth = (g * edges.from_center[which]).sum(axis=1)
-    return EdgeViews(which, at, across, along, motion, np.column_stack([stretch, growth]))
+    return EdgeViews(which, at, across, along, motion, np.column_stack([aspect, growth]))
 
 
 def image_points(intrinsics: Intrinsics, p_CQ: Array) -> tuple[Array, Array]:

@@ -29,7 +29,7 @@ FEWEST = 2
 upright, they are no chance."""
 FEWEST_BLANK = 3
 """Places of a row or column that must be in the image, or all, if it has fewer."""
-LOOK_OFFSETS = 4
+POINTS_PER_AXIS = 4
 """Points along both axes at which a place must be blank, the first and last on the border."""
 BLANK = 0.25
 """Most that brightness in the place of a marker may differ from paper's, as a share of the
@@ -73,7 +73,7 @@ class WrongBoardCheck:
         cell, gap = 1.0 / layout.cells, board.markers.spacing / layout.side
         # Middles of the border's cells, and the white beside them, in half sides.
         self._frame = np.concatenate([(1.0 - cell) * SIDES, (1.0 + min(cell, gap)) * SIDES])
-        middles = np.linspace(cell - 1.0, 1.0 - cell, LOOK_OFFSETS)
+        middles = np.linspace(cell - 1.0, 1.0 - cell, POINTS_PER_AXIS)
         self._looks = np.stack(np.meshgrid(middles, middles), axis=-1).reshape(-1, 2)
 
     def beyond(self, grey: NDArray[np.uint8], X_SC: Array, contrast: float) -> str:

@@ -47,7 +47,7 @@ class SheetFit:
     Attributes:
         H: (3, 3) homography from x and y of the scene frame [m] to undistorted image coordinates,
             which have their origin in the image's middle and half its diagonal as their unit.
-        distortion: what a lens adds to a distance r from the middle: `r (1 + bend r^2)`.
+        distortion: what a lens adds to a distance r from the middle: `r (1 + distortion r^2)`.
         middle: (2,) [pixels].
         radius: half the image's diagonal [pixels].
         error: root mean square distance of the markers' corners from their places on the sheet [m].

@@ -221,7 +221,7 @@ class _LogLines:
         self._clock = clock
         self._begun = self._last = clock()
         self._phase = ""
-        self._forecast = self._last_shown = False
+        self._forecast = self._any_shown = False
 
     def show(self, event: Progress) -> None:
         now = self._clock()
@@ -230,13 +230,13 @@ class _LogLines:
         )
         new = event.phase != self._phase
         starting = new and event.phase == STARTING and event.done < event.total
-        if not (self._last_shown or known or starting or now - self._begun >= FORECAST):
+        if not (self._any_shown or known or starting or now - self._begun >= FORECAST):
             return
         shown_forecast = self._forecast and not new
         finished = 0 < event.total == event.done
         if new or finished or (known and not shown_forecast) or now - self._last >= INTERVAL:
             self._phase, self._last = event.phase, now
-            self._last_shown = self._last_shown or not starting
+            self._any_shown = self._any_shown or not starting
             self._forecast = shown_forecast or known
             parts = (event.phase, _count(event), _rate_text(event), _outcome_text(event))
             print("  ".join(part for part in parts if part), file=sys.stderr, flush=True)

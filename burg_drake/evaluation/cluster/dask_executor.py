@@ -34,7 +34,7 @@ class DaskExecutor:
         self,
         client: Any,
         limits: WorkerLimits | None = None,
-        tend: Callable[[], None] = lambda: None,
+        maintain: Callable[[], None] = lambda: None,
     ) -> None:
         """Uses a cluster that one is connected to.
 
@@ -42,7 +42,7 @@ class DaskExecutor:
             client: a `distributed.Client`; what it is connected to has to be safe, see
                 `require_safe`.
             limits: the usual ones if None.
-            tend: called from time to time while grasps are judged.
+            maintain: called from time to time while grasps are judged, such as to restart workers.
 
         Raises:
             ClusterError: the connection is not encrypted and goes beyond this machine.
@@ -55,7 +55,7 @@ class DaskExecutor:
             require_safe(client.scheduler_info()["address"], "the scheduler listens at ")
         self.client = client
         self.limits = limits or WorkerLimits()
-        self._tend = tend
+        self._maintain = maintain
 
     @property
     def workers(self) -> int:
@@ -74,7 +74,7 @@ class DaskExecutor:
         """
         from burg_drake.evaluation.cluster.dispatch import Dispatch
 
-        yield from Dispatch(self.client, self.limits, self._tend).run(jobs, on_failure)
+        yield from Dispatch(self.client, self.limits, self._maintain).run(jobs, on_failure)
 
 
 @contextlib.contextmanager
@@ -101,7 +101,7 @@ def connect_cluster(cluster: str, limits: WorkerLimits | None = None) -> Iterato
         ) from error
     quiet = dask.config.set({"distributed.comm.timeouts.connect": f"{REACH:g}s"})
     with quiet, _without_its_log(), contextlib.ExitStack() as stack:
-        tend: Callable[[], None] = lambda: None  # noqa: E731
+        maintain: Callable[[], None] = lambda: None  # noqa: E731
         where: Any
         security = _security(distributed, asked)
         if asked.local:
@@ -109,7 +109,7 @@ def connect_cluster(cluster: str, limits: WorkerLimits | None = None) -> Iterato
 
             nodes = LocalNodes(asked.local)
             stack.callback(nodes.close)
-            where, tend = nodes.address, nodes.restart_workers
+            where, maintain = nodes.address, nodes.restart_workers
         elif asked.document is not None and asked.document.jobqueue is not None:
             from burg_drake.evaluation.cluster.jobqueue import start_jobqueue
 
@@ -120,7 +120,7 @@ def connect_cluster(cluster: str, limits: WorkerLimits | None = None) -> Iterato
             where = asked.document.address
         client = _client(distributed, where, security)
         stack.callback(_leave, client)
-        yield DaskExecutor(client, limits, tend)
+        yield DaskExecutor(client, limits, maintain)
 
 
 def _client(distributed: Any, where: Any, security: Any) -> Any:

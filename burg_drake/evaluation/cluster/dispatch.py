@@ -48,10 +48,10 @@ class Dispatch:
         jobs: those under way.
     """
 
-    def __init__(self, client: Any, limits: WorkerLimits, tend: Callable[[], None]) -> None:
+    def __init__(self, client: Any, limits: WorkerLimits, maintain: Callable[[], None]) -> None:
         self.client = client
         self.limits = limits
-        self._tend = tend
+        self._maintain = maintain
         self.cluster = ClusterWorkers(client)
         self.jobs: list[SentJob] = []
         self._name = f"burg-drake-{uuid.uuid4().hex}"
@@ -98,7 +98,7 @@ class Dispatch:
 
     def update_workers(self) -> Iterator[Answer]:
         """Sees who is there."""
-        self._tend()
+        self._maintain()
         for worker in self.cluster.update():
             yield from self.lose(worker)
         self._seen = time.monotonic()

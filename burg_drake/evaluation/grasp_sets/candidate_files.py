@@ -65,7 +65,7 @@ def read_grasps(
     Grasps of a file that names instances, such as `grasps.npz` of a run, stay on them. Those that
     are measured in the frame of their object go to every instance of it. Those that are measured
     in one frame for all, a camera's or a world's, go to the instance that they hold; see
-    `placement.held_instances`.
+    `candidates.scene_frame.held_instances`.
 
     Args:
         scene: the scene.

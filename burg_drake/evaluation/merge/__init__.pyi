@@ -1,4 +1,4 @@
 from .runs import (
+    merge_folders as merge_folders,
     merge_runs as merge_runs,
-    unite as unite,
 )

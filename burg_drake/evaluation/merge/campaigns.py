@@ -1,4 +1,4 @@
-"""Unites runs over many scenes: scenes that one of them has are copied, others are united."""
+"""Merges runs over many scenes: scenes that one of them has are copied, others are merged."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from burg_drake.core import InvalidInputError
 from burg_drake.core.files import atomic_write
 from burg_drake.evaluation.merge.finishing import MissingFromMerge
 from burg_drake.evaluation.merge.journals import choose
-from burg_drake.evaluation.merge.united_run import (
+from burg_drake.evaluation.merge.merged_run import (
     all_sessions,
     common_shard,
     copy_documents,
     missing_shards,
-    write_united,
+    write_merged,
 )
 from burg_drake.evaluation.records import (
     JOURNAL_FILE,
@@ -44,7 +44,7 @@ from burg_drake.evaluation.store import (
 
 
 def merge_campaigns(campaigns: Sequence[Campaign], staging: Path, folder: Path) -> MissingFromMerge:
-    """Writes a united run over many scenes, but for what is made from its journals.
+    """Writes a merged run over many scenes, but for what is made from its journals.
 
     Args:
         campaigns: the runs.
@@ -64,21 +64,21 @@ def merge_campaigns(campaigns: Sequence[Campaign], staging: Path, folder: Path) 
         if found := campaign_differences(first.document, other.document):
             raise InvalidInputError(
                 f"{first.path} and {other.path} are not the same run ({'; '.join(found)}); only"
-                " shards and copies of one run can be united"
+                " shards and copies of one run can be merged"
             )
     document = replace(
         first.document,
         shard=common_shard(campaigns),
         stretches=all_sessions([campaign.document.stretches for campaign in campaigns]),
     )
-    united = Campaign(staging, document)
+    merged = Campaign(staging, document)
     (staging / SCENES_FOLDER).mkdir()
-    merge = _Merge(campaigns, united, folder)
-    for name in united.names:
+    merge = _Merge(campaigns, merged, folder)
+    for name in merged.names:
         merge.take(name)
     merge.copy_parts()
     atomic_write(staging / LEDGER_FILE, ledger_text(merge.states))
-    save_campaign(united)
+    save_campaign(merged)
     return MissingFromMerge(merge.missing, tuple(merge.not_begun), missing_shards(campaigns))
 
 
@@ -92,9 +92,9 @@ class _Merge:
         not_begun: scenes that no run has begun.
     """
 
-    def __init__(self, campaigns: Sequence[Campaign], united: Campaign, folder: Path) -> None:
-        self._campaigns, self._united, self._folder = campaigns, united, folder
-        shard = united.document.shard_of_grasps
+    def __init__(self, campaigns: Sequence[Campaign], merged: Campaign, folder: Path) -> None:
+        self._campaigns, self._merged, self._folder = campaigns, merged, folder
+        shard = merged.document.shard_of_grasps
         self._shard = "" if shard is None else str(shard)
         self.states: list[SceneState] = []
         self.copied: dict[int, set[str]] = {k: set() for k in range(len(campaigns))}
@@ -117,20 +117,20 @@ class _Merge:
             self._take(name, begun)
 
     def _take(self, name: str, begun: Sequence[int]) -> None:
-        target = self._united.folder(name)
+        target = self._merged.folder(name)
         final = self._folder / SCENES_FOLDER / name
         runs = [load_run(self._campaigns[k].folder(name)) for k in begun]
         if len(runs) == 1 and runs[0].document.shard == self._shard:
             self._copy(begun[0], name, runs[0], target, final)
             return
         target.mkdir()
-        choice = write_united(runs, target, final, self._shard)
+        choice = write_merged(runs, target, final, self._shard)
         self._note(name, runs[0], choice.missing, choice.failed, choice.interrupted)
 
     def copy_parts(self) -> None:
         """Copies the parts of which all scenes were copied; the others are made from journals."""
         number = 0
-        parts = self._united.path / PARTS_FOLDER
+        parts = self._merged.path / PARTS_FOLDER
         parts.mkdir()
         for k, campaign in enumerate(self._campaigns):
             for part in PartIndex.of(campaign.path).parts:
@@ -155,9 +155,9 @@ class _Merge:
     def _note(self, name: str, run: Run, missing: int, failed: int, interrupted: int) -> None:
         self.missing += missing
         count = len(run.candidates)
-        shard = self._united.document.shard_of_grasps
+        shard = self._merged.document.shard_of_grasps
         mine = len(share(range(count), shard))
-        size = (self._united.folder(name) / JOURNAL_FILE).stat().st_size
+        size = (self._merged.folder(name) / JOURNAL_FILE).stat().st_size
         state = SceneState(
             scene=name,
             state="open" if missing else "done",

@@ -1,4 +1,4 @@
-"""What is left of a merge when the united run is in its place: tables, parts and reports.
+"""What is left of a merge when the merged run is in its place: tables, parts and reports.
 
 A file in the run's folder tells of it until it is done, so that the same merge finishes what was
 killed; `evaluate`, which finishes it, too, removes the file.
@@ -29,7 +29,7 @@ from burg_drake.evaluation.store import (
 
 @dataclass(frozen=True)
 class MissingFromMerge:
-    """What no run had that was united.
+    """What none of the merged runs had.
 
     Attributes:
         missing: number of grasps.
@@ -43,7 +43,7 @@ class MissingFromMerge:
 
 
 def note_unfinished(folder: Path, sources: Sequence[Path], left: MissingFromMerge) -> None:
-    """Notes in a united run that it is to be finished."""
+    """Notes in a merged run that it is to be finished."""
     _note(folder, sources).write_text(json.dumps(asdict(left)), encoding="utf-8")
 
 
@@ -57,7 +57,7 @@ def unfinished(folder: Path, sources: Sequence[Path]) -> MissingFromMerge | None
 
 
 def finish(folder: Path, sources: Sequence[Path]) -> Run | Campaign:
-    """Writes what is made from the journals of a united run, as far as it is not there.
+    """Writes what is made from the journals of a merged run, as far as it is not there.
 
     Raises:
         InvalidInputError: another process is writing it, or it cannot be written.

@@ -1,4 +1,4 @@
-"""Unites the journals of runs of the same grasps, a line at a time."""
+"""Merges the journals of runs of the same grasps, a line at a time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Unites runs of the same: shards, or copies that were interrupted.
+"""Merges runs of the same: shards, or copies that were interrupted.
 
 What comes of it has the rows of a run that nobody divided, to the bit. Its journals are written
 beside the place where it is to be, and get there when they are whole; what is made from them
@@ -26,7 +26,7 @@ from burg_drake.evaluation.merge.finishing import (
     note_unfinished,
     unfinished,
 )
-from burg_drake.evaluation.merge.united_run import missing_shards, write_united
+from burg_drake.evaluation.merge.merged_run import missing_shards, write_merged
 from burg_drake.evaluation.records import unchanged
 from burg_drake.evaluation.store import Campaign, Run, is_campaign, open_results
 
@@ -53,7 +53,7 @@ class Merged:
         notes = []
         shard = self.result.document.shard
         if shard:
-            notes.append(f"only shard {shard} was given, so the united run is only that shard")
+            notes.append(f"only shard {shard} was given, so the merged run is only that shard")
         if not (self.missing or self.scenes):
             return tuple(notes)
         if self.missing:
@@ -68,19 +68,19 @@ class Merged:
 
 
 def merge_runs(paths: Sequence[str | Path], out: str | Path) -> Run | Campaign:
-    """Unites runs of the same scenes and grasps; see `unite`."""
-    return unite(paths, out).result
+    """Merges runs of the same scenes and grasps; see `merge_folders`."""
+    return merge_folders(paths, out).result
 
 
-def unite(paths: Sequence[str | Path], out: str | Path) -> Merged:
-    """Unites runs of the same scenes and grasps: shards, or copies that were interrupted.
+def merge_folders(paths: Sequence[str | Path], out: str | Path) -> Merged:
+    """Merges runs of the same scenes and grasps: shards, or copies that were interrupted.
 
     Of each grasp the verdict is taken that some run has; one of a trial goes before
     `simulation_failed`. The runs stay as they are.
 
     Args:
         paths: folders of runs, all of one scene or all of many.
-        out: folder for the united run; it does not exist, or is empty, or the same call was killed
+        out: folder for the merged run; it does not exist, or is empty, or the same call was killed
             when it had put the run there.
 
     Raises:
@@ -94,19 +94,19 @@ def unite(paths: Sequence[str | Path], out: str | Path) -> Merged:
         with ExitStack() as stack:
             for path in folders:
                 stack.enter_context(unchanged(lock_file(path), make=is_campaign(path)))
-            left = _unite(folders, folder)
+            left = _merge_folders(folders, folder)
     return Merged(finish(folder, folders), left.missing, left.scenes, left.shards)
 
 
-def _unite(folders: Sequence[Path], folder: Path) -> MissingFromMerge:
-    """Puts a united run where it is to be, but for what is made from its journals."""
+def _merge_folders(folders: Sequence[Path], folder: Path) -> MissingFromMerge:
+    """Puts a merged run where it is to be, but for what is made from its journals."""
     results = [open_results(path) for path in folders]
     kinds = {type(result) for result in results}
     if len(kinds) > 1:
         one = next(r.path for r in results if isinstance(r, Run))
         many = next(r.path for r in results if isinstance(r, Campaign))
         raise InvalidInputError(
-            f"{one} is a run of one scene, {many} one of many; only runs of the same can be united"
+            f"{one} is a run of one scene, {many} one of many; only runs of the same can be merged"
         )
     staging = _staging_folder(folder)
     try:
@@ -115,7 +115,7 @@ def _unite(folders: Sequence[Path], folder: Path) -> MissingFromMerge:
             left = merge_campaigns(campaigns, staging, folder)
         else:
             runs = [result for result in results if isinstance(result, Run)]
-            choice = write_united(runs, staging, folder)
+            choice = write_merged(runs, staging, folder)
             left = MissingFromMerge(choice.missing, (), missing_shards(runs))
         note_unfinished(staging, folders, left)
         move(staging, folder)

@@ -246,8 +246,8 @@ def require_same_shard(folder: Path, there: str, here: str) -> None:
         held = f"shard {there} of this run" if there else "all of this run"
         asked = f"shard {here}" if here else "no shard"
         raise InvalidInputError(
-            f"{folder} holds {held}, and {asked} is given; choose another folder; burg-drake"
-            " merge unites shards"
+            f"{folder} holds {held}, and {asked} is given; choose another folder; merge shards"
+            " with burg-drake merge"
         ).about("out")
 
 

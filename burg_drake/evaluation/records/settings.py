@@ -39,7 +39,7 @@ class EvaluationSettings:
         motion: how the hand goes to a grasp and away from it; as the station says if None.
         seed: of the sampling.
         shard: a share of the work, such as `2/8`: of at least as many scenes every eighth one, of
-            fewer every eighth grasp of each. `merge_runs` unites the shares.
+            fewer every eighth grasp of each. `merge_runs` merges the shares.
         table: format of the results file.
         scene_reports: whether each of several scenes gets a report of its own; None if they are at
             most a hundred, as one takes some tenths of a second. `write_report` makes it later.
@@ -87,7 +87,7 @@ class EvaluationSettings:
     shard: Shard | str | None = setting(
         None,
         "judge a share of the work, such as 2/8, on one of several machines: every N-th scene, or"
-        " of fewer than N scenes every N-th grasp; burg-drake merge unites them",
+        " of fewer than N scenes every N-th grasp; merge them with burg-drake merge",
         metavar="K/N",
     )
     table: TableFormat = setting(

@@ -1,7 +1,7 @@
 """A share of a run: what one of several machines judges of it.
 
 Which share a scene or a grasp belongs to follows from its place alone, so that machines need not
-talk to each other; `merge` unites what they find.
+talk to each other; `merge` puts together what they find.
 """
 
 from __future__ import annotations

@@ -114,7 +114,7 @@ def _notice(campaign: Campaign, summary: Summary) -> Html | None:
     parts = []
     if campaign.document.shard:
         number, _, whole = campaign.document.shard.partition("/")
-        parts.append(f"This is shard {number} of {whole}; burg-drake merge unites the shards.")
+        parts.append(f"This is shard {number} of {whole}; merge the shards with burg-drake merge.")
     if not campaign.complete:
         judged, expected = format_count(summary.total.judged), format_count(campaign.expected)
         parts.append(

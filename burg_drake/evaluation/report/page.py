@@ -111,7 +111,7 @@ def _notice(run: Run) -> Html | None:
         number, _, whole = run.document.shard.partition("/")
         parts.append(
             f"This is shard {number} of {whole}: of {len(run.candidates)} grasps {mine} are judged"
-            " here. burg-drake merge unites the shards."
+            " here. Merge the shards with burg-drake merge."
         )
     if judged < mine:
         parts.append(

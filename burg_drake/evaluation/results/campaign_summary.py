@@ -27,8 +27,8 @@ from burg_drake.evaluation.store import Campaign, StoredRows
 OUTCOMES = tuple(Outcome)
 ALL_STAGES = tuple(Stage)
 Text = TypeVar("Text", bound=str)
-TOLD = 5
-"""Scenes of which it is told what is missing, and why."""
+SCENES_LISTED = 5
+"""So many scenes with too few grasps are listed, each with what is missing, and why."""
 
 
 def summarize_campaign(campaign: Campaign) -> Summary:
@@ -110,7 +110,7 @@ def _notes(campaign: Campaign) -> tuple[str, ...]:
     if failed := list(campaign.failed):
         notes.append(f"{len(failed)} scenes could not be judged: {listing(failed)}")
     short = [n for n in campaign.names if n in states and states[n].missing]
-    notes += [f"scene {name}: {states[name].missing}" for name in short[:TOLD]]
-    if len(short) > TOLD:
-        notes.append(f"{len(short) - TOLD} more scenes have fewer grasps than asked for")
+    notes += [f"scene {name}: {states[name].missing}" for name in short[:SCENES_LISTED]]
+    if len(short) > SCENES_LISTED:
+        notes.append(f"{len(short) - SCENES_LISTED} more scenes have fewer grasps than asked for")
     return tuple(notes)

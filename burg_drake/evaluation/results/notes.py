@@ -89,16 +89,16 @@ def _unexecuted_note(name: str, columns: Columns, mine: np.ndarray, motion: Gras
 
 def _other_motion(outcome: Outcome, motion: GraspMotion) -> str:
     """Another motion of the hand that may avoid an outcome; "" if there is none."""
-    ways = []
+    motions = []
     if outcome in NO_LIFT and motion.shortest >= motion.lift_height:
-        ways.append("a shorter lift (least_lift)")
+        motions.append("a shorter lift (least_lift)")
     elif outcome in NO_LIFT and motion.shortest > 0.0:
-        ways.append("a smaller least_lift")
+        motions.append("a smaller least_lift")
     if outcome in NO_LIFT and not motion.retreat:
-        ways.append("a retreat first")
+        motions.append("a retreat first")
     if outcome in NO_RETREAT:
-        ways.append("a shorter retreat")
-    return " or ".join(ways)
+        motions.append("a shorter retreat")
+    return " or ".join(motions)
 
 
 def unclear_notes(

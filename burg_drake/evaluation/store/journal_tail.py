@@ -16,7 +16,7 @@ from burg_drake.core.files import open_regular
 from burg_drake.core.grasps import Outcome
 from burg_drake.evaluation.store.part_file import CANDIDATE, read_part
 from burg_drake.evaluation.store.part_segments import chain
-from burg_drake.evaluation.store.part_store import PARTS_FOLDER, PartIndex, StoredRun, united
+from burg_drake.evaluation.store.part_store import PARTS_FOLDER, PartIndex, StoredRun, merged
 
 LINE = re.compile(rb'^\{"id":"((?:[^"\\]|\\.)*)","outcome":"([a-z_]+)"[^\n]*\}\n', re.MULTILINE)
 """A line of a journal, as `journal.encode` writes it."""
@@ -108,7 +108,7 @@ def tails_of(folder: Path, places: Sequence[StoredRun]) -> dict[str, JournalTail
 
 def _count_rows(tail: JournalTail, slices: Sequence[Any]) -> None:
     """Counts rows of Arrow tables."""
-    table = united(slices) if len(slices) > 1 else slices[0]
+    table = merged(slices) if len(slices) > 1 else slices[0]
     column = table.column("outcome")
     counts = {item["values"]: item["counts"] for item in column.value_counts().to_pylist()}
     tail.lines = table.num_rows

@@ -128,7 +128,7 @@ def segment_table(run: Run, begin: int, end: int) -> Any:
     return arrow_table({**part.results, CANDIDATE: np.array(places, dtype=np.int64)})
 
 
-def united(tables: Sequence[Any]) -> Any:
+def merged(tables: Sequence[Any]) -> Any:
     """Tables of one run as one: of each candidate the last row, in the order of the candidates."""
     arrow = require_arrow("a columnar table")
     table = arrow.concat_tables(tables, promote_options="permissive")
@@ -174,7 +174,7 @@ def _read(
         slices = [tables[part.path].slice(row, rows) for part, row, rows in piece]
         if tail is not None:
             slices.append(_with_columns(tail, wanted))
-        runs.append(united(slices) if len(slices) > 1 else slices[0] if slices else None)
+        runs.append(merged(slices) if len(slices) > 1 else slices[0] if slices else None)
     counts = np.array([_size(run) for run in runs], dtype=np.int64)
     there = [table for table in _joined(runs, tables) if table.num_rows]
     empty = arrow.table({name: empty_column(name, 0) for name in wanted})

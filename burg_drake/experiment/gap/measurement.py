@@ -103,7 +103,7 @@ def measure_gap(
         scene, station = run.scene(), run.station()
         if not run.complete:
             raise InvalidInputError(
-                f"{run.path} is not complete; go on with it first, by the command in its report"
+                f"{run.path} is not complete; finish it first with the command in its report"
             )
     else:
         assert not isinstance(source, Run)

@@ -53,5 +53,5 @@ class Footprint:
         return Sides.of(-self.corners)
 
     def forbids(self, moving: Footprint) -> Array:
-        """Where another one's origin must not be, see `packing.forbidden`."""
+        """Where another one's origin must not be, see `polygons.no_fit_polygon`."""
         return no_fit_polygon_of_sides(self.sides, moving.opposite_sides)

@@ -1,4 +1,4 @@
-"""Brings a scene to rest: piles, heaps, and objects that are placed in the air."""
+"""Brings a scene to rest: stacks, heaps, and objects that are placed in the air."""
 
 from __future__ import annotations
 

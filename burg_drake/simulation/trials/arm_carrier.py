@@ -79,7 +79,7 @@ class ArmCarrier:
         return self._touches.first
 
     def approach(self) -> None:
-        """Follows the way to the grasp."""
+        """Follows the path to the grasp."""
         self._follow(self._approach)
 
     def close(self) -> None:
@@ -95,13 +95,13 @@ class ArmCarrier:
             trial.simulator.Initialize()
 
     def lift(self, number: int, check: int) -> None:
-        """Follows one of the ways."""
+        """Follows one segment of the plan."""
         if check == 0:
             self._number = number
             self._follow(self._commands[number])
 
     def stop(self) -> None:
-        """Stays where the last way ends."""
+        """Stays where the last segment ends."""
         self._follow(None)
 
     def advance_to(self, time: float) -> None:
@@ -122,7 +122,7 @@ class ArmCarrier:
         return self._touches.update(contacts, self._arrived)
 
     def travelled(self) -> float:
-        """Of the grasp frame since the beginning of a way as it was commanded [m]."""
+        """Of the grasp frame since the beginning of a segment as it was commanded [m]."""
         p_WG = self._mounted.X_WG(self._plant_context)[:3, 3]
         p_GG_W = p_WG - self._commands[self._number].p_WG[0]
         return float(p_GG_W @ self.segments[self._number].direction_W)

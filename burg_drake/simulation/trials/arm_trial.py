@@ -46,8 +46,8 @@ class ArmTrial(GraspTrial):
         scene: the scene.
         station: a station with an arm.
         engine: time step and contact settings, or the name of a preset.
-        settings: phases of a trial; all ways are the plan's, so that `motion` and `lift_time` do
-            not count.
+        settings: phases of a trial; the hand's paths come from the plan, so that `motion` and
+            `lift_time` do not count.
         transfer: begin at the home posture, and go to the pregrasp first. As the arm is fast there,
             its contacts are looked at after every step up to the grasp, and not only at `poll`.
         clearance: the screen of the open hand in this scene, if there is one already.

@@ -76,9 +76,9 @@ class Execution:
         self._blocker = ""
         self._steps = 0
         self._steps_per_check = max(1, round(self._settings.poll / diagram.engine.time_step))
-        self._creeping_since: list[float] = []
+        self._motions_in_hand: list[float] = []
         self._in_free_air = 0.0
-        self._path_blocker = False
+        self._path_is_blocked = False
         self._left_to_go = 0.0
 
     def run(self) -> TrialResult:
@@ -161,7 +161,7 @@ class Execution:
         Unless the whole trial is asked for, the end is early when the grip is steady.
         """
         settings = self._settings
-        self._creeping_since.clear()
+        self._motions_in_hand.clear()
         for _ in range(max(1, round(settings.hold_time / settings.poll))):
             self.advance()
             if self._blocker:
@@ -190,7 +190,7 @@ class Execution:
         carry it lets the target go ever faster; so what sticks to the pads then, or creeps and does
         not get faster, in free air and with all others at rest, is held to the end, too.
         """
-        if self._trial.diagram.engine.whole_trial or self._path_blocker:
+        if self._trial.diagram.engine.whole_trial or self._path_is_blocked:
             return False
         if not self.contact.both or not (self._is_held_steadily() or self._is_coming_to_rest()):
             return False
@@ -199,15 +199,15 @@ class Execution:
         left = last.length - self._carrier.travelled()
         if self.followed() + left < MINIMUM_LIFT * self._path_length:
             return False
-        self._path_blocker = not self._carrier.is_free_ahead()
-        if not self._path_blocker:
+        self._path_is_blocked = not self._carrier.is_free_ahead()
+        if not self._path_is_blocked:
             self._left_to_go = left
-        return not self._path_blocker
+        return not self._path_is_blocked
 
     def _is_held_steadily(self) -> bool:
         """Whether the grip has been steady for `steady_time`."""
         settings = self._settings
-        recent = self._creeping_since[-settings.steady_polls :]
+        recent = self._motions_in_hand[-settings.steady_polls :]
         enough = len(recent) == settings.steady_polls
         return enough and max(recent) <= settings.creep_speed * settings.poll
 
@@ -219,9 +219,9 @@ class Execution:
         """
         settings = self._settings
         n = settings.steady_polls
-        before, now = sum(self._creeping_since[-2 * n : -n]), sum(self._creeping_since[-n:])
+        before, now = sum(self._motions_in_hand[-2 * n : -n]), sum(self._motions_in_hand[-n:])
         ahead = (self._carrier.lift_time + settings.hold_time) / settings.poll
-        enough = len(self._creeping_since) >= 2 * n
+        enough = len(self._motions_in_hand) >= 2 * n
         return enough and now <= before and now / n * ahead <= settings.creep_distance
 
     def advance(self, steps: int | None = None) -> float:
@@ -267,9 +267,9 @@ class Execution:
         distance, angle = motion_in_hand(self._X_GO_last, X_GO)
         self._X_GO_last = X_GO
         if self._moved.update(self._still) <= settings.settled_speed * settings.poll:
-            self._creeping_since.append(max(distance, angle * LEVER))
+            self._motions_in_hand.append(max(distance, angle * LEVER))
         else:
-            self._creeping_since.clear()
+            self._motions_in_hand.clear()
         self._blocker = self._carrier.watch(contacts)
         free = not touched_from_outside(contacts, self._robot | {target})
         self._in_free_air = self._in_free_air + settings.poll if free else 0.0

@@ -146,7 +146,7 @@ class HandTrial(GraspTrial):
         return Execution(self, target, moving, LiftCarrier(self, paths, lift_clearance))
 
     def lift_paths(self, X_WG: Array, lift: float | None = None) -> tuple[LiftPath, ...]:
-        """Straight ways of the hand with the target.
+        """Straight paths of the hand with the target: the retreat, if there is one, and the lift.
 
         Args:
             X_WG: (4, 4) grasp in the world.

@@ -70,7 +70,7 @@ class LiftCarrier:
         )
         self.lift_time = sum(settings.time_of(path.length) for path in paths)
         self._number = 0
-        self._start_time = False
+        self._is_lifting = False
         self._X_WG_start = self._floating.X_WG(self._plant_context)
 
     def approach(self) -> None:
@@ -83,7 +83,7 @@ class LiftCarrier:
         """Commands the speed of the middle of the interval; in one interval more, where another
         segment follows, the hand comes to rest."""
         segment, settings = self.segments[number], self._trial.settings
-        self._start_time = True
+        self._is_lifting = True
         if number != self._number:
             self._number = number
             self._X_WG_start = self._floating.X_WG(self._plant_context)
@@ -106,7 +106,7 @@ class LiftCarrier:
         """Looks for fixed bodies that the hand touches; the table is none of them, unless the hand
         goes down."""
         fixed = set(self._trial.diagram.fixed.values())
-        if self._start_time and self.segments[self._number].direction_W[2] < DOWN:
+        if self._is_lifting and self.segments[self._number].direction_W[2] < DOWN:
             fixed.add(self._trial.diagram.table)
         hit = reached(contacts, self._hand, fixed)
         return self._names[min(hit)] if hit else ""

@@ -34,7 +34,7 @@ EXPLODED = 0.25
 """How far pieces are moved outward, as a share of their distance from the object's middle."""
 LINE = 0.22
 """Height of a line of text as it is seen, as a share of the gallery's unit."""
-STRETCH = 1.0 / float(np.sin(ELEVATION))
+LETTER_STRETCH = 1.0 / float(np.sin(ELEVATION))
 """Text on the floor is longer than it is seen."""
 CAPTION = 0.85
 """Size of captions, compared with labels."""
@@ -96,9 +96,9 @@ def prepare_object(
     touching = np.vstack([m.vertices for m in contact]) if contact else corners
     things = [corners @ R_WO.T, np.vstack(apart) @ R_WO.T, touching @ R_WO.T]
     things += [corners @ R.T for R in poses]
-    label, label_width = label_mesh(_description(name, entry), LINE * unit, STRETCH)
+    label, label_width = label_mesh(_description(name, entry), LINE * unit, LETTER_STRETCH)
     size = CAPTION * LINE * unit
-    captions = [label_mesh((text,), size, STRETCH) for text in _captions(entry, contact)]
+    captions = [label_mesh((text,), size, LETTER_STRETCH) for text in _captions(entry, contact)]
     items = [
         Item(points.min(axis=0), points.max(axis=0), width)
         for points, (_, width) in zip(things, captions, strict=True)

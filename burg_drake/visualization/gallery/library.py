@@ -10,9 +10,9 @@ from pydrake.geometry import Meshcat, Rgba
 from burg_drake.core import InvalidInputError
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.visualization.gallery.gallery_object import (
+    LETTER_STRETCH,
     LINE,
     ROOT,
-    STRETCH,
     TILE_HEIGHT,
     GalleryObject,
     draw_object,
@@ -75,7 +75,7 @@ def show_library(
     unit = float(np.median([np.max(np.subtract(e.upper, e.lower)) for e in entries]))
     contact = hydroelastic_meshes(library, chosen)
     objects = [prepare_object(library, name, contact[name], unit) for name in chosen]
-    layout = lay_out([e.row for e in objects], unit, STRETCH * LINE * unit)
+    layout = lay_out([e.row for e in objects], unit, LETTER_STRETCH * LINE * unit)
     for item, placed in zip(objects, layout.rows, strict=True):
         draw_object(meshcat, item, placed, unit)
     for k, bank in enumerate(layout.banks):

@@ -15,9 +15,9 @@ from burg_drake.geometry import hull_mesh
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.visualization.gallery.gallery_object import (
     CAPTION,
+    LETTER_STRETCH,
     LINE,
     ROOT,
-    STRETCH,
     TILE_HEIGHT,
     draw_slab,
     write_label,
@@ -110,7 +110,7 @@ def _object_with_grasps(
     points = np.vstack([corners, drawn.T]) @ R_WO.T
     count = int(own.sum())
     text = (name, f"{count} grasp{'' if count == 1 else 's'}")
-    caption = label_mesh(text, CAPTION * LINE * unit, STRETCH)
+    caption = label_mesh(text, CAPTION * LINE * unit, LETTER_STRETCH)
     return ObjectWithGrasps(
         name, R_WO, Item(points.min(axis=0), points.max(axis=0), caption[1]), caption
     )
@@ -125,5 +125,5 @@ def _in_rows(
         size = -(-len(stands) // count)
         rows = [stands[k : k + size] for k in range(0, len(stands), size)]
         items = [GalleryRow(0.0, (), [stand.item for stand in row]) for row in rows]
-        layouts.append((lay_out(items, unit, TEXT_ROOM * STRETCH * LINE * unit, 1), rows))
+        layouts.append((lay_out(items, unit, TEXT_ROOM * LETTER_STRETCH * LINE * unit, 1), rows))
     return min(layouts, key=lambda layout: layout[0].distance())

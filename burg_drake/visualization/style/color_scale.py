@@ -1,4 +1,4 @@
-"""From numbers to bins of a colour bar: a range that a few outliers do not spoil, and its ticks."""
+"""From numbers to bins of a colour bar: a range that a few outliers do not widen, and its ticks."""
 
 from __future__ import annotations
 

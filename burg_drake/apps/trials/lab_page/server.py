@@ -68,7 +68,7 @@ class LabServer(PageServer):
 
     Args:
         lab: the trials.
-        shelf: their pictures.
+        pictures: of the trials.
         camera: over the board, if there is one.
         host: address to listen on; only this machine can reach the default.
         port: to listen on; the first free one from `FIRST_PORT` on if None, any if 0.
@@ -85,14 +85,14 @@ class LabServer(PageServer):
     def __init__(
         self,
         lab: LabBook,
-        shelf: PictureCache,
+        pictures: PictureCache,
         camera: LabCamera | None = None,
         *,
         host: str = LOCALHOST,
         port: int | None = None,
         secret: str | None = None,
     ) -> None:
-        self.lab, self.shelf, self.camera = lab, shelf, camera
+        self.lab, self.pictures, self.camera = lab, pictures, camera
         self.plan = json.dumps(plan_data(lab) | {"camera": camera is not None}).encode()
         super().__init__(LabHandler, host=host, port=port)
         bound, number = self.server_address[:2]
@@ -180,9 +180,9 @@ class LabHandler(PageHandler):
             self.send_json(found)
 
     def _send_picture(self, name: str, query: dict[str, str]) -> None:
-        picture = self.server.shelf.get(name, RENDERING)
+        picture = self.server.pictures.get(name, RENDERING)
         if picture is None:
-            fault = self.server.shelf.fault or f"there is no picture {name[:100]}"
+            fault = self.server.pictures.fault or f"there is no picture {name[:100]}"
             raise RequestError(HTTPStatus.NOT_FOUND, fault)
         self.send(HTTPStatus.OK, "image/jpeg", picture, {"Cache-Control": KEPT})
 

@@ -104,7 +104,7 @@ def _axis(focus: Array, limit: Limit | None) -> _Axis:
 
 
 def _bars(series: Sequence[Series], axis: _Axis, base: float, sign: int) -> list[Html]:
-    """Bars of one half; `way` is 1 downward."""
+    """Bars of one half; `sign` is 1 downward."""
     edges = axis.edges
     inside = [np.histogram(s.values, edges)[0] for s in series]
     beyond = [int((s.values > axis.end).sum()) for s in series]

@@ -39,8 +39,8 @@ def arm_section(summary: Summary, columns: Columns) -> Html | None:
                 for cell in (count, format_percent(count / clear))
             ]
             name = element("th", outcome.value.replace("_", " "), scope="row")
-            way = element("td", _blockers(columns, outcome))
-            rows.append(element("tr", name, *cells, element("td", outcome.meaning), way))
+            blockers = element("td", _blockers(columns, outcome))
+            rows.append(element("tr", name, *cells, element("td", outcome.meaning), blockers))
     share = f" ({format_percent(planned / clear)})" if clear else ""
     text = (
         f"Of {clear} grasps at which the open hand is clear, the arm can execute"

@@ -1,4 +1,4 @@
-"""The parts that a united run is put together of: its documents and its journal."""
+"""The parts that a merged run is put together of: its documents and its journal."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ from burg_drake.scene.document import SceneDocument, save_scene
 from burg_drake.station.document import StationDocument
 
 
-def write_united(
+def write_merged(
     runs: Sequence[Run], staging: Path, folder: Path, shard: str | None = None
 ) -> JournalChoice:
-    """Writes a united run, but for what is made from its journal.
+    """Writes a merged run, but for what is made from its journal.
 
     Args:
         runs: of one scene.
         staging: an empty folder to write it to.
         folder: where it is to be, which references have to fit.
-        shard: that the united run is; what all of them are if None.
+        shard: that the merged run is; what all of them are if None.
 
     Returns:
         Which verdicts were taken.
@@ -74,7 +74,7 @@ def write_united(
 
 
 def require_mergeable(first: Run, other: Run) -> None:
-    """Refuses to unite runs that are not of the same.
+    """Refuses to merge runs that are not of the same.
 
     Raises:
         InvalidInputError: names every difference.
@@ -87,7 +87,7 @@ def require_mergeable(first: Run, other: Run) -> None:
         found = [f"grasps are {a.grasps.content[:12]} there, {b.grasps.content[:12]} here"]
     raise InvalidInputError(
         f"{first.path} and {other.path} are not the same run ({'; '.join(found)}); only shards and"
-        " copies of one run can be united"
+        " copies of one run can be merged"
     )
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from burg_drake.core.documents.schema import Pose
-from burg_drake.generation.heap import pile
+from burg_drake.generation.heap import settle_heap
 from burg_drake.objects.library.document import ObjectLibrary
 from burg_drake.scene.arrangement.object_shapes import ObjectShapes
 from burg_drake.scene.document.board import Board
@@ -32,11 +32,11 @@ def test_what_falls_off_the_table_is_dropped_once_more(
     check = SceneCheck(tabletop, household)
     assert {i.instance for i in check.issues(scene) if i.kind == "out_of_bounds"} == {"can"}
 
-    piled = pile(scene, tabletop, check, ObjectShapes(household), np.random.default_rng(0))
+    settled = settle_heap(scene, tabletop, check, ObjectShapes(household), np.random.default_rng(0))
 
-    assert piled.drops >= 1 and piled.faulty == ()
-    assert list(piled.scene.instances) == ["box", "can"]
-    assert piled.scene.X_SO("can")[0, 3] > 0.0
-    assert not [issue for issue in check.issues(piled.scene) if issue.is_error]
-    for moved in stillness(piled.scene, tabletop, duration=1.0).values():
+    assert settled.drops >= 1 and settled.faulty == ()
+    assert list(settled.scene.instances) == ["box", "can"]
+    assert settled.scene.X_SO("can")[0, 3] > 0.0
+    assert not [issue for issue in check.issues(settled.scene) if issue.is_error]
+    for moved in stillness(settled.scene, tabletop, duration=1.0).values():
         assert moved.distance < 1e-4 and moved.angle < np.deg2rad(0.02)

@@ -1,4 +1,4 @@
-"""What is in the way of hand and target on their way up is met, though a trial may end early."""
+"""What stands above hand or target is met in the lift, though a trial may end early."""
 
 from __future__ import annotations
 

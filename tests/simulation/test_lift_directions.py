@@ -1,4 +1,4 @@
-"""Where the hand goes with the target: along which ways, by closed forms and by symmetry."""
+"""Where the hand goes with the target: in which directions, by closed forms and by symmetry."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ BLOCK_MASS, MIDDLE = 0.1, from_above(0.025)
 """The grasp is at the block's centre of mass."""
 FROM_THE_SIDE = grasp_from_axes((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -0.02, 0.05))
 TIME = 0.3
-WAY = GRAVITY * TIME**2 / 4
-"""On so long a way in this time the hand accelerates and brakes by g."""
+DISTANCE = GRAVITY * TIME**2 / 4
+"""Over this distance in this time the hand accelerates and brakes by g [m]."""
 
 
 @pytest.mark.parametrize("u", [(0, 0, 1), (0, 0, -1), (1, 0, 0), (1e-9, 0, -1), (0.3, -0.5, -0.9)])
@@ -83,8 +83,8 @@ def test_friction_bears_weight_and_acceleration(make_scene, u: tuple[float, ...]
     trial = HandTrial(
         make_scene(BLOCK),
         make_station(),
-        settings=replace(lifting(WAY, TIME, hold_time=0.1), motion=None, poll=0.002),
-        motion=GraspMotion(lift_height=WAY, lift_direction=u),
+        settings=replace(lifting(DISTANCE, TIME, hold_time=0.1), motion=None, poll=0.002),
+        motion=GraspMotion(lift_height=DISTANCE, lift_direction=u),
     )
     held, lost = (trial.run("block", MIDDLE, friction=share * limit) for share in (1.08, 0.92))
     assert held.outcome is Outcome.LIFTED
@@ -93,7 +93,7 @@ def test_friction_bears_weight_and_acceleration(make_scene, u: tuple[float, ...]
 
 
 @pytest.mark.thorough
-def test_what_is_decided_on_a_tilted_way_is_confirmed_by_the_whole_trial(make_scene) -> None:
+def test_what_is_decided_on_a_tilted_lift_is_confirmed_by_the_whole_trial(make_scene) -> None:
     motion = GraspMotion(lift_height=0.2, lift_direction=(0.5, 0.0, 0.5))
     scene, station = make_scene(IN_THE_AIR), make_station()
     early, whole = (
@@ -153,7 +153,7 @@ def test_a_station_says_where_the_hand_goes(make_scene) -> None:
     assert high.outcome is Outcome.BLOCKED
 
 
-def test_a_way_down_through_the_table_is_blocked(make_scene) -> None:
+def test_a_lift_down_through_the_table_is_blocked(make_scene) -> None:
     motion = GraspMotion(lift_direction=(0.0, 0.0, -1.0))
     trial = HandTrial(
         make_scene(("box", 0.3, 0.2, 0.0)), make_station(), motion=motion, engine=QUICK
