@@ -68,7 +68,7 @@ def test_clicks_survive_the_death_of_the_server(page: Page, trials: Path) -> Non
         expect(page.locator("#entered")).to_contain_text("Entered: slipped, AB")
         expect(page.locator("#note")).to_have_value("<b>wet</b> & cold")
     finally:
-        server.shelf.close()
+        server.pictures.close()
         server.close()
 
 
@@ -98,5 +98,5 @@ def test_what_is_refused_for_good_can_be_dropped(page: Page, trials: Path) -> No
         assert load_trials(trials).trial(1).outcome is None
         assert read_entries(journal_path(trials)) == []
     finally:
-        server.shelf.close()
+        server.pictures.close()
         server.close()
