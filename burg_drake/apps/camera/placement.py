@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import (
     Parser,
+    add_depth_unit,
+    add_intrinsics,
     add_measured_board,
     add_scene,
     add_verb,
-    positive,
     print_scale,
 )
 from burg_drake.core.terminal import TextTable, format_number
@@ -46,22 +47,14 @@ def add_to(group: Any) -> None:
 def _add_options(parser: Parser) -> None:
     add_scene(parser)
     parser.add_argument("photo", metavar="PHOTO", help="image of the scene on its board")
-    parser.add_argument(
-        "--intrinsics", metavar="FILE", required=True, help="intrinsics of the camera"
-    )
+    add_intrinsics(parser, required=True)
     add_measured_board(parser)
     parser.add_argument(
         "--depth",
         metavar="FILE",
         help="depth image of the same camera, to align the objects with: 16-bit .png or .npy",
     )
-    parser.add_argument(
-        "--depth-unit",
-        metavar="M",
-        type=positive,
-        help="unit of the depth image's numbers in metres"
-        " (default: 0.001 for whole numbers, 1 for others)",
-    )
+    add_depth_unit(parser)
     parser.add_argument("-o", "--output", metavar="FILE", help="placement file to write (.yaml)")
     parser.add_argument(
         "--overlay", metavar="FILE", help="image to write: the photo with targets and errors"

@@ -25,17 +25,17 @@ CLEAR_VIEW = 0.10
 """How far other objects should be beside the line of sight [m]."""
 
 
-TOLD = shown_order(
+FIGURES = shown_order(
     ("lift", "slip", "tilt", "pad_force", "patch_area", "others_moved", "pushed", "tracking_error"),
     TRIAL_MARGINS,
     without=(
-        "overlap",  # told with what the hand is in
+        "overlap",  # with what the hand is in
         "clearance",  # of the open hand, before anything moves
         "end_time",  # seen
         "tracking_distance",  # as the error of the joints
     ),
 )
-"""Margins of a trial, in the order in which people are told."""
+"""Margins of a trial that are shown, in this order."""
 
 
 def record_trial(
@@ -127,7 +127,7 @@ def describe(result: TrialResult) -> list[str]:
         lines[0] += f" ({result.blocker}{depth})"
     if result.reason:
         lines.append(result.reason)
-    figures = shown_figures(margins.of_trial(), TOLD)
+    figures = shown_figures(margins.of_trial(), FIGURES)
     moved = sorted(result.displacements.items(), key=lambda item: -item[1])
     pushed = [f"{name} {far * 1e3:.1f} mm" for name, far in moved if far >= SHOWN]
     lines += [figures] if figures else []
