@@ -144,7 +144,7 @@ def sliding(trial: burg.HandTrial, friction: float = 0.01) -> float:
     """Mean force of pads that slide past the box, to Coulomb's."""
     execution = trial.begin("box", trial.X_WG("box", from_above(0.05)), friction=friction)
     execution.close()
-    trial.command("lift", np.array([0.0, 0.05]))
+    trial.world.command("lift", np.array([0.0, 0.05]))
     forces = []
     for _ in range(20):
         execution.advance()

@@ -35,4 +35,4 @@ from .trials.lift_clearance import (
     HandLiftClearance as HandLiftClearance,
 )
 from .trials.result import Margins as Margins
-from .trials.scene_trial import SceneTrial as SceneTrial
+from .trials.trial_world import TrialWorld as TrialWorld

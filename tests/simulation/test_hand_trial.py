@@ -62,7 +62,7 @@ def test_dropped_while_holding(make_scene, monkeypatch: pytest.MonkeyPatch) -> N
 
     def lift_and_grease(execution: Execution) -> Outcome | None:
         outcome = lift(execution)
-        trial.set_friction("box", 0.01)
+        trial.world.set_friction("box", 0.01)
         greased.append(trial.context.get_time())
         return outcome
 
@@ -105,7 +105,7 @@ def test_what_lies_on_one_finger_in_the_end_is_not_held(
 
     def lift_and_open(execution: Execution) -> Outcome | None:
         outcome = lift(execution)
-        trial.command("hand", -0.02 * trial.hand.closing_command())
+        trial.world.command("hand", -0.02 * trial.hand.closing_command())
         after.append(execution)
         return outcome
 

@@ -109,7 +109,7 @@ def test_after_a_trial_that_was_left_in_the_middle(scene: Scene, alone) -> None:
         "carrier", trial.X_WG("carrier", from_above(0.05, y=-0.03)), friction=0.9, mass=0.4
     )
     assert execution.close() is None
-    trial.command("lift", np.array([0.0, 0.2]))
+    trial.world.command("lift", np.array([0.0, 0.2]))
     execution.advance()
     for name in ("carries the block", "heavier"):
         assert execute(trial, name) == alone[name], name

@@ -83,7 +83,7 @@ def test_pads_that_slide_pull_with_coulombs_force(slow_trials, friction: float) 
     trial = slow_trials["standard"]
     execution = trial.begin("box", box_grasp(trial), friction=friction)
     assert execution.close() is None
-    trial.command("lift", np.array([0.0, 0.05]))
+    trial.world.command("lift", np.array([0.0, 0.05]))
     pulls = []
     for _ in range(20):
         execution.advance()

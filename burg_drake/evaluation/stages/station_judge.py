@@ -48,10 +48,11 @@ class HandJudge(StationJudge):
     ) -> None:
         """Builds the diagrams that all grasps share; see `build_judge`."""
         from burg_drake.simulation.trials import HandTrial
+        from burg_drake.station.diagram import instance_pose
 
         self._trial = HandTrial(scene, station, engine=engine, settings=settings)
         motion = self._trial.motion
-        X_WO = {name: self._trial.diagram.X_WO(name) for name in scene.instances}
+        X_WO = {name: instance_pose(scene, station, name) for name in scene.instances}
         room = _room(scene, station, motion) if mode == "hand" else None
         screens = [hand_screen(self._trial.clearance, X_WO, room)]
         if mode == "reach":

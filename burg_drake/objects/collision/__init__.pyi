@@ -4,6 +4,10 @@ from .decomposition import (
     convex_pieces as convex_pieces,
     given_pieces as given_pieces,
 )
+from .feet import (
+    FLAT as FLAT,
+    support_feet as support_feet,
+)
 from .fit import (
     describe_fit as describe_fit,
     deviation as deviation,

@@ -14,7 +14,7 @@ DEFAULT_FRICTION = 0.24
 Inertia = tuple[float, float, float, float, float, float]
 """Ixx, Iyy, Izz, Ixy, Ixz, Iyz [kg m^2]."""
 
-ContactKind = Literal["pieces", "compliant_pieces", "mesh", "primitive"]
+ContactKind = Literal["surface", "pieces", "compliant_pieces", "mesh", "primitive"]
 CONTACT_KINDS: tuple[ContactKind, ...] = get_args(ContactKind)
 
 PRIMITIVE_SIZES = {"box": 3, "cylinder": 2, "sphere": 1}
@@ -165,6 +165,7 @@ class ContactGeometry:
     kind: ContactKind = "pieces"
     fit: Fit | None = None
     mesh: str = ""
+    excess: float = 0.0
     primitive: Primitive | None = None
 
 

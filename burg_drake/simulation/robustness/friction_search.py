@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
+from pydrake.multibody.tree import UniformGravityFieldElement
 
 from burg_drake.core import Array
 from burg_drake.core.grasps import Outcome
@@ -63,6 +63,7 @@ def friction_to_carry(trial: HandTrial, instance: str, mass: float | None = None
     it at its centre: m (g + a) / (2 N)."""
     settings = trial.settings
     if mass is None:
-        mass = trial.diagram.scene.entry(instance).mass
-    gravity = float(np.linalg.norm(trial.diagram.plant.gravity_field().gravity_vector()))
-    return mass * (gravity + settings.acceleration) / (2.0 * trial.hand.document.force)
+        mass = trial.scene.entry(instance).mass
+    gravity = UniformGravityFieldElement.kDefaultStrength
+    friction: float = mass * (gravity + settings.acceleration) / (2.0 * trial.station.hand.force)
+    return friction

@@ -23,6 +23,7 @@ from burg_drake.simulation.trials import (
     finger_contact,
     motion_in_hand,
 )
+from burg_drake.station.diagram import FloatingHand
 
 REST_SPEED = 0.002
 """A target that moves in the hand slower than this is at rest [m/s]."""
@@ -51,20 +52,22 @@ class Grip:
     """
 
     def __init__(self, trial: HandTrial, instance: str, friction: float | None = None) -> None:
-        self._trial = trial
-        self._plant = trial.diagram.plant
-        self._context = trial.context
+        self._world = world = trial.world
+        assert isinstance(world.hand, FloatingHand)
+        self._hand = world.hand
+        self._plant = world.diagram.plant
+        self._context = world.context
         self._plant_context = self._plant.GetMyContextFromRoot(self._context)
         self._contacts_port = self._plant.get_contact_results_output_port()
-        self._forces_port = trial.diagram.diagram.GetInputPort("applied_forces")
-        self._target = self._plant.get_body(trial.diagram.free[instance])
+        self._forces_port = world.diagram.diagram.GetInputPort("applied_forces")
+        self._target = self._plant.get_body(world.diagram.free[instance])
         self._gravity = float(np.linalg.norm(self._plant.gravity_field().gravity_vector()))
-        self._step = trial.diagram.engine.time_step
+        self._step = world.diagram.engine.time_step
         self._mass = self._target.get_mass(self._plant_context)
         self.weight = self._mass * self._gravity
-        mu = trial.diagram.scene.entry(instance).friction if friction is None else friction
-        self.friction_force = 2.0 * mu * trial.hand.document.force
-        trial.isolate(self._target.index())
+        mu = trial.scene.entry(instance).friction if friction is None else friction
+        self.friction_force = 2.0 * mu * trial.station.hand.force
+        world.isolate(self._target.index())
         self._brake()
         self._rest()
         self._time = self._context.get_time()
@@ -96,9 +99,9 @@ class Grip:
         """
         self._context.SetTime(self._time)
         self._context.SetDiscreteState(self._state)
-        self._trial.simulator.Initialize()
-        R_WG = self._trial.hand.X_WG(self._plant_context)[:3, :3]
-        steps_per_check = max(1, round(self._trial.settings.poll / self._step))
+        self._world.simulator.Initialize()
+        R_WG = self._hand.X_WG(self._plant_context)[:3, :3]
+        steps_per_check = max(1, round(self._world.settings.poll / self._step))
         checks = math.ceil(duration / (steps_per_check * self._step) - 1e-9)
         X_GO, at_rest = self._X_GO, 0
         try:
@@ -125,24 +128,24 @@ class Grip:
         self._forces_port.FixValue(self._context, [force])
 
     def _is_touched(self) -> bool:
-        contacts = self._trial.contacts.read(self._contacts_port.Eval(self._plant_context))
-        return finger_contact(contacts, self._trial.hand.fingers, self._target.index()).both
+        contacts = self._world.contacts.read(self._contacts_port.Eval(self._plant_context))
+        return finger_contact(contacts, self._hand.fingers, self._target.index()).both
 
     def _is_at_rest(self, before: Array, after: Array) -> bool:
         """Whether the target has hardly moved in the hand from one look to the next."""
         distance, angle = motion_in_hand(before, after)
-        return max(distance, angle * LEVER) <= REST_SPEED * self._trial.settings.poll
+        return max(distance, angle * LEVER) <= REST_SPEED * self._world.settings.poll
 
     def _brake(self) -> None:
         """Stops the hand as gently as it was accelerated."""
-        settings = self._trial.settings
+        settings = self._world.settings
         braking = settings.acceleration
-        speed = self._trial.hand.lift.get_translation_rate(self._plant_context)
+        speed = self._hand.lift.get_translation_rate(self._plant_context)
         checks = math.ceil(speed / (braking * settings.poll))
         for i in range(checks):
-            self._trial.command("lift", np.array([0.0, speed * (1.0 - (i + 0.5) / checks)]))
+            self._world.command("lift", np.array([0.0, speed * (1.0 - (i + 0.5) / checks)]))
             self._advance()
-        self._trial.command("lift", np.zeros(2))
+        self._world.command("lift", np.zeros(2))
 
     def _rest(self) -> None:
         """Waits until the target is at rest in the hand."""
@@ -155,16 +158,16 @@ class Grip:
                 return
 
     def _advance(self) -> None:
-        self._advance_by(max(1, round(self._trial.settings.poll / self._step)))
+        self._advance_by(max(1, round(self._world.settings.poll / self._step)))
 
     def _advance_by(self, steps: int) -> None:
         """To a whole number of steps since 0, with the rounding that Drake's own steps have."""
         done = round(self._context.get_time() / self._step)
-        self._trial.simulator.AdvanceTo((done + steps) * self._step)
+        self._world.simulator.AdvanceTo((done + steps) * self._step)
 
     def _current_X_GO(self) -> Array:
         X_WO = self._plant.EvalBodyPoseInWorld(self._plant_context, self._target)
-        X_GO: Array = inverse(self._trial.hand.X_WG(self._plant_context)) @ X_WO.GetAsMatrix4()
+        X_GO: Array = inverse(self._hand.X_WG(self._plant_context)) @ X_WO.GetAsMatrix4()
         return X_GO
 
 

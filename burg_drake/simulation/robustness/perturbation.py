@@ -116,7 +116,7 @@ def success_rate(
     """
     if repeats < 1:
         raise InvalidInputError(f"repeats is {repeats}; give 1 or more")
-    entry = trial.diagram.scene.entry(instance)
+    entry = trial.scene.entry(instance)
     outcomes: Counter[Outcome] = Counter()
     for repeat in range(repeats):
         drawn = perturb(

@@ -12,9 +12,9 @@ from burg_drake.core import Array
 from burg_drake.simulation.trials.carrier import HandSegment
 from burg_drake.simulation.trials.command_sequence import CommandSequence
 from burg_drake.simulation.trials.contacts import BodyContact
-from burg_drake.simulation.trials.grasp_trial import GraspTrial
 from burg_drake.simulation.trials.lift_clearance import ArmLiftClearance
 from burg_drake.simulation.trials.robot_contacts import RobotContactWatch
+from burg_drake.simulation.trials.trial_world import TrialWorld
 from burg_drake.station.diagram import MountedHand
 
 SPACING = 0.01
@@ -33,28 +33,31 @@ class ArmCarrier:
     wanted at its end.
 
     Args:
-        trial: a trial with an arm that has been brought to its start.
+        world: that of a trial with an arm which has been brought to its start.
         target: the grasped body.
         approach: from the pregrasp, or from further back, to the grasp.
         segments: from there on, at least one; the hand goes straight on each.
+        closed: how far the fingers can close at a grasp (4, 4) in the world before they touch.
         lift_clearance: gives the check of the path ahead with the target in the hand.
     """
 
     def __init__(
         self,
-        trial: GraspTrial,
+        world: TrialWorld,
         target: BodyIndex,
         approach: CommandSequence,
         segments: Sequence[CommandSequence],
+        closed: Callable[[Array], float],
         lift_clearance: Callable[[], ArmLiftClearance],
     ) -> None:
-        assert isinstance(trial.hand, MountedHand)
-        diagram = trial.diagram
-        self._trial = trial
-        self._mounted = trial.hand
+        assert isinstance(world.hand, MountedHand)
+        diagram = world.diagram
+        self._world = world
+        self._closed = closed
+        self._mounted = world.hand
         self._lift_clearance = lift_clearance
         self._step = diagram.engine.time_step
-        self._plant_context = diagram.plant.GetMyMutableContextFromRoot(trial.context)
+        self._plant_context = diagram.plant.GetMyMutableContextFromRoot(world.context)
         self._port = diagram.diagram.GetInputPort("arm.desired_state")
         self._approach, self._commands = approach, tuple(segments)
         self._gravity = float(np.linalg.norm(diagram.plant.gravity_field().gravity_vector()))
@@ -62,7 +65,7 @@ class ArmCarrier:
         self._loads = _loads(segments[-1].p_WG, interval, self._gravity)
         speed = np.linalg.norm(np.diff(segments[-1].p_WG, axis=0), axis=1)
         self._fastest = int(speed.argmax())
-        self._touches = RobotContactWatch(diagram, trial.hand.links, target)
+        self._touches = RobotContactWatch(diagram, world.hand.links, target)
         self._current: CommandSequence | None = None
         self._number = 0
         self._start = 0
@@ -87,12 +90,12 @@ class ArmCarrier:
         happens before, unless something has been moved."""
         self._arrived = True
         self._follow(None)
-        trial = self._trial
-        trial.command("hand", self._mounted.closing_command())
+        world = self._world
+        world.command("hand", self._mounted.closing_command())
         if not self.touched:
             X_WG = self._mounted.X_WG(self._plant_context)
-            self._mounted.set_fingers(self._plant_context, trial.clearance.free_travel(X_WG))
-            trial.simulator.Initialize()
+            self._mounted.set_fingers(self._plant_context, self._closed(X_WG))
+            world.simulator.Initialize()
 
     def lift(self, number: int, check: int) -> None:
         """Follows one segment of the plan."""
@@ -106,7 +109,7 @@ class ArmCarrier:
 
     def advance_to(self, time: float) -> None:
         """Steps, with a command of its own for each step."""
-        context, simulator = self._trial.context, self._trial.simulator
+        context, simulator = self._world.context, self._world.simulator
         if self._current is None:
             simulator.AdvanceTo(time)
             return
@@ -133,7 +136,7 @@ class ArmCarrier:
         Not straight up, the load when the hand brakes is another one than when it accelerates, and
         both count.
         """
-        polls = self._trial.settings.steady_polls
+        polls = self._world.settings.steady_polls
         window = self._loads[max(0, check + 1 - polls) : check + 1]
         ahead = np.append(self._loads[check + 1 :], self._gravity).max()
         brakes = self.segments[-1].is_straight_up or check >= self._fastest + polls
@@ -148,20 +151,19 @@ class ArmCarrier:
         marks = np.append(np.arange(SPACING, gone[-1], SPACING), gone[-1])
         rows = check + np.searchsorted(gone, marks - 1e-9)
         q = np.array([commands.q_at_check(row) for row in rows])
-        positions = self._trial.diagram.plant.GetPositions(self._plant_context)
-        return self._lift_clearance().is_free(positions, q)
+        return self._lift_clearance().is_free(self._world, q)
 
     def _follow(self, commands: CommandSequence | None) -> None:
         """Follows a course from now on; without one the last command stays."""
         self._current = commands
-        self._start = self._steps(self._trial.context.get_time())
+        self._start = self._steps(self._world.context.get_time())
 
     def _steps(self, time: float) -> int:
         return round(time / self._step)
 
     def _checks_done(self, commands: CommandSequence) -> int:
         """Looks since the start of the course that is followed."""
-        steps = self._steps(self._trial.context.get_time()) - self._start
+        steps = self._steps(self._world.context.get_time()) - self._start
         return steps // commands.steps_per_check
 
     def _track(self, commands: CommandSequence) -> None:

@@ -26,10 +26,10 @@ from burg_drake.simulation.trials.execution import Execution
 from burg_drake.simulation.trials.grasp_trial import GraspTrial
 from burg_drake.simulation.trials.lift_clearance import ArmLiftClearance
 from burg_drake.simulation.trials.result import TrialResult
-from burg_drake.simulation.trials.scene_trial import check_overrides
 from burg_drake.simulation.trials.trial_settings import DEFAULT_TRIAL, TrialSettings
-from burg_drake.station.diagram import MountedHand, build_station_diagram
-from burg_drake.station.document import ENGINES, Engine, StationLike, as_station
+from burg_drake.simulation.trials.trial_world import TrialWorld, check_overrides
+from burg_drake.station.diagram import MountedHand, StationDiagram, build_station_diagram
+from burg_drake.station.document import ENGINES, Engine, StationLike, as_engine, as_station
 
 REST = 0.05
 """Time between arrival and closing, in which the arm comes to rest [s]."""
@@ -54,16 +54,11 @@ class ArmTrial(GraspTrial):
         meshcat: where to show the trials; recording is the caller's.
 
     Attributes:
-        diagram: the station diagram that all trials share.
-        clearance: the screen of the open hand.
-        hand: hand and arm.
-        contacts, neighbours, simulator, settings: see `SceneTrial`.
+        scene, station, engine, settings, motion, clearance: see `GraspTrial`.
 
     Raises:
         InvalidInputError: the station has no arm.
     """
-
-    hand: MountedHand
 
     def __init__(
         self,
@@ -77,17 +72,25 @@ class ArmTrial(GraspTrial):
         meshcat: Meshcat | None = None,
     ) -> None:
         scene, station = as_scene(scene), as_station(station)
-        diagram = build_station_diagram(scene, station, robot="arm", engine=engine, meshcat=meshcat)
+        self._plain = build_station_diagram(scene, station, robot="arm")
         if clearance is None:
             clearance = HandClearance(build_station_diagram(scene, station, robot="hand"))
-        super().__init__(diagram, MountedHand(diagram), settings, clearance)
+        super().__init__(
+            scene,
+            station,
+            "arm",
+            as_engine(engine),
+            settings=settings,
+            clearance=clearance,
+            meshcat=meshcat,
+        )
         self._transfer = transfer
         arm = station.document.arm
         assert arm is not None
         self._X_WA = arm.X_WA.matrix()
-        self._kinematics = ArmKinematics.of(diagram)
-        self.steps_per_check = max(1, round(settings.poll / diagram.engine.time_step))
-        self._lift_clearance = cache(partial(ArmLiftClearance, diagram))
+        self._kinematics = ArmKinematics.of(self._plain)
+        self.steps_per_check = max(1, round(settings.poll / self.engine.time_step))
+        self._lift_clearance = cache(partial(ArmLiftClearance, self._plain))
 
     def run(
         self,
@@ -122,7 +125,10 @@ class ArmTrial(GraspTrial):
         as_planned = self._X_WG_at(plan.approach.q[-1:])[0, :3, :3]
         if rotation_angle(X_WG[:3, :3].T @ as_planned) > OFF_ANGLE:
             X_WG = swap_fingers(X_WG)
-        begin = partial(self.begin, instance, plan, friction=friction, mass=mass)
+
+        def begin(world: TrialWorld) -> Execution:
+            return self.begin(instance, plan, friction=friction, mass=mass, world=world)
+
         return self.execute(instance, X_WG, begin)
 
     def begin(
@@ -132,6 +138,7 @@ class ArmTrial(GraspTrial):
         *,
         friction: float | None = None,
         mass: float | None = None,
+        world: TrialWorld | None = None,
     ) -> Execution:
         """Brings the Context to the start of a trial; nothing of an earlier one remains.
 
@@ -141,11 +148,14 @@ class ArmTrial(GraspTrial):
             instance: the target.
             plan: where the arm goes.
             friction, mass: as in `run`.
+            world: in which it runs; by default the complete one.
         """
-        target = self.diagram.free[instance]
+        world = self._enter(world)
+        assert isinstance(world.hand, MountedHand)
+        target = world.diagram.free[instance]
         moving: set[BodyIndex] = set()
-        self.prepare(instance, moving, friction, mass)
-        step = self.diagram.engine.time_step
+        world.prepare(instance, moving, friction, mass)
+        step = self.engine.time_step
         to_grasp = [plan.transfer, plan.approach] if self._transfer else [plan.approach]
         steps = 1 if self._transfer else self.steps_per_check
         rest = max(1, round(REST / (steps * step)))
@@ -154,14 +164,18 @@ class ArmTrial(GraspTrial):
             CommandSequence([segment], step, self.steps_per_check, self._p_WG)
             for segment in _phases_with_target(plan)
         ]
-        plant_context = self.diagram.plant.GetMyMutableContextFromRoot(self.context)
-        self.hand.place(plant_context, approach.q_at_check(0))
-        self.command("arm", approach.at(0))
-        self.command("hand", self.hand.opening_command())
-        self.simulator.Initialize()
-        lift_clearance = partial(self._lift_clearance, target)
-        carrier = ArmCarrier(self, target, approach, segments, lift_clearance)
-        return Execution(self, target, moving, carrier)
+        plant_context = world.diagram.plant.GetMyMutableContextFromRoot(world.context)
+        world.hand.place(plant_context, approach.q_at_check(0))
+        world.command("arm", approach.at(0))
+        world.command("hand", world.hand.opening_command())
+        world.simulator.Initialize()
+        closed = partial(self.closed_before_contact, instance)
+        lift_clearance = partial(self._lift_clearance, instance)
+        carrier = ArmCarrier(world, target, approach, segments, closed, lift_clearance)
+        return Execution(world, target, moving, carrier)
+
+    def _handle(self, diagram: StationDiagram) -> MountedHand:
+        return MountedHand(diagram)
 
     def _check_plan(self, plan: Plan, X_WG: Array) -> None:
         """Whether a plan is one for this scene, arm and grasp; of one without an origin the arm and
@@ -171,8 +185,8 @@ class ArmTrial(GraspTrial):
             InvalidInputError: it is not.
         """
         if plan.origin is not None:
-            plan.require_for(self.diagram.scene, self.diagram.station)
-        joints = len(self.diagram.arm_joints)
+            plan.require_for(self.scene, self.station)
+        joints = len(self._plain.arm_joints)
         parts = {name: part for name, part in plan.phases.items() if name != "close"}
         if not self._transfer:
             del parts["transfer"]
@@ -182,7 +196,7 @@ class ArmTrial(GraspTrial):
             if part.q.shape[1] != joints:
                 raise InvalidInputError(
                     f"the plan's {name} moves {part.q.shape[1]} joints; the arm of station"
-                    f" {self.diagram.station.name!r} has {joints}"
+                    f" {self.station.name!r} has {joints}"
                 )
         names = list(parts)
         for one, other in pairwise(names):
@@ -203,7 +217,7 @@ class ArmTrial(GraspTrial):
 
     def _X_WG_at(self, q: Array) -> Array:
         """(K, 4, 4) grasp frames in the world at arm positions (K, n)."""
-        return self._X_WA @ self._kinematics.forward(q)[0] @ self.hand.document.X_HG.matrix()
+        return self._X_WA @ self._kinematics.forward(q)[0] @ self.station.hand.X_HG.matrix()
 
     def _p_WG(self, q: Array) -> Array:
         return self._X_WG_at(q)[:, :3, 3]

@@ -6,7 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.geometry import SceneGraph
+from pydrake.geometry import GeometryId, SceneGraph
 from pydrake.multibody.plant import ContactResults, MultibodyPlant
 from pydrake.multibody.tree import BodyIndex
 
@@ -88,6 +88,13 @@ class ContactReader:
                 BodyContact(pair.bodyA_index(), pair.bodyB_index(), pair.contact_force())
             )
         return contacts
+
+    @staticmethod
+    def has_any(results: ContactResults, geometries: Collection[GeometryId]) -> bool:
+        """Whether one of these geometries meets something at a point."""
+        pairs = map(results.point_pair_contact_info, range(results.num_point_pair_contacts()))
+        points = (pair.point_pair() for pair in pairs)
+        return any(p.id_A in geometries or p.id_B in geometries for p in points)
 
 
 def finger_contact(

@@ -23,12 +23,16 @@ from burg_drake.simulation.trials.mass_centers import MassCenterTracker, center_
 from burg_drake.simulation.trials.result import TrialResult
 
 if TYPE_CHECKING:
-    from burg_drake.simulation.trials.scene_trial import SceneTrial
+    from burg_drake.simulation.trials.trial_world import TrialWorld
 
 MINIMUM_LIFT = 0.5
 """Share of the hand's way that the target must go with it to count as lifted."""
 LEVER = 0.01
 """Turning counts as the motion of a point so far from the grasp [m], which is at a pad's rim."""
+
+
+class OtherTouched(Exception):
+    """In a world of the target alone, target or robot meet something else that could move."""
 
 
 class Execution:
@@ -38,7 +42,7 @@ class Execution:
     them: the trial goes back to the look before, where they were apart, and goes on from there.
 
     Args:
-        trial: the trial.
+        world: in which the trial runs.
         target: the grasped body.
         moving: the free objects that are not locked.
         carrier: what brings the hand to the grasp and away from it.
@@ -48,13 +52,13 @@ class Execution:
     """
 
     def __init__(
-        self, trial: SceneTrial, target: BodyIndex, moving: set[BodyIndex], carrier: Carrier
+        self, world: TrialWorld, target: BodyIndex, moving: set[BodyIndex], carrier: Carrier
     ) -> None:
-        diagram = trial.diagram
-        self._trial = trial
+        diagram = world.diagram
+        self._world = world
         self._carrier = carrier
-        self._settings = trial.settings
-        self._context = trial.context
+        self._settings = world.settings
+        self._context = world.context
         self._plant = diagram.plant
         self._plant_context = self._plant.GetMyContextFromRoot(self._context)
         self._results_port = self._plant.get_contact_results_output_port()
@@ -86,6 +90,7 @@ class Execution:
 
         Raises:
             RuntimeError: the simulation failed.
+            OtherTouched: it has to run in the complete world.
         """
         for phase in (self.approach, self.close, self.lift, self.hold):
             outcome = phase()
@@ -105,7 +110,7 @@ class Execution:
             target.update(self._still)
             if self._blocker:
                 break
-        self._pushed = self._moved.by_name(self._others) | target.by_name(self._itself)
+        self._pushed = self._displaced() | target.by_name(self._itself)
         return Outcome.BLOCKED if self._blocker else None
 
     def close(self) -> Outcome | None:
@@ -113,11 +118,11 @@ class Execution:
         settings = self._settings
         self._carrier.close()
         slow_since = math.inf
-        timeout = max(settings.close_timeout, 2.0 * self._trial.hand.document.closing_time)
+        timeout = max(settings.close_timeout, 2.0 * self._world.hand.document.closing_time)
         timeout += self._context.get_time()
         while self._context.get_time() < timeout:
             now = self.advance()
-            if self._trial.hand.finger_speed(self._plant_context) > settings.settled_speed:
+            if self._world.hand.finger_speed(self._plant_context) > settings.settled_speed:
                 slow_since = math.inf
             else:
                 slow_since = min(slow_since, now)
@@ -168,7 +173,7 @@ class Execution:
                 return Outcome.BLOCKED
             if not self.contact.any:
                 return Outcome.DROPPED
-            if self._is_held_steadily() and not self._trial.diagram.engine.whole_trial:
+            if self._is_held_steadily() and not self._world.diagram.engine.whole_trial:
                 break
         return None if self.contact.both else Outcome.DROPPED
 
@@ -190,7 +195,7 @@ class Execution:
         carry it lets the target go ever faster; so what sticks to the pads then, or creeps and does
         not get faster, in free air and with all others at rest, is held to the end, too.
         """
-        if self._trial.diagram.engine.whole_trial or self._path_is_blocked:
+        if self._world.diagram.engine.whole_trial or self._path_is_blocked:
             return False
         if not self.contact.both or not (self._is_held_steadily() or self._is_coming_to_rest()):
             return False
@@ -232,6 +237,7 @@ class Execution:
 
         Raises:
             RuntimeError: the simulation failed.
+            OtherTouched: the trial has to run in the complete world.
         """
         before = self._time()
         self._steps += self._steps_per_check if steps is None else steps
@@ -241,27 +247,30 @@ class Execution:
             self._carrier.advance_to(time)
             if not math.isfinite(self._center()[2]):
                 raise RuntimeError(f"the state is not finite at {time:.3f} s")
-            contacts = self._trial.contacts.read(self._results_port.Eval(self._plant_context))
-            moving = self._robot | (set(self._trial.diagram.free.values()) - self._still)
+            results = self._results_port.Eval(self._plant_context)
+            if self._world.meets_another(results):
+                raise OtherTouched
+            contacts = self._world.contacts.read(results)
+            moving = self._robot | (set(self._world.diagram.free.values()) - self._still)
             found = reached(contacts, moving, self._still)
             if not found:
                 break
             self._context.SetTime(before)
             self._context.SetDiscreteState(state)
-            found = self._trial.neighbours.close_to(found) & self._still
+            found = self._world.neighbours.close_to(found) & self._still
             self._still -= found
-            self._trial.release(found, self._still)
+            self._world.release(found, self._still)
         self._record_contacts(contacts)
         return time
 
     def _time(self) -> float:
         """Time of the last look [s]: a whole number of steps, rounded as Drake's own steps are."""
-        return self._steps * self._trial.diagram.engine.time_step
+        return self._steps * self._world.diagram.engine.time_step
 
     def _record_contacts(self, contacts: list[BodyContact]) -> None:
         """Takes down what the contacts and poses say."""
         settings, target = self._settings, self._target.index()
-        self.contact = finger_contact(contacts, self._trial.hand.fingers, target)
+        self.contact = finger_contact(contacts, self._world.hand.fingers, target)
         self._touched = self._touched or self.contact.any
         X_GO = self.X_GO()
         distance, angle = motion_in_hand(self._X_GO_last, X_GO)
@@ -282,7 +291,7 @@ class Execution:
     def X_GO(self) -> Array:
         """(4, 4) target in the grasp frame."""
         X_WO = self._plant.EvalBodyPoseInWorld(self._plant_context, self._target)
-        X_GO: Array = inverse(self._trial.hand.X_WG(self._plant_context)) @ X_WO.GetAsMatrix4()
+        X_GO: Array = inverse(self._world.hand.X_WG(self._plant_context)) @ X_WO.GetAsMatrix4()
         return X_GO
 
     def _center(self) -> Array:
@@ -293,12 +302,17 @@ class Execution:
         """Of bodies, from where they are now."""
         return MassCenterTracker(self._plant, self._plant_context, bodies)
 
+    def _displaced(self) -> dict[str, float]:
+        """Largest displacements of the others by name [m]; what can only stand has none."""
+        standing = dict.fromkeys(self._world.diagram.standing, 0.0)
+        return standing | self._moved.by_name(self._others)
+
     def result(self, outcome: Outcome) -> TrialResult:
         """The outcome with the margins at this moment."""
         slip = tilt = force = area = math.nan
         if self._X_GO_grip is not None:
             slip, tilt = motion_in_hand(self._X_GO_grip, self.X_GO())
-            closing = self._trial.hand.X_WG(self._plant_context)[:3, 0]
+            closing = self._world.hand.X_WG(self._plant_context)[:3, 0]
             force = float(np.abs(self.contact.force @ closing).min())
             area = float(self.contact.area.min())
         margins = Margins(
@@ -318,7 +332,7 @@ class Execution:
             outcome=outcome,
             margins=margins,
             blocker=self._blocker if outcome is Outcome.BLOCKED else "",
-            displacements=self._moved.by_name(self._others),
+            displacements=self._displaced(),
             pushed=self._pushed,
             touched=self._carrier.touched,
         )

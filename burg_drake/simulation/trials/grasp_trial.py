@@ -1,50 +1,142 @@
-"""What trials of grasps share, whatever carries the hand: the screen of the open hand before, and
-the result of the execution after it."""
+"""What trials of grasps share, whatever carries the hand: the worlds in which they run, the screen
+of the open hand before, and the result of the execution after it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
 
-from burg_drake.core import Array
+from pydrake.geometry import Meshcat
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context
+
+from burg_drake.core import Array, InvalidInputError, check_pose
 from burg_drake.grasping.clearance import HandClearance
-from burg_drake.simulation.trials.execution import Execution
+from burg_drake.scene.document import Scene
+from burg_drake.simulation.rest import Neighbours
+from burg_drake.simulation.trials.contacts import ContactReader
+from burg_drake.simulation.trials.execution import Execution, OtherTouched
 from burg_drake.simulation.trials.result import TrialResult, collision, failure
-from burg_drake.simulation.trials.scene_trial import SceneTrial
 from burg_drake.simulation.trials.trial_settings import TrialSettings
-from burg_drake.station.diagram import HandHandle, StationDiagram
-from burg_drake.station.document import GraspMotion
+from burg_drake.simulation.trials.trial_world import TrialWorld
+from burg_drake.station.diagram import (
+    HandHandle,
+    StationDiagram,
+    build_station_diagram,
+    instance_pose,
+)
+from burg_drake.station.document import Engine, GraspMotion, Station
+from burg_drake.station.world import Robot
 
 
-class GraspTrial(SceneTrial):
+class GraspTrial:
     """Executes grasps in one scene.
 
+    A trial runs in a world in which the target alone can move, in half the time. If it meets
+    another object there, it runs again in the complete world, from its beginning.
+
     Args:
-        diagram, hand, settings, motion: see `SceneTrial`.
+        scene: the scene.
+        station: the station.
+        robot: what of it moves.
+        engine: time step and contact settings.
+        settings: phases of a trial.
         clearance: the screen of the open hand in the scene.
+        motion: where the hand goes, if not as the settings or else the station say.
+        lock: keep objects locked until something moving touches them, and run in worlds of the
+            target alone.
+        meshcat: where to show the trials.
 
     Attributes:
-        clearance: as given.
+        scene, station, engine, settings, clearance: as given.
+        motion: where the hand goes.
     """
 
     def __init__(
         self,
-        diagram: StationDiagram,
-        hand: HandHandle,
+        scene: Scene,
+        station: Station,
+        robot: Robot,
+        engine: Engine,
+        *,
         settings: TrialSettings,
         clearance: HandClearance,
         motion: GraspMotion | None = None,
+        lock: bool = True,
+        meshcat: Meshcat | None = None,
     ) -> None:
-        super().__init__(diagram, hand, settings, motion)
-        self.clearance = clearance
+        self.scene, self.station, self.engine = scene, station, engine
+        self.settings, self.clearance = settings, clearance
+        self.motion = motion or settings.motion or station.document.motion
+        self._robot, self._lock, self._meshcat = robot, lock, meshcat
+        self._alone: dict[str, TrialWorld | None] = {}
+        self._complete: TrialWorld | None = None
+        self._world: TrialWorld | None = None
 
-    def execute(self, instance: str, X_WG: Array, begin: Callable[[], Execution]) -> TrialResult:
+    @property
+    def world(self) -> TrialWorld:
+        """That of the last trial; before the first one the complete world."""
+        return self._world or self.complete_world
+
+    @property
+    def complete_world(self) -> TrialWorld:
+        """The one in which all objects can move."""
+        if self._complete is None:
+            self._complete = self._build(None)
+        return self._complete
+
+    @property
+    def diagram(self) -> StationDiagram:
+        """Of `world`."""
+        return self.world.diagram
+
+    @property
+    def hand(self) -> HandHandle:
+        """The hand in `world`."""
+        return self.world.hand
+
+    @property
+    def contacts(self) -> ContactReader:
+        """Of `world`."""
+        return self.world.contacts
+
+    @property
+    def neighbours(self) -> Neighbours:
+        """Of `world`."""
+        return self.world.neighbours
+
+    @property
+    def simulator(self) -> Simulator:
+        """Of `world`."""
+        return self.world.simulator
+
+    @property
+    def context(self) -> Context:
+        """Of the trial that runs or ran last."""
+        return self.world.context
+
+    def X_WG(self, instance: str, X_OG: Array) -> Array:
+        """A grasp (4, 4) of an instance in the world.
+
+        Raises:
+            InvalidInputError: `X_OG` is not a pose, or `instance` cannot be grasped.
+        """
+        if instance not in self.scene.instances:
+            free = ", ".join(self.scene.instances) or "(none)"
+            raise InvalidInputError(
+                f"{instance!r} is not a free object of scene {self.scene.name!r}; free are: {free}"
+            )
+        return instance_pose(self.scene, self.station, instance) @ check_pose(X_OG, "X_OG")
+
+    def execute(
+        self, instance: str, X_WG: Array, begin: Callable[[TrialWorld], Execution]
+    ) -> TrialResult:
         """Executes a grasp, if the open hand is clear at it.
 
         Args:
             instance: the target.
             X_WG: (4, 4) grasp in the world.
-            begin: brings the Context to the start of the trial.
+            begin: brings the Context of a world to the start of the trial.
 
         Returns:
             The outcome with its margins. A failure of the simulator is an outcome, too.
@@ -53,8 +145,53 @@ class GraspTrial(SceneTrial):
         if screen.outcome is not None:
             return collision(screen)
         try:
-            found = begin().run()
+            try:
+                found = begin(self._world_of(instance)).run()
+            except OtherTouched:
+                found = begin(self.complete_world).run()
             return replace(found, margins=replace(found.margins, clearance=screen.clearance))
         except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
-            self.invalidate()
+            self.world.invalidate()
             return failure(error, screen, self.context.get_time())
+
+    def closed_before_contact(self, instance: str, X_WG: Array) -> float:
+        """How far the fingers can close, from 0 (open) to 1, before they touch anything: the
+        clearance knows pieces, out of which the target's surface stands a little.
+
+        Args:
+            instance: the target.
+            X_WG: (4, 4) grasp in the world at which the open hand is clear.
+        """
+        travel = min(abs(f.closed - f.open) for f in self.station.hand.fingers)
+        excess = self.scene.entry(instance).contact.excess / travel
+        return max(0.0, self.clearance.free_travel(X_WG) - excess)
+
+    def _enter(self, world: TrialWorld | None) -> TrialWorld:
+        """Makes a world, the complete one if None, the present one."""
+        self._world = self.complete_world if world is None else world
+        return self._world
+
+    def _world_of(self, instance: str) -> TrialWorld:
+        """The cheapest in which a trial of an instance can begin."""
+        if not self._lock:
+            return self.complete_world
+        if instance not in self._alone:
+            world = self._build(instance)
+            self._alone[instance] = world if world.is_usable() else None
+        return self._alone[instance] or self.complete_world
+
+    def _build(self, alone: str | None) -> TrialWorld:
+        diagram = build_station_diagram(
+            self.scene,
+            self.station,
+            robot=self._robot,
+            engine=self.engine,
+            meshcat=self._meshcat,
+            contact_parts=True,
+            alone=alone,
+        )
+        return TrialWorld(diagram, self._handle(diagram), self.settings)
+
+    def _handle(self, diagram: StationDiagram) -> HandHandle:
+        """The hand in a diagram."""
+        raise NotImplementedError

@@ -23,14 +23,15 @@ from burg_drake.simulation.trials.grasp_trial import GraspTrial
 from burg_drake.simulation.trials.lift_carrier import LiftCarrier, LiftPath
 from burg_drake.simulation.trials.lift_clearance import HandLiftClearance
 from burg_drake.simulation.trials.result import TrialResult
-from burg_drake.simulation.trials.scene_trial import check_overrides
 from burg_drake.simulation.trials.trial_settings import DEFAULT_TRIAL, TrialSettings
-from burg_drake.station.diagram import FloatingHand, build_station_diagram
+from burg_drake.simulation.trials.trial_world import TrialWorld, check_overrides
+from burg_drake.station.diagram import FloatingHand, StationDiagram, build_station_diagram
 from burg_drake.station.document import (
     ENGINES,
     Engine,
     GraspMotion,
     StationLike,
+    as_engine,
     as_station,
 )
 
@@ -50,13 +51,8 @@ class HandTrial(GraspTrial):
         meshcat: where to show the trials; recording is the caller's.
 
     Attributes:
-        diagram: the station diagram that all trials share.
-        clearance: the screen of the open hand in it.
-        hand: the floating hand in it.
-        contacts, neighbours, simulator, settings, motion: see `SceneTrial`.
+        scene, station, engine, settings, motion, clearance: see `GraspTrial`.
     """
-
-    hand: FloatingHand
 
     def __init__(
         self,
@@ -70,13 +66,19 @@ class HandTrial(GraspTrial):
         meshcat: Meshcat | None = None,
     ) -> None:
         scene, station = as_scene(scene), as_station(station)
-        diagram = build_station_diagram(
-            scene, station, robot="hand", engine=engine, meshcat=meshcat
+        self._plain = build_station_diagram(scene, station, robot="hand")
+        super().__init__(
+            scene,
+            station,
+            "hand",
+            as_engine(engine),
+            settings=settings,
+            clearance=HandClearance(self._plain),
+            motion=motion,
+            lock=lock,
+            meshcat=meshcat,
         )
-        clearance = HandClearance(diagram)
-        super().__init__(diagram, FloatingHand(diagram), settings, clearance, motion)
-        self._lock = lock
-        self._lift_clearance = cache(partial(HandLiftClearance, diagram))
+        self._lift_clearance = cache(partial(HandLiftClearance, self._plain))
 
     def run(
         self,
@@ -106,7 +108,10 @@ class HandTrial(GraspTrial):
         X_WG = self.X_WG(instance, X_OG)
         check_overrides(friction, mass)
         paths = self.lift_paths(X_WG, lift)
-        begin = partial(self.begin, instance, X_WG, paths, friction=friction, mass=mass)
+
+        def begin(world: TrialWorld) -> Execution:
+            return self.begin(instance, X_WG, paths, friction=friction, mass=mass, world=world)
+
         return self.execute(instance, X_WG, begin)
 
     def begin(
@@ -117,6 +122,7 @@ class HandTrial(GraspTrial):
         *,
         friction: float | None = None,
         mass: float | None = None,
+        world: TrialWorld | None = None,
     ) -> Execution:
         """Brings the Context to the start of a trial; nothing of an earlier one remains.
 
@@ -130,20 +136,26 @@ class HandTrial(GraspTrial):
             X_WG: (4, 4) grasp in the world at which the open hand is clear.
             paths: of the hand with the target; those of the motion if None.
             friction, mass: as in `run`.
+            world: in which it runs; by default the complete one.
         """
-        target = self.diagram.free[instance]
-        everything = set(self.diagram.free.values())
-        moving = self.neighbours.close_to({target}) if self._lock else everything
-        self.prepare(instance, moving, friction, mass)
+        world = self._enter(world)
+        target = world.diagram.free[instance]
+        everything = set(world.diagram.free.values())
+        moving = world.neighbours.close_to({target}) if self._lock else everything
+        world.prepare(instance, moving, friction, mass)
         paths = self.lift_paths(X_WG) if paths is None else paths
-        plant_context = self.diagram.plant.GetMyMutableContextFromRoot(self.context)
-        closed = self.clearance.free_travel(X_WG)
-        self.hand.place(plant_context, X_WG, closed, direction_W=paths[0].direction_W)
-        self.command("lift", np.zeros(2))
-        self.command("hand", self.hand.closing_command())
-        self.simulator.Initialize()
-        lift_clearance = partial(self._lift_clearance, target)
-        return Execution(self, target, moving, LiftCarrier(self, paths, lift_clearance))
+        plant_context = world.diagram.plant.GetMyMutableContextFromRoot(world.context)
+        assert isinstance(world.hand, FloatingHand)
+        closed = self.closed_before_contact(instance, X_WG)
+        world.hand.place(plant_context, X_WG, closed, direction_W=paths[0].direction_W)
+        world.command("lift", np.zeros(2))
+        world.command("hand", world.hand.closing_command())
+        world.simulator.Initialize()
+        lift_clearance = partial(self._lift_clearance, instance)
+        return Execution(world, target, moving, LiftCarrier(world, paths, lift_clearance))
+
+    def _handle(self, diagram: StationDiagram) -> FloatingHand:
+        return FloatingHand(diagram)
 
     def lift_paths(self, X_WG: Array, lift: float | None = None) -> tuple[LiftPath, ...]:
         """Straight paths of the hand with the target: the retreat, if there is one, and the lift.

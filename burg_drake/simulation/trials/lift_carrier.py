@@ -12,8 +12,8 @@ from burg_drake.core import Array
 from burg_drake.simulation.trials.carrier import HandSegment
 from burg_drake.simulation.trials.contacts import BodyContact, reached
 from burg_drake.simulation.trials.lift_clearance import HandLiftClearance
-from burg_drake.simulation.trials.scene_trial import SceneTrial
 from burg_drake.simulation.trials.trial_settings import TrialSettings
+from burg_drake.simulation.trials.trial_world import TrialWorld
 from burg_drake.station.diagram import FloatingHand
 
 DOWN = -1e-6
@@ -39,8 +39,8 @@ class LiftCarrier:
     the new direction.
 
     Args:
-        trial: a trial that has been brought to its start, with the floating hand at the grasp and
-            the joint along the first of the paths.
+        world: that of a trial which has been brought to its start, with the floating hand at the
+            grasp and the joint along the first of the paths.
         paths: of the hand, straight, at least one.
         lift_clearance: gives the check of the path ahead with the target in the hand.
     """
@@ -51,19 +51,19 @@ class LiftCarrier:
 
     def __init__(
         self,
-        trial: SceneTrial,
+        world: TrialWorld,
         paths: Sequence[LiftPath],
         lift_clearance: Callable[[], HandLiftClearance],
     ) -> None:
-        assert isinstance(trial.hand, FloatingHand)
-        settings = trial.settings
-        self._trial = trial
-        self._floating = trial.hand
+        assert isinstance(world.hand, FloatingHand)
+        settings = world.settings
+        self._world = world
+        self._floating = world.hand
         self._lift_clearance = lift_clearance
-        self._plant = trial.diagram.plant
-        self._plant_context = self._plant.GetMyMutableContextFromRoot(trial.context)
-        self._names = trial.diagram.body_names
-        self._hand = set(trial.diagram.robot_bodies)
+        self._plant = world.diagram.plant
+        self._plant_context = self._plant.GetMyMutableContextFromRoot(world.context)
+        self._names = world.diagram.body_names
+        self._hand = set(world.diagram.robot_bodies)
         self.segments = tuple(
             HandSegment(*path, _check_count(path.length, settings) + (number + 1 < len(paths)))
             for number, path in enumerate(paths)
@@ -82,32 +82,32 @@ class LiftCarrier:
     def lift(self, number: int, check: int) -> None:
         """Commands the speed of the middle of the interval; in one interval more, where another
         segment follows, the hand comes to rest."""
-        segment, settings = self.segments[number], self._trial.settings
+        segment, settings = self.segments[number], self._world.settings
         self._is_lifting = True
         if number != self._number:
             self._number = number
             self._X_WG_start = self._floating.X_WG(self._plant_context)
             self._floating.set_lift_direction(self._plant_context, segment.direction_W)
-            self._trial.simulator.Initialize()
+            self._world.simulator.Initialize()
         checks = _check_count(segment.length, settings)
         top_speed = 2 * segment.length / (checks * settings.poll)
         speed = top_speed * max(0.0, 1 - abs(2 * check + 1 - checks) / checks)
-        self._trial.command("lift", np.array([0.0, speed]))
+        self._world.command("lift", np.array([0.0, speed]))
 
     def stop(self) -> None:
         """Stands still."""
-        self._trial.command("lift", np.zeros(2))
+        self._world.command("lift", np.zeros(2))
 
     def advance_to(self, time: float) -> None:
         """Steps; commands change only from look to look."""
-        self._trial.simulator.AdvanceTo(time)
+        self._world.simulator.AdvanceTo(time)
 
     def watch(self, contacts: list[BodyContact]) -> str:
         """Looks for fixed bodies that the hand touches; the table is none of them, unless the hand
         goes down."""
-        fixed = set(self._trial.diagram.fixed.values())
+        fixed = set(self._world.diagram.fixed.values())
         if self._is_lifting and self.segments[self._number].direction_W[2] < DOWN:
-            fixed.add(self._trial.diagram.table)
+            fixed.add(self._world.diagram.table)
         hit = reached(contacts, self._hand, fixed)
         return self._names[min(hit)] if hit else ""
 
@@ -119,17 +119,16 @@ class LiftCarrier:
         """The hand accelerates in the first half of a segment and brakes in the second. Straight
         up, the first adds to the weight and the second takes away from it. Otherwise both count,
         and standing still is in between."""
-        half = _check_count(self.segments[-1].length, self._trial.settings) // 2
+        half = _check_count(self.segments[-1].length, self._world.settings) // 2
         if self.segments[-1].is_straight_up:
             return check < half
-        return check >= half + self._trial.settings.steady_polls
+        return check >= half + self._world.settings.steady_polls
 
     def is_free_ahead(self) -> bool:
         """Looks along the joint's axis."""
-        positions = self._plant.GetPositions(self._plant_context)
         last = self.segments[-1]
         return self._lift_clearance().is_free(
-            self._X_WG_start, positions, last.length - self.travelled(), last.direction_W
+            self._world, self._X_WG_start, last.length - self.travelled(), last.direction_W
         )
 
 

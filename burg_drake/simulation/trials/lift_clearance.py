@@ -7,10 +7,12 @@ import numpy as np
 from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, QueryObject
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import BodyIndex
+from pydrake.systems.framework import Context
 
 from burg_drake.core import Array, inverse
-from burg_drake.simulation.trials.scene_trial import collision_geometries
+from burg_drake.simulation.trials.trial_world import TrialWorld, collision_geometries
 from burg_drake.station.diagram import FloatingHand, MountedHand, StationDiagram, mesh_by_pieces
+from burg_drake.station.world import ROBOT_MODELS
 
 STEP = 0.01
 """Way between two looks [m]; a hand and what it meets are thicker, taken together."""
@@ -22,11 +24,12 @@ class HandLiftClearance:
     """Looks along the straight segment ahead of one target in the hand.
 
     Args:
-        station_diagram: a diagram built with `robot="hand"`.
-        target: the body in the hand.
+        station_diagram: a diagram built with `robot="hand"`, without contact parts.
+        instance: name of what is in the hand.
     """
 
-    def __init__(self, station_diagram: StationDiagram, target: BodyIndex) -> None:
+    def __init__(self, station_diagram: StationDiagram, instance: str) -> None:
+        target = station_diagram.free[instance]
         self._diagram = station_diagram
         self._plant = plant = station_diagram.plant
         self._context = station_diagram.diagram.CreateDefaultContext()
@@ -48,17 +51,18 @@ class HandLiftClearance:
         start = plant.get_body(target).floating_positions_start() + 4
         self._places = [start, start + 1, start + 2, self._hand.lift.position_start()]
 
-    def is_free(self, X_WG: Array, positions: Array, length: float, direction_W: Array) -> bool:
+    def is_free(self, world: TrialWorld, X_WG: Array, length: float, direction_W: Array) -> bool:
         """Whether nothing is met on the way.
 
         Args:
+            world: in its present state.
             X_WG: (4, 4) grasp at which this way began; it sets the frames of the lift.
-            positions: of the plant, at present.
             length: how far there is to go [m].
             direction_W: (3,) unit vector of the lift.
         """
         self._hand.place(self._plant_context, X_WG, direction_W=direction_W)
-        self._plant.SetPositions(self._plant_context, positions)
+        _take_positions(self._diagram, self._plant_context, world)
+        positions = self._plant.GetPositions(self._plant_context)
         if not self._boxes_meet(length * direction_W):
             return True
         for travelled in np.append(np.arange(STEP, length, STEP), length):
@@ -101,11 +105,12 @@ class ArmLiftClearance:
     """Looks along the way up of one target in the hand of an arm.
 
     Args:
-        station_diagram: a diagram built with `robot="arm"`.
-        target: the body in the hand.
+        station_diagram: a diagram built with `robot="arm"`, without contact parts.
+        instance: name of what is in the hand.
     """
 
-    def __init__(self, station_diagram: StationDiagram, target: BodyIndex) -> None:
+    def __init__(self, station_diagram: StationDiagram, instance: str) -> None:
+        target = station_diagram.free[instance]
         self._diagram = station_diagram
         self._plant = plant = station_diagram.plant
         self._target = plant.get_body(target)
@@ -123,15 +128,15 @@ class ArmLiftClearance:
             geometries = GeometrySet(collision_geometries(plant, side))
             manager.Apply(CollisionFilterDeclaration().ExcludeWithin(geometries))
 
-    def is_free(self, positions: Array, q: Array) -> bool:
+    def is_free(self, world: TrialWorld, q: Array) -> bool:
         """Whether nothing is met.
 
         Args:
-            positions: of the plant, at present.
+            world: in its present state.
             q: (K, n) arm positions on the way.
         """
         context = self._plant_context
-        self._plant.SetPositions(context, positions)
+        _take_positions(self._diagram, context, world)
         X_WO = self._plant.EvalBodyPoseInWorld(context, self._target).GetAsMatrix4()
         X_HO = inverse(self._hand.X_WH(context)) @ X_WO
         graph = self._diagram.scene_graph
@@ -145,6 +150,20 @@ class ArmLiftClearance:
             if graph.get_query_output_port().Eval(graph_context).HasCollisions():
                 return False
         return True
+
+
+def _take_positions(diagram: StationDiagram, plant_context: Context, world: TrialWorld) -> None:
+    """Puts robot and objects where they are in a world; what cannot move there is where it was."""
+    plant, other = diagram.plant, world.diagram.plant
+    other_context = other.GetMyContextFromRoot(world.context)
+    for model in ROBOT_MODELS:
+        if other.HasModelInstanceNamed(model):
+            q = other.GetPositions(other_context, other.GetModelInstanceByName(model))
+            plant.SetPositions(plant_context, plant.GetModelInstanceByName(model), q)
+    for name, index in world.diagram.free.items():
+        X_WO = other.EvalBodyPoseInWorld(other_context, other.get_body(index))
+        body = plant.get_body(diagram.free[name])
+        plant.SetFloatingBaseBodyPoseInWorldFrame(plant_context, body, X_WO)
 
 
 def _bounds(

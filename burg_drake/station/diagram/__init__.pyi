@@ -1,5 +1,5 @@
-from .ball_contact import separate_ball_contact as separate_ball_contact
 from .builder import build_station_diagram as build_station_diagram
+from .contact_pairs import separate_contact as separate_contact
 from .floating_hand import FloatingHand as FloatingHand
 from .hand_handle import HandHandle as HandHandle
 from .leaning import (

@@ -45,19 +45,23 @@ from pydrake.planning import RobotDiagramBuilder
 from burg_drake.core import InvalidInputError, UnknownNameError, nearest
 from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.station.control import export_driven_ports, export_ports
-from burg_drake.station.diagram.ball_contact import separate_ball_contact
+from burg_drake.station.diagram.contact_pairs import separate_contact
 from burg_drake.station.diagram.leaning import soften_touching
 from burg_drake.station.diagram.station_diagram import StationDiagram, instance_pose
 from burg_drake.station.document import ENGINES, Engine, StationLike, as_engine, as_station
 from burg_drake.station.world import (
+    ContactParts,
     Robot,
     add_board,
     add_cameras,
+    add_contact_parts,
     add_instance,
     add_obstacles,
     add_robot,
+    add_standing,
     add_table,
     add_vertical_joint,
+    needs_no_pieces,
     set_default_posture,
     set_packages,
 )
@@ -76,6 +80,8 @@ def build_station_diagram(
     drivers: bool = False,
     cameras: bool | str | Sequence[str] = False,
     weld_objects: bool = False,
+    contact_parts: bool = False,
+    alone: str | None = None,
 ) -> StationDiagram:
     """Builds the diagram of a scene on a station.
 
@@ -99,6 +105,10 @@ def build_station_diagram(
             stands where it is placed, and can be lifted off by a joint `RISE` of its model along
             world z, and moved sideways with its frame `PLACE`; rigid meshes are replaced by pieces
             (see `world.mesh_pieces`).
+        contact_parts: have the hand meet the own surfaces of objects, and let these stand on the
+            table with feet, as trials do (see `world.contact_parts`).
+        alone: name of an instance that alone can move, with such parts and a hull that meets all
+            but the hand and the table; of the others there are only hulls (see `world.standing`).
 
     Returns:
         The diagram. In its default context all stands as the documents say, the hand is open and
@@ -124,7 +134,15 @@ def build_station_diagram(
     table = add_table(plant, station)
     add_board(plant, scene.board, station, markers=bool(cameras) or meshcat is not None)
     add = partial(add_instance, builder, scene, station.packages, by_pieces=weld_objects)
-    free = {name: add(name) for name in scene.instances}
+    if alone is not None:
+        free = {alone: add(alone, bare=needs_no_pieces(scene, station, alone))}
+    else:
+        free = {name: add(name) for name in scene.instances}
+    standing = {
+        name: add_standing(plant, scene, name, instance_pose(scene, station, name))
+        for name in scene.instances
+        if name not in free
+    }
     fixed = {name: add(name) for name in scene.background}
     for name, body in fixed.items():
         X_WO = instance_pose(scene, station, name)
@@ -133,6 +151,9 @@ def build_station_diagram(
         add_vertical_joint(plant, body, RigidTransform(instance_pose(scene, station, name)))
     fixed |= add_obstacles(plant, station)
     models = add_robot(builder, station, robot, simulated=not weld_objects)
+    parts = ContactParts()
+    if contact_parts or alone is not None:
+        parts = add_contact_parts(plant, scene, station, free, fixed, hulls=alone is not None)
 
     plant.Finalize()
     for name, body in ({} if weld_objects else free).items():
@@ -156,12 +177,14 @@ def build_station_diagram(
         robot=robot,
         engine=engine,
         free={name: body.index() for name, body in free.items()},
+        standing={name: body.index() for name, body in standing.items()},
         fixed={name: body.index() for name, body in fixed.items()},
+        parts=parts,
         table=table.index(),
         robot_bodies=tuple(i for m in models.values() for i in plant.GetBodyIndices(m)),
     )
     if not weld_objects:
-        separate_ball_contact(built)
+        separate_contact(built)
         soften_touching(built)
     return built
 

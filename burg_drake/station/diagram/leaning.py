@@ -78,7 +78,9 @@ def soften(station_diagram: StationDiagram, names: Iterable[str]) -> None:
     for name in names:
         if not is_mesh(scene, name) and not is_ball(scene, name):
             body = plant.get_body(station_diagram.free[name])
-            for geometry in plant.GetCollisionGeometriesForBody(body):
+            for geometry in list(plant.GetCollisionGeometriesForBody(body)):
+                if geometry in station_diagram.parts.all:
+                    continue
                 _soften(station_diagram, geometry)
 
 

@@ -12,7 +12,7 @@ from pydrake.planning import RobotDiagram
 from burg_drake.core import Array
 from burg_drake.scene.document import Scene
 from burg_drake.station.document import Engine, Station
-from burg_drake.station.world import Robot, joint_actuators
+from burg_drake.station.world import ContactParts, Robot, joint_actuators
 
 if TYPE_CHECKING:
     from pydrake.geometry import SceneGraph
@@ -26,7 +26,9 @@ class StationDiagram:
         diagram: the Drake diagram; keep it alive while its plant is used.
         scene, station, robot, engine: what it was built from.
         free: body of each instance that is not background, by name.
+        standing: bodies of instances that could be free, but are welded where they stand, by name.
         fixed: bodies of background instances and obstacles, by name.
+        parts: geometries of objects that only some bodies meet.
         table: the table's body.
         robot_bodies: all bodies of hand and arm.
     """
@@ -37,7 +39,9 @@ class StationDiagram:
     robot: Robot
     engine: Engine
     free: dict[str, BodyIndex]
+    standing: dict[str, BodyIndex]
     fixed: dict[str, BodyIndex]
+    parts: ContactParts
     table: BodyIndex
     robot_bodies: tuple[BodyIndex, ...]
 
@@ -62,7 +66,8 @@ class StationDiagram:
     @property
     def body_names(self) -> dict[BodyIndex, str]:
         """What people call a body: the names of instances and obstacles, `table`, robot links."""
-        names = {index: name for name, index in {**self.free, **self.fixed}.items()}
+        objects = {**self.free, **self.standing, **self.fixed}
+        names = {index: name for name, index in objects.items()}
         links = {i: self.plant.get_body(i).name() for i in self.robot_bodies}
         return names | links | {self.table: "table"}
 

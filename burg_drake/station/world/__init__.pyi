@@ -6,6 +6,11 @@ from .camera_sensors import (
     LIGHTS as LIGHTS,
     add_cameras as add_cameras,
 )
+from .contact_parts import (
+    ContactParts as ContactParts,
+    add_contact_parts as add_contact_parts,
+    needs_no_pieces as needs_no_pieces,
+)
 from .gripper import (
     gripper_of as gripper_of,
     station_gripper as station_gripper,
@@ -43,6 +48,10 @@ from .robot import (
 from .rolling import (
     ROLLING as ROLLING,
     is_ball as is_ball,
+)
+from .standing import (
+    add_hull as add_hull,
+    add_standing as add_standing,
 )
 from .surroundings import (
     DISSIPATION as DISSIPATION,

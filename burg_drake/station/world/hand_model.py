@@ -20,7 +20,11 @@ from pydrake.planning import RobotDiagramBuilder
 from burg_drake.core import InvalidInputError, nearest
 from burg_drake.core.paths import NO_PACKAGES, Packages
 from burg_drake.station.document import Finger, Hand
-from burg_drake.station.world.model_file import add_models, require_loose
+from burg_drake.station.world.model_file import (
+    add_models,
+    require_loose,
+    without_hydroelastic,
+)
 
 STALL = 1.25
 """Force that a finger's servo asks for when it stands still, over the force of the grip. A velocity
@@ -69,7 +73,8 @@ def add_hand(
     plant = builder.plant()
     constraints = plant.num_constraints()
     try:
-        (instance,) = add_models(builder.parser(), path, packages, simulated=simulated)
+        edit = None if simulated else without_hydroelastic
+        (instance,) = add_models(builder.parser(), path, packages, edit=edit)
     except (RuntimeError, ValueError) as error:
         raise InvalidInputError(
             f"hand {hand.name!r}: {path} cannot be loaded as one model"

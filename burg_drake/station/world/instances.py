@@ -18,6 +18,7 @@ from burg_drake.station.world.mesh_pieces import is_mesh, sdf_by_pieces
 from burg_drake.station.world.model_file import (
     add_models,
     buffered_remarks,
+    without_collisions,
     without_hydroelastic,
 )
 from burg_drake.station.world.robot import ROBOT_MODELS
@@ -32,9 +33,24 @@ which may be moved through the context; for a plant that is not simulated."""
 
 
 def add_instance(
-    builder: RobotDiagramBuilder, scene: Scene, packages: Packages, name: str, *, by_pieces: bool
+    builder: RobotDiagramBuilder,
+    scene: Scene,
+    packages: Packages,
+    name: str,
+    *,
+    by_pieces: bool = False,
+    bare: bool = False,
 ) -> RigidBody:
-    """Parses the object's SDF; the model instance goes by the name of the scene's instance."""
+    """Parses the object's SDF; the model instance goes by the name of the scene's instance.
+
+    Args:
+        builder: to add it to.
+        scene: the scene.
+        packages: what the station says of packages.
+        name: the instance.
+        by_pieces: for point queries alone, see `mesh_pieces`.
+        bare: without its contact geometry.
+    """
     plant, parser = builder.plant(), builder.parser()
     if plant.HasModelInstanceNamed(name) or name in ROBOT_MODELS:
         raise name_taken_error(scene, name)
@@ -45,7 +61,8 @@ def add_instance(
                 text = without_hydroelastic(sdf_by_pieces(scene, name))
                 (model,) = parser.AddModelsFromString(text, "sdf")
             else:
-                (model,) = add_models(parser, path, packages, simulated=not by_pieces)
+                edit = without_hydroelastic if by_pieces else without_collisions if bare else None
+                (model,) = add_models(parser, path, packages, edit=edit)
             body = plant.GetBodyByName(LINK, model)
             _require_inertia(body, scene.entry(name).mass_properties)
             if is_ball(scene, name) and not by_pieces:

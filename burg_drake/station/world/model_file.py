@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from html import escape
 from pathlib import Path
@@ -31,10 +31,15 @@ from burg_drake.core.paths import (
 PATH = re.compile(r"<uri>\s*((?![A-Za-z]+:)[^<]*?)\s*</uri>")
 """A file that is named by its path, from the folder of the model on if it is not absolute."""
 HYDROELASTIC = re.compile(r"<drake:(?:rigid|compliant)_hydroelastic\s*/>")
+COLLISION = re.compile(r"<collision\b.*?</collision>", re.DOTALL)
 
 
 def add_models(
-    parser: Parser, path: Path, packages: Packages = NO_PACKAGES, *, simulated: bool = True
+    parser: Parser,
+    path: Path,
+    packages: Packages = NO_PACKAGES,
+    *,
+    edit: Callable[[str], str] | None = None,
 ) -> list[ModelInstanceIndex]:
     """As `parser.AddModels(path)`, sooner, and with the packages that `core.paths.packages` finds.
 
@@ -43,7 +48,7 @@ def add_models(
             same names, and no model that would be fetched from the network.
         path: SDF or URDF file.
         packages: what a station says of packages.
-        simulated: whether contact will be simulated; see `without_hydroelastic`.
+        edit: of an SDF's text, such as `without_hydroelastic`.
 
     Raises:
         InvalidInputError: it cannot be read, or is too large.
@@ -57,8 +62,8 @@ def add_models(
         text = ""
     if path.suffix != ".sdf" or not text or "<include" in text:
         return list(parser.AddModels(path))
-    if not simulated:
-        text = without_hydroelastic(text)
+    if edit is not None:
+        text = edit(text)
     folder = Path(escape(str(path.parent.resolve()), quote=False))
     whole = PATH.sub(lambda found: f"<uri>file://{folder / found[1]}</uri>", text)
     try:
@@ -72,6 +77,11 @@ def without_hydroelastic(text: str) -> str:
     which it would copy into each context; a collision checker is there in two thirds of the time.
     """
     return HYDROELASTIC.sub("", text)
+
+
+def without_collisions(text: str) -> str:
+    """A model (SDF) that nothing touches."""
+    return COLLISION.sub("", text)
 
 
 def set_packages(parser: Parser, found: Mapping[str, Path]) -> None:

@@ -22,7 +22,11 @@ from burg_drake.core import Array, InvalidInputError, UnknownNameError, nearest
 from burg_drake.station.document import Station
 from burg_drake.station.world.hand_check import check_hand
 from burg_drake.station.world.hand_model import add_hand
-from burg_drake.station.world.model_file import add_models, require_loose
+from burg_drake.station.world.model_file import (
+    add_models,
+    require_loose,
+    without_hydroelastic,
+)
 
 Robot = Literal["arm", "hand", "none"]
 
@@ -114,7 +118,8 @@ def _add_arm(
     plant = builder.plant()
     try:
         path, packages = station.arm_model, station.packages
-        (model,) = add_models(builder.parser(), path, packages, simulated=simulated)
+        edit = None if simulated else without_hydroelastic
+        (model,) = add_models(builder.parser(), path, packages, edit=edit)
     except (RuntimeError, ValueError) as error:
         raise InvalidInputError(
             f"{station.path}: arm.model: {station.arm_model} cannot be loaded as one robot"

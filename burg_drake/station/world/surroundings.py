@@ -33,6 +33,9 @@ stops four times too early; at 1e6 it obeys Coulomb's law."""
 DISSIPATION = 5.0
 """Hunt-Crossley dissipation of table and obstacles [s/m]."""
 
+POINT_STIFFNESS = 1e12
+"""Of the table [N/m], so that a foot on it is as stiff as the foot."""
+
 TABLE_COLOR = (0.82, 0.79, 0.74, 1.0)
 SEEN_BOARD = {"paper": (0.97, 0.97, 0.95, 1.0), "markers": (0.06, 0.06, 0.06, 1.0)}
 """Colours for simulated cameras, as printed."""
@@ -78,8 +81,8 @@ def obstacle_boxes(station: Station) -> dict[str, FixedBox]:
 
 
 def add_table(plant: MultibodyPlant, station: Station) -> RigidBody:
-    """Adds the table."""
-    return _add_box(plant, "table", table_box(station))
+    """Adds the table. At a point it is as stiff as what meets it."""
+    return _add_box(plant, "table", table_box(station), POINT_STIFFNESS)
 
 
 def add_board(plant: MultibodyPlant, board: Board, station: Station, markers: bool) -> None:
@@ -130,16 +133,16 @@ def obstacle_name_error(station: Station, name: str) -> InvalidInputError:
     )
 
 
-def _add_box(plant: MultibodyPlant, name: str, fixed: FixedBox) -> RigidBody:
+def _add_box(
+    plant: MultibodyPlant, name: str, fixed: FixedBox, point_stiffness: float | None = None
+) -> RigidBody:
     """A box welded to the world as a body of its own: with collision geometry on the world body
     itself, locking a joint crashes (drake#24773)."""
     size = np.array(fixed.size)
     instance = plant.AddModelInstance(name)
     body = plant.AddRigidBody(name, instance, SpatialInertia.SolidBoxWithMass(1.0, *size))
-    box = Box(*size)
-    plant.RegisterCollisionGeometry(
-        body, RigidTransform(), box, "collision", _compliant_box(size, fixed.friction)
-    )
+    box, properties = Box(*size), _compliant_box(size, fixed.friction, point_stiffness)
+    plant.RegisterCollisionGeometry(body, RigidTransform(), box, "collision", properties)
     drawn = Box(*np.maximum(size - 2 * PAPER, size / 2))  # thin ones, too, remain
     plant.RegisterVisualGeometry(body, RigidTransform(), drawn, "visual", np.array(fixed.color))
     plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform(fixed.X_WB))
@@ -152,10 +155,15 @@ def _seen_as(color: tuple[float, ...]) -> PerceptionProperties:
     return properties
 
 
-def _compliant_box(size: Array, friction: float) -> ProximityProperties:
+def _compliant_box(
+    size: Array, friction: float, point_stiffness: float | None
+) -> ProximityProperties:
     properties = ProximityProperties()
     AddCompliantHydroelasticProperties(float(np.max(size)), TABLE_MODULUS, properties)
     AddContactMaterial(
-        dissipation=DISSIPATION, friction=CoulombFriction(friction, friction), properties=properties
+        dissipation=DISSIPATION,
+        point_stiffness=point_stiffness,
+        friction=CoulombFriction(friction, friction),
+        properties=properties,
     )
     return properties

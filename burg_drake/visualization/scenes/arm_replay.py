@@ -46,7 +46,7 @@ def record_arm_trial(
     Raises:
         InvalidInputError: as `ArmTrial.run`.
     """
-    scene, station = trial.diagram.scene, trial.diagram.station
+    scene, station = trial.scene, trial.station
     draw_board(scene, station, meshcat, labels=False)
     arm = station.document.arm
     assert arm is not None  # ArmTrial has seen to it

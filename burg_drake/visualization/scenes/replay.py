@@ -66,7 +66,7 @@ def record_trial(
     Raises:
         InvalidInputError: as `HandTrial.run`.
     """
-    scene, station = trial.diagram.scene, trial.diagram.station
+    scene, station = trial.scene, trial.station
     X_WG = trial.X_WG(instance, X_OG)
     hand = _show_start(trial, X_WG)
     draw_board(scene, station, meshcat, labels=False)

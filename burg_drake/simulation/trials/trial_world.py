@@ -1,7 +1,6 @@
-"""What all trials of one scene share: a diagram, and how a trial changes its Context.
+"""What many trials share: a diagram, and how a trial changes its Context.
 
-One compiled diagram serves all trials; a trial changes only the Context, and what it returns does
-not depend on the trials before it.
+A trial changes only the Context, and what it returns does not depend on the trials before it.
 """
 
 from __future__ import annotations
@@ -16,31 +15,34 @@ from pydrake.geometry import (
     ProximityProperties,
     RoleAssign,
 )
-from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
+from pydrake.multibody.plant import ContactResults, CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, SpatialInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
-from burg_drake.core import Array, InvalidInputError, check_pose
+from burg_drake.core import Array, InvalidInputError
 from burg_drake.simulation.rest import Neighbours
 from burg_drake.simulation.trials.contacts import ContactReader
 from burg_drake.simulation.trials.trial_settings import TrialSettings
-from burg_drake.station.diagram import HandHandle, StationDiagram, separate_ball_contact
-from burg_drake.station.document import GraspMotion
+from burg_drake.station.diagram import HandHandle, StationDiagram, separate_contact
+
+TOUCHING = 0.001
+"""A target whose hull is closer to another thing than this may lean on it [m]."""
 
 
-class SceneTrial:
+class TrialWorld:
     """A scene on a station with a robot, and a simulator that executes grasps in it.
+
+    In a world of one target alone the others only stand there (see `build_station_diagram`): what
+    happens in it is what happens, as long as neither target nor robot meets one of them.
 
     Args:
         diagram: the station diagram.
         hand: the hand in it.
         settings: phases of a trial.
-        motion: where the hand goes, if not as the settings or else the station say.
 
     Attributes:
         diagram, hand, settings: as given.
-        motion: where the hand goes.
         contacts: reader of the diagram's contact results.
         neighbours: which free objects stand close to each other.
         simulator: the simulator that runs the trials.
@@ -53,14 +55,15 @@ class SceneTrial:
         diagram: StationDiagram,
         hand: HandHandle,
         settings: TrialSettings,
-        motion: GraspMotion | None = None,
     ) -> None:
         self.diagram = diagram
         self.hand = hand
         self.settings = settings
-        self.motion = motion or settings.motion or diagram.station.document.motion
         self.contacts = ContactReader(diagram.plant, diagram.scene_graph)
         self.neighbours = Neighbours(diagram)
+        self._hulls = frozenset(
+            [*diagram.parts.hulls, *self._geometries(set(diagram.standing.values()))]
+        )
         self._default = diagram.diagram.CreateDefaultContext()
         self.simulator = Simulator(diagram.diagram, self._default.Clone())
         self._prepared: tuple[str, float | None, float | None] | None = None
@@ -71,18 +74,20 @@ class SceneTrial:
         """Context of the trial that runs or ran last."""
         return self.simulator.get_mutable_context()
 
-    def X_WG(self, instance: str, X_OG: Array) -> Array:
-        """A grasp (4, 4) of an instance in the world.
+    def is_usable(self) -> bool:
+        """Whether trials can begin in it. In a world of a target alone that is so if there is
+        nothing but the table that the target may lean on where it stands."""
+        if not self._hulls:
+            return True
+        graph = self.diagram.scene_graph
+        query = graph.get_query_output_port().Eval(graph.GetMyContextFromRoot(self._default))
+        pairs = query.ComputeSignedDistancePairwiseClosestPoints(TOUCHING)
+        return not any(pair.id_A in self._hulls or pair.id_B in self._hulls for pair in pairs)
 
-        Raises:
-            InvalidInputError: `X_OG` is not a pose, or `instance` cannot be grasped.
-        """
-        if instance not in self.diagram.free:
-            raise InvalidInputError(
-                f"{instance!r} is not a free object of scene {self.diagram.scene.name!r};"
-                f" free are: {', '.join(self.diagram.free) or '(none)'}"
-            )
-        return self.diagram.X_WO(instance) @ check_pose(X_OG, "X_OG")
+    def meets_another(self, results: ContactResults) -> bool:
+        """Whether, in a world of a target alone, it or the robot meets what else could move, or it
+        meets something fixed: what happens then is for the complete world to say."""
+        return bool(self._hulls) and self.contacts.has_any(results, self._hulls)
 
     def prepare(
         self, instance: str, moving: set[BodyIndex], friction: float | None, mass: float | None
@@ -126,7 +131,7 @@ class SceneTrial:
         declaration.AllowWithin(GeometrySet(self._geometries(released)))
         declaration.AllowBetween(GeometrySet(self._geometries(released)), resting)
         self._filter(declaration)
-        separate_ball_contact(self.diagram, self.context)
+        separate_contact(self.diagram, self.context)
         self.simulator.Initialize()
 
     def isolate(self, target: BodyIndex) -> None:
@@ -182,7 +187,8 @@ class SceneTrial:
 
     def _resting(self, still: set[BodyIndex]) -> set[BodyIndex]:
         """What does not move while these objects are locked."""
-        return still | {self.diagram.table} | set(self.diagram.fixed.values())
+        diagram = self.diagram
+        return still | {diagram.table, *diagram.fixed.values(), *diagram.standing.values()}
 
     def _geometries(self, bodies: set[BodyIndex]) -> list[GeometryId]:
         return collision_geometries(self.diagram.plant, bodies)

@@ -1,0 +1,192 @@
+"""What of an object touches what where grasps are simulated: the hand its own surface, the table
+its feet, everything else its pieces.
+
+Pads need the surface as it is, which pieces bulge out of, and one surface is cheaper than many
+pieces. On a table an object stands on points: a compliant table carries it on patches, on which it
+tips at 0.8 of the slope at which it should, and which cost more than the pads do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from pydrake.geometry import (
+    AddContactMaterial,
+    AddRigidHydroelasticProperties,
+    Cylinder,
+    GeometryId,
+    Mesh,
+    ProximityProperties,
+    Shape,
+    Sphere,
+)
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
+from pydrake.multibody.tree import RigidBody
+
+from burg_drake.core import Array, make_pose, transform_points
+from burg_drake.objects.collision import FLAT, support_feet
+from burg_drake.objects.library import DEFAULT_CONTACT, ObjectEntry
+from burg_drake.scene.document import Scene
+from burg_drake.station.document import Station
+from burg_drake.station.world.object_hull import support_corners
+from burg_drake.station.world.rolling import is_ball
+from burg_drake.station.world.standing import add_hull
+
+FOOT_STIFFNESS = 1e5
+"""Of a foot [N/m]: under the weight of a full can it sinks in by 10 um."""
+FOOT_DISSIPATION = 20.0
+"""Hunt-Crossley dissipation of a foot [s/m]: what is set down does not bounce."""
+RIM_FEET = 8
+"""Feet on each rim of a cylinder."""
+RIM = 1e-4
+"""The discs on which a cylinder rolls are so thick, and so far within its ends [m]: standing, it
+touches with its feet alone."""
+EDGE = 0.05
+"""What stands nearer to the table's edge than this may come to lie over it, where feet are no
+support, and keeps its pieces there [m]."""
+
+
+@dataclass(frozen=True)
+class ContactParts:
+    """Geometries of bodies that only some others meet.
+
+    Attributes:
+        surfaces: own surfaces, which the hand meets in the place of the pieces.
+        feet: what stands on the table in the place of all else.
+        hulls: what meets all but the hand and the table in the place of the pieces.
+    """
+
+    surfaces: tuple[GeometryId, ...] = ()
+    feet: tuple[GeometryId, ...] = ()
+    hulls: tuple[GeometryId, ...] = ()
+
+    @property
+    def all(self) -> frozenset[GeometryId]:
+        """Of whatever kind."""
+        return frozenset((*self.surfaces, *self.feet, *self.hulls))
+
+
+def add_contact_parts(
+    plant: MultibodyPlant,
+    scene: Scene,
+    station: Station,
+    free: Mapping[str, RigidBody],
+    fixed: Mapping[str, RigidBody],
+    *,
+    hulls: bool = False,
+) -> ContactParts:
+    """Adds the own surfaces of objects, and feet to those that can move.
+
+    Where the documents let an object sink into the table, by the fraction of a millimetre that
+    settling leaves, its feet are drawn in, so that it stands as it is placed. Balls have no feet:
+    they roll at a point.
+
+    Args:
+        plant: to add them to, with the robot in it, not finalized.
+        scene: the scene.
+        station: the station.
+        free: bodies of objects that can move, by name.
+        fixed: bodies of what cannot, by name; the station's obstacles are as they are.
+        hulls: have a hull of each free object meet what its pieces would.
+    """
+    surfaces, feet, around = [], [], []
+    for name, body in {**free, **fixed}.items():
+        if name in station.document.background:
+            continue
+        if scene.entry(name).contact.kind == "surface":
+            surfaces.append(_add_surface(plant, scene, name, body))
+        if name in free and not is_ball(scene, name):
+            feet += _add_feet(plant, scene, station, name, body)
+        if name in free and hulls:
+            around.append(add_hull(plant, scene, name, body))
+    return ContactParts(tuple(surfaces), tuple(feet), tuple(around))
+
+
+def needs_no_pieces(scene: Scene, station: Station, name: str) -> bool:
+    """Whether surface, feet and hull of an object leave nothing for its pieces to meet."""
+    return scene.entry(name).contact.kind == "surface" and _is_on_table(scene, station, name)
+
+
+def _add_surface(plant: MultibodyPlant, scene: Scene, name: str, body: RigidBody) -> GeometryId:
+    entry = scene.entry(name)
+    mesh = Mesh(str(scene.library.path(entry.contact.mesh)))
+    properties = _material(entry, DEFAULT_CONTACT.dissipation)
+    AddRigidHydroelasticProperties(properties)
+    return plant.RegisterCollisionGeometry(body, RigidTransform(), mesh, "surface", properties)
+
+
+def _add_feet(
+    plant: MultibodyPlant, scene: Scene, station: Station, name: str, body: RigidBody
+) -> list[GeometryId]:
+    if not _is_on_table(scene, station, name):
+        return []
+    X_WO = station.document.X_WS.matrix() @ scene.X_SO(name)
+    properties = _material(scene.entry(name), FOOT_DISSIPATION, FOOT_STIFFNESS)
+    return [
+        plant.RegisterCollisionGeometry(body, RigidTransform(X_OF), shape, label, properties)
+        for label, X_OF, shape in _parts(scene, name, X_WO)
+    ]
+
+
+def _is_on_table(scene: Scene, station: Station, name: str) -> bool:
+    """Whether an object stands well within the table's edge."""
+    X_WO = station.document.X_WS.matrix() @ scene.X_SO(name)
+    table, entry = station.document.table, scene.entry(name)
+    corners = np.array(np.meshgrid(*zip(entry.lower, entry.upper, strict=True))).reshape(3, -1).T
+    away = np.abs(transform_points(X_WO, corners)[:, :2] - table.center)
+    return bool((away <= np.array(table.size[:2]) / 2 - EDGE).all())
+
+
+def _parts(scene: Scene, name: str, X_WO: Array) -> Iterator[tuple[str, Array, Shape]]:
+    """Names, poses (4, 4) in O and shapes of what an object stands on, placed at `X_WO`."""
+    entry, up = scene.entry(name), np.round(X_WO[2, :3], 9)
+    primitive = entry.contact.primitive
+    if primitive is None:
+        ups = [pose.X_SO.matrix()[2, :3] for pose in entry.stable_poses]
+        rolling = [one for one, pose in zip(ups, entry.stable_poses, strict=True) if pose.rolls]
+        feet = support_feet(support_corners(scene.library, entry), [up, *ups], rolling)
+    elif primitive.shape == "box":
+        feet = np.array(list(product(*((-s / 2, s / 2) for s in primitive.size))))
+        feet = transform_points(primitive.X_OP.matrix(), feet)
+    else:
+        radius, length = primitive.size
+        for k, end in enumerate((-0.5, 0.5)):
+            X_OD = primitive.X_OP.matrix() @ make_pose(p_AB=(0.0, 0.0, end * (length - 3.0 * RIM)))
+            axis_height = float(up @ X_OD[:3, 2])
+            reach = radius * math.sqrt(max(0.0, 1.0 - axis_height**2)) + RIM / 2 * abs(axis_height)
+            lowest = X_WO[2, 3] + float(up @ X_OD[:3, 3]) - reach
+            X_OD[:3, 3] -= _excess(lowest) * up
+            yield f"rim_{k}", X_OD, Cylinder(radius, RIM)
+        feet = transform_points(primitive.X_OP.matrix(), _rim_points(radius, length))
+    heights = X_WO[2, 3] + feet @ up
+    for k, (foot, height) in enumerate(zip(feet, heights.tolist(), strict=True)):
+        yield f"foot_{k:03d}", make_pose(p_AB=foot - _excess(height) * up), Sphere(0.0)
+
+
+def _rim_points(radius: float, length: float) -> Array:
+    """(N, 3) points on the two rims of a cylinder along z [m]."""
+    angle = 2.0 * np.pi * np.arange(RIM_FEET) / RIM_FEET
+    x, y = radius * np.cos(angle), radius * np.sin(angle)
+    ends = np.full(RIM_FEET, length / 2)
+    return np.concatenate([np.stack([x, y, -ends], axis=1), np.stack([x, y, ends], axis=1)])
+
+
+def _excess(height: float) -> float:
+    """By how much a foot at this height over the table is moved down, to the table's top [m]."""
+    return height if height < FLAT else 0.0
+
+
+def _material(
+    entry: ObjectEntry, dissipation: float, stiffness: float | None = None
+) -> ProximityProperties:
+    properties = ProximityProperties()
+    friction = CoulombFriction(entry.friction, entry.friction)
+    AddContactMaterial(
+        dissipation=dissipation, point_stiffness=stiffness, friction=friction, properties=properties
+    )
+    return properties

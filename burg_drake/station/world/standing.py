@@ -1,0 +1,48 @@
+"""Objects that only stand there, where a single other one can move: each a hull of its own, welded.
+
+Whoever meets a hull may meet the object; what happens then is not for this world to say. Hulls cost
+a fraction of the pieces, as Drake looks at every two geometries that are near each other.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.geometry import (
+    Convex,
+    GeometryId,
+    Mesh,
+    ProximityProperties,
+)
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import RigidBody, SpatialInertia
+
+from burg_drake.core import Array
+from burg_drake.objects.library import LINK
+from burg_drake.scene.document import Scene
+from burg_drake.station.world.instances import name_taken_error
+from burg_drake.station.world.object_hull import hull_corners
+from burg_drake.station.world.robot import ROBOT_MODELS
+
+GREY = (0.8, 0.8, 0.8, 1.0)
+"""Colour of meshes that have none of their own."""
+
+
+def add_standing(plant: MultibodyPlant, scene: Scene, name: str, X_WO: Array) -> RigidBody:
+    """Adds an instance as a hull and a mesh to look at, welded where it stands."""
+    if plant.HasModelInstanceNamed(name) or name in ROBOT_MODELS:
+        raise name_taken_error(scene, name)
+    entry, model = scene.entry(name), plant.AddModelInstance(name)
+    body = plant.AddRigidBody(LINK, model, SpatialInertia.SolidSphereWithMass(entry.mass, 0.01))
+    add_hull(plant, scene, name, body)
+    mesh = Mesh(str(scene.library.path(entry.mesh)))
+    plant.RegisterVisualGeometry(body, RigidTransform(), mesh, "visual", np.array(GREY))
+    plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform(X_WO))
+    return body
+
+
+def add_hull(plant: MultibodyPlant, scene: Scene, name: str, body: RigidBody) -> GeometryId:
+    """Adds the convex hull of all that touches others of an instance."""
+    shape = Convex(hull_corners(scene.library, scene.entry(name)).T, name)
+    X = RigidTransform()
+    return plant.RegisterCollisionGeometry(body, X, shape, "hull", ProximityProperties())
