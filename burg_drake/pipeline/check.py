@@ -11,10 +11,11 @@ from typing import Literal
 import numpy as np
 
 from burg_drake.core import BurgError, MeshError
-from burg_drake.objects.collision import deviation_warning
+from burg_drake.objects.collision import deviation_warning, pieces_instead
 from burg_drake.objects.library import ObjectEntry, ObjectLibrary
 from burg_drake.objects.meshes import mesh_hash
 from burg_drake.objects.physics import implausible
+from burg_drake.pipeline.keys import VERSION
 from burg_drake.pipeline.record import (
     Record,
     entry_hash,
@@ -79,7 +80,7 @@ def _file_issues(library: ObjectLibrary, name: str, entry: ObjectEntry) -> Itera
         yield _issue(
             name, "missing", f"{library.root / missing[0]} is missing{more}; build it again"
         )
-    if record is None:
+    if record is None or record.version != VERSION:
         text = f"{home} was built by another release; build it again"
         yield _issue(name, "stale", text)
     else:
@@ -136,6 +137,8 @@ def _value_issues(name: str, entry: ObjectEntry) -> Iterator[LibraryIssue]:
         text = f"friction {entry.friction:g} is not that of household materials ({low} to {high})"
         yield _issue(name, "implausible", text)
     yield from _fit_issues(name, entry)
+    if entry.contact.reason:
+        yield _issue(name, "unsure", pieces_instead(entry.contact))
     yield from _pose_issues(name, entry)
 
 

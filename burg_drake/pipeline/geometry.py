@@ -166,7 +166,7 @@ def _confirmed(
         mesh=f"{name}/{MESH_FILE}",
         sdf=f"{name}/{name}.sdf",
         pieces=tuple(f"{name}/{piece}" for piece in geometry.pieces),
-        contact=geometry.contact,
+        contact=placed_contact(geometry.contact, name),
         lower=geometry.lower,
         upper=geometry.upper,
         mass_properties=properties,
@@ -177,6 +177,11 @@ def _confirmed(
     document = LibraryDocument(name="resting", objects={name: entry})
     confirmation = confirm_poses(ObjectLibrary(document, folder.parent), name)
     return confirmation.poses, confirmation.notes
+
+
+def placed_contact(contact: ContactGeometry, name: str) -> ContactGeometry:
+    """The contact geometry of object `name` with its mesh relative to the library's folder."""
+    return replace(contact, mesh=f"{name}/{contact.mesh}") if contact.mesh else contact
 
 
 def _vector(values: Any) -> Vector3:

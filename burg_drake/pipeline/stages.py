@@ -13,7 +13,7 @@ import trimesh
 
 from burg_drake.core.files import atomic_write
 from burg_drake.core.paths import MESH_FILE
-from burg_drake.objects.collision import deviation_warning
+from burg_drake.objects.collision import deviation_warning, pieces_instead
 from burg_drake.objects.library import (
     Decomposition,
     MassProperties,
@@ -23,7 +23,7 @@ from burg_drake.objects.library import (
     model_sdf,
 )
 from burg_drake.objects.physics import DEFAULT_DENSITY, implausible, mass_properties
-from burg_drake.pipeline.geometry import build_geometry
+from burg_drake.pipeline.geometry import build_geometry, placed_contact
 from burg_drake.pipeline.keys import StageKeys
 from burg_drake.pipeline.record import (
     Geometry,
@@ -124,12 +124,21 @@ def build_object(
     # again.
     write_record(target, record)
     atomic_write(target / f"{source.name}.sdf", sdf)
-    return Built(folder, entry, tuple(_notes(source, geometry, properties)), seconds)
+    notes = _notes(source, geometry, properties, before)
+    return Built(folder, entry, tuple(notes), seconds)
 
 
-def _notes(source: ObjectSource, geometry: Geometry, properties: MassProperties) -> list[str]:
-    """What the user should know of a built object."""
+def _notes(
+    source: ObjectSource, geometry: Geometry, properties: MassProperties, before: Record | None
+) -> list[str]:
+    """What the user should know of a built object, and of what there was `before`."""
     notes = []
+    if (
+        before is not None
+        and before.geometry.contact.kind == "pieces"
+        and (geometry.contact.kind == "surface")
+    ):
+        notes.append("built again: pads now touch the object's own surface")
     if source.mass is None and not source.fixed:
         used = DEFAULT_DENSITY if source.density is None else source.density
         why = "no mass or density given" if source.density is None else "no mass given"
@@ -138,6 +147,7 @@ def _notes(source: ObjectSource, geometry: Geometry, properties: MassProperties)
         notes.append("the mesh is not closed; its volume is that of the convex pieces")
     notes += implausible(properties, geometry.lower, geometry.upper)
     diagonal = float(np.linalg.norm(np.subtract(geometry.upper, geometry.lower)))
+    notes.append(pieces_instead(geometry.contact))
     notes += [geometry.cut, deviation_warning(geometry.fit, diagonal), *geometry.notes]
     return [note for note in notes if note]
 
@@ -159,9 +169,6 @@ def _entry(
     root: Path,
 ) -> ObjectEntry:
     file, path = _origin(source, root)
-    contact = geometry.contact
-    if contact.mesh:
-        contact = replace(contact, mesh=f"{source.name}/{contact.mesh}")
     return ObjectEntry(
         description=source.description,
         mesh=f"{source.name}/{MESH_FILE}",
@@ -170,7 +177,7 @@ def _entry(
         pieces=tuple(f"{source.name}/{name}" for name in geometry.pieces),
         decomposition=_decomposition(source, geometry),
         fit=geometry.fit,
-        contact=contact,
+        contact=placed_contact(geometry.contact, source.name),
         friction=source.coefficient,
         lower=geometry.lower,
         upper=geometry.upper,

@@ -1,4 +1,7 @@
-from .contact import contact_geometry as contact_geometry
+from .contact import (
+    contact_geometry as contact_geometry,
+    pieces_instead as pieces_instead,
+)
 from .decomposition import (
     Pieces as Pieces,
     convex_pieces as convex_pieces,

@@ -21,13 +21,14 @@ from pathlib import Path
 import trimesh
 
 from burg_drake.core import MeshError
+from burg_drake.objects.collision.contact_surface import contact_surface, excess
 from burg_drake.objects.collision.fit import surface_distance, union_mesh
 from burg_drake.objects.collision.primitive import fit_primitive, nearest_primitive
 from burg_drake.objects.library import ContactGeometry, ContactKind, Fit, write_piece
 from burg_drake.objects.meshes import decimated
 
 CONTACT_FILE = "contact.obj"
-"""The mesh of kind `mesh`, in the object's folder."""
+"""The mesh of kinds `surface` and `mesh`, in the object's folder."""
 
 MESH_FACES = 2000
 """Faces of the mesh of kind `mesh`, where so few stay within `solids.DECIMATION`."""
@@ -43,20 +44,29 @@ def contact_geometry(
     """What of an object touches others.
 
     Args:
-        kind: as the user wants it; None: a primitive where one fits, else the pieces.
+        kind: as the user wants it; None: a primitive where one fits, else the surface where it is
+            closed and can be decimated, else the pieces.
         surface: of the object [m].
         closed: whether it is watertight, so that its volume can be trusted.
-        pieces: its convex pieces.
-        folder: the object's; the mesh of kind `mesh` is written into it.
+        pieces: its convex pieces, at least one for a surface.
+        folder: the object's; the mesh of kinds `surface` and `mesh` is written into it.
 
     Returns:
         The contact geometry, whose mesh is relative to `folder`, and the files written.
 
     Raises:
-        MeshError: the object is not near any primitive, or not closed, and `kind` needs it.
+        MeshError: the object is not near any primitive, not closed, or cannot be decimated, and
+            `kind` needs it.
     """
     if kind == "mesh":
         return _mesh(surface, closed, folder), (CONTACT_FILE,)
+    if kind == "surface":
+        try:
+            return _surface(surface, closed, pieces, folder), (CONTACT_FILE,)
+        except MeshError as error:
+            raise MeshError(
+                f"contact 'surface': {error}; repair the mesh, or choose 'pieces'"
+            ) from error
     if kind in ("pieces", "compliant_pieces"):
         return ContactGeometry(kind=kind), ()
     volume = float(surface.volume) if closed else float(union_mesh(pieces).volume)
@@ -66,7 +76,25 @@ def contact_geometry(
         return ContactGeometry(kind="primitive", primitive=primitive, fit=fit), ()
     if kind == "primitive":
         raise MeshError(_refusal(surface, volume))
-    return ContactGeometry(), ()
+    try:
+        return _surface(surface, closed, pieces, folder), (CONTACT_FILE,)
+    except MeshError as error:
+        return ContactGeometry(reason=str(error)), ()
+
+
+def pieces_instead(contact: ContactGeometry) -> str:
+    """What to say where pads meet pieces that were not asked for; empty elsewhere."""
+    if not contact.reason:
+        return ""
+    return f"pads meet its convex pieces and not its own surface: {contact.reason}"
+
+
+def _surface(
+    surface: trimesh.Trimesh, closed: bool, pieces: Sequence[trimesh.Trimesh], folder: Path
+) -> ContactGeometry:
+    mesh, fit = contact_surface(surface, closed)
+    write_piece(mesh, folder / CONTACT_FILE)
+    return ContactGeometry(kind="surface", mesh=CONTACT_FILE, fit=fit, excess=excess(mesh, pieces))
 
 
 def _mesh(surface: trimesh.Trimesh, closed: bool, folder: Path) -> ContactGeometry:

@@ -155,11 +155,16 @@ class ContactGeometry:
     """What of an object touches others in simulation.
 
     Attributes:
-        kind: `pieces` (convex pieces, rigid), `compliant_pieces` (the same with a pressure field),
-            `mesh` (the surface, rigid) or `primitive`.
+        kind: `surface` (gripper pads meet the surface in `mesh`, rigid, all else the convex
+            pieces), `pieces` (convex pieces, rigid), `compliant_pieces` (the same with a pressure
+            field), `mesh` (the surface in `mesh`, rigid, for all) or `primitive`.
         fit: how well it stands for the surface; None for pieces, see `ObjectEntry.fit`.
-        mesh: the surface mesh of kind `mesh` (.obj, relative to the library's folder).
+        mesh: the mesh of kinds `surface` and `mesh` (.obj, relative to the library's folder).
         primitive: that of kind `primitive`.
+        excess: how far the surface of kind `surface` stands out of the union of the convex pieces,
+            at most [m]. Fingers that are clear of the pieces by more do not touch the surface.
+        reason: why pads meet the pieces, where neither a primitive nor the object's own surface
+            can stand for it; else empty.
     """
 
     kind: ContactKind = "pieces"
@@ -167,6 +172,8 @@ class ContactGeometry:
     mesh: str = ""
     excess: float = 0.0
     primitive: Primitive | None = None
+    excess: float = 0.0
+    reason: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)

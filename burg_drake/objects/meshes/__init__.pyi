@@ -4,7 +4,10 @@ from .offset import (
     offsets as offsets,
 )
 from .openings import Openings as Openings
-from .solids import decimated as decimated
+from .solids import (
+    coarser_surfaces as coarser_surfaces,
+    decimated as decimated,
+)
 from .surface import (
     FORMATS as FORMATS,
     UNITS as UNITS,
