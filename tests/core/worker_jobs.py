@@ -11,6 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.workers import report_progress
 
@@ -128,3 +130,31 @@ def build_and_die(log: Path) -> None:
 
 def refuse_to_build() -> None:
     raise InvalidInputError("no such scene")
+
+
+def mapped_files() -> set[str]:
+    """Files that this process has in its memory."""
+    lines = Path("/proc/self/maps").read_text().splitlines()
+    return {line.split(maxsplit=5)[-1] for line in lines if "/" in line}
+
+
+def preloaded_in_a_child() -> tuple[str | None, set[str]]:
+    """`LD_PRELOAD` of a process that a worker starts, and files in that one's memory."""
+    program = (
+        "import os; print(os.environ.get('LD_PRELOAD')); print(open('/proc/self/maps').read())"
+    )
+    output = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    ).stdout.splitlines()
+    preload = None if output[0] == "None" else output[0]
+    return preload, {line.split(maxsplit=5)[-1] for line in output[1:] if "/" in line}
+
+
+def sums_of_many_arrays() -> bytes:
+    """Arithmetic on arrays of all sizes, which come and go."""
+    rng, kept, total = np.random.default_rng(1), [], np.zeros(3)
+    for k in range(3000):
+        kept.append(rng.normal(size=(rng.integers(1, 2000), 3)))
+        total += np.exp(kept[k // 2]).sum(axis=0) @ rng.normal(size=(3, 3))
+        kept[k // 3] = kept[k // 3][:1].copy()
+    return total.tobytes()

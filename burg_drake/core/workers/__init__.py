@@ -12,7 +12,8 @@ results in order, and the pool is a context that ends its processes::
 
 Workers are fresh interpreters that are talked to over a pipe. They are never forked, which Drake
 does not survive, and they do not import the program's main module, so that scripts and notebooks
-need no guard; hence functions have to stand in a module that can be imported.
+need no guard; hence functions have to stand in a module that can be imported. On Linux they start
+with a faster memory allocator where there is one (`allocator`).
 
 **Sessions.** What is expensive to build (a scene with its renderer, a judge) is built once in each
 worker, and handed to every task of the session as its first argument. A worker keeps the last few

@@ -15,6 +15,7 @@ import time
 from multiprocessing.connection import Connection, Pipe
 
 from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.workers.allocator import PRELOAD, restore_preload, worker_preload
 
 FROM_OUTSIDE = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP)
 """Signals that end a process from outside: the system when memory runs out, a batch system, a user.
@@ -53,6 +54,8 @@ def start_worker(module: str, *arguments: bool) -> tuple[subprocess.Popen[bytes]
     blocked: the parent alone decides what it means. They end when their parent does, also while
     they are at work and do not look at their pipe: a parent that is killed cannot end them.
 
+    They have a faster allocator where there is one (`allocator`); what they start does not.
+
     Args:
         module: has a function `main(handle: int)`, called with the file descriptor of its end of
             the pipe.
@@ -65,9 +68,12 @@ def start_worker(module: str, *arguments: bool) -> tuple[subprocess.Popen[bytes]
     program = (
         f"import sys; sys.path[:] = {sys.path!r};"
         f" from {__name__} import end_with_parent; end_with_parent({os.getpid()});"
+        f" from {restore_preload.__module__} import restore_preload;"
+        f" restore_preload({os.environ.get(PRELOAD)!r});"
         f" from {module} import main;"
         f" main{(theirs.fileno(), *arguments)!r}"
     )
+    environment = {**os.environ, **ONE_THREAD, **worker_preload()}
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         process = subprocess.Popen(
@@ -75,7 +81,7 @@ def start_worker(module: str, *arguments: bool) -> tuple[subprocess.Popen[bytes]
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             pass_fds=[theirs.fileno()],
-            env={**os.environ, **ONE_THREAD},
+            env=environment,
         )
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
