@@ -170,7 +170,6 @@ class ContactGeometry:
     kind: ContactKind = "pieces"
     fit: Fit | None = None
     mesh: str = ""
-    excess: float = 0.0
     primitive: Primitive | None = None
     excess: float = 0.0
     reason: str = ""
