@@ -20,6 +20,7 @@ POSE_SIZE = (160, 120)
 """Pictures of stable poses [pixel]."""
 
 KINDS = {
+    "surface": "surface to pads, convex pieces to others",
     "pieces": "convex pieces, rigid",
     "compliant_pieces": "convex pieces, compliant",
     "mesh": "surface mesh, rigid",
