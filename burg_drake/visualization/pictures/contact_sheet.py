@@ -144,7 +144,7 @@ def source_line(entry: ObjectEntry) -> str:
 def _figures(entry: ObjectEntry) -> list[Html]:
     mass = entry.mass_properties
     size = [b - a for a, b in zip(entry.lower, entry.upper, strict=True)]
-    pieces = entry.contact.kind in ("pieces", "compliant_pieces")
+    pieces = entry.contact.kind in ("surface", "pieces", "compliant_pieces")
     fit = entry.fit if pieces else entry.contact.fit
     about = "" if mass.source == "given" else "~"
     wall = mass.wall_thickness
