@@ -21,6 +21,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+import trimesh
 
 import burg_drake as burg
 from burg_drake.core.arrays import Array
@@ -39,7 +40,7 @@ from burg_drake.simulation.trials.result import TrialResult
 from burg_drake.station.document.engine import ENGINES
 
 OBJECTS = ("box", "can", "marble", "mug", "bowl", "banana", "bottle", "screwdriver")
-KINDS = ("truth", "pieces", "compliant_pieces", "mesh", "primitive", "tets")
+KINDS = ("truth", "surface", "pieces", "compliant_pieces", "mesh", "primitive", "tets")
 CONE = np.deg2rad(60.0)
 TET_EDGE = 0.02
 """Length of the tetrahedra's edges as a share of the object's diagonal."""
@@ -148,8 +149,9 @@ def represented(
             return None
         contact, count = dataclasses.replace(contact, mesh="contact.vtk"), f"{tets} tets"
     else:
+        pieces = [trimesh.load_mesh(library.path(p), process=False) for p in entry.pieces]
         try:
-            contact, written = contact_geometry(kind, surface, surface.is_watertight, [], home)
+            contact, written = contact_geometry(kind, surface, surface.is_watertight, pieces, home)
         except MeshError:
             return None
         if contact.primitive is not None:
@@ -157,12 +159,14 @@ def represented(
         if written:
             faces = (home / written[0]).read_text().count("\nf ")
             count = f"{faces} faces"
-    pieces = [Path(p).relative_to(name).as_posix() for p in entry.pieces]
-    text = model_sdf(name, entry.mass_properties, entry.friction, "mesh.obj", pieces, contact)
+    names = [Path(p).relative_to(name).as_posix() for p in entry.pieces]
+    text = model_sdf(name, entry.mass_properties, entry.friction, "mesh.obj", names, contact)
     if kind == "tets":
         soft = f"<drake:hydroelastic_modulus>{DEFAULT_CONTACT.modulus}</drake:hydroelastic_modulus>"
         text = text.replace("<drake:rigid_h", f"{soft}<drake:compliant_h")
     (folder / entry.sdf).write_text(text)
+    if contact.mesh:
+        contact = dataclasses.replace(contact, mesh=f"{name}/{contact.mesh}")
     objects = {name: dataclasses.replace(entry, contact=contact)}
     document = dataclasses.replace(library.document, objects=objects)
     return ObjectLibrary(document, folder), folder / "scene.yaml", count

@@ -15,7 +15,6 @@ from burg_drake.objects.collision import deviation_warning, pieces_instead
 from burg_drake.objects.library import ObjectEntry, ObjectLibrary
 from burg_drake.objects.meshes import mesh_hash
 from burg_drake.objects.physics import implausible
-from burg_drake.pipeline.keys import VERSION
 from burg_drake.pipeline.record import (
     Record,
     entry_hash,
@@ -80,7 +79,7 @@ def _file_issues(library: ObjectLibrary, name: str, entry: ObjectEntry) -> Itera
         yield _issue(
             name, "missing", f"{library.root / missing[0]} is missing{more}; build it again"
         )
-    if record is None or record.version != VERSION:
+    if record is None:
         text = f"{home} was built by another release; build it again"
         yield _issue(name, "stale", text)
     else:

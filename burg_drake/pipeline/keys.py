@@ -18,11 +18,7 @@ from burg_drake.pipeline.cutting import FINER, MOST_PIECES
 from burg_drake.pipeline.source import ObjectSource, check_source
 
 VERSION = 3
-"""Raise it when any stage gives other results for the same input, so that all objects are built
-again; their visual meshes and pieces are kept."""
-
-SHAPE_VERSION = 2
-"""Raise it as well when these two change, of which the pieces take longest."""
+"""Raise it when a stage gives other results for the same input; everything is then built anew."""
 
 
 @dataclass(frozen=True)
@@ -65,11 +61,9 @@ def stage_keys(source: ObjectSource, confirm: bool) -> StageKeys:
     thickness = None if source.wall_thickness is None else float(source.wall_thickness)
     makers = (_release("trimesh"), _release("manifold3d"))
     surface = (mesh, float(source.scale), thickness, source.openings, *makers)
-    visual = content_hash(SHAPE_VERSION, "opaque visual", *surface, _floats(source.rgba))
+    visual = content_hash(VERSION, "opaque visual", *surface, _floats(source.rgba))
     maker = [_release("coacd"), *FINER, MOST_PIECES] if given is None else []
-    pieces = content_hash(
-        SHAPE_VERSION, "pieces", *surface, given, asdict(source.decomposition), *maker
-    )
+    pieces = content_hash(VERSION, "pieces", *surface, given, asdict(source.decomposition), *maker)
     rest = content_hash(
         VERSION,
         "rest",

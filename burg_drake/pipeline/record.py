@@ -128,6 +128,16 @@ def is_object_folder(home: Path) -> bool:
     return data is not None and "keys" in data
 
 
+def touched_by_pieces(home: Path) -> bool:
+    """Whether pads touch the convex pieces of what a build, of any release, left in a folder."""
+    data = _read_json(home) or {}
+    geometry = data.get("geometry")
+    if not isinstance(geometry, dict):
+        return False
+    contact = geometry.get("contact", {})
+    return isinstance(contact, dict) and contact.get("kind", "pieces") == "pieces"
+
+
 def file_hashes(home: Path) -> dict[str, str]:
     """SHA-256 of all files of an object's folder but the record, by name."""
     files = sorted(p for p in home.rglob("*") if p.is_file() and p.name != RECORD_FILE)

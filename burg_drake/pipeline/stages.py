@@ -33,6 +33,7 @@ from burg_drake.pipeline.record import (
     intact,
     is_as_built,
     read_record,
+    touched_by_pieces,
     write_record,
 )
 from burg_drake.pipeline.source import ObjectSource
@@ -89,7 +90,7 @@ def build_object(
         BurgError: the object cannot be built.
     """
     home = root / source.name
-    before = read_record(home)
+    before, had_pieces = read_record(home), touched_by_pieces(home)
     seconds: dict[str, float] = {}
     folder: Path | None = None
     if (
@@ -124,21 +125,15 @@ def build_object(
     # again.
     write_record(target, record)
     atomic_write(target / f"{source.name}.sdf", sdf)
-    notes = _notes(source, geometry, properties, before)
+    notes = _notes(source, geometry, properties)
+    if had_pieces and geometry.contact.kind == "surface":
+        notes.append("built again: pads now touch the object's own surface")
     return Built(folder, entry, tuple(notes), seconds)
 
 
-def _notes(
-    source: ObjectSource, geometry: Geometry, properties: MassProperties, before: Record | None
-) -> list[str]:
-    """What the user should know of a built object, and of what there was `before`."""
+def _notes(source: ObjectSource, geometry: Geometry, properties: MassProperties) -> list[str]:
+    """What the user should know of a built object."""
     notes = []
-    if (
-        before is not None
-        and before.geometry.contact.kind == "pieces"
-        and (geometry.contact.kind == "surface")
-    ):
-        notes.append("built again: pads now touch the object's own surface")
     if source.mass is None and not source.fixed:
         used = DEFAULT_DENSITY if source.density is None else source.density
         why = "no mass or density given" if source.density is None else "no mass given"

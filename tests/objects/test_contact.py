@@ -8,7 +8,13 @@ import pytest
 import trimesh
 
 from burg_drake.core.errors import MeshError
-from burg_drake.objects.collision.contact import CONTACT_FILE, MESH_FACES, contact_geometry
+from burg_drake.objects.collision.contact import (
+    CONTACT_FILE,
+    MESH_FACES,
+    contact_geometry,
+    pieces_instead,
+)
+from burg_drake.objects.collision.contact_surface import MOST_DISTANCE
 from burg_drake.objects.library.document import load_library
 from burg_drake.objects.library.entry import ContactGeometry
 
@@ -26,7 +32,21 @@ def test_by_itself_it_is_a_primitive_where_one_fits(tmp_path: Path) -> None:
     assert contact.kind == "primitive" and written == ()
     assert contact.primitive is not None and contact.primitive.shape == "cylinder"
     assert contact.fit is not None and contact.fit.hausdorff < 1e-4
-    assert contact_geometry(None, torus(), True, [torus()], tmp_path)[0] == ContactGeometry()
+    contact, written = contact_geometry(None, torus(), True, [cylinder()], tmp_path)
+    assert contact.kind == "surface" and written == (contact.mesh,) == (CONTACT_FILE,)
+    assert contact.fit is not None and contact.fit.hausdorff <= MOST_DISTANCE
+    assert contact.reason == "" and (tmp_path / CONTACT_FILE).exists()
+
+
+def test_pads_meet_the_pieces_where_there_is_no_surface(tmp_path: Path) -> None:
+    holey = trimesh.Trimesh(torus().vertices, torus().faces[1:], process=False)
+    contact, written = contact_geometry(None, holey, False, [torus()], tmp_path)
+    assert contact == ContactGeometry(reason="its surface is not closed") and written == ()
+    assert (
+        pieces_instead(contact)
+        == "pads meet its convex pieces and not its own surface: its surface is not closed"
+    )
+    assert pieces_instead(ContactGeometry()) == ""
 
 
 def test_the_volume_of_an_open_surface_is_that_of_its_pieces(tmp_path: Path) -> None:
@@ -58,6 +78,11 @@ def test_what_cannot_be_is_said(tmp_path: Path) -> None:
     holey = trimesh.Trimesh(torus().vertices, torus().faces[1:], process=False)
     with pytest.raises(MeshError, match=r"^contact 'mesh' needs a closed surface; repair"):
         contact_geometry("mesh", holey, False, [torus()], tmp_path)
+    with pytest.raises(
+        MeshError,
+        match=r"^contact 'surface': its surface is not closed; repair the mesh, or choose",
+    ):
+        contact_geometry("surface", holey, False, [torus()], tmp_path)
     with pytest.raises(MeshError, match=r"no box, cylinder or sphere has about this volume"):
         contact_geometry("primitive", torus(), True, [], tmp_path)
     bottle = load_library("household").surface("bottle")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import time
@@ -272,6 +273,21 @@ def test_given_pieces_become_the_collision_geometry(tmp_path: Path) -> None:
     entry = report.library.entry("box")
     assert len(entry.pieces) == 2
     assert report.library.path(entry.sdf).read_text().count("<drake:declare_convex/>") == 2
+
+
+def test_objects_of_before_get_a_surface_and_are_told(tmp_path: Path) -> None:
+    torus = trimesh.creation.torus(0.04, 0.012)
+    source = ObjectSource(name="ring", mesh=torus, mass=0.1, pieces=(torus.convex_hull,))
+    first = build_library([source], tmp_path, confirm=False)
+    assert first.library.entry("ring").contact.kind == "surface"
+    record = tmp_path / "ring" / "build.json"
+    data = json.loads(record.read_text())
+    del data["geometry"]["contact"]
+    record.write_text(json.dumps({**data, "version": 2}))
+    again = build_library([source], tmp_path, confirm=False)
+    assert again.built == ("ring",)
+    told = "built again: pads now touch the object's own surface"
+    assert told in again.notes["ring"] and told not in first.notes["ring"]
 
 
 def test_open_meshes_become_walls(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ import trimesh
 
 from burg_drake.core.documents.schema import save_document
 from burg_drake.objects.library.document import ObjectLibrary, load_library
+from burg_drake.objects.library.entry import ContactGeometry
 from burg_drake.pipeline.build import build_library
 from burg_drake.pipeline.check import check_library
 from burg_drake.pipeline.source import ObjectSource
@@ -129,6 +130,23 @@ def test_faults(library: ObjectLibrary, fault: Fault, kind: str, message: str) -
     issues = [i for i in check_library(load_library(library.root)) if i.is_error]
     assert kind in [issue.kind for issue in issues]
     assert message in next(issue.message for issue in issues if issue.kind == kind)
+
+
+def test_pads_that_meet_pieces_are_told(tmp_path: Path) -> None:
+    torus = trimesh.creation.torus(0.04, 0.012)
+    source = ObjectSource(name="ring", mesh=torus, mass=0.1, pieces=(torus.convex_hull,))
+    report = build_library([source], tmp_path / "lib", confirm=False)
+    library = report.library
+    closed = library.entry("ring").contact
+    assert closed.kind == "surface" and closed.mesh == "ring/contact.obj"
+    assert not [n for n in report.notes.get("ring", ()) if "pads" in n]
+    reason = "its surface is not closed"
+    entry = replace(library.entry("ring"), contact=ContactGeometry(reason=reason))
+    document = replace(library.document, objects={"ring": entry})
+    told = [i for i in check_library(ObjectLibrary(document, library.root)) if "pads" in i.message]
+    assert [(i.kind, i.message) for i in told] == [
+        ("unsure", f"pads meet its convex pieces and not its own surface: {reason}")
+    ]
 
 
 def test_implausible_values(tmp_path: Path) -> None:

@@ -187,7 +187,7 @@ KNOWN = (
          " wall"),
         (one("    contact: hull\n"),
          "FILE:5: objects.mug.contact: 'hull' is not valid; known: compliant_pieces, mesh, pieces,"
-         " primitive"),
+         " primitive, surface"),
         (one("    center_of_mass: [0, 0]\n"),
          "FILE:5: objects.mug.center_of_mass: has 2 entries; expected 3"),
         (one("    inertia: [1, 1, 1]\n"),

@@ -10,7 +10,10 @@ that of the rigid pieces; verdicts against a rigid mesh of full resolution at `r
   objects meet by point contact of their convex hulls, so that a mug is solid to a marble;
 * a compliant mesh of tetrahedra of the mug took 48 s to make and 12 times as long to simulate.
 
-Hence by itself an object is a primitive where one fits, and its pieces otherwise.
+Gripper pads, though, feel the pieces' seams and bulges, which are none of the object's. Hence by
+itself an object is a primitive where one fits; otherwise pads meet its closed, decimated surface,
+and all else its pieces. Where it has no such surface, pads meet the pieces as well, and the entry
+says why.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from burg_drake.core import Array, MeshError
-from burg_drake.objects.collision.fit import surface_distance
+from burg_drake.objects.collision.fit import distances, surface_distance
 from burg_drake.objects.library import Fit
 from burg_drake.objects.meshes import coarser_surfaces
 from burg_drake.objects.physics import spread_over
@@ -36,6 +36,12 @@ those of a scan jump from face to face, and a pad that yields feels none of it."
 
 MOST_FACES = 10_000
 """A surface with more faces costs more in simulation than it tells."""
+
+DIGITS = 7
+"""Of coordinates in metres: enough for the bounds, and a third of the file."""
+
+SPREAD = 0.8
+"""Mean distance over the largest one, at most, of surfaces that are worth a look."""
 
 THINNEST = 1e-6
 """Smallest height of a face [m]: Drake finds no normal of a thinner one."""
@@ -60,12 +66,14 @@ def contact_surface(surface: trimesh.Trimesh, closed: bool) -> tuple[trimesh.Tri
     """
     if not closed:
         raise MeshError("its surface is not closed")
-    for mesh in reversed(coarser_surfaces(surface)):
-        if len(mesh.faces) > MOST_FACES:
+    normals = SurfaceNormals(surface)
+    for rung in reversed(coarser_surfaces(surface, SPREAD * MOST_DISTANCE)):
+        if len(rung.faces) > MOST_FACES:
             break
-        if thinnest(mesh) < THINNEST or turned_share(mesh, surface) > TURNED:
+        mesh = trimesh.Trimesh(np.round(rung.vertices, DIGITS), rung.faces, process=False)
+        if thinnest(mesh) < THINNEST or normals.turned_share(mesh) > TURNED:
             continue
-        distance = surface_distance(surface, mesh)
+        distance = surface_distance(mesh, surface, MOST_DISTANCE)
         if distance <= MOST_DISTANCE:
             return mesh, Fit(volume_ratio=float(mesh.volume / surface.volume), hausdorff=distance)
     raise MeshError(
@@ -74,25 +82,53 @@ def contact_surface(surface: trimesh.Trimesh, closed: bool) -> tuple[trimesh.Tri
     )
 
 
-def turned_share(mesh: trimesh.Trimesh, surface: trimesh.Trimesh) -> float:
-    """Share of a mesh's area whose normals are more than `MOST_ANGLE` off those of a surface, both
-    of the nearest place, and of the mean around it."""
-    points, face = spread_over(mesh, SAMPLES)
-    normals = np.asarray(mesh.face_normals)[face]
-    samples, owner = spread_over(surface, TARGETS)
-    every = np.concatenate([owner, np.arange(len(surface.faces))])
-    tree = cKDTree(np.vstack([samples, surface.triangles_center]))
-    _, near = tree.query(points, min(CANDIDATES, len(every)))
-    foot, own = _nearest(points, every[near], surface)
-    distance, around = cKDTree(samples).query(
-        foot, NEIGHBOURS, distance_upper_bound=SMOOTHING, workers=1
-    )
-    others = surface.face_normals[owner[np.where(np.isfinite(distance), around, 0)]]
-    facing = np.isfinite(distance) & ((others * own[:, None]).sum(axis=2) > 0.0)
-    mean = (others * facing[..., None]).sum(axis=1)
-    mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300)
-    cosine = np.maximum((own * normals).sum(axis=1), (mean * normals).sum(axis=1))
-    return float((cosine < np.cos(MOST_ANGLE)).mean())
+class SurfaceNormals:
+    """The normals of a surface, at each place and in the mean around it.
+
+    Args:
+        surface: [m].
+    """
+
+    def __init__(self, surface: trimesh.Trimesh) -> None:
+        self.triangles = np.asarray(surface.triangles)
+        self.normals = np.asarray(surface.face_normals)
+        self.samples, self.owner = spread_over(surface, TARGETS)
+        self.every = np.concatenate([self.owner, np.arange(len(self.triangles))])
+        self.places = cKDTree(np.vstack([self.samples, self.triangles.mean(axis=1)]))
+        self.even = cKDTree(self.samples)
+        alike = SMOOTHING * self.normals[self.owner]
+        self.alike = cKDTree(np.hstack([self.samples, alike]))
+
+    def turned_share(self, mesh: trimesh.Trimesh) -> float:
+        """Share of a mesh's area whose normals are more than `MOST_ANGLE` off those of the surface,
+        both of the nearest place and of the mean around it."""
+        points, face = spread_over(mesh, SAMPLES)
+        normals = np.asarray(mesh.face_normals)[face]
+        own = self._nearest(points, normals)
+        mean = self._mean(points, own)
+        cosine = np.maximum((own * normals).sum(axis=1), (mean * normals).sum(axis=1))
+        return float((cosine < np.cos(MOST_ANGLE)).mean())
+
+    def _nearest(self, points: Array, normals: Array) -> Array:
+        """Normals (N, 3) of the surface at the nearest places: within `MOST_DISTANCE` at those that
+        face the same way, as near a thin wall its other side may be nearer."""
+        _, near = self.places.query(points, min(CANDIDATES, len(self.every)))
+        _, alike = self.alike.query(np.hstack([points, SMOOTHING * normals]), CANDIDATES)
+        which = np.hstack([self.every[near], self.owner[alike]])
+        apart = distances(points[:, None], self.triangles[which])
+        facing = (self.normals[which] * normals[:, None]).sum(axis=2) > 0.0
+        apart -= np.where(facing & (apart <= MOST_DISTANCE), MOST_DISTANCE, 0.0)
+        return np.asarray(self.normals[which[np.arange(len(points)), apart.argmin(axis=1)]])
+
+    def _mean(self, points: Array, own: Array) -> Array:
+        """Normals (N, 3) in the mean around points, of what faces the same way as `own`."""
+        distance, around = self.even.query(points, NEIGHBOURS, distance_upper_bound=SMOOTHING)
+        within = np.isfinite(distance)
+        others = self.normals[self.owner[np.where(within, around, 0)]]
+        facing = within & ((others * own[:, None]).sum(axis=2) > 0.0)
+        mean = (others * facing[..., None]).sum(axis=1)
+        length = np.linalg.norm(mean, axis=1, keepdims=True)
+        return np.asarray(mean / np.maximum(length, 1e-300))
 
 
 def excess(mesh: trimesh.Trimesh, pieces: Sequence[trimesh.Trimesh]) -> float:
@@ -102,7 +138,9 @@ def excess(mesh: trimesh.Trimesh, pieces: Sequence[trimesh.Trimesh]) -> float:
     for piece in pieces:
         planes = np.asarray(piece.face_normals)
         offset = (planes * piece.triangles[:, 0]).sum(axis=1)
-        height = np.minimum(height, (points @ planes.T - offset).max(axis=1))
+        for some in np.array_split(np.arange(len(points)), max(1, len(planes) // 100)):
+            above = (points[some] @ planes.T - offset).max(axis=1)
+            height[some] = np.minimum(height[some], above)
     return max(0.0, float(height.max()))
 
 
@@ -111,14 +149,3 @@ def thinnest(mesh: trimesh.Trimesh) -> float:
     t = np.asarray(mesh.triangles)
     longest = np.linalg.norm(t - np.roll(t, 1, axis=1), axis=2).max(axis=1)
     return float((2.0 * mesh.area_faces / np.maximum(longest, 1e-300)).min())
-
-
-def _nearest(points: Array, which: Array, surface: trimesh.Trimesh) -> tuple[Array, Array]:
-    """The nearest points (N, 3) on faces `which` (N, K) of a surface, and its normals there."""
-    count, faces = which.shape
-    repeated = np.repeat(points, faces, axis=0)
-    closest = trimesh.triangles.closest_point(surface.triangles[which.reshape(-1)], repeated)
-    apart = np.linalg.norm(closest - repeated, axis=1).reshape(count, faces)
-    best = np.arange(count), apart.argmin(axis=1)
-    foot = closest.reshape(count, faces, 3)[best]
-    return foot, np.asarray(surface.face_normals)[which[best]]

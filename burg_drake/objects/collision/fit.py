@@ -111,9 +111,17 @@ def union_mesh(parts: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
     return trimesh.Trimesh(np.asarray(mesh.vert_properties)[:, :3], faces, process=False)
 
 
-def surface_distance(one: trimesh.Trimesh, other: trimesh.Trimesh) -> float:
-    """Hausdorff distance of two surfaces [m]: of vertices and dense samples, both ways."""
-    return max(_farthest(_points(one)[0], other), _farthest(_points(other)[0], one))
+def surface_distance(one: trimesh.Trimesh, other: trimesh.Trimesh, enough: float = np.inf) -> float:
+    """Hausdorff distance of two surfaces [m]: of vertices and dense samples, both ways.
+
+    Where it is above `enough`, a distance above that is found sooner.
+    """
+    points = _points(other)[0]
+    largest = _farthest(points[:: max(1, len(points) // SAMPLES)], one, enough)
+    for some, surface in ((points, one), (_points(one)[0], other)):
+        if largest <= enough:
+            largest = max(largest, _farthest(some, surface, enough))
+    return largest
 
 
 def _points(surface: trimesh.Trimesh) -> tuple[Array, Array]:
@@ -147,12 +155,12 @@ def _reached(points: Array, normals: Array, parts: Sequence[trimesh.Trimesh]) ->
     return clear
 
 
-def _farthest(points: Array, surface: trimesh.Trimesh) -> float:
+def _farthest(points: Array, surface: trimesh.Trimesh, enough: float = np.inf) -> float:
     """Largest distance of points (N, 3) to a surface [m].
 
     The distance to the nearest sample is an upper bound of that to the surface, that to the
     triangles of the nearest samples a better one, mostly exact. Points are looked at in the order
-    of these bounds, until they are below what was found.
+    of these bounds, until they are below what was found, or that is above `enough`.
     """
     samples, faces = _spread(surface)
     tree = cKDTree(samples)
@@ -164,15 +172,15 @@ def _farthest(points: Array, surface: trimesh.Trimesh) -> float:
     largest = 0.0
     for start in range(0, len(order), ROUND):
         some = points[order[start : start + ROUND]]
-        if bound[order[start]] <= largest + RESOLUTION:
+        if bound[order[start]] <= largest + RESOLUTION or largest > enough:
             break
         _, near = tree.query(some, k=min(CANDIDATES, len(samples)))
-        nearer = _distances(some[:, None], triangles[faces[near]]).min(axis=1)
+        nearer = distances(some[:, None], triangles[faces[near]]).min(axis=1)
         for i in np.argsort(-nearer, kind="stable"):
-            if nearer[i] <= largest + RESOLUTION:
+            if nearer[i] <= largest + RESOLUTION or largest > enough:
                 break
             possible = np.linalg.norm(middle - some[i], axis=1) - reach <= nearer[i] + 1e-12
-            exact = _distances(some[i][None], triangles[possible])
+            exact = distances(some[i][None], triangles[possible])
             largest = max(largest, float(exact.min()))
     return largest
 
@@ -184,7 +192,7 @@ def _spread(surface: trimesh.Trimesh) -> tuple[Array, Array]:
     return np.vstack([points, middle]), np.concatenate([face, np.arange(len(middle))])
 
 
-def _distances(points: Array, triangles: Array) -> Array:
+def distances(points: Array, triangles: Array) -> Array:
     """Distances [m] of points (..., 1, 3) to triangles (..., K, 3, 3), as (..., K)."""
     a, b, c = triangles[..., 0, :], triangles[..., 1, :], triangles[..., 2, :]
     squared = np.minimum.reduce([_to_segment(points, p, q) for p, q in ((a, b), (b, c), (c, a))])

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from burg_drake.core import Array
 from burg_drake.objects.meshes.cleaning import bodies, encloses, signed_volume
+from burg_drake.objects.meshes.quadrics import collapsed
 
 COUNTED_TWICE = 1e-4
 """Bodies are united when their overlap is above this share of their volumes' sum; below it they
@@ -24,8 +25,15 @@ DECIMATION = (1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3)
 diagonal: 0.02 to 0.4 mm on a mug. In turn they leave fewer faces nearer to the surface than the
 last one at once: a bottle's 262,080 faces, noise 0.1 mm, became 6,288 and 34,594."""
 
-COARSER = (2e-5, 4e-5, 6e-5, 8e-5, 1e-4, 1.2e-4, 1.4e-4, 1.7e-4, 2e-4, 2.4e-4, 3e-4, 4e-4)
-"""Tolerances of ever coarser surfaces [m]."""
+CLEARED = (1e-6, 1e-5, 2e-5, 4e-5, 8e-5, 1.2e-4)
+"""Tolerances [m] at which Manifold, which is fast, takes most faces away before edges are collapsed
+in the order of what it costs."""
+
+COLLAPSED, MOST_COLLAPSED = 20_000, 100_000
+"""Faces that are few enough for that, and so many that it would take longer than 20 s."""
+
+FEWEST, RUNG = 20, 0.9
+"""Faces of the coarsest surface, and of each over those of the one before."""
 
 BOUNDARIES = 400
 """Most bodies that are looked through for cavities and overlaps."""
@@ -130,25 +138,34 @@ def decimated(surface: trimesh.Trimesh, max_faces: int) -> tuple[trimesh.Trimesh
     ]
 
 
-def coarser_surfaces(surface: trimesh.Trimesh) -> list[trimesh.Trimesh]:
+def coarser_surfaces(surface: trimesh.Trimesh, most_distance: float) -> list[trimesh.Trimesh]:
     """The surface itself, and ever coarser ones, each made of the one before.
 
     Args:
         surface: closed, wound outward.
+        most_distance: about how far the coarsest are from it, in the mean [m].
 
     Returns:
-        Closed surfaces, finest first.
+        Closed surfaces, finest first, each with about `RUNG` times the faces of the one before.
     """
     found, manifold = [surface], _manifold(surface)
-    for tolerance in COARSER:
-        if manifold is None:
+    for tolerance in CLEARED:
+        if manifold is None or len(found[-1].faces) <= COLLAPSED:
             break
         manifold = manifold.simplify(tolerance)
-        merged = _merged(_mesh(manifold))
-        if not is_closed(merged) or signed_volume(merged) <= 0.0:
-            break
-        found.append(merged)
+        _append_closed(found, _merged(_mesh(manifold)))
+    finest = found[-1]
+    if len(finest.faces) > MOST_COLLAPSED:
+        return found
+    rungs = collapsed(np.asarray(finest.vertices), finest.faces, most_distance, FEWEST, RUNG)
+    for vertices, faces in rungs:
+        _append_closed(found, trimesh.Trimesh(vertices, faces, process=False))
     return found
+
+
+def _append_closed(found: list[trimesh.Trimesh], mesh: trimesh.Trimesh) -> None:
+    if is_closed(mesh) and signed_volume(mesh) > 0.0:
+        found.append(mesh)
 
 
 def one_sided_hausdorff(points: Array, surface: trimesh.Trimesh) -> float:

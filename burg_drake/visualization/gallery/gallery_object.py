@@ -135,6 +135,7 @@ def _touching(entry: ObjectEntry) -> str:
     if entry.contact.primitive is not None:
         return entry.contact.primitive.shape
     return {
+        "surface": "rigid surface to pads",
         "pieces": "rigid pieces",
         "compliant_pieces": "compliant pieces",
         "mesh": "rigid mesh",

@@ -20,6 +20,7 @@ POSE_SIZE = (160, 120)
 """Pictures of stable poses [pixel]."""
 
 KINDS = {
+    "surface": "surface to pads, convex pieces to others",
     "pieces": "convex pieces, rigid",
     "compliant_pieces": "convex pieces, compliant",
     "mesh": "surface mesh, rigid",
@@ -143,7 +144,7 @@ def source_line(entry: ObjectEntry) -> str:
 def _figures(entry: ObjectEntry) -> list[Html]:
     mass = entry.mass_properties
     size = [b - a for a, b in zip(entry.lower, entry.upper, strict=True)]
-    pieces = entry.contact.kind in ("pieces", "compliant_pieces")
+    pieces = entry.contact.kind in ("surface", "pieces", "compliant_pieces")
     fit = entry.fit if pieces else entry.contact.fit
     about = "" if mass.source == "given" else "~"
     wall = mass.wall_thickness
