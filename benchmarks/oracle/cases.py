@@ -169,7 +169,7 @@ def hardened(case: Case) -> Case | None:
 
 
 def _settled(case: Case, other: Case) -> Case | None:
-    """The case with its verdict, if that stands small changes of friction and is not the other's."""
+    """The case with its verdict, if that stands small changes of friction and not the other's."""
     verdict = judge(case)
     if verdict.fouled or judge(other).lifted == verdict.lifted:
         return None

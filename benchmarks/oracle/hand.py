@@ -1,8 +1,8 @@
 """The hand and the phases of a trial, in numbers: what oracle and engine have in common.
 
 The figures are those of `models/panda/panda_hand.sdf`, `models/hands/panda_hand.yaml` and the
-default settings of a trial, written down again. Everything is in the grasp frame G: midway between the
-pads, +x the closing direction, +z the approach.
+default settings of a trial, written down again. Everything is in the grasp frame G: midway between
+the pads, +x the closing direction, +z the approach.
 """
 
 from __future__ import annotations
