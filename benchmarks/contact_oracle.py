@@ -13,7 +13,12 @@ oracle judges 3 % less and 3 % more friction as well: where its verdict changes,
 marginal, and counts apart. Two canaries always run: engines that are known to be worse, which must
 show.
 
-`--converge` has the oracle judge the hard cases at half the step and with twice as many samples.
+The oracle also judges every grasp over a table as soft as the engine's, of 1/150 of the stiffness,
+and with pads of twice the damping. Where its verdict changes, the grasp hinges on what neither
+method knows of the world; it counts, but is told apart.
+
+`--converge` has the oracle judge the hard cases at half the step and with twice as many samples: of
+72, no verdict changes.
 
 FOLDER keeps the library and a journal (trials.jsonl): a run that was interrupted goes on where it
 was. After a change of contact geometry or engine take a new folder.
@@ -31,7 +36,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, get_args
 
-from contact_oracle_report import print_convergence, print_report
+from contact_oracle_report import Probes, print_convergence, print_report
 from contact_oracle_trials import CANARIES, KNOWN, build, run_engine
 from oracle.cases import MARGIN, Case, draw_cases, judge, load_cases
 from oracle.catalogue import HELD_OUT, SPACING, TUNED
@@ -47,6 +52,11 @@ FINER = {
     "half the step": (Numerics(step=DEFAULT_NUMERICS.step / 2), SPACING),
     "twice the samples": (DEFAULT_NUMERICS, SPACING / 2**0.5),
 }
+HINGES = {
+    "soft table": Numerics(table_stiffness=1e6 / 0.05),
+    "twice the damping": Numerics(dissipation=2.0 * DEFAULT_NUMERICS.dissipation),
+}
+"""Other worlds. The engine's table is a box 0.1 m thick with a modulus of 1e6 Pa."""
 CHUNK = 4
 """Trials that a worker executes before it reports."""
 
@@ -59,7 +69,7 @@ class Run:
 
     Attributes:
         case: the grasp.
-        label: an engine's name, `oracle`, or one of PROBES and FINER.
+        label: an engine's name, `oracle`, or one of PROBES, FINER and HINGES.
         library: folder of the objects.
     """
 
@@ -97,7 +107,8 @@ def main() -> None:
     else:
         library = str(build(arguments.output / "library", arguments.contact).resolve())
         engines = list(dict.fromkeys((*(arguments.engine or ENGINES), *CANARIES)))
-        labels += [*PROBES, *engines] if arguments.all is not None else engines
+        labels += [*HINGES, *engines]
+        labels += PROBES if arguments.all is not None else []
     journal = Journal(arguments.output / "trials.jsonl")
     runs = [Run(case, label, library) for label in labels for case in cases]
     with ProcessPoolExecutor(arguments.workers, get_context("spawn")) as pool:
@@ -107,7 +118,7 @@ def main() -> None:
         print_convergence(cases, list(FINER), rows)
     else:
         probes = list(PROBES) if arguments.all is not None else []
-        print_report(cases, engines, probes, rows)
+        print_report(cases, engines, Probes(probes, list(HINGES)), rows)
 
 
 def random_cases(each: int) -> list[Case]:
@@ -161,7 +172,8 @@ def execute_one(run: Run) -> Row:
     if run.label in KNOWN:
         row = run_engine(run.library, run.case, run.label)
     else:
-        numerics, spacing = FINER.get(run.label, (DEFAULT_NUMERICS, SPACING))
+        world = HINGES.get(run.label, DEFAULT_NUMERICS)
+        numerics, spacing = FINER.get(run.label, (world, SPACING))
         found = judge(run.case, PROBES.get(run.label, 1.0), numerics, spacing)
         row = {
             "lifted": found.lifted,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,19 +15,30 @@ ORACLE = "oracle"
 Rows = Mapping[tuple[str, str], dict[str, Any]]
 
 
-def print_report(
-    cases: Sequence[Case], engines: Sequence[str], probes: Sequence[str], rows: Rows
-) -> None:
+@dataclass(frozen=True)
+class Probes:
+    """What else the oracle judged.
+
+    Attributes:
+        friction: small changes of friction; of hard cases none are needed.
+        worlds: other tables and pads.
+    """
+
+    friction: Sequence[str]
+    worlds: Sequence[str]
+
+
+def print_report(cases: Sequence[Case], engines: Sequence[str], probes: Probes, rows: Rows) -> None:
     """Prints the tables and the disagreements.
 
     Args:
         cases: all cases.
         engines: names.
-        probes: the oracle's small changes of friction; of hard cases none are needed.
+        probes: what else the oracle judged.
         rows: by case and label.
     """
     usable = [c for c in cases if is_usable(c, engines, rows)]
-    marginal = [c for c in usable if is_marginal(c, probes, rows)]
+    marginal = [c for c in usable if changes(c, probes.friction, rows)]
     settled = [c for c in usable if c not in marginal]
     lifted = sum(rows[c.id, ORACLE]["lifted"] for c in settled)
     print(f"{len(settled)} grasps, {lifted} of them lifted by the oracle")
@@ -38,9 +50,10 @@ def print_report(
         "all": settled,
         "tuned": [c for c in settled if not c.held_out],
         "held out": [c for c in settled if c.held_out],
+        "the same in other worlds": [c for c in settled if not changes(c, probes.worlds, rows)],
         "marginal": marginal,
     }
-    print(f"\n{'agreement with the oracle':32} {'':7}  {'95 % interval':>16} {'of':>6}"
+    print(f"\n{'agreement with the oracle':40} {'':7}  {'95 % interval':>16} {'of':>6}"
           f" {'false lifts':>11} {'false drops':>11}")  # fmt: skip
     for engine in engines:
         for group, chosen in groups.items():
@@ -48,7 +61,7 @@ def print_report(
                 print_agreement(f"{engine}, {group}", engine, chosen, rows)
     print_objects(settled, engines, rows)
     for engine in engines:
-        print_disagreements(engine, settled, rows)
+        print_disagreements(engine, settled, probes, rows)
 
 
 def print_convergence(cases: Sequence[Case], finer: Sequence[str], rows: Rows) -> None:
@@ -65,9 +78,9 @@ def is_usable(case: Case, engines: Sequence[str], rows: Rows) -> bool:
     return all(rows[case.id, label]["executed"] for label in (ORACLE, *engines))
 
 
-def is_marginal(case: Case, probes: Sequence[str], rows: Rows) -> bool:
-    """Whether the oracle's verdict changes with a small change of friction."""
-    return any(differs(case, label, rows) for label in probes)
+def changes(case: Case, labels: Sequence[str], rows: Rows) -> list[str]:
+    """With which of these the oracle contradicts itself."""
+    return [label for label in labels if differs(case, label, rows)]
 
 
 def differs(case: Case, label: str, rows: Rows) -> bool:
@@ -77,10 +90,10 @@ def differs(case: Case, label: str, rows: Rows) -> bool:
 
 def print_times(cases: Sequence[Case], labels: Sequence[str], rows: Rows) -> None:
     """CPU time of a trial."""
-    print(f"\n{'CPU time of a trial [s]':32} {'median':>7} {'mean':>7}")
+    print(f"\n{'CPU time of a trial [s]':40} {'median':>7} {'mean':>7}")
     for label in labels:
         cpu = [rows[c.id, label]["cpu"] for c in cases]
-        print(f"{label:32} {np.median(cpu):7.2f} {np.mean(cpu):7.2f}")
+        print(f"{label:40} {np.median(cpu):7.2f} {np.mean(cpu):7.2f}")
 
 
 def print_agreement(title: str, engine: str, cases: Sequence[Case], rows: Rows) -> None:
@@ -90,7 +103,7 @@ def print_agreement(title: str, engine: str, cases: Sequence[Case], rows: Rows) 
     same = len(cases) - len(wrong)
     low, high = wilson_interval(same, len(cases))
     print(
-        f"{title:32} {same / len(cases):7.2%}  {low:6.1%} to {high:6.1%} {len(cases):6}"
+        f"{title:40} {same / len(cases):7.2%}  {low:6.1%} to {high:6.1%} {len(cases):6}"
         f" {lifts:11} {len(wrong) - lifts:11}"
     )
 
@@ -109,15 +122,16 @@ def print_objects(cases: Sequence[Case], engines: Sequence[str], rows: Rows) -> 
         print(f"{label:22} {len(own):4}" + "".join(f"{cell:>12}" for cell in cells))
 
 
-def print_disagreements(engine: str, cases: Sequence[Case], rows: Rows) -> None:
-    """Every grasp on which an engine disagrees, with the margins of both."""
+def print_disagreements(engine: str, cases: Sequence[Case], probes: Probes, rows: Rows) -> None:
+    """Every grasp on which an engine disagrees, with the margins of both, and on what it hinges."""
     wrong = [c for c in cases if differs(c, engine, rows)]
     if not wrong:
         return
     print(f"\n{engine} disagrees on {len(wrong)} grasps")
     print(f"{'grasp':22} {'friction':>8} {'mass':>8} {'oracle':>34} | {engine:>34}")
     for case in wrong:
-        print(f"{line(case, rows)} | {outcome(rows[case.id, engine])}")
+        hinges = ", ".join(changes(case, probes.worlds, rows))
+        print(f"{line(case, rows)} | {outcome(rows[case.id, engine])}  {hinges}")
 
 
 def line(case: Case, rows: Rows) -> str:
