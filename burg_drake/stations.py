@@ -27,6 +27,7 @@ from burg_drake.station.document import (
     Table as Table,
 )
 from burg_drake.station.world import (
+    ContactParts as ContactParts,
     FixedBox as FixedBox,
     HandFigures as HandFigures,
 )

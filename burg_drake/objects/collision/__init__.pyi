@@ -9,6 +9,7 @@ from .decomposition import (
 )
 from .feet import (
     FLAT as FLAT,
+    carrying_corners as carrying_corners,
     support_feet as support_feet,
 )
 from .fit import (

@@ -16,10 +16,11 @@ from burg_drake.core import Array
 
 FLAT = 1.5e-4
 """Corners that are no higher than this over the lowest one of a pose carry the object in it [m]."""
-CARRYING = 5e-4
-"""The polygon of the corners that carry an object is kept to this [m] ..."""
 MOST_CARRYING = 12
-"""... with so many of them, which make 0.97 of a circle at least."""
+"""Of the corners that carry an object, so many count: those that reach farthest in as many
+directions. They keep 0.96 of a circle at least."""
+WITHIN = 5e-4
+"""How far within its polygon a centre of mass is over it, so that the object stands [m]."""
 ANYWHERE = 4e-3
 """In any other direction the hull is kept to this [m]: nothing comes to rest there."""
 ROUND = 3e-4
@@ -30,8 +31,13 @@ AROUND = 180
 """Directions about an axis; 2 degrees apart."""
 
 
-def support_feet(corners: Array, ups: Sequence[Array], rolling: Sequence[Array] = ()) -> Array:
-    """Chooses the feet of an object.
+def support_feet(
+    corners: Array,
+    ups: Sequence[Array],
+    rolling: Sequence[Array] = (),
+    carrying: Sequence[int] | NDArray[np.intp] = (),
+) -> NDArray[np.intp]:
+    """Chooses the feet of an object among the corners of its hull.
 
     The choice is the object's own: which way it is turned about the vertical does not enter.
 
@@ -40,20 +46,50 @@ def support_feet(corners: Array, ups: Sequence[Array], rolling: Sequence[Array] 
         ups: (3,) the plane's normals in O, in poses in which the object rests: it is carried in
             them as by all its corners.
         rolling: (3,) those of poses from which it can roll on.
+        carrying: corners that carry it in the first of `ups`; by default the lowest ones.
 
     Returns:
-        (F, 3) corners of the hull in O [m].
+        Indices of corners, in their order.
     """
     chosen: list[int] = []
-    for up in ups:
-        low = _lowest(corners, up)
-        directions = _circle(AROUND) @ _plane(up)
-        chosen += low[_thinned(corners[low], directions, CARRYING, MOST_CARRYING)].tolist()
+    for k, up in enumerate(ups):
+        low = np.asarray(carrying) if k == 0 and len(carrying) else _lowest(corners, up)
+        reach = np.round(corners[low] @ (_circle(MOST_CARRYING) @ _plane(up)).T, 9)
+        chosen += low[reach.argmax(axis=0)].tolist()
     for up in rolling:
         directions = _around(corners, up)
         chosen += _thinned(corners, directions, ROUND, len(corners), chosen)
     chosen += _thinned(corners, _sphere(DIRECTIONS), ANYWHERE, len(corners), chosen)
-    found: Array = corners[np.unique(chosen)]
+    return np.unique(np.array(chosen, dtype=np.intp))
+
+
+def carrying_corners(
+    corners: Array, up: Array, center_of_mass: Array, most: float
+) -> NDArray[np.intp]:
+    """The lowest corners that carry an object which rests on a plane.
+
+    Corners count from the lowest one on until the centre of mass is over their polygon: what came
+    to rest on something soft may stand on fewer when nothing yields.
+
+    Args:
+        corners: (N, 3) corners of the hull in O [m].
+        up: (3,) normal of the plane in O.
+        center_of_mass: (3,) of O [m].
+        most: height over the lowest corner up to which others may count [m].
+
+    Returns:
+        Indices of corners; where that is no support, of those within `FLAT` of the lowest one.
+    """
+    heights = np.round(corners @ up, 9)
+    order = np.argsort(heights, kind="stable")
+    order = order[heights[order] <= heights.min() + most]
+    directions = _circle(AROUND) @ _plane(up)
+    beyond = np.maximum.accumulate((corners[order] - center_of_mass) @ directions.T, axis=0)
+    stands = np.flatnonzero(beyond.min(axis=1) >= WITHIN)
+    flat = heights[order] <= heights.min() + FLAT
+    if len(stands):
+        flat |= heights[order] <= heights[order[stands[0]]]
+    found: NDArray[np.intp] = order[flat]
     return found
 
 

@@ -92,6 +92,13 @@ class ArmTrial(GraspTrial):
         self.steps_per_check = max(1, round(settings.poll / self.engine.time_step))
         self._lift_clearance = cache(partial(ArmLiftClearance, self._plain))
 
+    @property
+    def hand(self) -> MountedHand:
+        """The hand in `world`."""
+        hand = self.world.hand
+        assert isinstance(hand, MountedHand)
+        return hand
+
     def run(
         self,
         instance: str,

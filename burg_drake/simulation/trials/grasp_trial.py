@@ -187,8 +187,7 @@ class GraspTrial:
             robot=self._robot,
             engine=self.engine,
             meshcat=self._meshcat,
-            contact_parts=True,
-            alone=alone,
+            for_trials=alone or True,
         )
         return TrialWorld(diagram, self._handle(diagram), self.settings)
 

@@ -80,6 +80,13 @@ class HandTrial(GraspTrial):
         )
         self._lift_clearance = cache(partial(HandLiftClearance, self._plain))
 
+    @property
+    def hand(self) -> FloatingHand:
+        """The hand in `world`."""
+        hand = self.world.hand
+        assert isinstance(hand, FloatingHand)
+        return hand
+
     def run(
         self,
         instance: str,

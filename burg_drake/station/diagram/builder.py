@@ -80,8 +80,7 @@ def build_station_diagram(
     drivers: bool = False,
     cameras: bool | str | Sequence[str] = False,
     weld_objects: bool = False,
-    contact_parts: bool = False,
-    alone: str | None = None,
+    for_trials: bool | str = False,
 ) -> StationDiagram:
     """Builds the diagram of a scene on a station.
 
@@ -105,10 +104,10 @@ def build_station_diagram(
             stands where it is placed, and can be lifted off by a joint `RISE` of its model along
             world z, and moved sideways with its frame `PLACE`; rigid meshes are replaced by pieces
             (see `world.mesh_pieces`).
-        contact_parts: have the hand meet the own surfaces of objects, and let these stand on the
-            table with feet, as trials do (see `world.contact_parts`).
-        alone: name of an instance that alone can move, with such parts and a hull that meets all
-            but the hand and the table; of the others there are only hulls (see `world.standing`).
+        for_trials: have the hand meet the own surfaces of objects, and let these stand on the table
+            with feet (see `world.contact_parts`). The name of an instance: it alone can move, and a
+            hull of it meets all but the hand and the table; of the others there are only hulls (see
+            `world.standing`).
 
     Returns:
         The diagram. In its default context all stands as the documents say, the hand is open and
@@ -134,6 +133,7 @@ def build_station_diagram(
     table = add_table(plant, station)
     add_board(plant, scene.board, station, markers=bool(cameras) or meshcat is not None)
     add = partial(add_instance, builder, scene, station.packages, by_pieces=weld_objects)
+    alone = for_trials if isinstance(for_trials, str) else None
     if alone is not None:
         free = {alone: add(alone, bare=needs_no_pieces(scene, station, alone))}
     else:
@@ -152,7 +152,7 @@ def build_station_diagram(
     fixed |= add_obstacles(plant, station)
     models = add_robot(builder, station, robot, simulated=not weld_objects)
     parts = ContactParts()
-    if contact_parts or alone is not None:
+    if for_trials:
         parts = add_contact_parts(plant, scene, station, free, fixed, hulls=alone is not None)
 
     plant.Finalize()

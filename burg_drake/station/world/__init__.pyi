@@ -49,10 +49,7 @@ from .rolling import (
     ROLLING as ROLLING,
     is_ball as is_ball,
 )
-from .standing import (
-    add_hull as add_hull,
-    add_standing as add_standing,
-)
+from .standing import add_standing as add_standing
 from .surroundings import (
     DISSIPATION as DISSIPATION,
     OBSTACLE_COLOR as OBSTACLE_COLOR,

@@ -29,7 +29,7 @@ from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 
 from burg_drake.core import Array, make_pose, transform_points
-from burg_drake.objects.collision import FLAT, support_feet
+from burg_drake.objects.collision import FLAT, carrying_corners, support_feet
 from burg_drake.objects.library import DEFAULT_CONTACT, ObjectEntry
 from burg_drake.scene.document import Scene
 from burg_drake.station.document import Station
@@ -46,6 +46,9 @@ RIM_FEET = 8
 RIM = 1e-4
 """The discs on which a cylinder rolls are so thick, and so far within its ends [m]: standing, it
 touches with its feet alone."""
+SETTLED = 1e-3
+"""Corners up to this height over the lowest one may carry what was settled on a compliant table
+[m]."""
 EDGE = 0.05
 """What stands nearer to the table's edge than this may come to lie over it, where feet are no
 support, and keeps its pieces there [m]."""
@@ -147,25 +150,47 @@ def _parts(scene: Scene, name: str, X_WO: Array) -> Iterator[tuple[str, Array, S
     entry, up = scene.entry(name), np.round(X_WO[2, :3], 9)
     primitive = entry.contact.primitive
     if primitive is None:
-        ups = [pose.X_SO.matrix()[2, :3] for pose in entry.stable_poses]
-        rolling = [one for one, pose in zip(ups, entry.stable_poses, strict=True) if pose.rolls]
-        feet = support_feet(support_corners(scene.library, entry), [up, *ups], rolling)
+        feet = _corner_feet(scene, name, X_WO)
     elif primitive.shape == "box":
-        feet = np.array(list(product(*((-s / 2, s / 2) for s in primitive.size))))
-        feet = transform_points(primitive.X_OP.matrix(), feet)
+        corners = np.array(list(product(*((-s / 2, s / 2) for s in primitive.size))))
+        feet = _drawn_in(transform_points(primitive.X_OP.matrix(), corners), X_WO)
     else:
         radius, length = primitive.size
         for k, end in enumerate((-0.5, 0.5)):
             X_OD = primitive.X_OP.matrix() @ make_pose(p_AB=(0.0, 0.0, end * (length - 3.0 * RIM)))
             axis_height = float(up @ X_OD[:3, 2])
             reach = radius * math.sqrt(max(0.0, 1.0 - axis_height**2)) + RIM / 2 * abs(axis_height)
-            lowest = X_WO[2, 3] + float(up @ X_OD[:3, 3]) - reach
-            X_OD[:3, 3] -= _excess(lowest) * up
-            yield f"rim_{k}", X_OD, Cylinder(radius, RIM)
-        feet = transform_points(primitive.X_OP.matrix(), _rim_points(radius, length))
-    heights = X_WO[2, 3] + feet @ up
-    for k, (foot, height) in enumerate(zip(feet, heights.tolist(), strict=True)):
-        yield f"foot_{k:03d}", make_pose(p_AB=foot - _excess(height) * up), Sphere(0.0)
+            sunk = max(0.0, reach - X_WO[2, 3] - float(up @ X_OD[:3, 3]))
+            lies = abs(axis_height) < math.sqrt(0.5)
+            X_OD[:3, 3] += 0.0 if lies else sunk * up
+            yield f"rim_{k}", X_OD, Cylinder(radius - (sunk if lies else 0.0), RIM)
+        rims = transform_points(primitive.X_OP.matrix(), _rim_points(radius, length))
+        feet = _drawn_in(rims, X_WO)
+    for k, foot in enumerate(feet):
+        yield f"foot_{k:03d}", make_pose(p_AB=foot), Sphere(0.0)
+
+
+def _corner_feet(scene: Scene, name: str, X_WO: Array) -> Array:
+    """(F, 3) feet of an object of pieces or a surface, in O [m]."""
+    entry, up = scene.entry(name), np.round(X_WO[2, :3], 9)
+    corners = support_corners(scene.library, entry)
+    ups = [pose.X_SO.matrix()[2, :3] for pose in entry.stable_poses]
+    rolling = [one for one, pose in zip(ups, entry.stable_poses, strict=True) if pose.rolls]
+    center = np.array(entry.mass_properties.center_of_mass)
+    carrying = carrying_corners(corners, up, center, SETTLED)
+    placed = corners.copy()
+    placed[carrying] = _drawn_in(corners[carrying], X_WO, SETTLED)
+    chosen = support_feet(corners, [up, *ups], rolling, carrying)
+    return _drawn_in(placed[chosen], X_WO)
+
+
+def _drawn_in(points: Array, X_WO: Array, most: float = FLAT) -> Array:
+    """Points (N, 3) of O, those that are under the table's top or less than `most` above it moved
+    there, along the vertical."""
+    up = np.round(X_WO[2, :3], 9)
+    heights = X_WO[2, 3] + points @ up
+    moved: Array = points - np.where(heights < most, heights, 0.0)[:, None] * up
+    return moved
 
 
 def _rim_points(radius: float, length: float) -> Array:
@@ -174,11 +199,6 @@ def _rim_points(radius: float, length: float) -> Array:
     x, y = radius * np.cos(angle), radius * np.sin(angle)
     ends = np.full(RIM_FEET, length / 2)
     return np.concatenate([np.stack([x, y, -ends], axis=1), np.stack([x, y, ends], axis=1)])
-
-
-def _excess(height: float) -> float:
-    """By how much a foot at this height over the table is moved down, to the table's top [m]."""
-    return height if height < FLAT else 0.0
 
 
 def _material(
