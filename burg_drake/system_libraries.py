@@ -20,6 +20,7 @@ GLIB = "libglib-2.0.so.0"
 EGL = "libEGL.so.1"
 MESA_EGL = "libEGL_mesa.so.0"
 MESA_DRIVER = "swrast_dri.so"
+ATOMIC = "libatomic.so.1"
 
 # Debian's and Ubuntu's package for each of them.
 _PACKAGES = {
@@ -27,6 +28,7 @@ _PACKAGES = {
     EGL: "libegl1",
     MESA_EGL: "libegl-mesa0",
     MESA_DRIVER: "libgl1-mesa-dri",
+    ATOMIC: "libatomic1",
 }
 # Releases with at least this glibc (Ubuntu 24.04, Debian 13) have the 64-bit time_t names.
 _T64_GLIBC = (2, 39)
@@ -62,6 +64,12 @@ def missing_render_libraries() -> list[str]:
     if not _has_mesa_driver():
         missing.append(MESA_DRIVER)
     return missing
+
+
+def missing_useful_libraries() -> list[str]:
+    """System libraries that nothing needs, but for which trials run faster: without libatomic the
+    allocator of the package cmeel-mimalloc cannot be loaded."""
+    return [ATOMIC] if sys.platform == "linux" and not _loads(ATOMIC) else []
 
 
 def apt_packages(missing: Sequence[str]) -> list[str]:
@@ -121,17 +129,20 @@ def _has_mesa_driver() -> bool:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Says what is missing; with `--packages` prints Debian package names only.
+    """Says what is missing; with `--packages` prints names of Debian's packages only, those of
+    useful libraries among them.
 
     Returns:
         0 if nothing is missing, 1 if images cannot be rendered, 2 if pydrake cannot be imported.
     """
     arguments = sys.argv[1:] if arguments is None else arguments
     missing = missing_render_libraries()
+    if "--packages" in arguments:
+        print(" ".join(apt_packages([*missing, *missing_useful_libraries()])))
+    elif missing:
+        print(describe_missing(missing))
     if not missing:
         return 0
-    names_only = "--packages" in arguments
-    print(" ".join(apt_packages(missing)) if names_only else describe_missing(missing))
     return 2 if GLIB in missing else 1
 
 

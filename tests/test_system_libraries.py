@@ -108,4 +108,14 @@ def test_packages_option_prints_names_only(
     pretend_only(monkeypatch, "libEGL.so.1", "libEGL_nvidia.so.0")
     monkeypatch.setattr(system_libraries.platform, "libc_ver", lambda: ("glibc", "2.41"))
     assert system_libraries.main(["--packages"]) == 2
-    assert capsys.readouterr().out == "libglib2.0-0t64\n"
+    assert capsys.readouterr().out == "libglib2.0-0t64 libatomic1\n"
+
+
+def test_useful_libraries_are_installed_but_not_missed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pretend_only(monkeypatch, "libglib-2.0.so.0", "libEGL.so.1", "libEGL_nvidia.so.0")
+    assert system_libraries.main([]) == 0
+    assert capsys.readouterr().out == ""
+    assert system_libraries.main(["--packages"]) == 0
+    assert capsys.readouterr().out == "libatomic1\n"
