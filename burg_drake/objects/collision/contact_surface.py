@@ -22,7 +22,7 @@ from burg_drake.objects.physics import spread_over
 MOST_DISTANCE = 2.5e-4
 """Largest distance between the object's surface and that which pads touch, either way [m]."""
 
-MOST_ANGLE = np.deg2rad(10.0)
+MOST_ANGLE = float(np.deg2rad(10.0))
 """Angle from which on a normal counts as turned: the force of a pad then leaves the friction cone
 of 0.24, 13.5 degrees wide to each side, though the grasp is a good one."""
 
@@ -51,12 +51,18 @@ SAMPLES, TARGETS, CANDIDATES, NEIGHBOURS = 20_000, 60_000, 8, 24
 points whose normals are averaged."""
 
 
-def contact_surface(surface: trimesh.Trimesh, closed: bool) -> tuple[trimesh.Trimesh, Fit]:
+def contact_surface(
+    surface: trimesh.Trimesh,
+    closed: bool,
+    most_distance: float = MOST_DISTANCE,
+    most_angle: float = MOST_ANGLE,
+) -> tuple[trimesh.Trimesh, Fit]:
     """The coarsest surface that keeps both bounds.
 
     Args:
         surface: of the object [m].
         closed: whether it is watertight, wound outward.
+        most_distance, most_angle: the bounds [m and rad].
 
     Returns:
         The surface, closed and wound outward, and how well it fits.
@@ -66,19 +72,19 @@ def contact_surface(surface: trimesh.Trimesh, closed: bool) -> tuple[trimesh.Tri
     """
     if not closed:
         raise MeshError("its surface is not closed")
-    normals = SurfaceNormals(surface)
-    for rung in reversed(coarser_surfaces(surface, SPREAD * MOST_DISTANCE)):
+    normals = SurfaceNormals(surface, most_distance)
+    for rung in reversed(coarser_surfaces(surface, SPREAD * most_distance)):
         if len(rung.faces) > MOST_FACES:
             break
         mesh = trimesh.Trimesh(np.round(rung.vertices, DIGITS), rung.faces, process=False)
-        if thinnest(mesh) < THINNEST or normals.turned_share(mesh) > TURNED:
+        if thinnest(mesh) < THINNEST or normals.turned_share(mesh, most_angle) > TURNED:
             continue
-        distance = surface_distance(mesh, surface, MOST_DISTANCE)
-        if distance <= MOST_DISTANCE:
+        distance = surface_distance(mesh, surface, most_distance)
+        if distance <= most_distance:
             return mesh, Fit(volume_ratio=float(mesh.volume / surface.volume), hausdorff=distance)
     raise MeshError(
         f"its surface cannot be decimated to {MOST_FACES} faces within"
-        f" {1e3 * MOST_DISTANCE:g} mm and {np.rad2deg(MOST_ANGLE):g} degrees"
+        f" {1e3 * most_distance:g} mm and {np.rad2deg(most_angle):g} degrees"
     )
 
 
@@ -87,9 +93,11 @@ class SurfaceNormals:
 
     Args:
         surface: [m].
+        reach: how far away a place may be that faces the same way, to count as the nearest [m].
     """
 
-    def __init__(self, surface: trimesh.Trimesh) -> None:
+    def __init__(self, surface: trimesh.Trimesh, reach: float = MOST_DISTANCE) -> None:
+        self.reach = reach
         self.triangles = np.asarray(surface.triangles)
         self.normals = np.asarray(surface.face_normals)
         self.samples, self.owner = spread_over(surface, TARGETS)
@@ -99,25 +107,25 @@ class SurfaceNormals:
         alike = SMOOTHING * self.normals[self.owner]
         self.alike = cKDTree(np.hstack([self.samples, alike]))
 
-    def turned_share(self, mesh: trimesh.Trimesh) -> float:
-        """Share of a mesh's area whose normals are more than `MOST_ANGLE` off those of the surface,
+    def turned_share(self, mesh: trimesh.Trimesh, most_angle: float = MOST_ANGLE) -> float:
+        """Share of a mesh's area whose normals are more than an angle [rad] off those of the surface,
         both of the nearest place and of the mean around it."""
         points, face = spread_over(mesh, SAMPLES)
         normals = np.asarray(mesh.face_normals)[face]
         own = self._nearest(points, normals)
         mean = self._mean(points, own)
         cosine = np.maximum((own * normals).sum(axis=1), (mean * normals).sum(axis=1))
-        return float((cosine < np.cos(MOST_ANGLE)).mean())
+        return float((cosine < np.cos(most_angle)).mean())
 
     def _nearest(self, points: Array, normals: Array) -> Array:
-        """Normals (N, 3) of the surface at the nearest places: within `MOST_DISTANCE` at those that
+        """Normals (N, 3) of the surface at the nearest places: within `reach` at those that
         face the same way, as near a thin wall its other side may be nearer."""
         _, near = self.places.query(points, min(CANDIDATES, len(self.every)))
         _, alike = self.alike.query(np.hstack([points, SMOOTHING * normals]), CANDIDATES)
         which = np.hstack([self.every[near], self.owner[alike]])
         apart = distances(points[:, None], self.triangles[which])
         facing = (self.normals[which] * normals[:, None]).sum(axis=2) > 0.0
-        apart -= np.where(facing & (apart <= MOST_DISTANCE), MOST_DISTANCE, 0.0)
+        apart -= np.where(facing & (apart <= self.reach), self.reach, 0.0)
         return np.asarray(self.normals[which[np.arange(len(points)), apart.argmin(axis=1)]])
 
     def _mean(self, points: Array, own: Array) -> Array:
