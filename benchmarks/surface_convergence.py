@@ -5,8 +5,8 @@
 The hard cases of the oracle (see contact_oracle.py) on those of its objects that touch with a
 surface of their own, with surfaces from coarse to fine: each keeps half the distance and 0.7 times
 the angle of the one before. Prints for each the faces, the verdicts that differ from those with the
-finest one, those that differ from the oracle's, how far slip is off, and CPU time. What changes from
-the pipeline's bounds on to the finest is what the choice of its bounds costs.
+finest one, those that differ from the oracle's, how far slip is off, and CPU time. What changes
+from the pipeline's bounds on to the finest is what the choice of its bounds costs.
 """
 
 from __future__ import annotations

@@ -108,8 +108,8 @@ class SurfaceNormals:
         self.alike = cKDTree(np.hstack([self.samples, alike]))
 
     def turned_share(self, mesh: trimesh.Trimesh, most_angle: float = MOST_ANGLE) -> float:
-        """Share of a mesh's area whose normals are more than an angle [rad] off those of the surface,
-        both of the nearest place and of the mean around it."""
+        """Share of a mesh's area whose normals are more than an angle [rad] off the
+        surface's, both of the nearest place and of the mean around it."""
         points, face = spread_over(mesh, SAMPLES)
         normals = np.asarray(mesh.face_normals)[face]
         own = self._nearest(points, normals)
