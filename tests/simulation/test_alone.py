@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 from trial_world import CENTRE, QUICK, make_station
 
+from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.scene.document.scene import Scene
+from burg_drake.scene.document.scene import Scene, load_scene
 from burg_drake.simulation.trials.hand_trial import HandTrial
+from burg_drake.station.diagram.builder import build_station_diagram
 
 MakeScene = Callable[..., Scene]
 
@@ -35,3 +38,22 @@ def test_a_target_that_something_leans_on_is_never_alone(make_scene: MakeScene) 
     trial = HandTrial(scene, make_station(), engine=QUICK)
     trial.run("box", CENTRE)
     assert trial.world is trial.complete_world
+
+
+def test_contact_at_points_meets_pieces_and_not_the_hull_of_a_surface() -> None:
+    """Of a bowl, which is hollow."""
+    scene = load_scene("tabletop_six")
+    engine = replace(QUICK, contact_model="point")
+    on_points = HandTrial(scene, "panda_tabletop", engine=engine).complete_world.diagram
+    assert not on_points.parts.surfaces
+    on_patches = HandTrial(scene, "panda_tabletop", engine=QUICK).complete_world.diagram
+    assert len(on_patches.parts.surfaces) == 5
+
+
+def test_what_cannot_be_alone_is_refused() -> None:
+    with pytest.raises(UnknownNameError, match=r"'mugg' is not a free object .*did you mean 'mug'"):
+        build_station_diagram("tabletop_six", "panda_tabletop", robot="hand", for_trials="mugg")
+    with pytest.raises(InvalidInputError, match="welded objects are not simulated"):
+        build_station_diagram(
+            "tabletop_six", "panda_tabletop", robot="none", for_trials=True, weld_objects=True
+        )

@@ -114,14 +114,17 @@ def build_station_diagram(
         the arm is in its home posture.
 
     Raises:
-        UnknownNameError: no such `robot`, engine or camera.
-        InvalidInputError: an object's model cannot be loaded, `arm` without an arm in the station,
-            a home posture that does not fit the arm, or two things of the same name.
+        UnknownNameError: no such `robot`, engine, camera, or instance that is to be alone.
+        InvalidInputError: options that contradict each other; an object's model cannot be loaded,
+            `arm` without an arm in the station, a home posture that does not fit the arm, or two
+            things of the same name.
         MissingDependencyError: cameras without the renderer's system libraries.
     """
     scene, station, engine = as_scene(scene), as_station(station), as_engine(engine)
     if drivers and (robot != "arm" or weld_objects):
         raise InvalidInputError("drivers need robot='arm', and objects that are not welded")
+    if for_trials and weld_objects:
+        raise InvalidInputError("welded objects are not simulated; leave for_trials out")
     if robot not in get_args(Robot):
         raise UnknownNameError(f"robot {robot!r} does not exist; {nearest(robot, get_args(Robot))}")
     builder = RobotDiagramBuilder(time_step=engine.time_step)
@@ -134,8 +137,12 @@ def build_station_diagram(
     add_board(plant, scene.board, station, markers=bool(cameras) or meshcat is not None)
     add = partial(add_instance, builder, scene, station.packages, by_pieces=weld_objects)
     alone = for_trials if isinstance(for_trials, str) else None
+    if alone is not None and alone not in scene.instances:
+        known = nearest(alone, tuple(scene.instances))
+        raise UnknownNameError(f"{alone!r} is not a free object of scene {scene.name!r}; {known}")
+    on_patches = engine.contact_model != "point"
     if alone is not None:
-        free = {alone: add(alone, bare=needs_no_pieces(scene, station, alone))}
+        free = {alone: add(alone, bare=on_patches and needs_no_pieces(scene, station, alone))}
     else:
         free = {name: add(name) for name in scene.instances}
     standing = {
@@ -153,7 +160,9 @@ def build_station_diagram(
     models = add_robot(builder, station, robot, simulated=not weld_objects)
     parts = ContactParts()
     if for_trials:
-        parts = add_contact_parts(plant, scene, station, free, fixed, hulls=alone is not None)
+        parts = add_contact_parts(
+            plant, scene, station, free, fixed, own_surfaces=on_patches, hulls=alone is not None
+        )
 
     plant.Finalize()
     for name, body in ({} if weld_objects else free).items():

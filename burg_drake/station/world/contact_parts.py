@@ -81,6 +81,7 @@ def add_contact_parts(
     free: Mapping[str, RigidBody],
     fixed: Mapping[str, RigidBody],
     *,
+    own_surfaces: bool = True,
     hulls: bool = False,
 ) -> ContactParts:
     """Adds the own surfaces of objects, and feet to those that can move.
@@ -95,13 +96,14 @@ def add_contact_parts(
         station: the station.
         free: bodies of objects that can move, by name.
         fixed: bodies of what cannot, by name; the station's obstacles are as they are.
+        own_surfaces: those of objects that have one; at points Drake would meet its convex hull.
         hulls: have a hull of each free object meet what its pieces would.
     """
     surfaces, feet, around = [], [], []
     for name, body in {**free, **fixed}.items():
         if name in station.document.background:
             continue
-        if scene.entry(name).contact.kind == "surface":
+        if own_surfaces and scene.entry(name).contact.kind == "surface":
             surfaces.append(_add_surface(plant, scene, name, body))
         if name in free and not is_ball(scene, name):
             feet += _add_feet(plant, scene, station, name, body)
