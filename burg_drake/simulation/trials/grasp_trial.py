@@ -29,6 +29,10 @@ from burg_drake.station.document import Engine, GraspMotion, Station
 from burg_drake.station.world import Robot
 
 
+KEPT_WORLDS = 16
+"""Worlds of a target alone that are kept; each takes some 20 MB, and 0.1 s to build."""
+
+
 class GraspTrial:
     """Executes grasps in one scene.
 
@@ -178,7 +182,10 @@ class GraspTrial:
         if instance not in self._alone:
             world = self._build(instance)
             self._alone[instance] = world if world.is_usable() else None
-        return self._alone[instance] or self.complete_world
+        self._alone[instance] = found = self._alone.pop(instance)  # used last comes last
+        if len(self._alone) > KEPT_WORLDS:
+            del self._alone[next(iter(self._alone))]
+        return found or self.complete_world
 
     def _build(self, alone: str | None) -> TrialWorld:
         diagram = build_station_diagram(
