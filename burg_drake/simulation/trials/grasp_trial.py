@@ -28,7 +28,6 @@ from burg_drake.station.diagram import (
 from burg_drake.station.document import Engine, GraspMotion, Station
 from burg_drake.station.world import Robot
 
-
 KEPT_WORLDS = 16
 """Worlds of a target alone that are kept; each takes some 20 MB, and 0.1 s to build."""
 

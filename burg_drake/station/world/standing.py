@@ -6,10 +6,11 @@ a fraction of the pieces, as Drake looks at every two geometries that are near e
 
 from __future__ import annotations
 
-import numpy as np
 from pydrake.geometry import (
     Convex,
     GeometryId,
+    GeometryInstance,
+    IllustrationProperties,
     Mesh,
     ProximityProperties,
 )
@@ -24,9 +25,6 @@ from burg_drake.station.world.instances import name_taken_error
 from burg_drake.station.world.object_hull import hull_corners
 from burg_drake.station.world.robot import ROBOT_MODELS
 
-GREY = (0.8, 0.8, 0.8, 1.0)
-"""Colour of meshes that have none of their own."""
-
 
 def add_standing(plant: MultibodyPlant, scene: Scene, name: str, X_WO: Array) -> RigidBody:
     """Adds an instance as a hull and a mesh to look at, welded where it stands."""
@@ -35,8 +33,9 @@ def add_standing(plant: MultibodyPlant, scene: Scene, name: str, X_WO: Array) ->
     entry, model = scene.entry(name), plant.AddModelInstance(name)
     body = plant.AddRigidBody(LINK, model, SpatialInertia.SolidSphereWithMass(entry.mass, 0.01))
     add_hull(plant, scene, name, body)
-    mesh = Mesh(str(scene.library.path(entry.mesh)))
-    plant.RegisterVisualGeometry(body, RigidTransform(), mesh, "visual", np.array(GREY))
+    look = GeometryInstance(RigidTransform(), Mesh(str(scene.library.path(entry.mesh))), "visual")
+    look.set_illustration_properties(IllustrationProperties())
+    plant.RegisterVisualGeometry(body, look)
     plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform(X_WO))
     return body
 
