@@ -52,9 +52,11 @@ class Symbol(ctypes.Structure):
 
 program, symbol = ctypes.CDLL(None), Symbol()
 blocks = [bytearray(1 << k) for k in range(22)]
-print(program.dladdr(program.malloc, ctypes.byref(symbol)) and symbol.file.decode())
+found = program.dladdr(program.malloc_usable_size, ctypes.byref(symbol))
+print(found and symbol.file.decode())
 """
-"""Says which file the process has its malloc from."""
+"""Says which file the process has its memory from. A program that is not position-independent, as
+Debian's Python, gives itself as the file of functions that it calls, such as malloc."""
 
 _log = logging.getLogger("burg_drake")
 
