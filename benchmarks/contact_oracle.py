@@ -13,9 +13,9 @@ oracle judges 3 % less and 3 % more friction as well: where its verdict changes,
 marginal, and counts apart. Two canaries always run: engines that are known to be worse, which must
 show.
 
-The oracle also judges every grasp over a table as soft as the engine's, of 1/150 of the stiffness,
-and with pads of twice the damping. Where its verdict changes, the grasp hinges on what neither
-method knows of the world; it counts, but is told apart.
+The oracle also judges every grasp over a table of 1/150 of the stiffness, as that of Drake diagrams
+outside of trials, and with pads of twice the damping. Where its verdict changes, the grasp hinges
+on what neither method knows of the world; it counts, but is told apart.
 
 `--converge` has the oracle judge the hard cases at half the step and with twice as many samples: of
 72, no verdict changes.
@@ -27,20 +27,21 @@ was. After a change of contact geometry or engine take a new folder.
 from __future__ import annotations
 
 import argparse
-import json
 import time
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from itertools import islice
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, get_args
+from typing import get_args
 
 from contact_oracle_report import Probes, print_convergence, print_report
 from contact_oracle_trials import CANARIES, KNOWN, build, run_engine
 from oracle.cases import MARGIN, Case, draw_cases, judge, load_cases
 from oracle.catalogue import HELD_OUT, SPACING, TUNED
 from oracle.trial import DEFAULT_NUMERICS, Numerics
+from trial_journal import Row, TrialJournal
 
 from burg_drake.core.content import content_hash
 from burg_drake.objects.library.entry import ContactKind
@@ -56,11 +57,10 @@ HINGES = {
     "soft table": Numerics(table_stiffness=1e6 / 0.05),
     "twice the damping": Numerics(dissipation=2.0 * DEFAULT_NUMERICS.dissipation),
 }
-"""Other worlds. The engine's table is a box 0.1 m thick with a modulus of 1e6 Pa."""
+"""Other worlds. The compliant table of diagrams is a box 0.1 m thick with a modulus of 1e6 Pa; in
+trials objects stand on feet instead."""
 CHUNK = 4
 """Trials that a worker executes before it reports."""
-
-Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def main() -> None:
     parser.add_argument("--contact", choices=get_args(ContactKind), help="as the pipeline decides")
     chosen = parser.add_mutually_exclusive_group()
     chosen.add_argument("--hard", action="store_true", help="the frozen hard cases")
-    chosen.add_argument("--all", type=int, metavar="N", help="random grasps of each object")
+    chosen.add_argument("--all", type=counted, metavar="N", help="random grasps of each object")
     parser.add_argument("--converge", action="store_true", help="the oracle, more finely")
     parser.add_argument("-o", "--output", type=Path, default=Path("contact_oracle"))
     parser.add_argument("--workers", type=int, default=2)
@@ -109,10 +109,10 @@ def main() -> None:
         engines = list(dict.fromkeys((*(arguments.engine or ENGINES), *CANARIES)))
         labels += [*HINGES, *engines]
         labels += PROBES if arguments.all is not None else []
-    journal = Journal(arguments.output / "trials.jsonl")
+    journal = TrialJournal(arguments.output / "trials.jsonl")
     runs = [Run(case, label, library) for label in labels for case in cases]
     with ProcessPoolExecutor(arguments.workers, get_context("spawn")) as pool:
-        journal.complete(pool, runs)
+        journal.complete(pool, runs, chunked, execute)
     rows = {(run.case.id, run.label): journal.rows[run.key] for run in runs}
     if arguments.converge:
         print_convergence(cases, list(FINER), rows)
@@ -121,44 +121,25 @@ def main() -> None:
         print_report(cases, engines, Probes(probes, list(HINGES)), rows)
 
 
+def counted(text: str) -> int:
+    """A number of grasps from the command line.
+
+    Raises:
+        argparse.ArgumentTypeError: it is not 1 or more.
+    """
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number from 1 on")
+    return int(text)
+
+
 def random_cases(each: int) -> list[Case]:
     """Grasps with mixed friction and mass, so many of each object."""
     return [c for name in (*TUNED, *HELD_OUT) for c in islice(draw_cases(name, "all"), each)]
 
 
-class Journal:
-    """Trials that were executed, by key.
-
-    Args:
-        path: file with a row a line.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.rows: dict[str, Row] = {}
-        for line in path.read_text().splitlines() if path.exists() else ():
-            try:
-                row = json.loads(line)
-            except json.JSONDecodeError:  # the last line of an interrupted run, or an empty one
-                continue
-            self.rows[row["key"]] = row
-
-    def complete(self, pool: ProcessPoolExecutor, runs: list[Run]) -> None:
-        """Executes the runs that are missing, and writes them down as they come."""
-        missing = [run for run in runs if run.key not in self.rows]
-        chunks = [missing[i : i + CHUNK] for i in range(0, len(missing), CHUNK)]
-        done = 0
-        with self.path.open("a") as file:
-            file.write("\n")  # after an interruption the last line may have no end
-            for future in as_completed([pool.submit(execute, chunk) for chunk in chunks]):
-                for row in future.result():
-                    self.rows[row["key"]] = row
-                    file.write(json.dumps(row) + "\n")
-                    done += 1
-                file.flush()
-                print(f"\r{done} of {len(missing)} trials ", end="", flush=True)
-        if missing:
-            print()
+def chunked(runs: Sequence[Run]) -> list[list[Run]]:
+    """What a worker executes before it reports."""
+    return [list(runs[i : i + CHUNK]) for i in range(0, len(runs), CHUNK)]
 
 
 def execute(runs: list[Run]) -> list[Row]:

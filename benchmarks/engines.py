@@ -23,15 +23,14 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import json
 import time
 from collections.abc import Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import get_args, get_type_hints
 
 import numpy as np
 from engine_cases import (
@@ -45,6 +44,7 @@ from engine_cases import (
     resting_objects,
 )
 from engine_report import print_report
+from trial_journal import Row, TrialJournal
 
 import burg_drake as burg
 from burg_drake.core.content import content_hash
@@ -82,9 +82,6 @@ class Run:
         return f"{case.id} {self.label} {content_hash(what)[:12]}"
 
 
-Row = dict[str, Any]
-
-
 def main() -> None:
     """Runs the study, or what is left of it."""
     parser = argparse.ArgumentParser(
@@ -102,11 +99,13 @@ def main() -> None:
     with ProcessPoolExecutor(arguments.workers, context) as pool:
         cases = all_cases(pool, [LIBRARY, *arguments.library], arguments.grasps)
         print(f"{len(cases)} grasps", flush=True)
-        journal = Journal(arguments.output / "trials.jsonl")
-        journal.complete(pool, [r for case in cases for r in case_runs(case, engines)])
+        journal = TrialJournal(arguments.output / "trials.jsonl")
+        runs = [r for case in cases for r in case_runs(case, engines)]
+        journal.complete(pool, runs, chunked, execute)
         disputed = [c for c in cases if is_disputed(journal, c, engines)]
-        journal.complete(pool, [probe(case, label) for case in disputed for label in PROBES])
-    print_report(cases, engines, lambda case, label: journal.find(case, label, engines))
+        probes = [probe(case, label) for case in disputed for label in PROBES]
+        journal.complete(pool, probes, chunked, execute)
+    print_report(cases, engines, lambda case, label: find(journal, case, label, engines))
 
 
 def variant(text: str) -> Engine:
@@ -171,50 +170,14 @@ def probe(case: Case, label: str) -> Run:
     return Run(case, label, ENGINES["reference"], *PROBES[label])
 
 
-def is_disputed(journal: Journal, case: Case, engines: dict[str, Engine]) -> bool:
+def is_disputed(journal: TrialJournal, case: Case, engines: dict[str, Engine]) -> bool:
     """Whether the engines disagree on the verdict."""
     return len({journal.rows[Run(case, n, e).key]["held"] for n, e in engines.items()}) > 1
 
 
-class Journal:
-    """Trials that were executed, by key.
-
-    Args:
-        path: file with a row a line.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.rows: dict[str, Row] = {}
-        if path.exists():
-            for line in path.read_text().splitlines():
-                try:
-                    row = json.loads(line)
-                except json.JSONDecodeError:  # the last line of an interrupted run, or an empty one
-                    continue
-                self.rows[row["key"]] = row
-
-    def find(self, case: Case, label: str, engines: dict[str, Engine]) -> Row | None:
-        """The row of a case with an engine, or with what is changed for the reference."""
-        return self.rows.get(Run(case, label, engines.get(label, ENGINES["reference"])).key)
-
-    def complete(self, pool: ProcessPoolExecutor, runs: list[Run]) -> None:
-        """Executes the runs that are missing, and writes them down as they come."""
-        missing = [run for run in runs if run.key not in self.rows]
-        chunks = list(chunked(missing))
-        start, done = time.monotonic(), 0
-        with self.path.open("a") as file:
-            file.write("\n")  # after an interruption the last line may have no end
-            for future in as_completed([pool.submit(execute, chunk) for chunk in chunks]):
-                for row in future.result():
-                    self.rows[row["key"]] = row
-                    file.write(json.dumps(row) + "\n")
-                    done += 1
-                file.flush()
-                left = (time.monotonic() - start) * (len(missing) / done - 1.0)
-                print(f"\r{done} of {len(missing)} trials, {left / 60:.0f} min left ", end="")
-        if missing:
-            print()
+def find(journal: TrialJournal, case: Case, label: str, engines: dict[str, Engine]) -> Row | None:
+    """The row of a case with an engine, or with what is changed for the reference."""
+    return journal.rows.get(Run(case, label, engines.get(label, ENGINES["reference"])).key)
 
 
 def chunked(runs: Iterable[Run]) -> Iterator[list[Run]]:
@@ -248,7 +211,7 @@ def execute_one(run: Run) -> Row:
         X_OG = moved(X_OG, f"{case.id} {run.motion}")
     friction = case.friction
     if run.friction_factor != 1.0:
-        own = trial.diagram.scene.entry("target").friction
+        own = trial.scene.entry("target").friction
         friction = run.friction_factor * (own if friction is None else friction)
     start = time.process_time()
     result = trial.run("target", X_OG, friction=friction, mass=case.mass)

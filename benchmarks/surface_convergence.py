@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from contact_oracle_trials import build, run_engine
+from contact_oracle_trials import KNOWN, build, run_engine
 from oracle.cases import Case, load_cases
 
 from burg_drake.objects.collision.contact_surface import (
@@ -52,7 +52,7 @@ class Rung:
 def main() -> None:
     """Runs the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--engine", default="standard")
+    parser.add_argument("--engine", default="standard", choices=list(KNOWN))
     parser.add_argument("-o", "--output", type=Path, default=Path("surface_convergence"))
     arguments = parser.parse_args()
     built = load_library(build(arguments.output / "library", None))

@@ -58,8 +58,8 @@ def support_feet(
         chosen += low[reach.argmax(axis=0)].tolist()
     for up in rolling:
         directions = _around(corners, up)
-        chosen += _thinned(corners, directions, ROUND, len(corners), chosen)
-    chosen += _thinned(corners, _sphere(DIRECTIONS), ANYWHERE, len(corners), chosen)
+        chosen += _missed(corners, directions, ROUND, chosen)
+    chosen += _missed(corners, _sphere(DIRECTIONS), ANYWHERE, chosen)
     return np.unique(np.array(chosen, dtype=np.intp))
 
 
@@ -93,20 +93,17 @@ def carrying_corners(
     return found
 
 
-def _thinned(
-    corners: Array, directions: Array, tolerance: float, most: int, chosen: Sequence[int] = ()
+def _missed(
+    corners: Array, directions: Array, tolerance: float, chosen: Sequence[int]
 ) -> list[int]:
-    """Corners (N, d) that are missing among those that are chosen, so that these reach as far as
-    all of them, to a tolerance, in directions (D, d); the one that is missed most comes first."""
+    """Which of the corners (N, 3) are missing among those that are chosen, so that these reach as
+    far as all of them, to a tolerance [m], in directions (D, 3); the worst missed comes first."""
     reach = np.round(corners @ directions.T, 9)  # what is as far is as far, however it is turned
     full = reach.max(axis=0)
-    now = reach[list(chosen)].max(axis=0) if len(chosen) else np.full(len(directions), -np.inf)
+    now = reach[list(chosen)].max(axis=0, initial=-np.inf)
     added: list[int] = []
-    while len(added) < most:
-        missing = full - now
+    while (missing := full - now).max() > tolerance:
         worst = int(np.argmax(missing))
-        if missing[worst] <= tolerance:
-            break
         added.append(int(np.argmax(reach[:, worst])))
         now = np.maximum(now, reach[added[-1]])
     return added

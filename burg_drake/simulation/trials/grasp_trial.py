@@ -3,6 +3,7 @@ of the open hand before, and the result of the execution after it."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -32,10 +33,10 @@ KEPT_WORLDS = 16
 """Worlds of a target alone that are kept; each takes some 20 MB, and 0.1 s to build."""
 
 
-class GraspTrial:
+class GraspTrial(ABC):
     """Executes grasps in one scene.
 
-    A trial runs in a world in which the target alone can move, in half the time. If it meets
+    A trial runs in a world in which the target alone can move, which costs less. If it meets
     another object there, it runs again in the complete world, from its beginning.
 
     Args:
@@ -197,6 +198,6 @@ class GraspTrial:
         )
         return TrialWorld(diagram, self._handle(diagram), self.settings)
 
+    @abstractmethod
     def _handle(self, diagram: StationDiagram) -> HandHandle:
         """The hand in a diagram."""
-        raise NotImplementedError
