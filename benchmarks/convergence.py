@@ -40,6 +40,7 @@ from burg_drake.simulation.trials.trial_settings import TrialSettings
 from burg_drake.station.document.engine import ENGINES, Engine
 from burg_drake.station.document.gripper_document import load_hand
 from burg_drake.station.document.station_document import Station, StationDocument, Table
+from tools.robot_model.pad_mesh import pad_vtk, squares
 
 FORCE, GRAVITY = 40.0, 9.81
 PAD = (0.0175, 0.0152, 0.0185)
@@ -83,7 +84,8 @@ def run(scratch: Path) -> list[Panel]:
     show("time step [ms]", [f"{1e3 * time_step:g}" for time_step in TIME_STEPS], by_step)
     stations = [make_station(pad_model(scratch / f"pad_{n}", n)) for n in SQUARES]
     by_pad = [measure(shapes, station, standard) for station in stations]
-    show("squares of a pad", [f"{n} x {n}" for n in SQUARES], by_pad)
+    labels = [f"{n} x {n}" for n in SQUARES]
+    show("squares of a pad", [*labels, "as it is"], [*by_pad, measure(shapes, default, standard)])
     by_mesh, faces = [], []
     for n in SUBDIVISIONS:
         meshes = make_shapes(scratch / f"mesh_{n}", subdivisions=n)
@@ -92,7 +94,7 @@ def run(scratch: Path) -> list[Panel]:
     show("faces of box, ball", [f"{box}, {ball}" for box, ball in faces], by_mesh)
     return [
         Panel("Time step [ms]", [f"{1e3 * t:g}" for t in TIME_STEPS], series(by_step), 2),
-        Panel("Pad front [squares]", [f"{n} x {n}" for n in SQUARES], series(by_pad), 1),
+        Panel("Pad front [squares]", labels, series(by_pad), 1),
         Panel(
             "Faces of box, ball", [f"{box}/{ball}" for box, ball in faces], series(by_mesh), None
         ),
@@ -271,57 +273,12 @@ def make_station(hand_model: Path | None = None) -> Station:
     return Station(document, hand, hand_model or resolve(hand.model), None, Path("convergence"))
 
 
-def pad_model(folder: Path, squares: int) -> Path:
-    """A copy of the hand whose pads' fronts are divided into `squares` x `squares`."""
+def pad_model(folder: Path, n: int) -> Path:
+    """A copy of the hand whose pads' fronts are divided into n x n squares."""
     model = resolve(load_hand("panda_hand").model)
     shutil.copytree(model.parent, folder)
-    (folder / "meshes" / "pad.vtk").write_text(pad_vtk(squares))
+    (folder / "meshes" / "pad.vtk").write_text(pad_vtk(PAD, front=squares(n)))
     return folder / model.name
-
-
-def pad_vtk(squares: int) -> str:
-    """Tetrahedra that join the middle of the pad with its surface."""
-    points: dict[tuple[int, int, int], int] = {(0, 0, 0): 0}
-    cells = []
-    for triangle in surface(squares):
-        corners = np.array(triangle)
-        if np.linalg.det(corners) < 0.0:
-            triangle = (triangle[0], triangle[2], triangle[1])
-        cells.append([0, *(points.setdefault(corner, len(points)) for corner in triangle)])
-    scale = np.array(PAD) / 2 / (squares, 1, squares)
-    lines = ["# vtk DataFile Version 3.0", "Finger pad", "ASCII", "DATASET UNSTRUCTURED_GRID"]
-    lines.append(f"POINTS {len(points)} double")
-    lines.extend(
-        " ".join(f"{value:.9g}" for value in point * scale) for point in map(np.array, points)
-    )
-    lines.append(f"CELLS {len(cells)} {5 * len(cells)}")
-    lines.extend("4 " + " ".join(map(str, cell)) for cell in cells)
-    lines.extend([f"CELL_TYPES {len(cells)}", *["10"] * len(cells)])
-    return "\n".join(lines) + "\n"
-
-
-Corner = tuple[int, int, int]
-
-
-def surface(n: int) -> list[tuple[Corner, Corner, Corner]]:
-    """Triangles of a block of n x 1 x n squares; corners at -n, 2 - n, ..., n and at -1, 1."""
-    triangles: list[tuple[Corner, Corner, Corner]] = []
-
-    def square(a: Corner, b: Corner, c: Corner, d: Corner) -> None:
-        triangles.extend([(a, b, c), (a, c, d)])
-
-    cuts = range(-n, n, 2)
-    for y in (-1, 1):
-        for x in cuts:
-            for z in cuts:
-                corners = [(x, y, z), (x + 2, y, z), (x + 2, y, z + 2), (x, y, z + 2)]
-                turn = 0 if (x + 1) * (z + 1) >= 0 else 1  # diagonals point to the middle
-                square(*(corners[(i + turn) % 4] for i in range(4)))
-    for side in (-n, n):
-        for t in cuts:
-            square((side, -1, t), (side, -1, t + 2), (side, 1, t + 2), (side, 1, t))
-            square((t, -1, side), (t + 2, -1, side), (t + 2, 1, side), (t, 1, side))
-    return triangles
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from pydrake.geometry import (
     GeometryId,
     ProximityProperties,
     Role,
+    VolumeMesh,
 )
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
@@ -146,22 +147,31 @@ def test_pads_meet_when_closed_and_open_to_80_mm(document: Hand) -> None:
     assert document.opening == (0.0, 0.08)
 
 
-def test_pad_mesh_is_its_own_image_on_the_other_finger() -> None:
-    """Turned by 180 degrees about z, the tetrahedra are the same ones, and they fill the box."""
-    lines = resolve("package://burg_drake/models/panda/meshes/pad.vtk").read_text().splitlines()
-    count = int(next(x for x in lines if x.startswith("POINTS")).split()[1])
-    points = np.array([[float(v) for v in x.split()] for x in lines[5 : 5 + count]])
-    cells = np.array([[int(v) for v in x.split()[1:]] for x in lines if x.startswith("4 ")])
-
-    def bodies(p: np.ndarray) -> set[frozenset[tuple[float, ...]]]:
-        return {frozenset(map(tuple, p[cell].round(9) + 0.0)) for cell in cells}
-
-    assert len(bodies(points)) == len(cells) == 32
-    assert bodies(points * (-1.0, -1.0, 1.0)) == bodies(points)
-    a, b, c, d = (points[cells[:, i]] for i in range(4))
-    volumes = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6
-    assert (volumes > 0).all()
-    assert volumes.sum() == pytest.approx(0.0175 * 0.0152 * 0.0185, rel=1e-9)
+def test_fronts_of_the_pads_look_at_each_other(document: Hand) -> None:
+    """The tetrahedra fill the box; turned by 180 degrees about z, those of one finger are those of
+    the other, and the front of both, which alone is divided, looks at the other finger."""
+    gripper = Gripper()
+    gripper.put(0.02, 0.02)
+    inspector = gripper.diagram.scene_graph().model_inspector()
+    base = gripper.plant.GetBodyByName("panda_hand")
+    seen = []
+    for finger, pad, inwards in zip(document.fingers, gripper.pads(), (-1.0, 1.0), strict=True):
+        mesh = inspector.maybe_get_hydroelastic_mesh(pad)
+        assert isinstance(mesh, VolumeMesh)
+        assert mesh.CalcVolume() == pytest.approx(0.0175 * 0.0152 * 0.0185, rel=1e-9)
+        body = gripper.plant.GetBodyByName(finger.body)
+        X_WP = body.EvalPoseInWorld(gripper.plant_context) @ inspector.GetPoseInFrame(pad)
+        X_HP = base.EvalPoseInWorld(gripper.plant_context).inverse() @ X_WP
+        points = np.array([X_HP @ mesh.vertex(i) for i in range(mesh.num_vertices())])
+        y = inwards * points[:, 1]
+        front, back = np.isclose(y, y.max()).sum(), np.isclose(y, y.min()).sum()
+        assert (front, back) == (12, 4)
+        cells = [[t.vertex(i) for i in range(4)] for t in mesh.tetrahedra()]
+        seen.append((points, cells))
+    (left, cells), (right, other) = seen
+    assert len(cells) == 28
+    assert other == cells
+    np.testing.assert_allclose(left * (-1.0, -1.0, 1.0), right, atol=1e-12)
 
 
 def test_grasp_frame_lies_between_the_pads(document: Hand) -> None:

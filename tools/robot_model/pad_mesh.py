@@ -1,40 +1,37 @@
 """The pads' tetrahedral mesh for hydroelastic contact.
 
 The tetrahedra that Drake makes of a box are too few for the torsional friction of a patch and too
-many for what they yield. Here a star of tetrahedra joins the centre, where the pressure is highest,
-with the surface, whose front and back are divided into 2 x 2 squares. The mesh is its own image
-when turned by 180 degrees about z, as the one finger is of the other one.
+many for what they yield. A contact surface has one point of contact per polygon, so that friction
+about its normal lacks what lies within the polygons. Here tetrahedra join the centre, where the
+pressure is highest, with the surface. Its front, which looks at the other finger, is divided into
+14 triangles that carry .965 of the torsional friction of a patch that covers it (2 x 2 squares
+.924, 3 x 3 .967), its other faces into as few as there can be.
 """
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.spatial import Delaunay
 
 PAD_FILE = "pad.vtk"
+DIAMOND = 0.45
+"""Where the corners of the diamond in the front lie, from its middle (0) to its edges (1)."""
 
 
-def pad_vtk(size: Sequence[float], thickness: int = 1) -> str:
+def pad_vtk(size: Sequence[float], thickness: int = 1, front: np.ndarray | None = None) -> str:
     """Text of a VTK file.
 
     Args:
         size: extents of the pad [m].
-        thickness: the axis across front and back: 0 for x, 1 for y.
+        thickness: the axis against which the front looks: 0 for x, 1 for y.
+        front: the front's points (n, 2) in [-1, 1], with the square's corners; default `star()`.
     """
-    half = np.array(size) / 2
-    points: list[tuple[int, int, int]] = [(0, 0, 0)]
-    cells = []
-    for triangle in _triangles():
-        for corner in triangle:
-            if corner not in points:
-                points.append(corner)
-        cells.append([0, *(points.index(corner) for corner in triangle)])
-    corners = np.array(points)
-    if thickness == 0:
+    corners, cells = _cells(star() if front is None else front)
+    if thickness == 1:
         corners = corners[:, (1, 0, 2)]
-    p = corners * half
+    p = corners * np.array(size) / 2
     lines = ["# vtk DataFile Version 3.0", "Finger pad", "ASCII", "DATASET UNSTRUCTURED_GRID"]
     lines.append(f"POINTS {len(p)} double")
     lines.extend(" ".join(f"{v:.9g}" for v in point + 0.0) for point in p)
@@ -45,24 +42,39 @@ def pad_vtk(size: Sequence[float], thickness: int = 1) -> str:
     return "\n".join(lines) + "\n"
 
 
-Corner = tuple[int, int, int]
+def squares(n: int) -> np.ndarray:
+    """A front of n x n squares."""
+    steps = np.linspace(-1.0, 1.0, n + 1)
+    return np.array([(u, v) for u in steps for v in steps])
 
 
-def _triangles() -> list[tuple[Corner, Corner, Corner]]:
-    """The surface of the cube from -1 to 1; all corners are at -1, 0 or 1."""
-    found: list[tuple[Corner, Corner, Corner]] = []
-    for y in (-1, 1):  # front and back: eight triangles around the middle
-        rim = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)]
-        for (x1, z1), (x2, z2) in itertools.pairwise([*rim, rim[0]]):
-            found.append(((0, y, 0), (x1, y, z1), (x2, y, z2)))
-    for s in (-1, 1):  # sides, divided where front and back are
-        for t in (-1, 0):
-            a, b = t, t + 1
-            found.append(((s, -s, a), (s, -s, b), (s, s, b)))
-            found.append(((s, -s, a), (s, s, b), (s, s, a)))
-            found.append(((a, -1, s), (b, -1, s), (b, 1, s)))
-            found.append(((a, -1, s), (b, 1, s), (a, 1, s)))
-    return found
+def star() -> np.ndarray:
+    """A front of a diamond within the corners and middles of its edges."""
+    outline = [point for point in squares(2) if point.any()]
+    return np.array([*outline, (DIAMOND, 0), (-DIAMOND, 0), (0, DIAMOND), (0, -DIAMOND)])
+
+
+def _cells(front: np.ndarray) -> tuple[np.ndarray, list[list[int]]]:
+    """Points (m, 3) in [-1, 1], first the centre, then the front at x = -1, then the back's four
+    corners; and tetrahedra."""
+    n, around = len(front), [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+    points = [(0, 0, 0), *((-1, *point) for point in front), *((1, *corner) for corner in around)]
+    faces = [list(triangle + 1) for triangle in Delaunay(front).simplices]
+    faces += [[n + 1, n + 2, n + 3], [n + 1, n + 3, n + 4]]
+    for i, j in ((0, 1), (1, 2), (2, 3), (3, 0)):
+        edge, back = _edge(front, np.array(around[i]), np.array(around[j])), (n + 1 + i, n + 1 + j)
+        middle = len(edge) // 2
+        for k in range(len(edge) - 1):
+            faces.append([edge[k], edge[k + 1], back[k >= middle]])
+        faces.append([edge[middle], *back])
+    return np.array(points, dtype=float), [[0, *face] for face in faces]
+
+
+def _edge(front: np.ndarray, start: np.ndarray, end: np.ndarray) -> list[int]:
+    """The points between two corners of the front, in order."""
+    offset, along = front - start, end - start
+    on = np.flatnonzero(np.abs(offset[:, 0] * along[1] - offset[:, 1] * along[0]) < 1e-9)
+    return [int(i) + 1 for i in on[np.argsort(offset[on] @ along)]]
 
 
 def _oriented(p: np.ndarray, cell: list[int]) -> list[int]:

@@ -44,9 +44,17 @@ Shape = Box | Capsule | Cylinder
 
 
 def mirrored_finger(boxes: tuple[Box, ...]) -> tuple[Box, ...]:
-    """The same boxes turned by 180 deg about z: the right finger from the left one."""
+    """The same boxes turned by 180 deg about z: the right finger from the left one.
+
+    Only the pad's mesh is not its own image, so that only the pad is turned in its frame.
+    """
     return tuple(
-        Box(b.name, b.size, (-b.p_BG[0], -b.p_BG[1], b.p_BG[2]), (-b.rpy[0], 0.0, 0.0))
+        Box(
+            b.name,
+            b.size,
+            (-b.p_BG[0], -b.p_BG[1], b.p_BG[2]),
+            (-b.rpy[0], 0.0, np.pi if b.name == PAD else 0.0),
+        )
         for b in boxes
     )
 
