@@ -10,12 +10,12 @@ friction and pose. A verdict is whether the object is held at the end.
 `--hard`, the default, takes the frozen grasps on which a method can be wrong (see `oracle.cases`);
 `--all` takes N random antipodal grasps of each object with mixed friction and mass. Of these the
 oracle judges 3 % less and 3 % more friction as well: where its verdict changes, the grasp is
-marginal, and counts apart. Two canaries always run: engines that are known to be worse, which must
-show.
+marginal, and counts apart. On the frozen grasps two canaries run as well: engines that are known to
+be worse, which must show.
 
-The oracle also judges every grasp over a table of 1/150 of the stiffness, as that of Drake diagrams
-outside of trials, and with pads of twice the damping. Where its verdict changes, the grasp hinges
-on what neither method knows of the world; it counts, but is told apart.
+Where an engine disagrees, the oracle also judges the grasp over a table of 1/150 of the stiffness,
+as that of Drake diagrams outside of trials, and with pads of twice the damping. Where its verdict
+changes, the grasp hinges on what neither method knows of the world; the list says so.
 
 `--converge` has the oracle judge the hard cases at half the step and with twice as many samples: of
 72, no verdict changes.
@@ -36,7 +36,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import get_args
 
-from contact_oracle_report import Probes, print_convergence, print_report
+from contact_oracle_report import Probes, differs, print_convergence, print_report
 from contact_oracle_trials import CANARIES, KNOWN, build, run_engine
 from oracle.cases import MARGIN, Case, draw_cases, judge, load_cases
 from oracle.catalogue import HELD_OUT, SPACING, TUNED
@@ -106,13 +106,20 @@ def main() -> None:
         labels += FINER
     else:
         library = str(build(arguments.output / "library", arguments.contact).resolve())
-        engines = list(dict.fromkeys((*(arguments.engine or ENGINES), *CANARIES)))
-        labels += [*HINGES, *engines]
+        canaries = CANARIES if arguments.all is None else ()
+        engines = list(dict.fromkeys((*(arguments.engine or ENGINES), *canaries)))
+        labels += engines
         labels += PROBES if arguments.all is not None else []
     journal = TrialJournal(arguments.output / "trials.jsonl")
     runs = [Run(case, label, library) for label in labels for case in cases]
     with ProcessPoolExecutor(arguments.workers, get_context("spawn")) as pool:
         journal.complete(pool, runs, chunked, execute)
+        if not arguments.converge:
+            judged = {(run.case.id, run.label): journal.rows[run.key] for run in runs}
+            open_cases = [c for c in cases if any(differs(c, e, judged) for e in engines)]
+            hinges = [Run(case, label, library) for label in HINGES for case in open_cases]
+            journal.complete(pool, hinges, chunked, execute)
+            runs += hinges
     rows = {(run.case.id, run.label): journal.rows[run.key] for run in runs}
     if arguments.converge:
         print_convergence(cases, list(FINER), rows)

@@ -21,7 +21,7 @@ class Probes:
 
     Attributes:
         friction: small changes of friction; of hard cases none are needed.
-        worlds: other tables and pads.
+        worlds: other tables and pads, for the grasps on which an engine disagrees.
     """
 
     friction: Sequence[str]
@@ -50,7 +50,6 @@ def print_report(cases: Sequence[Case], engines: Sequence[str], probes: Probes, 
         "all": settled,
         "tuned": [c for c in settled if not c.held_out],
         "held out": [c for c in settled if c.held_out],
-        "the same in other worlds": [c for c in settled if not changes(c, probes.worlds, rows)],
         "marginal": marginal,
     }
     print(f"\n{'agreement with the oracle':40} {'':7}  {'95 % interval':>16} {'of':>6}"
