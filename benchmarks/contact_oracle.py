@@ -81,7 +81,10 @@ class Run:
     def key(self) -> str:
         """Tells runs apart in the journal."""
         case = self.case
-        return f"{case.id} {self.label} {content_hash((case.X_OG, case.friction, case.mass))[:12]}"
+        what = (case.X_OG, case.friction, case.mass)
+        if self.label in KNOWN:
+            what = (*what, Path(self.library).name)
+        return f"{case.id} {self.label} {content_hash(what)[:12]}"
 
 
 def main() -> None:
@@ -105,7 +108,8 @@ def main() -> None:
     if arguments.converge:
         labels += FINER
     else:
-        library = str(build(arguments.output / "library", arguments.contact).resolve())
+        name = "library" if arguments.contact is None else f"library_{arguments.contact}"
+        library = str(build(arguments.output / name, arguments.contact).resolve())
         canaries = CANARIES if arguments.all is None else ()
         engines = list(dict.fromkeys((*(arguments.engine or ENGINES), *canaries)))
         labels += engines

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import shutil
 from functools import lru_cache
 from pathlib import Path
@@ -87,9 +88,16 @@ def damped(station: Station, folder: Path) -> Station:
     """The station with pads of ten times the dissipation, from a copy of the hand's model."""
     model = resolve(station.hand.model)
     if not folder.exists():
-        shutil.copytree(model.parent, folder)
-        path = folder / model.name
-        path.write_text(path.read_text().replace(*DAMPING))
+        beside = folder.with_name(f"{folder.name}_{os.getpid()}")
+        shutil.copytree(model.parent, beside)
+        path = beside / model.name
+        text = path.read_text()
+        assert DAMPING[0] in text, f"{path} has no {DAMPING[0]}"
+        path.write_text(text.replace(*DAMPING))
+        try:
+            beside.rename(folder)
+        except OSError:  # another worker was first
+            shutil.rmtree(beside)
     return dataclasses.replace(station, hand_model=folder / model.name)
 
 

@@ -174,6 +174,24 @@ def test_fronts_of_the_pads_look_at_each_other(document: Hand) -> None:
     np.testing.assert_allclose(left * (-1.0, -1.0, 1.0), right, atol=1e-12)
 
 
+def test_fronts_of_the_pads_carry_the_torsion_of_a_patch() -> None:
+    """One point a triangle, against the integral over the rectangle."""
+    lines = resolve("package://burg_drake/models/panda/meshes/pad.vtk").read_text().splitlines()
+    count = int(next(x for x in lines if x.startswith("POINTS")).split()[1])
+    points = np.array([[float(v) for v in x.split()] for x in lines[5 : 5 + count]])
+    cells = np.array([[int(v) for v in x.split()[2:]] for x in lines if x.startswith("4 ")])
+    faces = points[cells]
+    front = faces[np.isclose(faces[..., 1], -0.0076).all(axis=1)]
+    area = (
+        np.linalg.norm(np.cross(front[:, 1] - front[:, 0], front[:, 2] - front[:, 0]), axis=1) / 2
+    )
+    lever = np.linalg.norm(front.mean(axis=1)[:, ::2], axis=1)
+    x, z = (((np.arange(400) + 0.5) / 400 - 0.5)[:, None] * (0.0175, 0.0185)).T
+    whole = np.hypot(*np.meshgrid(x, z)).mean() * 0.0175 * 0.0185
+    assert area.sum() == pytest.approx(0.0175 * 0.0185, rel=1e-6)
+    assert 0.96 < (area * lever).sum() / whole < 0.97
+
+
 def test_grasp_frame_lies_between_the_pads(document: Hand) -> None:
     gripper = Gripper()
     gripper.put(0.02, 0.02)

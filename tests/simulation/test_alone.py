@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 from trial_world import CENTRE, QUICK, make_station
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.scene.document.scene import Scene, load_scene
 from burg_drake.simulation.trials.hand_trial import HandTrial
+from burg_drake.simulation.trials.lift_clearance import HandLiftClearance
 from burg_drake.station.diagram.builder import build_station_diagram
 
 MakeScene = Callable[..., Scene]
@@ -57,3 +60,21 @@ def test_what_cannot_be_alone_is_refused() -> None:
         build_station_diagram(
             "tabletop_six", "panda_tabletop", robot="none", for_trials=True, weld_objects=True
         )
+
+
+def test_the_way_up_is_free_of_where_others_were_in_an_earlier_trial(make_scene: MakeScene) -> None:
+    scene = make_scene(("box", 0.3, 0.2, 0.0), ("post", 0.5, 0.2, 0.0))
+    trial = HandTrial(scene, make_station(), engine=QUICK)
+    X_WG, up = trial.X_WG("box", CENTRE), np.array([0.0, 0.0, 1.0])
+    trial.run("box", CENTRE)
+    alone, complete = trial.world, trial.complete_world
+    assert alone is not complete
+    clearance = HandLiftClearance(build_station_diagram(scene, make_station(), robot="hand"), "box")
+    plant = complete.diagram.plant
+    plant.SetFloatingBaseBodyPoseInWorldFrame(
+        plant.GetMyMutableContextFromRoot(complete.context),
+        plant.get_body(complete.diagram.free["post"]),
+        RigidTransform([0.3, 0.2, 0.3]),
+    )
+    assert not clearance.is_free(complete, X_WG, 0.3, up)
+    assert clearance.is_free(alone, X_WG, 0.3, up)

@@ -23,8 +23,8 @@ MOST_DISTANCE = 2.5e-4
 """Largest distance between the object's surface and that which pads touch, either way [m]."""
 
 MOST_ANGLE = float(np.deg2rad(10.0))
-"""Angle from which on a normal counts as turned: the force of a pad then leaves the friction cone
-of 0.24, 13.5 degrees wide to each side, though the grasp is a good one."""
+"""Angle from which on a normal counts as turned. It uses up three quarters of the friction cone of
+0.24, 13.5 degrees wide to each side; a good grasp must not fail for it."""
 
 TURNED = 0.05
 """Largest share of the area whose normals are turned: next to edges that were moved, within

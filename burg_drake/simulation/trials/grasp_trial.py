@@ -148,15 +148,17 @@ class GraspTrial(ABC):
         screen = self.clearance.check(instance, X_WG)
         if screen.outcome is not None:
             return collision(screen)
+        world = self._world_of(instance)
         try:
             try:
-                found = begin(self._world_of(instance)).run()
+                found = begin(world).run()
             except OtherTouched:
-                found = begin(self.complete_world).run()
+                world = self.complete_world
+                found = begin(world).run()
             return replace(found, margins=replace(found.margins, clearance=screen.clearance))
         except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
-            self.world.invalidate()
-            return failure(error, screen, self.context.get_time())
+            world.invalidate()
+            return failure(error, screen, world.context.get_time())
 
     def closed_before_contact(self, instance: str, X_WG: Array) -> float:
         """How far the fingers can close, from 0 (open) to 1, before they touch anything: the

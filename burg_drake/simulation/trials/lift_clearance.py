@@ -153,17 +153,20 @@ class ArmLiftClearance:
 
 
 def _take_positions(diagram: StationDiagram, plant_context: Context, world: TrialWorld) -> None:
-    """Puts robot and objects where they are in a world; what cannot move there is where it was."""
+    """Puts robot and objects where they are in a world; what cannot move there is in its place."""
     plant, other = diagram.plant, world.diagram.plant
     other_context = other.GetMyContextFromRoot(world.context)
     for model in ROBOT_MODELS:
         if other.HasModelInstanceNamed(model):
             q = other.GetPositions(other_context, other.GetModelInstanceByName(model))
             plant.SetPositions(plant_context, plant.GetModelInstanceByName(model), q)
-    for name, index in world.diagram.free.items():
-        X_WO = other.EvalBodyPoseInWorld(other_context, other.get_body(index))
-        body = plant.get_body(diagram.free[name])
-        plant.SetFloatingBaseBodyPoseInWorldFrame(plant_context, body, X_WO)
+    for name, index in diagram.free.items():
+        if name in world.diagram.free:
+            moved = other.get_body(world.diagram.free[name])
+            X_WO = other.EvalBodyPoseInWorld(other_context, moved)
+        else:
+            X_WO = RigidTransform(diagram.X_WO(name))
+        plant.SetFloatingBaseBodyPoseInWorldFrame(plant_context, plant.get_body(index), X_WO)
 
 
 def _bounds(

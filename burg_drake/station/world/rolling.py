@@ -31,7 +31,7 @@ def is_ball(scene: Scene, name: str) -> bool:
 
 
 def add_rolling(builder: RobotDiagramBuilder, scene: Scene, name: str, body: RigidBody) -> None:
-    """Adds the sphere by which a ball rolls; `separate_ball_contact` says what it meets."""
+    """Adds the sphere by which a ball rolls; `separate_contact` says what it meets."""
     primitive = scene.entry(name).contact.primitive
     assert primitive is not None
     plant = builder.plant()
