@@ -81,7 +81,7 @@ class Run:
     def key(self) -> str:
         """Tells runs apart in the journal."""
         case = self.case
-        what = (case.X_OG, case.friction, case.mass)
+        what: tuple[object, ...] = (case.X_OG, case.friction, case.mass)
         if self.label in KNOWN:
             what = (*what, Path(self.library).name)
         return f"{case.id} {self.label} {content_hash(what)[:12]}"
