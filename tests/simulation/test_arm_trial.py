@@ -305,7 +305,7 @@ def test_swapped_fingers_make_no_difference(box_scene: Scene) -> None:
     plan = straight_plan(trial, trial.X_WG("box", BESIDE) @ SWAP)
     other = trial.run("box", BESIDE, plan)
     assert beside.outcome is other.outcome is Outcome.LIFTED
-    for name, tolerance in (("slip", 2e-4), ("tilt", 2e-3), ("lift", 5e-4), ("pad_force", 0.05)):
+    for name, tolerance in (("slip", 2e-4), ("tilt", 3e-3), ("lift", 5e-4), ("pad_force", 0.05)):
         first, second = getattr(beside.margins, name), getattr(other.margins, name)
         assert first == pytest.approx(second, abs=tolerance), name
 
