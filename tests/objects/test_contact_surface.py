@@ -148,6 +148,15 @@ def test_why_there_is_none() -> None:
         contact_surface(rough, True)
 
 
+def test_of_bodies_that_were_united() -> None:
+    bar = trimesh.creation.box((0.1, 0.01, 0.01))
+    cross = trimesh.boolean.union([bar, trimesh.creation.cylinder(0.01, 0.1)])
+    cross.vertices.flags.writeable = False  # as of a result of Manifold
+    mesh, fit = contact_surface(cross, True)
+    assert mesh.is_watertight
+    assert fit.volume_ratio == pytest.approx(1.0, abs=0.02)
+
+
 def test_the_same_surface_twice() -> None:
     one, other = (contact_surface(torus(), True)[0] for _ in range(2))
     assert one.vertices.tobytes() == other.vertices.tobytes()

@@ -208,12 +208,10 @@ def _boxes_meet(parts: list[trimesh.Trimesh]) -> bool:
 
 def _manifold(mesh: trimesh.Trimesh) -> manifold3d.Manifold | None:
     """None if the mesh is not closed in Manifold's eyes."""
-    manifold = manifold3d.Manifold(
-        manifold3d.Mesh64(
-            np.ascontiguousarray(mesh.vertices, dtype=float),
-            np.ascontiguousarray(mesh.faces, dtype=np.uint64),
-        )
-    )
+    # Copies, as Manifold refuses arrays that cannot be written to, such as its own results.
+    vertices = np.array(mesh.vertices, dtype=float, order="C")
+    faces = np.array(mesh.faces, dtype=np.uint64, order="C")
+    manifold = manifold3d.Manifold(manifold3d.Mesh64(vertices, faces))
     sound = manifold.status() == manifold3d.Error.NoError and not manifold.is_empty()
     return manifold if sound else None
 
