@@ -148,6 +148,13 @@ def test_why_there_is_none() -> None:
         contact_surface(rough, True)
 
 
+@pytest.mark.thorough
+def test_a_mesh_of_a_million_faces() -> None:
+    mesh, fit = contact_surface(sphere(8), True)
+    assert len(mesh.faces) < 2_000
+    assert fit.hausdorff <= MOST_DISTANCE
+
+
 def test_of_bodies_that_were_united() -> None:
     bar = trimesh.creation.box((0.1, 0.01, 0.01))
     cross = trimesh.boolean.union([bar, trimesh.creation.cylinder(0.01, 0.1)])
