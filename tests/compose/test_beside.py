@@ -58,8 +58,9 @@ def test_settling_is_a_proposal(session: ComposeSession) -> None:
     with pytest.raises(TaskCancelled):
         job.wait(PATIENCE)
     job = session.settle()
-    while (process := session._settler.process) is None and not job.done:
+    while job.progress[1] == "waiting":
         time.sleep(0.001)
+    process = session._settler.process
     assert process is not None
     os.kill(process, signal.SIGKILL)
     with pytest.raises(SimulationError, match=r"ended from outside by SIGKILL; the scene is as"):

@@ -142,6 +142,28 @@ def test_a_worker_that_is_ended_by_others_is_replaced() -> None:
         assert future.result(PATIENCE) == 3
 
 
+class KillsWhenPickled:
+    """A number; the worker that is about to be sent it dies."""
+
+    def __init__(self, process: int) -> None:
+        self.process = process
+
+    def __reduce__(self) -> tuple[type[int], tuple[int]]:
+        os.kill(self.process, signal.SIGKILL)
+        os.waitid(os.P_PID, self.process, os.WEXITED | os.WNOWAIT)
+        return int, (5,)
+
+
+@pytest.mark.parametrize("worker", [None, 0])
+def test_work_given_to_a_worker_that_has_just_died_is_done(worker: int | None) -> None:
+    with WorkerPool(1) as pool:
+        pool.submit(jobs.square, 1).result(PATIENCE)
+        (idle,) = pool.processes
+        task = Task(jobs.square, (KillsWhenPickled(idle),), retries=0)
+        assert pool.submit_tasks([task], worker)[0].result(PATIENCE) == 25
+        assert idle not in pool.processes
+
+
 def test_what_takes_too_long_is_ended_once() -> None:
     with WorkerPool(2) as pool:
         spinning = Task(jobs.spin, limit=TimeLimit(cpu=0.3, wall=30.0))

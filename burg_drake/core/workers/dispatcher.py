@@ -156,13 +156,13 @@ class Dispatcher:
         tasks: Batch = deque(task for task, _ in calls)
         try:
             worker.start()
+            while not worker.give(tasks, tuple(call for _, call in calls)):
+                worker.kill()
+                worker.forget()
+                worker.start()
         except OSError as error:
             for task in tasks:
                 task.future.set_exception(error)
-            return
-        if not worker.give(tasks, tuple(call for _, call in calls)):
-            worker.kill()
-            worker.own.appendleft(worker.forget())
 
     def _receive(self, worker: Worker) -> None:
         assert worker.connection is not None
