@@ -37,8 +37,8 @@ ROOMS = {
     "printout": "",
     "station": "document world control diagram checks",
     "export": "",
-    "cameras": "optics sources calibration pose rectification projection placement overlay systems"
-    " live",
+    "cameras": "optics sources calibration pose rectification projection placement overlay noise"
+    " systems live",
     "ros": "",
     "grasping": "similarity sampling quality comparison clearance",
     "motion": "ik proximity collision sweep lines transit reach plans timing workspace",
@@ -48,10 +48,12 @@ ROOMS = {
     "evaluation": "candidates stages workers cluster records store results grasp_sets robustness"
     " report run merge",
     "generation": "",
+    "dataset": "views appearance rendering labels samples generating exchange",
     "experiment": "trials planning statistics pairing comparison gap pages",
     "compose": "document commands storage background editing",
     "ui": "server widgets view pointing panels",
-    "apps": "terminal options web library scene camera ar grasps runs comparison trials",
+    "apps": "terminal options web library scene camera ar grasps runs comparison trials"
+    " dataset",
 }
 """Rooms, each with its sub-rooms. A room or sub-room imports those before it and itself."""
 WITHIN = {"evaluation.report": "elements sections"}

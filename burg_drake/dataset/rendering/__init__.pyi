@@ -1,0 +1,4 @@
+from .images import (
+    SURROUNDINGS as SURROUNDINGS,
+    Images as Images,
+)

@@ -1,0 +1,32 @@
+"""What a camera sees of a scene: images of the same size and the same pixels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import Bytes, Single
+
+SURROUNDINGS = 0
+"""Label of what is no object of the scene: table, board, obstacles, robot, distractors, sky."""
+
+
+@dataclass(frozen=True, eq=False)
+class Images:
+    """Images of one view; those that were not asked for are None.
+
+    Attributes:
+        color: (H, W, 3) red, green, blue.
+        depth: (H, W) distance along the optical axis [m]; 0 where nothing is in the depth range.
+        labels: (H, W) number of the instance that the pixel's centre shows: 1 for the first free
+            one of the scene, free ones before background; `SURROUNDINGS` for everything else.
+        normals: (H, W, 3) unit normals of the surfaces' faces in the camera frame, towards the
+            camera; 0 where nothing is.
+    """
+
+    color: Bytes | None = None
+    depth: Single | None = None
+    labels: NDArray[np.uint16] | None = None
+    normals: Single | None = None
