@@ -3,12 +3,9 @@ surfaces, each object in a colour of its own."""
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 
 import numpy as np
-import trimesh
-from pydrake.geometry import Box, Capsule, Cylinder, Ellipsoid, Mesh, Shape, Sphere
 
 from burg_drake.cameras.optics import FieldOfView
 from burg_drake.core import Array, Indices, transform_points
@@ -16,13 +13,13 @@ from burg_drake.core.terminal import CATEGORIES, distinct_colors
 from burg_drake.experiment.pages.painting import BACKGROUND, NOTHING, Painting, Viewpoint
 from burg_drake.experiment.pages.scene_bodies import GROUND, HAND, PlacedBody
 from burg_drake.geometry import RayCaster
+from burg_drake.station.diagram import Triangles, shape_triangles
 
 LIGHT = np.array([0.35, -0.45, 0.82])
 """Where the light comes from, in S."""
 AMBIENT = 0.45
 """Brightness of what the light does not reach."""
 HAND_COLOR = (0.86, 0.87, 0.88)
-Triangles = tuple[Array, Indices]
 
 
 class RayPainter:
@@ -61,7 +58,7 @@ class RayPainter:
         vertices, faces, owner, first = [], [], [], 0
         for index, one in enumerate(placed):
             if one.body.key not in self._triangles:
-                self._triangles[one.body.key] = triangles(one.body.shape)
+                self._triangles[one.body.key] = shape_triangles(one.body.shape)
             corners, mine = self._triangles[one.body.key]
             vertices.append(transform_points(one.X_SB, corners))
             faces.append(mine + first)
@@ -75,42 +72,3 @@ def _colors(placed: Sequence[PlacedBody]) -> list[tuple[float, float, float]]:
     more = distinct_colors(len(names))
     own = {n: CATEGORIES[i][:3] if i < len(CATEGORIES) else more[i] for i, n in enumerate(names)}
     return [own.get(one.name, one.body.color or HAND_COLOR) for one in placed]
-
-
-def triangles(shape: Shape) -> Triangles:
-    """Vertices (V, 3) [m] and faces (F, 3) of a visual shape; none of one without a surface."""
-    mesh = _trimesh(shape)
-    return np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64).reshape(-1, 3)
-
-
-def _trimesh(shape: Shape) -> trimesh.Trimesh:
-    if isinstance(shape, Mesh):
-        return _mesh(shape)
-    if isinstance(shape, Box):
-        return trimesh.creation.box((shape.width(), shape.depth(), shape.height()))
-    if isinstance(shape, Sphere):
-        return trimesh.creation.icosphere(radius=shape.radius())
-    if isinstance(shape, Cylinder):
-        return trimesh.creation.cylinder(shape.radius(), shape.length())
-    if isinstance(shape, Capsule):
-        capsule = trimesh.creation.capsule(shape.length(), shape.radius())
-        capsule.vertices -= capsule.bounds.mean(axis=0)
-        return capsule
-    if isinstance(shape, Ellipsoid):
-        ball = trimesh.creation.icosphere()
-        ball.vertices *= (shape.a(), shape.b(), shape.c())
-        return ball
-    return trimesh.Trimesh()
-
-
-def _mesh(shape: Mesh) -> trimesh.Trimesh:
-    source = shape.source()
-    if source.is_path():
-        mesh = trimesh.load(source.path(), force="mesh", process=False, skip_materials=True)
-    else:
-        file = source.in_memory().mesh_file
-        data = io.BytesIO(file.contents())
-        kind = file.extension().lstrip(".")
-        mesh = trimesh.load(data, file_type=kind, force="mesh", process=False)
-    mesh.vertices = np.asarray(mesh.vertices) * shape.scale3()
-    return mesh

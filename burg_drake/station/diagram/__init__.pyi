@@ -12,3 +12,9 @@ from .station_diagram import (
     StationDiagram as StationDiagram,
     instance_pose as instance_pose,
 )
+from .visible_triangles import (
+    Triangles as Triangles,
+    VisibleSurface as VisibleSurface,
+    shape_triangles as shape_triangles,
+    visible_surfaces as visible_surfaces,
+)

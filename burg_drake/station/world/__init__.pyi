@@ -4,6 +4,7 @@ from .board_visual import (
 )
 from .camera_sensors import (
     LIGHTS as LIGHTS,
+    RENDERER as RENDERER,
     add_cameras as add_cameras,
 )
 from .contact_parts import (

@@ -1,0 +1,62 @@
+"""Labels of the objects in a view: where each is, and how much of it is seen."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import inverse
+from burg_drake.dataset.labels.instance_label import Box, InstanceLabel
+from burg_drake.dataset.rendering import Images, SceneRenderer
+from burg_drake.dataset.views import View
+
+
+def label_instances(
+    renderer: SceneRenderer, view: View, images: Images | None = None
+) -> tuple[InstanceLabel, ...]:
+    """Labels of all instances, in the order of their numbers.
+
+    Args:
+        renderer: of the scene.
+        view: the camera.
+        images: what it sees, with labels; looked at again if None.
+    """
+    labels = images.labels if images is not None else None
+    if labels is None:
+        labels = renderer.images(view, ("labels",)).labels
+        assert labels is not None
+    rays, X_CS, height_width = renderer.rays(view), inverse(view.X_SC), labels.shape
+    counts = np.bincount(labels.ravel(), minlength=len(renderer.numbers) + 1)
+    found = []
+    for name, number in renderer.numbers.items():
+        silhouette = rays.silhouette(number, view)
+        amodal = silhouette.within(height_width[1], height_width[0])
+        visible = int(counts[number])
+        if visible:
+            amodal |= labels == number  # a ray along an edge may fall to either side
+        size = max(int(np.count_nonzero(silhouette.mask)), visible)
+        rows, columns = silhouette.mask.shape
+        found.append(
+            InstanceLabel(
+                name=name,
+                object=renderer.scene.instance(name).object,
+                number=number,
+                X_CO=X_CS @ renderer.scene.X_SO(name),
+                visible_pixels=visible,
+                silhouette_pixels=size,
+                visibility=visible / size if size else 0.0,
+                visible_box=box_around(labels == number) if visible else None,
+                amodal_box=(silhouette.left, silhouette.top, columns, rows) if rows else None,
+                amodal=amodal,
+            )
+        )
+    return tuple(found)
+
+
+def box_around(mask: NDArray[np.bool_]) -> Box | None:
+    """The smallest rectangle of pixels that holds a mask (H, W); None if it is empty."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if not len(rows):
+        return None
+    left, top = int(columns[0]), int(rows[0])
+    return left, top, int(columns[-1]) - left + 1, int(rows[-1]) - top + 1

@@ -1,0 +1,178 @@
+"""A scene to be looked at from anywhere: images of it, and labels of its objects."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from pydrake.multibody.tree import BodyIndex
+
+from burg_drake.core import Array, InvalidInputError, inverse, nearest, transform_points
+from burg_drake.dataset.rendering.colors import DrakeColors
+from burg_drake.dataset.rendering.images import SURROUNDINGS, Images
+from burg_drake.dataset.rendering.ray_scene import RayScene, label_numbers
+from burg_drake.dataset.views import View
+from burg_drake.scene.document import SceneLike, as_scene
+from burg_drake.station.diagram import build_station_diagram, visible_surfaces
+from burg_drake.station.document import StationLike, as_station
+from burg_drake.station.world import RENDERER
+
+if TYPE_CHECKING:
+    from burg_drake.dataset.appearance import Appearance
+
+ImageKind = Literal["color", "depth", "labels", "normals"]
+KINDS: tuple[ImageKind, ...] = ("color", "depth", "labels", "normals")
+
+
+class SceneRenderer:
+    """Renders one scene on one station from many places.
+
+    Depth, labels and normals come from rays and are exact; colours come from Drake's renderer.
+
+    Attributes:
+        scene, station: what is rendered.
+        numbers: label of each instance, by name.
+    """
+
+    def __init__(
+        self,
+        scene: SceneLike,
+        station: StationLike,
+        *,
+        appearance: Appearance | None = None,
+        arm: bool = False,
+        colors: bool = True,
+    ) -> None:
+        """Builds the scene.
+
+        Args:
+            scene: what stands on the board.
+            station: what is around it.
+            appearance: how it looks; as simulated cameras see it if None.
+            arm: whether the station's arm is there.
+            colors: whether colours will be asked for; rays alone need no system libraries.
+
+        Raises:
+            MissingDependencyError: a system library of the renderer is missing.
+            InvalidInputError: the station has no arm; and as `build_station_diagram`.
+        """
+        self.scene, self.station = as_scene(scene), as_station(station)
+        self.numbers = label_numbers((*self.scene.instances, *self.scene.background))
+        self._appearance = appearance
+        self._built = build_station_diagram(
+            self.scene, self.station, robot="arm" if arm else "none", cameras=colors
+        )
+        self._renderer = None
+        if appearance is not None:
+            from burg_drake.dataset.appearance import apply_appearance
+
+            self._renderer = apply_appearance(self._built, appearance, renderer=colors)
+        elif colors:
+            self._renderer = RENDERER
+        self._surfaces = visible_surfaces(self._built.plant, self._built.scene_graph)
+        self._context = self._built.diagram.CreateDefaultContext()
+        self._plant_context = self._built.plant.GetMyMutableContextFromRoot(self._context)
+        self._posture: tuple[float, ...] | None = None
+        self._rays: RayScene | None = None
+
+    def images(
+        self,
+        view: View,
+        kinds: Collection[ImageKind] = ("color", "depth", "labels"),
+        *,
+        rng: np.random.Generator | None = None,
+    ) -> Images:
+        """What a camera sees.
+
+        Args:
+            view: the camera.
+            kinds: of images.
+            rng: draws the noise of the colours' sensor, where the appearance has one.
+
+        Raises:
+            InvalidInputError: an image of another kind, or colours of a renderer without them.
+        """
+        for kind in kinds:
+            if kind not in KINDS:
+                raise InvalidInputError(f"no image of kind {kind!r}; {nearest(kind, KINDS)}")
+        self._place_arm(view)
+        by_rays = Images()
+        if {"depth", "labels", "normals"} & set(kinds) or self._colors_need_labels:
+            by_rays = self._ray_scene.images(view, normals="normals" in kinds)
+        color = None
+        if "color" in kinds:
+            X_WC = self.station.document.X_WS.matrix() @ view.X_SC
+            color = self._colors.image(view.intrinsics, X_WC, view.depth_range)
+            if self._appearance is not None:
+                from burg_drake.dataset.appearance import photometric
+
+                assert by_rays.labels is not None
+                color = photometric(color, by_rays.labels, self._appearance, rng)
+        return Images(
+            color,
+            by_rays.depth if "depth" in kinds else None,
+            by_rays.labels if "labels" in kinds else None,
+            by_rays.normals,
+        )
+
+    def rays(self, view: View) -> RayScene:
+        """All surfaces as they stand in a view."""
+        self._place_arm(view)
+        return self._ray_scene
+
+    @property
+    def _colors_need_labels(self) -> bool:
+        return self._appearance is not None
+
+    @cached_property
+    def _colors(self) -> DrakeColors:
+        if self._renderer is None:
+            raise InvalidInputError("this scene was built without colours")
+        scene_graph = self._built.scene_graph
+        context = scene_graph.GetMyContextFromRoot(self._context)
+        query = scene_graph.get_query_output_port().Eval(context)
+        return DrakeColors(query, scene_graph.world_frame_id(), self._renderer)
+
+    def _place_arm(self, view: View) -> None:
+        if view.posture == self._posture:
+            return
+        joints = self._built.arm_joints
+        if not joints or view.posture is None:
+            have = "no arm" if not joints else "its arm"
+            raise InvalidInputError(
+                f"a view {'without' if view.posture is None else 'with'} the arm in it, of a scene"
+                f" with {have}"
+            )
+        if len(view.posture) != len(joints):
+            raise InvalidInputError(
+                f"posture of {len(view.posture)} joints; the arm has {len(joints)}"
+            )
+        for joint, position in zip(joints, view.posture, strict=True):
+            joint.set_angle(self._plant_context, position)
+        self._posture, self._rays = view.posture, None
+
+    @property
+    def _ray_scene(self) -> RayScene:
+        if self._rays is None:
+            X_SW = inverse(self.station.document.X_WS.matrix())
+            placed = {**self._built.free, **self._built.fixed}
+            owner = {placed[name]: number for name, number in self.numbers.items()}
+            self._rays = RayScene.joined(
+                [
+                    (
+                        owner.get(one.body, SURROUNDINGS),
+                        transform_points(X_SW @ self._X_WB(one.body), one.vertices),
+                        one.faces,
+                    )
+                    for one in self._surfaces
+                ]
+            )
+        return self._rays
+
+    def _X_WB(self, body: BodyIndex) -> Array:
+        plant = self._built.plant
+        pose = plant.EvalBodyPoseInWorld(self._plant_context, plant.get_body(body))
+        X_WB: Array = pose.GetAsMatrix4()
+        return X_WB
