@@ -22,6 +22,9 @@ from .core.grasps.outcome import (
     Outcome as Outcome,
     Stage as Stage,
 )
+from .dataset.rendering.render import (
+    render as render,
+)
 from .evaluation.candidates.sampling_settings import (
     SamplingSettings as SamplingSettings,
 )

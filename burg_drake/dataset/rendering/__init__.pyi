@@ -7,6 +7,10 @@ from .ray_scene import (
     Silhouette as Silhouette,
     label_numbers as label_numbers,
 )
+from .render import (
+    render as render,
+    station_view as station_view,
+)
 from .scene_renderer import (
     KINDS as KINDS,
     ImageKind as ImageKind,

@@ -134,7 +134,8 @@ class RayScene:
         normals = (self._normals @ rotation)[face]
         away = np.einsum("ij,ij->i", normals, unit) > 0.0
         normals[away] *= -1.0
-        return normals.reshape(*shape, 3)
+        seen: Single = normals.reshape(*shape, 3)
+        return seen
 
     def _surface_of(self, number: int) -> tuple[Array, RayCaster]:
         faces = self._faces[self._labels[:-1] == number]

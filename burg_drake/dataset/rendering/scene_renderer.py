@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Iterable
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
@@ -80,7 +80,7 @@ class SceneRenderer:
     def images(
         self,
         view: View,
-        kinds: Collection[ImageKind] = ("color", "depth", "labels"),
+        kinds: Iterable[ImageKind] = ("color", "depth", "labels"),
         *,
         rng: np.random.Generator | None = None,
     ) -> Images:
@@ -94,6 +94,7 @@ class SceneRenderer:
         Raises:
             InvalidInputError: an image of another kind, or colours of a renderer without them.
         """
+        kinds = tuple(kinds)
         for kind in kinds:
             if kind not in KINDS:
                 raise InvalidInputError(f"no image of kind {kind!r}; {nearest(kind, KINDS)}")

@@ -1,0 +1,70 @@
+"""One look at a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from burg_drake.cameras.optics import of_camera
+from burg_drake.core import InvalidInputError, inverse
+from burg_drake.dataset.rendering.images import Images
+from burg_drake.dataset.rendering.scene_renderer import ImageKind, SceneRenderer
+from burg_drake.dataset.views import View
+from burg_drake.scene.document import SceneLike, as_scene
+from burg_drake.station.document import Station, StationLike, as_station
+
+
+def render(
+    scene: SceneLike,
+    station: StationLike,
+    camera: str | View = "board",
+    kinds: Iterable[ImageKind] = ("color", "depth", "labels"),
+    *,
+    arm: bool = False,
+) -> Images:
+    """What a camera sees of a scene on a station.
+
+    Args:
+        scene: what stands on the board.
+        station: what is around it.
+        camera: its name in the station, or any view.
+        kinds: of images: `color`, `depth`, `labels`, `normals`.
+        arm: whether the station's arm is there, in its home posture if the camera is a name.
+
+    Returns:
+        Images whose pixels are the same ones; those that were not asked for are None.
+
+    Raises:
+        UnknownNameError: there is no such camera, scene or station.
+        MissingDependencyError: colours were asked for, and the renderer lacks a system library.
+        InvalidInputError: there is no such kind of image, or the station has no arm.
+    """
+    scene, station = as_scene(scene), as_station(station)
+    kinds = tuple(kinds)
+    view = camera if isinstance(camera, View) else station_view(station, camera, arm=arm)
+    renderer = SceneRenderer(scene, station, arm=view.posture is not None, colors="color" in kinds)
+    return renderer.images(view, kinds)
+
+
+def station_view(station: Station, camera: str, *, arm: bool = False) -> View:
+    """The view of a station's camera.
+
+    Args:
+        station: has the camera.
+        camera: its name.
+        arm: whether the arm is there, in its home posture.
+
+    Raises:
+        UnknownNameError: there is no such camera.
+        InvalidInputError: the station has no arm.
+    """
+    document = station.document
+    if arm and document.arm is None:
+        raise InvalidInputError(f"station {station.name!r} has no arm that could be in view")
+    found = station.camera(camera)
+    return View(
+        camera=camera,
+        intrinsics=of_camera(found),
+        X_SC=inverse(document.X_WS.matrix()) @ found.X_WC.matrix(),
+        depth_range=found.depth_range,
+        posture=tuple(document.arm.home) if arm and document.arm is not None else None,
+    )
