@@ -126,7 +126,8 @@ class RayScene:
         normals = np.cross(b - a, c - a)
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         unit = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0.0)
-        return np.append(unit, np.zeros((1, 3)), axis=0).astype(np.float32)
+        normals_or_none: Single = np.append(unit, np.zeros((1, 3)), axis=0).astype(np.float32)
+        return normals_or_none
 
     def _normals_seen(
         self, face: NDArray[np.int32], unit: Single, rotation: Single, shape: tuple[int, int]
