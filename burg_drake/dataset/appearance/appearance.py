@@ -1,0 +1,127 @@
+"""How one scene looks: plain data, from which everything else follows."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from burg_drake.core import InvalidInputError
+from burg_drake.core.documents import Pose, Vector3, parse_document, plain_data
+from burg_drake.dataset.appearance.settings import Pattern
+
+WHITE: Vector3 = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DirectedLight:
+    """A light far away.
+
+    Attributes:
+        direction: that it shines in, in the world.
+        irradiance: of a surface that faces it: with 1, a white one is white in the image.
+        color: red, green, blue, linear.
+        shadows: whether it casts them.
+    """
+
+    direction: Vector3
+    irradiance: float
+    color: Vector3 = WHITE
+    shadows: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class TableSurface:
+    """The pattern on a table.
+
+    Attributes:
+        pattern: its kind.
+        seed: of all that is random about it.
+    """
+
+    pattern: Pattern
+    seed: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Photometry:
+    """How a camera makes a picture of the light that falls on it.
+
+    Attributes:
+        exposure: [stops].
+        white_balance: gains of red, green, blue, linear.
+        gamma: exponent that is left in the picture: light to the power of 1 / gamma.
+        blur: standard deviation [pixels].
+        electrons: that a white pixel collects; no noise if None.
+    """
+
+    exposure: float = 0.0
+    white_balance: Vector3 = WHITE
+    gamma: float = 1.0
+    blur: float = 0.0
+    electrons: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.gamma <= 0.0 or self.blur < 0.0 or (self.electrons or 1.0) <= 0.0:
+            raise InvalidInputError("gamma and electrons must be above 0, blur at least 0")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Distractor:
+    """A thing on the table that has no label.
+
+    Attributes:
+        object: name in the library of distractors.
+        X_SO: its pose in the scene frame.
+    """
+
+    object: str
+    X_SO: Pose
+
+
+@dataclass(frozen=True, kw_only=True)
+class Appearance:
+    """How a scene looks. Without anything it looks as simulated cameras always see it.
+
+    Attributes:
+        lights: the usual ones if there are none.
+        room: seed of the room behind the table; an even grey if None.
+        image_based: the picture of the room lights the scene.
+        table: its pattern; its own colour if None.
+        board: whether the printed board is seen.
+        photometry: of the image.
+        object_gains: of red, green and blue of each instance, linear, in the order of labels;
+            nothing is changed if empty.
+        library: that distractors are from: a built-in name, or a folder.
+        distractors: on the table.
+    """
+
+    version: int = 1
+    lights: tuple[DirectedLight, ...] = ()
+    room: int | None = None
+    image_based: bool = False
+    table: TableSurface | None = None
+    board: bool = True
+    photometry: Photometry = Photometry()
+    object_gains: tuple[Vector3, ...] = ()
+    library: str = "household"
+    distractors: tuple[Distractor, ...] = field(default=())
+
+    def plain(self) -> dict[str, Any]:
+        """As dicts, lists, numbers and texts, for JSON and YAML; `read_appearance` reads it."""
+        found: dict[str, Any] = plain_data(self)
+        return found
+
+
+def read_appearance(data: Mapping[str, Any], name: str = "appearance") -> Appearance:
+    """An appearance from plain data.
+
+    Args:
+        data: as `Appearance.plain` gives it.
+        name: stands for the place that it is from in messages.
+
+    Raises:
+        DocumentError: it does not fit; the message names the key.
+    """
+    return parse_document(json.dumps(data), Appearance, name)

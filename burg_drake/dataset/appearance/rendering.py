@@ -1,0 +1,197 @@
+"""An appearance in Drake: its renderer, and what the scene graph has to show it."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+import cv2
+import numpy as np
+from pydrake.common import MemoryFile
+from pydrake.geometry import (
+    EnvironmentMap,
+    EquirectangularMap,
+    GeometryInstance,
+    InMemoryMesh,
+    LightParameter,
+    MakeRenderEngineVtk,
+    Mesh,
+    PerceptionProperties,
+    RenderEngineVtkParams,
+    RenderLabel,
+    Rgba,
+    Role,
+)
+from pydrake.math import RigidTransform
+from pydrake.multibody.tree import RigidBody
+
+from burg_drake.core import MissingDependencyError, cache_folder
+from burg_drake.core.files import atomic_write
+from burg_drake.dataset.appearance.appearance import Appearance, DirectedLight
+from burg_drake.dataset.appearance.background import NOWHERE
+from burg_drake.dataset.appearance.distractors import distractor_library
+from burg_drake.dataset.appearance.room import environment_map
+from burg_drake.dataset.appearance.table_texture import EXTENT, table_texture
+from burg_drake.station.diagram import StationDiagram
+from burg_drake.station.world import LIGHTS
+from burg_drake.system_libraries import apt_command, missing_render_libraries
+
+RENDERER = "appearance"
+FAR = 50.0
+"""Distance of lights that cast no shadows [m]. They are points: Drake's directional lights all cast
+shadows where one of them does."""
+SHADOW_MAP = 2048
+"""Pixels along a side of the image that decides about shadows, which spans the whole table."""
+
+
+def apply_appearance(built: StationDiagram, appearance: Appearance) -> str:
+    """Makes a diagram look like that: adds a renderer, gives the table its pattern, takes the
+    printed board away, and puts distractors onto the table. Contact and poses stay as they are.
+
+    Args:
+        built: before a context of it is created.
+        appearance: how it shall look.
+
+    Returns:
+        The renderer's name, for `RenderCameraCore`. Its images need `with_background` and
+        `photometric`. Surfaces that nothing has a colour for are white.
+
+    Raises:
+        MissingDependencyError: a system library of the renderer is missing.
+        UnknownNameError: there is no such library of distractors, or no such object in it.
+    """
+    missing = missing_render_libraries()
+    if missing:
+        raise MissingDependencyError(
+            f"rendering needs the system libraries {', '.join(missing)}; run: {apt_command()}"
+        )
+    if appearance.table is not None:
+        _cover_table(built, appearance)
+    if not appearance.board:
+        _unseen(built, built.plant.GetBodyByName("board"))
+    _add_distractors(built, appearance)
+    engine = MakeRenderEngineVtk(render_parameters(appearance))
+    built.scene_graph.AddRenderer(RENDERER, engine)
+    return RENDERER
+
+
+def render_parameters(appearance: Appearance) -> RenderEngineVtkParams:
+    """Parameters of Drake's renderer: its lights, whether they cast shadows, and the picture of the
+    room if that lights the scene. Lights add up linearly."""
+    parameters = RenderEngineVtkParams(
+        default_clear_color=np.array(NOWHERE) / 255.0,
+        lights=[_light(one) for one in appearance.lights] or LIGHTS,
+    )
+    if appearance.lights:
+        parameters.force_to_pbr = True
+        parameters.cast_shadows = any(light.shadows for light in appearance.lights)
+        parameters.shadow_map_size = SHADOW_MAP
+    if appearance.image_based and appearance.room is not None:
+        texture = EquirectangularMap(path=str(environment_file(appearance.room)))
+        parameters.environment_map = EnvironmentMap(skybox=False, texture=texture)
+    return parameters
+
+
+def environment_file(seed: int) -> Path:
+    """The picture of a room as a PNG in the cache, or in the folder of temporary files if there is
+    no cache."""
+    _, png = cv2.imencode(".png", np.ascontiguousarray(environment_map(seed)[..., ::-1]))
+    folder = cache_folder() or Path(tempfile.gettempdir()) / f"burg_drake_{os.getuid()}"
+    path = folder / f"room-{seed}.png"
+    atomic_write(path, bytes(png))
+    return path
+
+
+def _light(light: DirectedLight) -> LightParameter:
+    """Drake's physically based shading divides by pi what a white surface reflects."""
+    direction = np.array(light.direction)
+    found = LightParameter(
+        type="directional" if light.shadows else "point",
+        frame="world",
+        color=Rgba(*np.clip(np.array(light.color) / max(light.color), 0.0, 1.0), 1.0),
+        intensity=light.irradiance * max(light.color) * np.pi,
+        attenuation_values=np.array([1.0, 0.0, 0.0]),
+    )
+    if light.shadows:
+        found.direction = direction
+    else:
+        found.position = -FAR * direction / np.linalg.norm(direction)
+    return found
+
+
+def _cover_table(built: StationDiagram, appearance: Appearance) -> None:
+    """Puts a box with the texture in the place of the one that cameras see."""
+    assert appearance.table is not None
+    table = built.plant.get_body(built.table)
+    inspector = built.scene_graph.model_inspector()
+    for geometry in built.plant.GetVisualGeometriesForBody(table):
+        size = inspector.GetShape(geometry).size()
+        X_TB = inspector.GetPoseInFrame(geometry)
+        mesh = textured_box(size, EXTENT[appearance.table.pattern], table_texture(appearance))
+        instance = GeometryInstance(X_TB, mesh, "table_texture")
+        instance.set_perception_properties(_without_label())
+        frame = built.plant.GetBodyFrameIdOrThrow(table.index())
+        built.scene_graph.RegisterGeometry(built.plant.get_source_id(), frame, instance)
+    _unseen(built, table)
+
+
+def textured_box(size: np.ndarray, extent: float, png: bytes) -> Mesh:
+    """A box around the origin whose six faces show a texture in its true size.
+
+    Args:
+        size: (3,) extents [m].
+        extent: side of the square that the texture covers [m].
+        png: the texture.
+    """
+    lines = ["mtllib box.mtl", "usemtl surface"]
+    for k, (axis, sign) in enumerate((axis, sign) for axis in range(3) for sign in (-1, 1)):
+        u, v = [(1, 2), (2, 0), (0, 1)][axis]
+        for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
+            p = np.zeros(3)
+            p[axis], p[u], p[v] = sign, a * sign, b
+            x, y, z = 0.5 * p * size
+            lines.append(f"v {x:.9g} {y:.9g} {z:.9g}")
+            s, t = 0.5 * (p[[u, v]] + 1.0) * size[[u, v]] / extent
+            lines.append(f"vt {s:.9g} {t:.9g}")
+        normal = np.eye(3)[axis] * sign
+        lines.append("vn " + " ".join(f"{n:g}" for n in normal))
+        lines.append("f " + " ".join(f"{i}/{i}/{k + 1}" for i in range(4 * k + 1, 4 * k + 5)))
+    material = "newmtl surface\nKd 1 1 1\nmap_Kd surface.png\n"
+    return Mesh(
+        InMemoryMesh(
+            mesh_file=MemoryFile("\n".join(lines) + "\n", ".obj", "box.obj"),
+            supporting_files={
+                "box.mtl": MemoryFile(material, ".mtl", "box.mtl"),
+                "surface.png": MemoryFile(png, ".png", "surface.png"),
+            },
+        )
+    )
+
+
+def _add_distractors(built: StationDiagram, appearance: Appearance) -> None:
+    if not appearance.distractors:
+        return
+    library = distractor_library(appearance.library)
+    X_WS = built.station.document.X_WS.matrix()
+    for k, one in enumerate(appearance.distractors):
+        mesh = Mesh(str(library.path(library.entry(one.object).mesh)))
+        X_WO = RigidTransform(X_WS @ one.X_SO.matrix())
+        instance = GeometryInstance(X_WO, mesh, f"distractor_{k}")
+        instance.set_perception_properties(_without_label())
+        built.scene_graph.RegisterAnchoredGeometry(built.plant.get_source_id(), instance)
+
+
+def _unseen(built: StationDiagram, body: RigidBody) -> None:
+    """Takes what cameras see of a body away from them."""
+    source = built.plant.get_source_id()
+    inspector = built.scene_graph.model_inspector()
+    for geometry in built.plant.GetVisualGeometriesForBody(body):
+        if inspector.GetPerceptionProperties(geometry) is not None:
+            built.scene_graph.RemoveRole(source, geometry, Role.kPerception)
+
+
+def _without_label() -> PerceptionProperties:
+    properties = PerceptionProperties()
+    properties.AddProperty("label", "id", RenderLabel.kDontCare)
+    return properties
