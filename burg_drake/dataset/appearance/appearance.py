@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
-from burg_drake.core import InvalidInputError
+from burg_drake.core import FieldError, InvalidInputError
 from burg_drake.core.documents import Pose, Vector3, parse_document, plain_data
 from burg_drake.dataset.appearance.settings import Pattern
 
@@ -19,16 +19,27 @@ class DirectedLight:
     """A light far away.
 
     Attributes:
-        direction: that it shines in, in the world.
+        direction: that it shines in.
+        frame: of the direction: the world, or that of the camera, with which the light goes.
         irradiance: of a surface that faces it: with 1, a white one is white in the image.
         color: red, green, blue, linear.
         shadows: whether it casts them.
     """
 
     direction: Vector3
+    frame: Literal["world", "camera"] = "world"
     irradiance: float
     color: Vector3 = WHITE
     shadows: bool = False
+
+    def __post_init__(self) -> None:
+        if not any(self.direction) or min(self.color) < 0.0 or not any(self.color):
+            raise InvalidInputError(
+                "a light needs a direction and a color, and no part of the color may be below 0;"
+                f" given: {list(self.direction)}, {list(self.color)}"
+            )
+        if self.irradiance < 0.0:
+            raise FieldError(f"irradiance is {self.irradiance:g}; it is at least 0", "irradiance")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from burg_drake.cameras.optics import FieldOfView, Intrinsics
-from burg_drake.core import Array, Bytes
+from burg_drake.core import Array, Booleans, Bytes
 from burg_drake.dataset.appearance.appearance import Appearance
 from burg_drake.dataset.appearance.room import environment_map, pixels_of
 
@@ -35,15 +35,33 @@ def with_background(color: Bytes, X_WC: Array, intrinsics: Intrinsics, look: App
     nothing = (color == NOWHERE).all(axis=2)
     if not nothing.any():
         return color
-    filled = color.copy()
-    if look.room is None:
-        filled[nothing] = GREY
-        return filled
-    d_W = _rays(intrinsics)[nothing] @ X_WC[:3, :3].T
-    at = pixels_of(d_W).astype(np.float32)[None]
-    room = _room(look.room)
-    filled[nothing] = _looked_up(room, at)
+    edge = cv2.dilate(nothing.astype(np.uint8), np.ones((3, 3), np.uint8)).astype(bool) & ~nothing
+    seen_behind = nothing | edge
+    behind = np.full(color.shape, GREY, np.uint8)
+    if look.room is not None:
+        d_W = _rays(intrinsics)[seen_behind] @ X_WC[:3, :3].T
+        behind[seen_behind] = _looked_up(_room(look.room), pixels_of(d_W).astype(np.float32)[None])
+    filled = np.where(nothing[..., None], behind, color)
+    filled[edge] = _unmixed(color, nothing, edge, behind)
     return filled
+
+
+def _unmixed(color: Bytes, nothing: Booleans, edge: Booleans, behind: Bytes) -> Bytes:
+    """(N, 3) pixels of edges, which the renderer has mixed with `NOWHERE`, mixed with what is
+    behind instead.
+
+    The share of `NOWHERE` in a pixel follows from how much more red and blue it has than green,
+    compared with pixels around it that are not mixed.
+    """
+    solid = (~nothing & ~edge).astype(np.float32)
+    excess = color[..., [0, 2]].astype(np.float32).mean(axis=2) - color[..., 1]
+    around = cv2.boxFilter(solid, -1, (5, 5), normalize=False)[edge]
+    total = cv2.boxFilter(excess * solid, -1, (5, 5), normalize=False)[edge]
+    inside = total / np.maximum(around, 1.0)
+    most = 0.5 * (NOWHERE[0] + NOWHERE[2]) - NOWHERE[1]
+    share = np.clip((excess[edge] - inside) / (most - inside), 0.0, 1.0)[:, None]
+    mixed = color[edge] + share * (behind[edge].astype(np.float32) - np.array(NOWHERE, np.float32))
+    return np.asarray(np.clip(mixed + 0.5, 0.0, 255.0), dtype=np.uint8)
 
 
 def _looked_up(room: Bytes, at: Array) -> Bytes:

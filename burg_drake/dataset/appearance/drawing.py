@@ -21,9 +21,13 @@ from burg_drake.station.document import StationLike, as_station
 SEEDS = 1 << 32
 TABLE_LIGHT = (0.75, 1.0)
 """Irradiance of the table by all lights together; with 1, what is white is white in the image."""
-FIRST_SHARE = (0.45, 0.7)
-"""Of it by the first light, if there are others. One light alone leaves what it does not reach
-black, so that a weak one from the other side always goes with it."""
+CAMERA_SHARE = (0.12, 0.3)
+"""Of it by the light that goes with the camera, and stands for what walls and ceiling scatter."""
+OTHER_WEIGHT = (0.2, 0.7)
+"""What other lights give the table, relative to the first one."""
+OTHER_ELEVATION_DEG = (25.0, 75.0)
+STEEP = 0.4
+"""The sine of elevations from which lights are no longer made brighter for shining flatly."""
 NEUTRAL = 6500.0
 """Temperature of light that is white in sRGB [K]."""
 
@@ -67,29 +71,31 @@ def _lights(settings: AppearanceSettings, rng: np.random.Generator) -> tuple[Dir
         return ()
     low, high = settings.lights
     count = int(rng.integers(low, high + 1))
-    elevation = np.deg2rad([rng.uniform(*settings.light_elevation_deg), *([0.0] * count)])
-    elevation[1:] = np.deg2rad(rng.uniform(25.0, 70.0, count))
-    turn = rng.uniform(-np.pi, np.pi)
-    azimuth = turn + np.array([0.0, np.pi, *([0.0] * (count - 1))])
-    azimuth[1:] += rng.uniform(-1.0, 1.0, count)
-    if count > 1:
-        azimuth[2:] = rng.uniform(-np.pi, np.pi, count - 1)
-    total, first = rng.uniform(*TABLE_LIGHT), rng.uniform(*FIRST_SHARE)
-    shares = np.append(first, rng.uniform(0.5, 1.0, count))
-    shares[1:] *= (1.0 - first) / shares[1:].sum()
+    elevation = np.deg2rad(rng.uniform(*OTHER_ELEVATION_DEG, count))
+    elevation[0] = np.deg2rad(rng.uniform(*settings.light_elevation_deg))
+    azimuth = rng.uniform(-np.pi, np.pi, count)
+    total, camera_share = rng.uniform(*TABLE_LIGHT), rng.uniform(*CAMERA_SHARE)
+    shares = rng.uniform(*OTHER_WEIGHT, count)
+    shares[0] = 1.0
+    shares *= (1.0 - camera_share) / shares.sum()
+    shadows = bool(rng.random() < settings.shadows)
     found = []
-    for k in range(count + 1):
+    for k in range(count):
         flat, up = np.cos(elevation[k]), np.sin(elevation[k])
         x, y, z = (rot_z(azimuth[k]) @ [-flat, 0.0, -up]).tolist()
         found.append(
             DirectedLight(
                 direction=(x, y, z),
-                irradiance=float(total * shares[k] / max(up, 0.4)),
+                irradiance=float(total * shares[k] / max(up, STEEP)),
                 color=_light_color(settings, rng),
-                shadows=k == 0 and bool(rng.random() < settings.shadows),
+                shadows=k == 0 and shadows,
             )
         )
-    return tuple(found)
+    x, y = rng.uniform(-0.4, 0.4, 2).tolist()
+    fill = DirectedLight(
+        direction=(x, y, 1.0), frame="camera", irradiance=float(total * camera_share)
+    )
+    return (*found, fill)
 
 
 def _light_color(settings: AppearanceSettings, rng: np.random.Generator) -> Vector3:

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from pydrake.common import MemoryFile
 from pydrake.geometry import (
+    Box,
     EnvironmentMap,
     EquirectangularMap,
     GeometryInstance,
-    InMemoryMesh,
     LightParameter,
     MakeRenderEngineVtk,
     Mesh,
@@ -26,23 +25,28 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import RigidBody
 
-from burg_drake.core import MissingDependencyError, cache_folder
+from burg_drake.core import MissingDependencyError, cache_folder, make_pose
 from burg_drake.core.files import atomic_write
 from burg_drake.dataset.appearance.appearance import Appearance, DirectedLight
 from burg_drake.dataset.appearance.background import NOWHERE
 from burg_drake.dataset.appearance.distractors import distractor_library
 from burg_drake.dataset.appearance.room import environment_map
 from burg_drake.dataset.appearance.table_texture import EXTENT, table_texture
+from burg_drake.dataset.appearance.textured_box import textured_box
 from burg_drake.station.diagram import StationDiagram
 from burg_drake.station.world import LIGHTS
 from burg_drake.system_libraries import apt_command, missing_render_libraries
 
 RENDERER = "appearance"
 FAR = 50.0
-"""Distance of lights that cast no shadows [m]. They are points: Drake's directional lights all cast
-shadows where one of them does."""
-SHADOW_MAP = 2048
+"""Distance of lights that are points [m]."""
+SHADOW_MAP = 1024
 """Pixels along a side of the image that decides about shadows, which spans the whole table."""
+HEADROOM = 1.5
+"""Of the speck that is put above the board where there are shadows [m]: what of a scene is nearest
+to the light has false shadows in VTK, so that something has to be nearer than the objects."""
+SPECK = 5e-4
+"""Its size [m]: less than a pixel."""
 
 
 def apply_appearance(built: StationDiagram, appearance: Appearance) -> str:
@@ -71,6 +75,8 @@ def apply_appearance(built: StationDiagram, appearance: Appearance) -> str:
     if not appearance.board:
         _unseen(built, built.plant.GetBodyByName("board"))
     _add_distractors(built, appearance)
+    if any(light.shadows for light in appearance.lights):
+        _add_speck(built)
     engine = MakeRenderEngineVtk(render_parameters(appearance))
     built.scene_graph.AddRenderer(RENDERER, engine)
     return RENDERER
@@ -79,14 +85,14 @@ def apply_appearance(built: StationDiagram, appearance: Appearance) -> str:
 def render_parameters(appearance: Appearance) -> RenderEngineVtkParams:
     """Parameters of Drake's renderer: its lights, whether they cast shadows, and the picture of the
     room if that lights the scene. Lights add up linearly."""
+    shadows = any(light.shadows for light in appearance.lights)
     parameters = RenderEngineVtkParams(
         default_clear_color=np.array(NOWHERE) / 255.0,
-        lights=[_light(one) for one in appearance.lights] or LIGHTS,
+        lights=[_light(one, shadows) for one in appearance.lights] or LIGHTS,
+        force_to_pbr=bool(appearance.lights),
+        cast_shadows=shadows,
+        shadow_map_size=SHADOW_MAP,
     )
-    if appearance.lights:
-        parameters.force_to_pbr = True
-        parameters.cast_shadows = any(light.shadows for light in appearance.lights)
-        parameters.shadow_map_size = SHADOW_MAP
     if appearance.image_based and appearance.room is not None:
         texture = EquirectangularMap(path=str(environment_file(appearance.room)))
         parameters.environment_map = EnvironmentMap(skybox=False, texture=texture)
@@ -103,20 +109,26 @@ def environment_file(seed: int) -> Path:
     return path
 
 
-def _light(light: DirectedLight) -> LightParameter:
-    """Drake's physically based shading divides by pi what a white surface reflects."""
-    direction = np.array(light.direction)
+def _light(light: DirectedLight, shadows: bool) -> LightParameter:
+    """A light for Drake, whose physically based shading divides by pi what a white surface
+    reflects.
+
+    Args:
+        light: far away.
+        shadows: whether any light of the scene casts shadows: all directional ones do then, but
+            points do not. Otherwise directional ones are quicker.
+    """
+    direction = np.array(light.direction) / np.linalg.norm(light.direction)
+    brightest = max(light.color)
     found = LightParameter(
-        type="directional" if light.shadows else "point",
-        frame="world",
-        color=Rgba(*np.clip(np.array(light.color) / max(light.color), 0.0, 1.0), 1.0),
-        intensity=light.irradiance * max(light.color) * np.pi,
+        type="directional" if light.shadows or not shadows else "point",
+        frame=light.frame,
+        color=Rgba(*(np.array(light.color) / brightest), 1.0),
+        intensity=light.irradiance * brightest * np.pi,
         attenuation_values=np.array([1.0, 0.0, 0.0]),
     )
-    if light.shadows:
-        found.direction = direction
-    else:
-        found.position = -FAR * direction / np.linalg.norm(direction)
+    found.direction = direction
+    found.position = -FAR * direction
     return found
 
 
@@ -136,39 +148,6 @@ def _cover_table(built: StationDiagram, appearance: Appearance) -> None:
     _unseen(built, table)
 
 
-def textured_box(size: np.ndarray, extent: float, png: bytes) -> Mesh:
-    """A box around the origin whose six faces show a texture in its true size.
-
-    Args:
-        size: (3,) extents [m].
-        extent: side of the square that the texture covers [m].
-        png: the texture.
-    """
-    lines = ["mtllib box.mtl", "usemtl surface"]
-    for k, (axis, sign) in enumerate((axis, sign) for axis in range(3) for sign in (-1, 1)):
-        u, v = [(1, 2), (2, 0), (0, 1)][axis]
-        for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
-            p = np.zeros(3)
-            p[axis], p[u], p[v] = sign, a * sign, b
-            x, y, z = 0.5 * p * size
-            lines.append(f"v {x:.9g} {y:.9g} {z:.9g}")
-            s, t = 0.5 * (p[[u, v]] + 1.0) * size[[u, v]] / extent
-            lines.append(f"vt {s:.9g} {t:.9g}")
-        normal = np.eye(3)[axis] * sign
-        lines.append("vn " + " ".join(f"{n:g}" for n in normal))
-        lines.append("f " + " ".join(f"{i}/{i}/{k + 1}" for i in range(4 * k + 1, 4 * k + 5)))
-    material = "newmtl surface\nKd 1 1 1\nmap_Kd surface.png\n"
-    return Mesh(
-        InMemoryMesh(
-            mesh_file=MemoryFile("\n".join(lines) + "\n", ".obj", "box.obj"),
-            supporting_files={
-                "box.mtl": MemoryFile(material, ".mtl", "box.mtl"),
-                "surface.png": MemoryFile(png, ".png", "surface.png"),
-            },
-        )
-    )
-
-
 def _add_distractors(built: StationDiagram, appearance: Appearance) -> None:
     if not appearance.distractors:
         return
@@ -180,6 +159,14 @@ def _add_distractors(built: StationDiagram, appearance: Appearance) -> None:
         instance = GeometryInstance(X_WO, mesh, f"distractor_{k}")
         instance.set_perception_properties(_without_label())
         built.scene_graph.RegisterAnchoredGeometry(built.plant.get_source_id(), instance)
+
+
+def _add_speck(built: StationDiagram) -> None:
+    x, y = built.scene.board.size
+    X_WQ = built.station.document.X_WS.matrix() @ make_pose(p_AB=(x / 2, y / 2, HEADROOM))
+    instance = GeometryInstance(RigidTransform(X_WQ), Box(SPECK, SPECK, SPECK), "headroom")
+    instance.set_perception_properties(_without_label())
+    built.scene_graph.RegisterAnchoredGeometry(built.plant.get_source_id(), instance)
 
 
 def _unseen(built: StationDiagram, body: RigidBody) -> None:

@@ -40,7 +40,8 @@ class AppearanceSettings:
     """Ranges and choices that the looks of scenes are drawn from; each can be switched off.
 
     Attributes:
-        lights: how many there are; the usual lights of simulated cameras if None.
+        lights: how many there are, besides a weak one that goes with the camera, without which
+            sides that face no light would be black; the usual lights if None.
         light_elevation_deg: of the first light above the table; the others come from anywhere
             above.
         temperature: of the lights' colours [K]; all are white if None.

@@ -83,7 +83,7 @@ def _cloth(rng: np.random.Generator) -> Array:
     weave = np.sin(x) * np.sin(y)
     wrinkles = layered_noise(rng, PIXELS, 3, 3, 3) - 0.5
     threads = smooth_noise(rng, PIXELS, 256, 24) - 0.5
-    woven: Array = image * (1.0 + 0.06 * weave + 0.12 * wrinkles + 0.06 * threads)[..., None]
+    woven: Array = image * (1.0 + 0.025 * weave + 0.12 * wrinkles + 0.05 * threads)[..., None]
     return woven
 
 
