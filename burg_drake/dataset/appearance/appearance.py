@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
 
 from burg_drake.core import FieldError, InvalidInputError
@@ -98,7 +98,7 @@ class Appearance:
     Attributes:
         lights: the usual ones if there are none.
         room: seed of the room behind the table; an even grey if None.
-        image_based: the picture of the room lights the scene.
+        room_light: irradiance of the table by the room's picture, as of lights; none if 0.
         table: its pattern; its own colour if None.
         board: whether the printed board is seen.
         photometry: of the image.
@@ -111,13 +111,20 @@ class Appearance:
     version: int = 1
     lights: tuple[DirectedLight, ...] = ()
     room: int | None = None
-    image_based: bool = False
+    room_light: float = 0.0
     table: TableSurface | None = None
     board: bool = True
     photometry: Photometry = Photometry()
     object_gains: tuple[Vector3, ...] = ()
     library: str = "household"
-    distractors: tuple[Distractor, ...] = field(default=())
+    distractors: tuple[Distractor, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.room_light < 0.0 or (self.room_light and self.room is None):
+            raise FieldError(
+                f"room_light is {self.room_light:g}; it is at least 0, and 0 without a room",
+                "room_light",
+            )
 
     def plain(self) -> dict[str, Any]:
         """As dicts, lists, numbers and texts, for JSON and YAML; `read_appearance` reads it."""

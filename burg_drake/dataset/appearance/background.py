@@ -17,7 +17,7 @@ NOWHERE = (255, 0, 254)
 GREY = 150
 """Where no room is."""
 KEPT = 4
-"""Rooms and cameras that are kept for the next image."""
+"""Cameras that are kept for the next image."""
 
 
 def with_background(color: Bytes, X_WC: Array, intrinsics: Intrinsics, look: Appearance) -> Bytes:
@@ -40,7 +40,9 @@ def with_background(color: Bytes, X_WC: Array, intrinsics: Intrinsics, look: App
     behind = np.full(color.shape, GREY, np.uint8)
     if look.room is not None:
         d_W = _rays(intrinsics)[seen_behind] @ X_WC[:3, :3].T
-        behind[seen_behind] = _looked_up(_room(look.room), pixels_of(d_W).astype(np.float32)[None])
+        behind[seen_behind] = _looked_up(
+            environment_map(look.room), pixels_of(d_W).astype(np.float32)[None]
+        )
     filled = np.where(nothing[..., None], behind, color)
     filled[edge] = _unmixed(color, nothing, edge, behind)
     return filled
@@ -72,11 +74,6 @@ def _looked_up(room: Bytes, at: Array) -> Bytes:
         for k in range(0, at.shape[1], most)
     ]
     return np.asarray(np.concatenate(parts, axis=1)[0])
-
-
-@lru_cache(maxsize=KEPT)
-def _room(seed: int) -> Bytes:
-    return environment_map(seed)
 
 
 @lru_cache(maxsize=KEPT)

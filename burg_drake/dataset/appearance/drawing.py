@@ -21,8 +21,10 @@ from burg_drake.station.document import StationLike, as_station
 SEEDS = 1 << 32
 TABLE_LIGHT = (0.75, 1.0)
 """Irradiance of the table by all lights together; with 1, what is white is white in the image."""
+ROOM_SHARE = (0.3, 0.7)
+"""Of it by the room, if that lights the scene."""
 CAMERA_SHARE = (0.12, 0.3)
-"""Of it by the light that goes with the camera, and stands for what walls and ceiling scatter."""
+"""Otherwise by a light that goes with the camera: it stands for what walls and ceiling scatter."""
 OTHER_WEIGHT = (0.2, 0.7)
 """What other lights give the table, relative to the first one."""
 OTHER_ELEVATION_DEG = (25.0, 75.0)
@@ -53,10 +55,13 @@ def draw_appearance(
     scene, station = as_scene(scene), as_station(station)
     objects = len(scene.instances) + len(scene.background)
     room = int(rng.integers(SEEDS)) if rng.random() < settings.room else None
+    by_room = room is not None and rng.random() < settings.room_light
+    total = float(rng.uniform(*TABLE_LIGHT))
+    share = float(rng.uniform(*ROOM_SHARE)) if by_room else 0.0
     return Appearance(
-        lights=_lights(settings, rng),
+        lights=_lights(settings, total * (1.0 - share), not by_room, rng),
         room=room,
-        image_based=settings.image_based and room is not None,
+        room_light=total * share if settings.lights is not None else float(by_room),
         table=_table(settings, rng),
         board=bool(rng.random() < settings.board),
         photometry=_photometry(settings, rng),
@@ -66,7 +71,11 @@ def draw_appearance(
     )
 
 
-def _lights(settings: AppearanceSettings, rng: np.random.Generator) -> tuple[DirectedLight, ...]:
+def _lights(
+    settings: AppearanceSettings, total: float, camera_light: bool, rng: np.random.Generator
+) -> tuple[DirectedLight, ...]:
+    """Lights that give the table so much irradiance together, by the settings; with one that goes
+    with the camera if wanted."""
     if settings.lights is None:
         return ()
     low, high = settings.lights
@@ -74,7 +83,7 @@ def _lights(settings: AppearanceSettings, rng: np.random.Generator) -> tuple[Dir
     elevation = np.deg2rad(rng.uniform(*OTHER_ELEVATION_DEG, count))
     elevation[0] = np.deg2rad(rng.uniform(*settings.light_elevation_deg))
     azimuth = rng.uniform(-np.pi, np.pi, count)
-    total, camera_share = rng.uniform(*TABLE_LIGHT), rng.uniform(*CAMERA_SHARE)
+    camera_share = float(rng.uniform(*CAMERA_SHARE)) if camera_light else 0.0
     shares = rng.uniform(*OTHER_WEIGHT, count)
     shares[0] = 1.0
     shares *= (1.0 - camera_share) / shares.sum()
@@ -91,6 +100,8 @@ def _lights(settings: AppearanceSettings, rng: np.random.Generator) -> tuple[Dir
                 shadows=k == 0 and shadows,
             )
         )
+    if not camera_light:
+        return tuple(found)
     x, y = rng.uniform(-0.4, 0.4, 2).tolist()
     fill = DirectedLight(
         direction=(x, y, 1.0), frame="camera", irradiance=float(total * camera_share)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import tempfile
+import time
 from pathlib import Path
 
 import cv2
@@ -25,12 +27,18 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import RigidBody
 
-from burg_drake.core import MissingDependencyError, cache_folder, make_pose
+from burg_drake.core import (
+    InvalidInputError,
+    MissingDependencyError,
+    cache_folder,
+    content_hash,
+    make_pose,
+)
 from burg_drake.core.files import atomic_write
 from burg_drake.dataset.appearance.appearance import Appearance, DirectedLight
 from burg_drake.dataset.appearance.background import NOWHERE
 from burg_drake.dataset.appearance.distractors import distractor_library
-from burg_drake.dataset.appearance.room import environment_map
+from burg_drake.dataset.appearance.room import room_radiance
 from burg_drake.dataset.appearance.table_texture import EXTENT, table_texture
 from burg_drake.dataset.appearance.textured_box import textured_box
 from burg_drake.station.diagram import StationDiagram
@@ -47,6 +55,8 @@ HEADROOM = 1.5
 to the light has false shadows in VTK, so that something has to be nearer than the objects."""
 SPECK = 5e-4
 """Its size [m]: less than a pixel."""
+OLD = 86_400.0
+"""Files of rooms older than that are removed [s]; each has some tens of kilobytes."""
 
 
 def apply_appearance(built: StationDiagram, appearance: Appearance) -> str:
@@ -93,20 +103,40 @@ def render_parameters(appearance: Appearance) -> RenderEngineVtkParams:
         cast_shadows=shadows,
         shadow_map_size=SHADOW_MAP,
     )
-    if appearance.image_based and appearance.room is not None:
-        texture = EquirectangularMap(path=str(environment_file(appearance.room)))
+    if appearance.room is not None and appearance.room_light:
+        texture = EquirectangularMap(path=str(environment_file(appearance)))
         parameters.environment_map = EnvironmentMap(skybox=False, texture=texture)
     return parameters
 
 
-def environment_file(seed: int) -> Path:
-    """The picture of a room as a PNG in the cache, or in the folder of temporary files if there is
-    no cache."""
-    _, png = cv2.imencode(".png", np.ascontiguousarray(environment_map(seed)[..., ::-1]))
+def environment_file(appearance: Appearance) -> Path:
+    """The light of a room, as a file that Drake's `EquirectangularMap` takes: in the cache, or in
+    the folder of temporary files if there is no cache.
+
+    It is a Radiance HDR file: Drake takes a PNG's values for linear ones, and 30 times as long.
+
+    Raises:
+        InvalidInputError: there is no room.
+    """
+    if appearance.room is None:
+        raise InvalidInputError("an appearance without a room has no environment")
+    radiance = room_radiance(appearance.room, appearance.room_light or 1.0)
+    _, encoded = cv2.imencode(".hdr", np.ascontiguousarray(radiance[..., ::-1]))
+    content = bytes(encoded)
     folder = cache_folder() or Path(tempfile.gettempdir()) / f"burg_drake_{os.getuid()}"
-    path = folder / f"room-{seed}.png"
-    atomic_write(path, bytes(png))
+    path = folder / f"room-{content_hash(content)[:32]}.hdr"
+    if not path.exists():
+        _remove_old(folder)
+        atomic_write(path, content)
     return path
+
+
+def _remove_old(folder: Path) -> None:
+    """Removes files of rooms that nobody can be about to read any more."""
+    for path in folder.glob("room-*.hdr"):
+        with contextlib.suppress(OSError):  # another process has removed it
+            if time.time() - path.stat().st_mtime > OLD:
+                path.unlink()
 
 
 def _light(light: DirectedLight, shadows: bool) -> LightParameter:

@@ -4,18 +4,26 @@ lamps, floor. It is drawn once, as an image of all directions, and is far away f
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
 
-from burg_drake.core import Array, Booleans, Bytes, rng_from
+from burg_drake.core import Array, Booleans, Bytes, Single, rng_from
 from burg_drake.dataset.appearance.noise import layered_noise
+from burg_drake.dataset.appearance.photometry import linear_from_srgb
 
 ROWS = 512
 """Of the image of all directions; it has twice as many columns."""
 TABLE_HEIGHT = 0.75
 """Usual height of tables [m]."""
 NOISE = 512
+KEPT = 4
+"""Rooms that are kept for the next image."""
+RADIANCE_ROWS = 64
+"""Of the picture that a room lights a scene by."""
+LAMPS, LAMP_GAIN = 0.98, 8.0
+"""Pixels that are so bright, of lamps and windows, are so many times brighter than they look."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +52,9 @@ class Panel:
         image[inside] = self.color * (tones[stripe] if self.stripes else 1.0)
 
 
+@lru_cache(maxsize=KEPT)
 def environment_map(seed: int) -> Bytes:
-    """A room as an image of all directions.
+    """A room as an image of all directions, which cannot be changed; the last ones are kept.
 
     Args:
         seed: of all that is random about it.
@@ -80,14 +89,38 @@ def environment_map(seed: int) -> Bytes:
     near_edge = np.sort(np.minimum(p_WQ - lower, upper - p_WQ), axis=2)[..., 1]
     image *= (1.0 - 0.35 * np.exp(-near_edge / 0.35))[..., None]
     blurred = _defocused(image, rng.uniform(0.8, 4.0))
-    return np.asarray(np.clip(blurred * 255.0 + 0.5, 0.0, 255.0), dtype=np.uint8)
+    found = np.asarray(np.clip(blurred * 255.0 + 0.5, 0.0, 255.0), dtype=np.uint8)
+    found.setflags(write=False)
+    return found
 
 
-def directions() -> Array:
-    """(ROWS, 2 ROWS, 3) unit vectors in the world along which the pixels' centres look: the first
-    row up, the middle column along x, and the column a quarter to the left of it along y."""
-    row = (np.arange(ROWS) + 0.5) / ROWS
-    column = (np.arange(2 * ROWS) + 0.5) / (2 * ROWS)
+def room_radiance(seed: int, irradiance: float) -> Single:
+    """The light of a room.
+
+    Args:
+        seed: of the room.
+        irradiance: of a table; with 1, what is white is white in the image.
+
+    Returns:
+        (RADIANCE_ROWS, 2 RADIANCE_ROWS, 3) linear, arranged as `environment_map`.
+    """
+    seen = environment_map(seed) / 255.0
+    light = linear_from_srgb(seen)
+    light[(seen > LAMPS).all(axis=2)] *= LAMP_GAIN
+    size = (2 * RADIANCE_ROWS, RADIANCE_ROWS)
+    small = np.asarray(cv2.resize(light, size, interpolation=cv2.INTER_AREA))
+    up = directions(RADIANCE_ROWS)[..., 2]
+    sine = np.sqrt(1.0 - up**2)  # the area of a pixel
+    weight = np.maximum(up, 0.0) * sine
+    table = (small.mean(axis=2) * weight).sum() / weight.sum()
+    return np.asarray(small * (irradiance / table), dtype=np.float32)
+
+
+def directions(rows: int = ROWS) -> Array:
+    """(rows, 2 rows, 3) unit vectors in the world along which the pixels' centres look: the first
+    row up, the middle of a row along x, and a quarter of the image to the left of it along y."""
+    row = (np.arange(rows) + 0.5) / rows
+    column = (np.arange(2 * rows) + 0.5) / (2 * rows)
     polar, azimuth = np.pi * row[:, None], 2.0 * np.pi * (0.5 - column)[None]
     flat = np.sin(polar)
     return np.stack(

@@ -16,6 +16,7 @@ MOST_DISTRACTORS = 50
 RANGES = {
     "shadows": (0.0, 1.0),
     "room": (0.0, 1.0),
+    "room_light": (0.0, 1.0),
     "board": (0.0, 1.0),
     "white_balance": (0.0, 0.5),
     "color_gain": (0.0, 0.9),
@@ -47,8 +48,8 @@ class AppearanceSettings:
         temperature: of the lights' colours [K]; all are white if None.
         shadows: probability that the first light casts shadows, which costs two thirds more.
         room: probability that a room is seen behind the table, and not an even grey.
-        image_based: let the picture of the room light the scene; that takes some ten seconds a
-            scene without a graphics card.
+        room_light: probability that the room, if there is one, lights the scene from all around,
+            by its picture; that takes about a second a scene without a graphics card.
         table: patterns of the table, each with equal probability; its own colour if empty.
         board: probability that the printed board lies on the table, and not only what stands on it.
         exposure: of the image [stops]; 0 if None.
@@ -74,7 +75,7 @@ class AppearanceSettings:
     temperature: Span | None = (3200.0, 7500.0)
     shadows: float = 0.5
     room: float = 0.9
-    image_based: bool = False
+    room_light: float = 0.3
     table: tuple[Pattern, ...] = PATTERNS
     board: float = 0.5
     exposure: Span | None = (-0.7, 0.3)
