@@ -8,6 +8,7 @@ from .appearance import (
 )
 from .background import with_background as with_background
 from .drawing import draw_appearance as draw_appearance
+from .patterns import table_texture as table_texture
 from .photometry import photometric as photometric
 from .rendering import (
     apply_appearance as apply_appearance,
@@ -16,4 +17,3 @@ from .rendering import (
 )
 from .room import environment_map as environment_map
 from .settings import AppearanceSettings as AppearanceSettings
-from .table_texture import table_texture as table_texture

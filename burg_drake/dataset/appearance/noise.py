@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from burg_drake.core import Array
+from burg_drake.core import Array, Indices
 
 
 def smooth_noise(rng: np.random.Generator, size: int, rows: int, columns: int) -> Array:
@@ -43,7 +43,7 @@ def layered_noise(
     return total / weight
 
 
-def _steps(size: int, cells: int) -> tuple[Array, Array, Array]:
+def _steps(size: int, cells: int) -> tuple[Indices, Indices, Array]:
     """(size,) the grid's index before and after each pixel, and how far it is from the first."""
     place = (np.arange(size) + 0.5) * cells / size
     first = np.floor(place).astype(np.intp)

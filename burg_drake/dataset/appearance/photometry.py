@@ -66,7 +66,8 @@ def photometric(
         spread = np.sqrt(light / made.electrons + (READ_NOISE / made.electrons) ** 2)
         light += spread * rng.standard_normal(light.shape, dtype=np.float32)
     steps = np.clip(light * np.float32(LEVELS - 1) + np.float32(0.5), 0, LEVELS - 1)
-    return _encoding(made.gamma)[steps.astype(np.uint16)]
+    encoded: Bytes = _encoding(made.gamma)[steps.astype(np.uint16)]
+    return encoded
 
 
 def _gains(
@@ -84,7 +85,8 @@ def _gains(
         raise InvalidInputError(
             f"label {most} has no gain; the appearance is of a scene of {len(gains) - 1} objects"
         )
-    return gains[labels]
+    of_pixels: Single = gains[labels]
+    return of_pixels
 
 
 def _encoding(gamma: float) -> Bytes:

@@ -38,8 +38,8 @@ from burg_drake.core.files import atomic_write
 from burg_drake.dataset.appearance.appearance import Appearance, DirectedLight
 from burg_drake.dataset.appearance.background import NOWHERE
 from burg_drake.dataset.appearance.distractors import distractor_library
+from burg_drake.dataset.appearance.patterns import EXTENT, table_texture
 from burg_drake.dataset.appearance.room import room_radiance
-from burg_drake.dataset.appearance.table_texture import EXTENT, table_texture
 from burg_drake.dataset.appearance.textured_box import textured_box
 from burg_drake.station.diagram import StationDiagram
 from burg_drake.station.world import LIGHTS

@@ -106,7 +106,7 @@ def room_radiance(seed: int, irradiance: float) -> Single:
     """
     seen = environment_map(seed) / 255.0
     light = linear_from_srgb(seen)
-    light[(seen > LAMPS).all(axis=2)] *= LAMP_GAIN
+    light[np.all(seen > LAMPS, axis=2)] *= LAMP_GAIN
     size = (2 * RADIANCE_ROWS, RADIANCE_ROWS)
     small = np.asarray(cv2.resize(light, size, interpolation=cv2.INTER_AREA))
     up = directions(RADIANCE_ROWS)[..., 2]

@@ -33,8 +33,6 @@ PAIRS = {
 }
 """The same of ranges that values are drawn from."""
 
-Span = tuple[float, float]
-
 
 @dataclass(frozen=True, kw_only=True)
 class AppearanceSettings:
@@ -71,18 +69,18 @@ class AppearanceSettings:
     WRITTEN_WHOLE: ClassVar[bool] = True
 
     lights: tuple[int, int] | None = (1, 3)
-    light_elevation_deg: Span = (35.0, 85.0)
-    temperature: Span | None = (3200.0, 7500.0)
+    light_elevation_deg: tuple[float, float] = (35.0, 85.0)
+    temperature: tuple[float, float] | None = (3200.0, 7500.0)
     shadows: float = 0.5
     room: float = 0.9
     room_light: float = 0.3
     table: tuple[Pattern, ...] = PATTERNS
     board: float = 0.5
-    exposure: Span | None = (-0.7, 0.3)
+    exposure: tuple[float, float] | None = (-0.7, 0.3)
     white_balance: float = 0.06
-    gamma: Span | None = (0.9, 1.1)
-    blur: Span | None = (0.0, 0.8)
-    electrons: Span | None = (1500.0, 20_000.0)
+    gamma: tuple[float, float] | None = (0.9, 1.1)
+    blur: tuple[float, float] | None = (0.0, 0.8)
+    electrons: tuple[float, float] | None = (1500.0, 20_000.0)
     color_gain: float = 0.1
     distractors: tuple[int, int] = (0, 4)
     distractor_library: str = "household"

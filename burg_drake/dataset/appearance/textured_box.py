@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from pydrake.common import MemoryFile
 from pydrake.geometry import InMemoryMesh, Mesh
@@ -36,12 +38,13 @@ def textured_box(size: Array, extent: float, png: bytes) -> Mesh:
             corners = range(count + 1, count + 5)
             lines.append("f " + " ".join(f"{i}/{i}/{k + 1}" for i in corners))
             count += 4
+    contents: Any = png  # which the stub has as text
     return Mesh(
         InMemoryMesh(
             mesh_file=MemoryFile("\n".join(lines) + "\n", ".obj", "box.obj"),
             supporting_files={
                 "box.mtl": MemoryFile(MATERIAL, ".mtl", "box.mtl"),
-                "surface.png": MemoryFile(png, ".png", "surface.png"),
+                "surface.png": MemoryFile(contents, ".png", "surface.png"),
             },
         )
     )
