@@ -40,9 +40,7 @@ def with_background(color: Bytes, X_WC: Array, intrinsics: Intrinsics, look: App
     behind = np.full(color.shape, GREY, np.uint8)
     if look.room is not None:
         d_W = _rays(intrinsics)[seen_behind] @ X_WC[:3, :3].T
-        behind[seen_behind] = _looked_up(
-            environment_map(look.room), pixels_of(d_W).astype(np.float32)[None]
-        )
+        behind[seen_behind] = _looked_up(environment_map(look.room), pixels_of(d_W))
     filled = np.where(nothing[..., None], behind, color)
     filled[edge] = _unmixed(color, nothing, edge, behind)
     return filled
@@ -66,8 +64,9 @@ def _unmixed(color: Bytes, nothing: Booleans, edge: Booleans, behind: Bytes) -> 
     return np.asarray(np.clip(mixed + 0.5, 0.0, 255.0), dtype=np.uint8)
 
 
-def _looked_up(room: Bytes, at: Array) -> Bytes:
-    """(N, 3) colours at columns and rows (1, N, 2), in parts that OpenCV can take."""
+def _looked_up(room: Bytes, pixels: Array) -> Bytes:
+    """(N, 3) colours at columns and rows (N, 2), in parts that OpenCV can take."""
+    at = pixels.astype(np.float32)[None]
     most = (1 << 15) - 2
     parts = [
         cv2.remap(room, at[:, k : k + most], None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)

@@ -213,7 +213,7 @@ def _ceiling(
     count, size = rng.integers(1, 4, 2), rng.uniform(0.1, 0.4, 2)
     share = (p / half + 1.0) * 0.5 * count
     from_middle = np.abs(share % 1.0 - 0.5) * 2.0 * half / count
-    lamp = (from_middle < size).all(axis=1)
+    lamp = np.all(from_middle < size, axis=1)
     image[on] = np.where(lamp[:, None], 1.1, colors)
 
 

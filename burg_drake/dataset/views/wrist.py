@@ -6,7 +6,7 @@ import numpy as np
 
 from burg_drake.core import Array, InvalidInputError, inverse, make_pose
 from burg_drake.motion.collision import ArmCollision, require_free_home
-from burg_drake.motion.ik import ArmKinematics, arm_solutions
+from burg_drake.motion.ik import ArmKinematics, arm_solutions, solve_ik
 from burg_drake.scene.document import Scene
 from burg_drake.station.diagram import build_station_diagram
 from burg_drake.station.document import Hand, Station
@@ -18,6 +18,9 @@ LIMIT_MARGIN = 0.01
 """Distance to keep from joint limits [rad or m]."""
 REDUNDANT = (16,)
 """Values of the redundant joint, where there is one, that are looked at."""
+REFINEMENTS, TOLERANCE = 5, 1e-9
+"""Steps by which solutions are refined, and what is left of their error then [m and rad]: poses of
+cameras are labels, and should be more exact than those of grasps."""
 CHECKED = 12
 """Postures of a hand pose that are checked for collisions, the nearest to home first."""
 
@@ -72,7 +75,14 @@ class WristCamera:
         found = [
             self._solutions.solve(X_AH[None], turn)[1] for turn in range(self._solutions.rounds)
         ]
-        q = self._kinematics.wrapped_near(np.concatenate(found), self._home)
+        near, met = solve_ik(
+            self._kinematics,
+            np.broadcast_to(X_AH, (sum(map(len, found)), 4, 4)),
+            np.concatenate(found),
+            iterations=REFINEMENTS,
+            tolerance=TOLERANCE,
+        )
+        q = self._kinematics.wrapped_near(near[met], self._home)
         if not len(q):
             return UNREACHABLE
         far = np.abs(q - self._home).max(axis=1)
