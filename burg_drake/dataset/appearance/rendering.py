@@ -64,12 +64,12 @@ def apply_appearance(built: StationDiagram, appearance: Appearance) -> str:
     printed board away, and puts distractors onto the table. Contact and poses stay as they are.
 
     Args:
-        built: before a context of it is created.
+        built: with cameras, so that its board has markers, and before a context of it is created.
         appearance: how it shall look.
 
     Returns:
-        The renderer's name, for `RenderCameraCore`. Its images need `with_background` and
-        `photometric`. Surfaces that nothing has a colour for are white.
+        The renderer's name, for `RenderCameraCore`. Its images need `with_background`, then
+        `photometric`.
 
     Raises:
         MissingDependencyError: a system library of the renderer is missing.

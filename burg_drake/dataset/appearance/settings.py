@@ -44,7 +44,8 @@ class AppearanceSettings:
         light_elevation_deg: of the first light above the table; the others come from anywhere
             above.
         temperature: of the lights' colours [K]; all are white if None.
-        shadows: probability that the first light casts shadows, which costs two thirds more.
+        shadows: probability that the first light casts shadows, which doubles the time of
+            rendering.
         room: probability that a room is seen behind the table, and not an even grey.
         room_light: probability that the room, if there is one, lights the scene from all around,
             by its picture; that takes about a second a scene without a graphics card.
