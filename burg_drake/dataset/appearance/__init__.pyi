@@ -1,0 +1,19 @@
+from .appearance import (
+    Appearance as Appearance,
+    DirectedLight as DirectedLight,
+    Distractor as Distractor,
+    Photometry as Photometry,
+    TableSurface as TableSurface,
+    read_appearance as read_appearance,
+)
+from .background import with_background as with_background
+from .drawing import draw_appearance as draw_appearance
+from .patterns import table_texture as table_texture
+from .photometry import photometric as photometric
+from .rendering import (
+    apply_appearance as apply_appearance,
+    environment_file as environment_file,
+    render_parameters as render_parameters,
+)
+from .room import environment_map as environment_map
+from .settings import AppearanceSettings as AppearanceSettings

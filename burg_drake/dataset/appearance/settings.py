@@ -1,0 +1,99 @@
+"""How much the looks of scenes vary: a part of documents that say how a data set is made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal, get_args
+
+from burg_drake.core import FieldError
+from burg_drake.core.documents import require_ranges
+
+Pattern = Literal["wood", "cloth", "stone", "plain"]
+PATTERNS: tuple[Pattern, ...] = get_args(Pattern)
+
+MOST_LIGHTS = 4
+MOST_DISTRACTORS = 50
+RANGES = {
+    "shadows": (0.0, 1.0),
+    "room": (0.0, 1.0),
+    "room_light": (0.0, 1.0),
+    "board": (0.0, 1.0),
+    "white_balance": (0.0, 0.5),
+    "color_gain": (0.0, 0.9),
+}
+PAIRS = {
+    "lights": (1, MOST_LIGHTS),
+    "light_elevation_deg": (5.0, 90.0),
+    "temperature": (1000.0, 20_000.0),
+    "exposure": (-5.0, 5.0),
+    "gamma": (0.2, 5.0),
+    "blur": (0.0, 20.0),
+    "electrons": (50.0, 1e6),
+    "distractors": (0, MOST_DISTRACTORS),
+}
+"""The same of ranges that values are drawn from."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class AppearanceSettings:
+    """Ranges and choices that the looks of scenes are drawn from; each can be switched off.
+
+    Attributes:
+        lights: how many there are, besides a weak one that goes with the camera, without which
+            sides that face no light would be black; the usual lights if None.
+        light_elevation_deg: of the first light above the table; the others come from anywhere
+            above.
+        temperature: of the lights' colours [K]; all are white if None.
+        shadows: probability that the first light casts shadows, which doubles the time of
+            rendering.
+        room: probability that a room is seen behind the table, and not an even grey.
+        room_light: probability that the room, if there is one, lights the scene from all around,
+            by its picture; that takes about a second a scene without a graphics card.
+        table: patterns of the table, each with equal probability; its own colour if empty.
+        board: probability that the printed board lies on the table, and not only what stands on it.
+        exposure: of the image [stops]; 0 if None.
+        white_balance: gains of red and blue differ from 1 by this, at most.
+        gamma: exponent that is left in the image; 1 if None.
+        blur: standard deviation [pixels]; none if None.
+        electrons: that a white pixel collects, by which its noise follows; no noise if None.
+        color_gain: channels of each object's colour differ from the library's by this share, at
+            most.
+        distractors: how many things that belong to no label stand on the table beside the objects;
+            fewer if there is no room for more.
+        distractor_library: that they are from: a built-in name, or a folder.
+        distractors_on_board: they may stand on the board, too.
+
+    Raises:
+        FieldError: a value is out of its range, or a range falls.
+    """
+
+    WRITTEN_WHOLE: ClassVar[bool] = True
+
+    lights: tuple[int, int] | None = (1, 3)
+    light_elevation_deg: tuple[float, float] = (35.0, 85.0)
+    temperature: tuple[float, float] | None = (3200.0, 7500.0)
+    shadows: float = 0.5
+    room: float = 0.9
+    room_light: float = 0.3
+    table: tuple[Pattern, ...] = PATTERNS
+    board: float = 0.5
+    exposure: tuple[float, float] | None = (-0.7, 0.3)
+    white_balance: float = 0.06
+    gamma: tuple[float, float] | None = (0.9, 1.1)
+    blur: tuple[float, float] | None = (0.0, 0.8)
+    electrons: tuple[float, float] | None = (1500.0, 20_000.0)
+    color_gain: float = 0.1
+    distractors: tuple[int, int] = (0, 4)
+    distractor_library: str = "household"
+    distractors_on_board: bool = False
+
+    def __post_init__(self) -> None:
+        require_ranges(self, RANGES)
+        for name, (least, most) in PAIRS.items():
+            pair = getattr(self, name)
+            if pair is not None and not least <= pair[0] <= pair[1] <= most:
+                raise FieldError(
+                    f"{name} is {pair[0]:g} to {pair[1]:g}; it must rise, within {least:g} to"
+                    f" {most:g}",
+                    name,
+                )

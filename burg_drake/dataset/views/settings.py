@@ -1,0 +1,87 @@
+"""What views of a scene are drawn: a part of documents that say how a data set is made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from burg_drake.core import FieldError
+from burg_drake.core.documents import Pose, require_ranges
+
+SPHERE, WRIST = "sphere", "wrist"
+"""Cameras that no station has: around the scene, and on the hand."""
+FARTHEST = 100.0
+"""Of a camera from what it looks at [m]."""
+
+RANGES = {
+    "aim": (0.0, FARTHEST),
+    "position_jitter": (0.0, FARTHEST),
+    "angle_jitter_deg": (0.0, 180.0),
+    "in_view": (0.0, 1.0),
+    "draws": (1, 100_000),
+}
+PAIRS = {
+    "distance": (1e-3, FARTHEST),
+    "elevation_deg": (-90.0, 90.0),
+    "azimuth_deg": (-360.0, 360.0),
+    "roll_deg": (-360.0, 360.0),
+}
+"""The same of ranges that views are drawn from."""
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ViewpointSettings:
+    """How views of a scene are drawn. A view looks at a point near the scene's middle, the mean of
+    its objects' centres.
+
+    Attributes:
+        cameras: what takes them, each with equal probability: `sphere`, `wrist`, or cameras of the
+            station by name.
+        distance: of the sphere's and the wrist's camera from the point that it looks at [m].
+        elevation_deg: of the camera above the board, seen from there; uniform on the sphere.
+        azimuth_deg: of the camera, from the board's x axis, counter-clockwise seen from above.
+        aim: the point that is looked at is so far from the scene's middle, at most [m].
+        roll_deg: about the optical axis; at 0 the image's rows are level.
+        position_jitter: the station's cameras are so far from their places, at most [m] ...
+        angle_jitter_deg: ... and turned by that, at most, about a random axis.
+        X_HC: the wrist's camera in the hand's frame; if None it is beside the hand, a little behind
+            the fingertips, and looks along the fingers.
+        in_view: share of the scene's objects whose centres a view shows, at least, with neither the
+            table nor an obstacle before them; one of them in any case.
+        draws: of a view, until it is given up.
+
+    Raises:
+        FieldError: a value is out of its range, a range falls, or there is no camera.
+    """
+
+    WRITTEN_WHOLE: ClassVar[bool] = True
+
+    cameras: tuple[str, ...] = (SPHERE,)
+    distance: Range = (0.5, 1.0)
+    elevation_deg: Range = (25.0, 75.0)
+    azimuth_deg: Range = (-180.0, 180.0)
+    aim: float = 0.08
+    roll_deg: Range = (-10.0, 10.0)
+    position_jitter: float = 0.0
+    angle_jitter_deg: float = 0.0
+    X_HC: Pose | None = None
+    in_view: float = 0.0
+    draws: int = 200
+
+    def __post_init__(self) -> None:
+        if not self.cameras:
+            raise FieldError(
+                f"cameras of views are missing; name {SPHERE!r}, {WRIST!r} or cameras of the"
+                " station",
+                "cameras",
+            )
+        require_ranges(self, RANGES)
+        for name, (least, most) in PAIRS.items():
+            low, high = getattr(self, name)
+            if not least <= low <= high <= most:
+                raise FieldError(
+                    f"{name} is {low:g} to {high:g}; it must rise, within {least:g} to {most:g}",
+                    name,
+                )
