@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from burg_drake.cameras.noise.document import DepthNoise
 from burg_drake.cameras.noise.surfaces import inverse_depth
 from burg_drake.core import Single
 
-STEEP = np.deg2rad(60.0)
+STEEP = math.radians(60.0)
 """Up to this angle axial noise does not depend on it (Nguyen et al. 2012)."""
-STEEPEST = np.deg2rad(82.0)
+STEEPEST = math.radians(82.0)
 """Beyond this angle nothing was measured; noise is that of this one."""
 
 
@@ -42,56 +44,46 @@ def axial_noise(
     depth: Single, angle: Single | None, noise: DepthNoise, rng: np.random.Generator
 ) -> Single:
     """Depth with normal errors of `axial_sigma`, each pixel's for itself; see there."""
-    errors = rng.standard_normal(depth.shape, dtype=np.float32)
-    moved = depth + errors * axial_sigma(depth, angle, noise)
+    moved = rng.standard_normal(depth.shape, dtype=np.float32)
+    moved *= axial_sigma(depth, angle, noise)
+    moved += depth
     return _kept(moved, depth)
 
 
-def disparity_noise(
+def disparity_errors(
     depth: Single, focal: float, noise: DepthNoise, rng: np.random.Generator
 ) -> Single:
-    """Depth of disparities with normal errors of `disparity_sigma`.
+    """Depth of disparities with normal errors of `disparity_sigma`, in steps of `disparity_step`.
 
-    The depth's standard deviation is `z^2 sigma / (f b)`, as Intel's papers on tuning the D400
-    cameras have it, as long as it is small against z; a disparity that falls to 0 or below gives
-    no depth.
-
-    Args:
-        depth: (H, W) [m], 0 for none.
-        focal: f_x [pixels].
-        noise: has sigma, and the baseline b.
-        rng: of the errors.
-    """
-    scale = np.float32(focal * abs(noise.baseline))
-    errors = rng.standard_normal(depth.shape, dtype=np.float32)
-    disparity = scale * inverse_depth(depth) + np.float32(noise.disparity_sigma) * errors
-    return _kept(_depth_of(disparity, scale), depth)
-
-
-def disparity_steps(depth: Single, focal: float, noise: DepthNoise) -> Single:
-    """Depth of disparities in whole steps: near z they are `z^2 step / (f b)` apart (Khoshelham
-    and Elberink, "Accuracy and resolution of Kinect depth data for indoor mapping applications",
-    Sensors 12, 2012). What is farther than half a step of disparity has no depth.
+    As long as they are small against z, the depth's standard deviation is `z^2 sigma / (f b)`, as
+    Intel's papers on tuning the D400 cameras have it, and steps are `z^2 step / (f b)` apart
+    (Khoshelham and Elberink, "Accuracy and resolution of Kinect depth data for indoor mapping
+    applications", Sensors 12, 2012). A disparity that is 0 or below, gives no depth.
 
     Args:
         depth: (H, W) [m], 0 for none.
         focal: f_x [pixels].
-        noise: has the step and the baseline b.
+        noise: has sigma and step, either of which may be 0, and the baseline b.
+        rng: of the errors; not asked if there are none.
     """
     scale = np.float32(focal * abs(noise.baseline))
-    step = np.float32(noise.disparity_step)
-    disparity = step * np.rint(scale / step * inverse_depth(depth))
-    return _kept(_depth_of(disparity, scale), depth)
+    disparity = scale * inverse_depth(depth)
+    if noise.disparity_sigma:
+        errors = rng.standard_normal(depth.shape, dtype=np.float32)
+        errors *= np.float32(noise.disparity_sigma)
+        disparity += errors
+    if noise.disparity_step:
+        disparity /= np.float32(noise.disparity_step)
+        np.rint(disparity, out=disparity)
+        disparity *= np.float32(noise.disparity_step)
+    disparity[disparity <= 0.0] = np.inf
+    return _kept(np.asarray(scale / disparity), depth)
 
 
 def depth_steps(depth: Single, noise: DepthNoise) -> Single:
     """Depth in whole multiples of `depth_step`, as cameras write it; 0 below half of one."""
     step = np.float32(noise.depth_step)
     return np.asarray(step * np.rint(depth / step))
-
-
-def _depth_of(disparity: Single, scale: np.float32) -> Single:
-    return np.divide(scale, disparity, out=np.zeros_like(disparity), where=disparity > 0.0)
 
 
 def _kept(moved: Single, depth: Single) -> Single:

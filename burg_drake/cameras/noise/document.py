@@ -53,7 +53,7 @@ class DepthNoise:
             hole grows from 0 to 1 [degrees]; no holes for that reason if the first is 90.
         dark_below: luma from which down a surface is dark, of 255.
         dark_probability: probability of a hole in a black surface; it falls to 0 at `dark_below`.
-        hole_size: radius of patches in which holes come [pixels]; each for itself if 0.
+        hole_size: radius of patches in which holes come, 1 or more [pixels]; each for itself if 0.
         depth_step: depth is written in steps of this [m].
 
     Raises:
@@ -88,6 +88,10 @@ class DepthNoise:
                 f"grazing_to_deg is {self.grazing_to_deg:g}; it must be at least grazing_from_deg,"
                 f" {self.grazing_from_deg:g}",
                 "grazing_to_deg",
+            )
+        if 0.0 < self.hole_size < 1.0:
+            raise FieldError(
+                f"hole_size is {self.hole_size:g}; it must be 0, or 1 to 20", "hole_size"
             )
         for name in ("disparity_sigma", "disparity_step", "second_view"):
             if not self.baseline and getattr(self, name) not in (0.0, "none"):

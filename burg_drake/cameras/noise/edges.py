@@ -10,7 +10,7 @@ from burg_drake.cameras.noise.document import DepthNoise
 from burg_drake.cameras.noise.surfaces import EDGE
 from burg_drake.core import Array, Booleans, Single
 
-REACH = 4.0
+REACH = 3.0
 """Standard deviations by which edges are moved at most."""
 
 
@@ -50,9 +50,9 @@ def lateral_noise(
     largest = float(lateral_sigma(np.array(STEEPEST if angle is not None else 0.0), noise))
     size = 2 * int(np.ceil(REACH * largest)) + 1
     near = cv2.dilate(edges.astype(np.uint8), np.ones((size, size), np.uint8)) > 0
-    rows, columns = np.nonzero(near & (depth > 0.0))
+    rows, columns = np.divmod(np.flatnonzero(near & (depth > 0.0)), depth.shape[1])
     sigma = lateral_sigma(np.zeros(len(rows)) if angle is None else angle[rows, columns], noise)
-    steps = np.rint(sigma * rng.standard_normal((2, len(rows)))).astype(np.intp)
+    steps = np.rint(sigma * rng.standard_normal((2, len(rows)), dtype=np.float32)).astype(np.intp)
     height, width = depth.shape
     frayed = depth.copy()
     frayed[rows, columns] = depth[
@@ -79,7 +79,7 @@ def flying_pixels(
     around = np.ones((3, 3), np.uint8)
     far = cv2.dilate(depth, around)
     near = cv2.erode(np.where(depth > 0.0, depth, np.float32(np.inf)), around)
-    rows, columns = np.nonzero(edges & (depth > 0.0))
+    rows, columns = np.divmod(np.flatnonzero(edges & (depth > 0.0)), depth.shape[1])
     low, high = near[rows, columns], far[rows, columns]
     mixed = rng.random(len(rows)) < noise.flying
     mixed &= high - low > EDGE * low

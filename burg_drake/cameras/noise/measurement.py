@@ -4,12 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from burg_drake.cameras.noise.axial import (
-    axial_noise,
-    depth_steps,
-    disparity_noise,
-    disparity_steps,
-)
+from burg_drake.cameras.noise.axial import axial_noise, depth_steps, disparity_errors
 from burg_drake.cameras.noise.document import DepthNoise
 from burg_drake.cameras.noise.edges import flying_pixels, lateral_noise
 from burg_drake.cameras.noise.holes import dark_probability, grazing_probability, holes
@@ -77,10 +72,8 @@ def _moved(
             measured = lateral_noise(measured, edges, angle, noise, rng)
     if noise.axial_base or noise.axial_square or noise.axial_angle:
         measured = axial_noise(measured, angle, noise, rng)
-    if noise.disparity_sigma:
-        measured = disparity_noise(measured, focal, noise, rng)
-    if noise.disparity_step:
-        measured = disparity_steps(measured, focal, noise)
+    if noise.disparity_sigma or noise.disparity_step:
+        measured = disparity_errors(measured, focal, noise, rng)
     if noise.depth_step:
         measured = depth_steps(measured, noise)
     return measured

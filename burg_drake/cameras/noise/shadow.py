@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
 from burg_drake.cameras.noise.surfaces import inverse_depth
-from burg_drake.core import Booleans, Single
+from burg_drake.core import Booleans, Indices, Single
 
 BEFORE = 0.5
 """A surface hides another one if its disparity is larger by this [pixels]."""
@@ -38,38 +39,38 @@ def hidden_from_second(
     disparity = np.float32(focal * baseline) * inverse_depth(depth)
     there = np.arange(depth.shape[1], dtype=np.float32) - disparity
     hidden = np.zeros(depth.shape, dtype=bool)
-    rows, columns = np.nonzero(_overtaken(there, disparity, seen))
-    if len(rows):
-        nearest = _nearest(there, disparity, seen)
-        at = _bins(np.rint(there[rows, columns]), depth.shape[1])
-        hidden[rows, columns] = nearest[rows, at] > disparity[rows, columns] + BEFORE
+    overtaken = np.flatnonzero(_overtaken(there, disparity) & seen)
+    if len(overtaken):
+        nearest, pixels = _second_view(there, disparity)
+        before = nearest.ravel()[pixels.ravel()[overtaken]] > disparity.ravel()[overtaken] + BEFORE
+        hidden.ravel()[overtaken[before]] = True
     if same_view:
         hidden |= seen & (there < -0.5)
     return hidden
 
 
-def _overtaken(there: Single, disparity: Single, seen: Booleans) -> Booleans:
+def _overtaken(there: Single, disparity: Single) -> Booleans:
     """Pixels right of which another one is seen farther left from the second centre. Of surfaces
     that both centres see there are none, however steep. Where a nearer surface begins, it does so
-    half a pixel before its first pixel's centre."""
-    begins = np.where(seen, there, np.float32(np.inf))
-    begins[:, 1:] -= np.float32(0.5) * (np.diff(disparity, axis=1) > 1.0)
+    half a pixel before its first pixel's centre. What is not there has no disparity, and so
+    overtakes nothing."""
+    begins = there.copy()
+    nearer = disparity[:, 1:] > disparity[:, :-1] + np.float32(1.0)
+    np.subtract(begins[:, 1:], np.float32(0.5), out=begins[:, 1:], where=nearer)
     leftmost = np.minimum.accumulate(begins[:, ::-1], axis=1)[:, ::-1]
     overtaken = np.zeros(there.shape, dtype=bool)
-    overtaken[:, :-1] = seen[:, :-1] & (there[:, :-1] > leftmost[:, 1:])
+    np.greater(there[:, :-1], leftmost[:, 1:], out=overtaken[:, :-1])
     return overtaken
 
 
-def _nearest(there: Single, disparity: Single, seen: Booleans) -> Single:
-    """(H, 3 W) largest disparity at each pixel of the second image, see `_bins`."""
+def _second_view(there: Single, disparity: Single) -> tuple[Single, Indices]:
+    """Largest disparity at each pixel of the second image (H, V), which reaches as far to the left
+    as needed, two widths at most; and the pixels (H, W), counted row by row, where the first
+    image's are in it. Gaps of one pixel, as in surfaces that are wider there, are filled."""
     height, width = there.shape
-    image = np.zeros((height, 3 * width), dtype=np.float32)
-    offsets = np.broadcast_to(3 * width * np.arange(height)[:, None], there.shape)[seen]
-    for rounded in (np.floor(there[seen]), np.ceil(there[seen])):
-        np.maximum.at(image.ravel(), offsets + _bins(rounded, width), disparity[seen])
-    return image
-
-
-def _bins(columns: Single, width: int) -> np.ndarray:
-    """Columns of an image that begins two widths further left."""
-    return np.clip(columns.astype(np.intp) + 2 * width, 0, 3 * width - 1)
+    left = min(int(np.ceil(disparity.max())) + 1, 2 * width)
+    image = np.zeros((height, left + width), dtype=np.float32)
+    pixels = np.rint(np.maximum(there, np.float32(-left))).astype(np.intp)
+    pixels += (left + image.shape[1] * np.arange(height))[:, None]
+    np.maximum.at(image.ravel(), pixels.ravel(), disparity.ravel())
+    return cv2.morphologyEx(image, cv2.MORPH_CLOSE, np.ones((1, 3), np.uint8)), pixels

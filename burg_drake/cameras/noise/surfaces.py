@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 
+import cv2
 import numpy as np
 
 from burg_drake.cameras.optics import FieldOfView, Intrinsics
@@ -21,7 +22,7 @@ hundredth of the depth has as much; where two planes at 75 degrees meet it is
 
 def inverse_depth(depth: Single) -> Single:
     """(H, W) 1 / z [1/m]; 0 where nothing is."""
-    return np.divide(np.float32(1.0), depth, out=np.zeros_like(depth), where=depth > 0.0)
+    return np.reciprocal(np.where(depth > 0.0, depth, np.float32(np.inf)))
 
 
 def depth_edges(depth: Single) -> Booleans:
@@ -34,8 +35,9 @@ def depth_edges(depth: Single) -> Booleans:
     limit = np.float32(EDGE) * w
     edges = np.zeros(depth.shape, dtype=bool)
     for turned, bound, found in ((w, limit, edges), (w.T, limit.T, edges.T)):
-        second = turned[:, :-2] + turned[:, 2:] - 2.0 * turned[:, 1:-1]
-        found[:, 1:-1] |= np.abs(second) > bound[:, 1:-1]
+        second = turned[:, :-2] + turned[:, 2:]
+        second -= 2.0 * turned[:, 1:-1]
+        found[:, 1:-1] |= np.abs(second, out=second) > bound[:, 1:-1]
     return edges & (depth > 0.0)
 
 
@@ -51,7 +53,8 @@ def incidence_angle(depth: Single, intrinsics: Intrinsics, normals: Single | Non
     if normals is None:
         cosine = _cosine_of_depth(inverse_depth(depth), intrinsics)
     else:
-        cosine = np.abs(np.einsum("ijk,ijk->ij", normals, _rays(intrinsics)))
+        products = cv2.multiply(np.asarray(normals, dtype=np.float32), _rays(intrinsics))
+        cosine = np.abs(cv2.transform(products, np.ones((1, 3), np.float32)))
     angle: Single = np.arccos(np.minimum(cosine, np.float32(1.0)))
     return np.where(depth > 0.0, angle, np.float32(0.0))
 
@@ -63,20 +66,26 @@ def _cosine_of_depth(w: Single, intrinsics: Intrinsics) -> Single:
     x = ((np.arange(w.shape[1]) - cx) / fx).astype(np.float32)
     y = ((np.arange(w.shape[0])[:, None] - cy) / fy).astype(np.float32)
     nx = np.float32(fx) * _slope(w)
-    ny = np.float32(fy) * _slope(w.T).T
-    nz = w - nx * x - ny * y
-    lengths = np.sqrt((nx * nx + ny * ny + nz * nz) * (x * x + y * y + np.float32(1.0)))
-    cosine: Single = np.divide(w, lengths, out=np.ones_like(w), where=lengths > 0.0)
-    return cosine
+    ny = np.float32(fy) * _slope(np.ascontiguousarray(w.T)).T
+    nz = w - nx * x
+    nz -= ny * y
+    squares = nx * nx
+    squares += ny * ny
+    squares += nz * nz
+    squares *= x * x + y * y + np.float32(1.0)
+    np.maximum(squares, np.float32(np.finfo(np.float32).tiny), out=squares)
+    return np.asarray(w / np.sqrt(squares))
 
 
 def _slope(w: Single) -> Single:
     """(H, W) change along the rows, per pixel: towards the neighbour on the same surface, which is
     the one with the smaller change."""
     steps = np.diff(w, axis=1)
-    before = np.concatenate([steps[:, :1], steps], axis=1)
-    after = np.concatenate([steps, steps[:, -1:]], axis=1)
-    return np.where(np.abs(before) < np.abs(after), before, after)
+    slope = np.empty_like(w)
+    slope[:, 0], slope[:, 1:] = steps[:, 0], steps
+    sizes = np.abs(steps)
+    np.copyto(slope[:, 1:-1], steps[:, 1:], where=sizes[:, 1:] < sizes[:, :-1])
+    return slope
 
 
 @lru_cache(maxsize=2)
