@@ -4,10 +4,11 @@
 
 The scene: a slanted table, eight boxes and a sphere, in closed form, with normals and colours. A
 row is a camera: process time of one image with normals at hand and without, of one thread, and how
-many pixels of the table lose their depth. Then an image of each camera's noise alone: the standard
+many pixels lose their depth. Then an image of each camera's noise alone: the standard
 deviation of a frontal wall at 0.8 m beside the formula's, and how far its mean is off.
 
-The end is an error if an image takes longer than 15 ms, or a deviation is off by more than 2 %.
+The end is an error if an image takes longer than 15 ms (20 ms without normals), or a deviation is
+off by more than 2 %.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ from burg_drake.cameras.noise.measurement import noisy_depth
 from burg_drake.cameras.optics.intrinsics import Intrinsics
 
 CAMERA = Intrinsics(width=640, height=480, focal=(600.0, 600.0), center=(319.5, 239.5))
-LONGEST = 15.0
-"""Of an image [ms]."""
+LONGEST, LONGEST_WITHOUT = 15.0, 20.0
+"""Of an image with normals at hand and without [ms]."""
 WALL = 0.8
 """Depth of the wall [m]."""
 
@@ -57,8 +58,8 @@ def main() -> int:
             f"{name:13} {with_normals:5.1f} {without:16.1f} {100 * (measured == 0.0).mean():7.2f}"
             f" {1e3 * sigma:9.3f} {1e3 * formula:11.3f} {1e3 * mean:8.3f}"
         )
-        if max(with_normals, without) > LONGEST:
-            wrong.append(f"{name} takes longer than {LONGEST:g} ms")
+        if with_normals > LONGEST or without > LONGEST_WITHOUT:
+            wrong.append(f"{name} takes longer than {LONGEST:g} or {LONGEST_WITHOUT:g} ms")
         if abs(sigma - formula) > 0.02 * formula:
             wrong.append(f"{name} has another deviation than its formula")
     print("\n".join(wrong) or "all as it should be")
