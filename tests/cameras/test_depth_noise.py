@@ -197,7 +197,7 @@ def test_flying_pixels_lie_between_the_surfaces() -> None:
     flying = result[moved]
     assert flying.min() >= 0.8 - 1e-6 and flying.max() <= 1.0 + 1e-6
     assert np.quantile(flying, [0.25, 0.5, 0.75]) == pytest.approx([0.85, 0.9, 0.95], abs=0.02)
-    nothing = step()
+    nothing, _ = plane(45.0)
     nothing[:, 320:] = 0.0
     np.testing.assert_array_equal(measured(nothing, DepthNoise(flying=1.0)), nothing)
 
@@ -231,6 +231,16 @@ def test_surfaces_seen_from_aside_have_holes(size: float) -> None:
         assert lost[band].mean() == pytest.approx((low + 1 - 60) / 20, abs=0.03)
 
 
+def test_holes_for_two_reasons_are_independent() -> None:
+    noise = DepthNoise(
+        grazing_from_deg=0.0, grazing_to_deg=90.0, dark_below=40.0, dark_probability=0.6
+    )
+    normals = np.zeros((*SHAPE, 3), np.float32)
+    normals[:] = np.array([1.0, 0.0, -1.0]) / np.sqrt(2.0)
+    lost = measured(wall(), noise, normals=normals, color=np.zeros((*SHAPE, 3), np.uint8)) == 0.0
+    assert lost[:, 306:336].mean() == pytest.approx(1.0 - 0.5 * 0.4, abs=0.015)
+
+
 def test_angles_and_edges_are_those_of_planes() -> None:
     for angle, upright in ((70.0, True), (0.0, True), (30.0, False), (60.0, False)):
         depth, exact = plane(angle, upright=upright)
@@ -238,6 +248,9 @@ def test_angles_and_edges_are_those_of_planes() -> None:
         assert np.abs(incidence_angle(depth, CAMERA) - exact)[seen].max() < np.deg2rad(0.6)
         assert not depth_edges(depth)[5:-5, 250:].any()
     assert set(np.nonzero(depth_edges(step()))[1]) == {319, 320}
+    ends = wall()
+    ends[:, 320:] = 0.0
+    assert set(np.nonzero(depth_edges(ends))[1]) == {319}
     crease = np.minimum(plane(30.0)[0], plane(-30.0)[0])
     assert not depth_edges(crease).any()
 
