@@ -27,12 +27,22 @@ from .live.snapshot import (
     SnapshotDocument as SnapshotDocument,
     load_snapshot as load_snapshot,
 )
+from .noise.document import (
+    DepthNoise as DepthNoise,
+    depth_noise as depth_noise,
+)
+from .noise.measurement import noisy_depth as noisy_depth
 from .optics.intrinsics import (
     Intrinsics as Intrinsics,
     camera_info as camera_info,
     of_camera_info as of_camera_info,
 )
 from .optics.intrinsics_file import load_intrinsics as load_intrinsics
+from .optics.sensors import (
+    Sensor as Sensor,
+    scaled as scaled,
+    sensor as sensor,
+)
 from .overlay.renderer import (
     Overlay as Overlay,
     instance_labels as instance_labels,
@@ -78,6 +88,7 @@ from .systems.board_loop import (
     build_board_loop as build_board_loop,
 )
 from .systems.camera_source import CameraSource as CameraSource
+from .systems.depth_noise_system import DepthNoiseSystem as DepthNoiseSystem
 from .systems.pose_estimator import BoardPoseEstimator as BoardPoseEstimator
 from .systems.pose_filter import (
     PoseFilter as PoseFilter,

@@ -14,6 +14,7 @@ from .intrinsics_file import (
     save_camera_info as save_camera_info,
     save_intrinsics as save_intrinsics,
 )
+from .sensors import SENSORS as SENSORS
 from .station_camera import (
     DEFAULT_CAMERA as DEFAULT_CAMERA,
     SIMULATED as SIMULATED,

@@ -1,0 +1,4 @@
+from .document import (
+    DepthNoise as DepthNoise,
+)
+from .measurement import noisy_depth as noisy_depth

@@ -1,0 +1,204 @@
+"""The figures of a depth camera's noise, as a document, with presets of real cameras."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar, Literal
+
+from burg_drake.cameras.optics import SENSORS
+from burg_drake.core import FieldError, UnknownNameError, nearest
+from burg_drake.core.documents import load_document, require_ranges
+
+SecondView = Literal["none", "same", "wide"]
+"""What the second imager or the projector sees: it is of no interest; as much as the first one to
+each side; all that the first one sees, if nothing is in between."""
+
+RANGES = {
+    "baseline": (-1.0, 1.0),
+    "axial_base": (0.0, 1.0),
+    "axial_square": (0.0, 1.0),
+    "axial_center": (-10.0, 10.0),
+    "axial_angle": (0.0, 1.0),
+    "disparity_sigma": (0.0, 10.0),
+    "disparity_step": (0.0, 10.0),
+    "lateral_base": (0.0, 10.0),
+    "lateral_angle": (0.0, 10.0),
+    "flying": (0.0, 1.0),
+    "grazing_from_deg": (0.0, 90.0),
+    "grazing_to_deg": (0.0, 90.0),
+    "dark_below": (0.0, 255.0),
+    "dark_probability": (0.0, 1.0),
+    "hole_size": (0.0, 20.0),
+    "depth_step": (0.0, 1.0),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class DepthNoise:
+    """Schema of a noise file: all effects; those whose figure is 0 do not happen.
+
+    Attributes:
+        baseline: x of the second imager, or of the projector, in the camera's frame [m].
+        second_view: what is seen from there; what is not, is not measured.
+        axial_base, axial_square, axial_center: standard deviation of depth z is
+            `axial_base + axial_square (z - axial_center)^2` [m, 1/m, m].
+        axial_angle: its growth on surfaces that are seen from aside [m^1.5], see `axial_sigma`.
+        disparity_sigma: standard deviation of the disparity [pixels of the image].
+        disparity_step: disparity is measured in steps of this [pixels of the image].
+        lateral_base, lateral_angle: standard deviation of where edges are, and its growth on
+            surfaces that are seen from aside [pixels], see `lateral_sigma`.
+        flying: share of the pixels at edges that lie anywhere between near and far.
+        grazing_from_deg, grazing_to_deg: between these angles of incidence the probability of a
+            hole grows from 0 to 1 [degrees]; no holes for that reason if the first is 90.
+        dark_below: luma from which down a surface is dark, of 255.
+        dark_probability: probability of a hole in a black surface; it falls to 0 at `dark_below`.
+        hole_size: radius of patches in which holes come, 1 or more [pixels]; each for itself if 0.
+        depth_step: depth is written in steps of this [m].
+
+    Raises:
+        FieldError: a figure is out of its range, or needs another one that is not there.
+    """
+
+    WRITTEN_WHOLE: ClassVar[bool] = True
+
+    version: int = 1
+    baseline: float = 0.0
+    second_view: SecondView = "none"
+    axial_base: float = 0.0
+    axial_square: float = 0.0
+    axial_center: float = 0.0
+    axial_angle: float = 0.0
+    disparity_sigma: float = 0.0
+    disparity_step: float = 0.0
+    lateral_base: float = 0.0
+    lateral_angle: float = 0.0
+    flying: float = 0.0
+    grazing_from_deg: float = 90.0
+    grazing_to_deg: float = 90.0
+    dark_below: float = 0.0
+    dark_probability: float = 0.0
+    hole_size: float = 0.0
+    depth_step: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_ranges(self, RANGES)
+        if self.grazing_to_deg < self.grazing_from_deg:
+            raise FieldError(
+                f"grazing_to_deg is {self.grazing_to_deg:g}; it must be at least grazing_from_deg,"
+                f" {self.grazing_from_deg:g}",
+                "grazing_to_deg",
+            )
+        if 0.0 < self.hole_size < 1.0:
+            raise FieldError(
+                f"hole_size is {self.hole_size:g}; it must be 0, or 1 to 20", "hole_size"
+            )
+        for name in ("disparity_sigma", "disparity_step", "second_view"):
+            if not self.baseline and getattr(self, name) not in (0.0, "none"):
+                raise FieldError(f"{name} needs a baseline, which is 0", name)
+
+    @property
+    def uses_angles(self) -> bool:
+        """Some effect depends on how surfaces are seen."""
+        return bool(self.axial_angle or self.lateral_angle or self.grazing_from_deg < 90.0)
+
+
+def depth_noise(name: str | Path) -> DepthNoise:
+    """Noise by name of a preset, or from a file (`.yaml`).
+
+    Raises:
+        UnknownNameError: there is no such preset.
+        DocumentError: the file cannot be read, or does not fit.
+    """
+    if str(name).endswith((".yaml", ".yml")):
+        return load_document(name, DepthNoise)
+    if name not in NOISES:
+        known = nearest(str(name), NOISES)
+        raise UnknownNameError(f"depth noise {str(name)!r} does not exist; {known}")
+    return NOISES[str(name)]
+
+
+def _realsense(name: str) -> DepthNoise:
+    """Disparity: 0.08 pixels of error (Grunnet-Jepsen, Sweetser and Woodfill, "Best-known methods
+    for tuning Intel RealSense D400 depth cameras", which say it of a well textured target), in
+    steps of 1/32 ("Subpixel linearity improvement for Intel RealSense depth camera D400 series").
+    The band at the left that the second imager does not see is in the data sheet. Edges as of the
+    Kinect; shares of holes and flying pixels are estimates, for want of published ones."""
+    return DepthNoise(
+        baseline=SENSORS[name].baseline,
+        second_view="same",
+        disparity_sigma=0.08,
+        disparity_step=1.0 / 32.0,
+        lateral_base=0.8,
+        lateral_angle=0.035,
+        flying=0.1,
+        grazing_from_deg=75.0,
+        grazing_to_deg=88.0,
+        dark_below=30.0,
+        dark_probability=0.3,
+        hole_size=1.5,
+        depth_step=0.001,
+    )
+
+
+KINECT_NOISE = DepthNoise(
+    baseline=SENSORS["kinect"].baseline,
+    second_view="wide",
+    axial_base=0.0012,
+    axial_square=0.0019,
+    axial_center=0.4,
+    axial_angle=0.0001,
+    lateral_base=0.8,
+    lateral_angle=0.035,
+    disparity_step=1.0 / 8.0,
+    grazing_from_deg=70.0,
+    grazing_to_deg=85.0,
+    dark_below=40.0,
+    dark_probability=0.5,
+    hole_size=1.5,
+    depth_step=0.001,
+)
+"""Axial and lateral noise as Nguyen, Izadi and Lovell measured them ("Modeling Kinect sensor noise
+for improved 3D reconstruction and tracking", 3DIMPVT 2012; up to 82 degrees, where few pixels are
+left); steps of Khoshelham and Elberink (Sensors 12, 2012). What was measured has the steps in it,
+so that both together are up to a tenth too much at 1 m. Holes of dark surfaces are an estimate."""
+
+AZURE_KINECT_NOISE = DepthNoise(
+    axial_base=0.001,
+    axial_square=0.0003,
+    axial_center=0.5,
+    lateral_base=0.5,
+    flying=0.5,
+    grazing_from_deg=75.0,
+    grazing_to_deg=88.0,
+    dark_below=30.0,
+    dark_probability=0.6,
+    hole_size=1.0,
+    depth_step=0.001,
+)
+"""An estimate: the specification, which Tölgyessy et al. confirmed (Sensors 21, 413, 2021), only
+says that the standard deviation is at most 17 mm, and flying pixels and holes on dark surfaces are
+described, not counted."""
+
+ZIVID_TWO_NOISE = DepthNoise(
+    baseline=SENSORS["zivid_two"].baseline,
+    second_view="wide",
+    axial_square=55e-6 / 0.7**2,
+    flying=0.05,
+    grazing_from_deg=78.0,
+    grazing_to_deg=88.0,
+    dark_below=15.0,
+    dark_probability=0.3,
+    hole_size=2.0,
+)
+"""Point precision of 55 um at 0.7 m (data sheet of the Zivid 2 M70), which grows with the square of
+the depth, as of all triangulation. Shares of holes and flying pixels are estimates."""
+
+NOISES = {
+    "none": DepthNoise(),
+    "d435": _realsense("d435"),
+    "d455": _realsense("d455"),
+    "azure_kinect": AZURE_KINECT_NOISE,
+    "zivid_two": ZIVID_TWO_NOISE,
+    "kinect": KINECT_NOISE,
+}

@@ -1,0 +1,300 @@
+"""Depth cameras that one can buy, as presets: intrinsics of their images, range and baseline.
+
+Every camera is calibrated on its own, and differs from these by about a percent. Images of one
+camera in several sizes come from the same sensor: scaled, and cut evenly on two sides where the
+aspect differs. That is how the sizes below have been derived from one calibration each; those of
+the RealSense devices agree with what the devices say themselves at 640 x 480.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from burg_drake.cameras.optics.intrinsics import HALF_PIXEL, Intrinsics
+from burg_drake.core import InvalidInputError, UnknownNameError, nearest
+
+Size = tuple[int, int]
+"""Width and height [pixels]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensor:
+    """A depth camera.
+
+    Attributes:
+        name: of the preset.
+        color, depth: intrinsics of its images, one for every aspect; the first is the usual one.
+        depth_range: nearest and farthest depth that it is made for [m].
+        baseline: x of the second imager, or of the projector, in the frame of the depth camera
+            [m]; 0 of a time-of-flight camera, which has none.
+        source: where the figures are from.
+    """
+
+    name: str
+    color: tuple[Intrinsics, ...]
+    depth: tuple[Intrinsics, ...]
+    depth_range: tuple[float, float]
+    baseline: float
+    source: str
+
+    def color_camera(self, size: Size | None = None) -> Intrinsics:
+        """Intrinsics of the colour images, of the usual size if none is given.
+
+        Raises:
+            InvalidInputError: the camera has no images of that aspect.
+        """
+        return self._camera("colour", self.color, size)
+
+    def depth_camera(self, size: Size | None = None) -> Intrinsics:
+        """Intrinsics of the depth images, of the usual size if none is given.
+
+        Raises:
+            InvalidInputError: the camera has no images of that aspect.
+        """
+        return self._camera("depth", self.depth, size)
+
+    def _camera(self, kind: str, modes: tuple[Intrinsics, ...], size: Size | None) -> Intrinsics:
+        if size is None:
+            return modes[0]
+        for mode in modes:
+            if _same_aspect(mode, *size):
+                return scaled(mode, *size)
+        known = ", ".join(f"{mode.width} x {mode.height}" for mode in modes)
+        raise InvalidInputError(
+            f"{self.name} has no {kind} images of {size[0]} x {size[1]} pixels; they have the"
+            f" aspect of {known}"
+        )
+
+
+def sensor(name: str) -> Sensor:
+    """The preset of a depth camera.
+
+    Raises:
+        UnknownNameError: there is no such preset.
+    """
+    if name not in SENSORS:
+        raise UnknownNameError(f"sensor {name!r} does not exist; {nearest(str(name), SENSORS)}")
+    return SENSORS[name]
+
+
+def scaled(intrinsics: Intrinsics, width: int, height: int) -> Intrinsics:
+    """Intrinsics of the same images in another size.
+
+    An image's edges stay its edges, so that the principal point, which counts from the first
+    pixel's centre, moves by a part of a pixel as well. Distortion does not depend on the size.
+
+    Args:
+        intrinsics: of the camera.
+        width, height: of the scaled images [pixels].
+
+    Raises:
+        InvalidInputError: the aspect is another one, by half a row or more.
+    """
+    if not _same_aspect(intrinsics, width, height):
+        fitting = max(1, round(intrinsics.height * width / intrinsics.width))
+        raise InvalidInputError(
+            f"images of {intrinsics.width} x {intrinsics.height} pixels cannot be scaled to"
+            f" {width} x {height}, which is another aspect; {width} x {fitting} would fit"
+        )
+    sx, sy = width / intrinsics.width, height / intrinsics.height
+    (fx, fy), (cx, cy) = intrinsics.focal, intrinsics.center
+    return replace(
+        intrinsics,
+        width=width,
+        height=height,
+        focal=(sx * fx, sy * fy),
+        center=(sx * (cx + HALF_PIXEL) - HALF_PIXEL, sy * (cy + HALF_PIXEL) - HALF_PIXEL),
+        residual=None if intrinsics.residual is None else sx * intrinsics.residual,
+    )
+
+
+def _same_aspect(intrinsics: Intrinsics, width: int, height: int) -> bool:
+    fitting = intrinsics.height * width / intrinsics.width
+    return width > 0 and height > 0 and abs(height - fitting) <= 0.5
+
+
+def _modes(whole: Intrinsics, *sizes: Size) -> tuple[Intrinsics, ...]:
+    """Images of several sizes, from one calibration: scaled so that the whole just covers them,
+    then cut evenly. `whole` itself may be a cut of the sensor, which covers smaller scales."""
+    return tuple(_mode(whole, *size) for size in sizes)
+
+
+def _mode(whole: Intrinsics, width: int, height: int) -> Intrinsics:
+    scale = max(width / whole.width, height / whole.height)
+    (fx, fy), (cx, cy) = whole.focal, whole.center
+    return replace(
+        whole,
+        width=width,
+        height=height,
+        focal=(scale * fx, scale * fy),
+        center=(
+            scale * (cx - (whole.width - 1) / 2) + (width - 1) / 2,
+            scale * (cy - (whole.height - 1) / 2) + (height - 1) / 2,
+        ),
+    )
+
+
+D435 = Sensor(
+    name="d435",
+    color=_modes(
+        Intrinsics(
+            camera="d435 color",
+            width=1280,
+            height=720,
+            focal=(920.7, 920.8),
+            center=(635.6, 373.1),
+        ),
+        (640, 480),
+        (1280, 720),
+    ),
+    depth=_modes(
+        Intrinsics(
+            camera="d435 depth",
+            width=1280,
+            height=800,
+            focal=(637.6, 637.6),
+            center=(638.3, 410.5),
+        ),
+        (640, 480),
+        (848, 480),
+        (1280, 720),
+    ),
+    depth_range=(0.3, 3.0),
+    baseline=0.050,
+    source="Intel RealSense Product Family D400 Series, data sheet 337029-009 (baseline, ideal"
+    " range); a device's own calibration as librealsense tells it; no distortion is told",
+)
+"""Intel RealSense D435, whose depth is that of its left imager."""
+
+D455 = Sensor(
+    name="d455",
+    color=_modes(
+        Intrinsics(
+            camera="d455 color",
+            width=1280,
+            height=800,
+            focal=(632.4, 632.0),
+            center=(639.8, 403.3),
+            distortion=(-0.056522, 0.068801, -0.000717, -0.000025, -0.022386),
+        ),
+        (640, 480),
+        (1280, 720),
+    ),
+    depth=_modes(
+        Intrinsics(
+            camera="d455 depth",
+            width=1280,
+            height=800,
+            focal=(641.5, 641.5),
+            center=(640.4, 403.8),
+        ),
+        (640, 480),
+        (848, 480),
+        (1280, 720),
+    ),
+    depth_range=(0.6, 6.0),
+    baseline=0.095,
+    source="Intel RealSense Product Family D400 Series, data sheet 337029-009 (baseline, ideal"
+    " range); a device's own calibration as librealsense tells it. It calls the distortion"
+    " inverse; users found that OpenCV's model, as here, is meant",
+)
+"""Intel RealSense D455, whose depth is that of its left imager."""
+
+AZURE_KINECT = Sensor(
+    name="azure_kinect",
+    color=_modes(
+        Intrinsics(
+            camera="azure_kinect color",
+            width=2048,
+            height=1536,
+            focal=(964.418, 963.756),
+            center=(1016.870, 784.185),
+            distortion=(
+                *(0.722746, -2.885590, 0.000783, -0.000143),
+                *(1.632723, 0.602199, -2.719626, 1.565053),
+            ),
+        ),
+        (1280, 720),
+        (2048, 1536),
+    ),
+    depth=_modes(
+        Intrinsics(
+            camera="azure_kinect depth",
+            width=640,
+            height=576,
+            focal=(503.928, 503.979),
+            center=(332.064, 325.881),
+            distortion=(
+                *(3.130577, 2.324939, 0.000081, -0.000051),
+                *(0.130416, 3.458652, 3.350115, 0.662942),
+            ),
+        ),
+        (640, 576),
+    ),
+    depth_range=(0.5, 3.86),
+    baseline=0.0,
+    source="Microsoft, Azure Kinect DK hardware specification (range of NFOV unbinned); a device's"
+    " own calibration as the Sensor SDK tells it",
+)
+"""Microsoft Azure Kinect: time of flight, in the mode NFOV unbinned."""
+
+ZIVID_TWO = Sensor(
+    name="zivid_two",
+    color=_modes(
+        Intrinsics(
+            camera="zivid_two color",
+            width=1944,
+            height=1200,
+            focal=(1805.0, 1805.0),
+            center=(971.5, 599.5),
+        ),
+        (1944, 1200),
+    ),
+    depth=_modes(
+        Intrinsics(
+            camera="zivid_two depth",
+            width=1944,
+            height=1200,
+            focal=(1805.0, 1805.0),
+            center=(971.5, 599.5),
+        ),
+        (1944, 1200),
+    ),
+    depth_range=(0.3, 1.5),
+    baseline=0.11,
+    source="Zivid 2 M70, data sheet: 754 mm over 1944 pixels at a distance of 700 mm. The baseline"
+    " is not published: an estimate from the housing, 169 mm wide. Points are told without"
+    " distortion",
+)
+"""Zivid 2 M70: coded light, colour and depth through the same lens."""
+
+KINECT = Sensor(
+    name="kinect",
+    color=_modes(
+        Intrinsics(
+            camera="kinect color",
+            width=640,
+            height=480,
+            focal=(525.0, 525.0),
+            center=(319.5, 239.5),
+        ),
+        (640, 480),
+    ),
+    depth=_modes(
+        Intrinsics(
+            camera="kinect depth",
+            width=640,
+            height=480,
+            focal=(585.0, 585.0),
+            center=(319.5, 239.5),
+        ),
+        (640, 480),
+    ),
+    depth_range=(0.5, 5.0),
+    baseline=0.075,
+    source="Khoshelham and Elberink, Sensors 12, 2012 (baseline, range); Nguyen, Izadi and Lovell,"
+    " 3DIMPVT 2012 (focal length); the colour camera's is the one usually taken",
+)
+"""Microsoft Kinect, the first: projected dots."""
+
+SENSORS = {preset.name: preset for preset in (D435, D455, AZURE_KINECT, ZIVID_TWO, KINECT)}

@@ -1,0 +1,96 @@
+"""Depth noise within a diagram: the same image for the same moment, however it is asked for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from pydrake.common.value import Value
+from pydrake.systems.framework import Context
+from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
+
+from burg_drake.cameras.noise.document import NOISES, DepthNoise
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.systems.depth_noise_system import DepthNoiseSystem
+from burg_drake.core.errors import InvalidInputError
+
+CAMERA = Intrinsics(width=64, height=48, focal=(60.0, 60.0), center=(31.5, 23.5))
+AXIAL = DepthNoise(axial_base=0.01)
+
+
+def context_of(system: DepthNoiseSystem, z: float = 1.0, width: int = 64) -> Context:
+    """One whose image is z but for a corner without depth, in the three ways of Drake."""
+    image = ImageDepth32F(width, 48)
+    image.mutable_data[:] = z
+    image.mutable_data[0, :3, 0] = [0.0, np.inf, np.nan]
+    context = system.CreateDefaultContext()
+    system.GetInputPort("depth_image").FixValue(context, image)
+    return context
+
+
+def depth(system: DepthNoiseSystem, context: Context, time: float = 0.0) -> NDArray[np.float32]:
+    context.SetTime(time)
+    return np.array(system.GetOutputPort("depth_image").Eval(context).data[..., 0])
+
+
+def test_an_image_is_that_of_its_moment() -> None:
+    system = DepthNoiseSystem(AXIAL, CAMERA, seed=3)
+    context = context_of(system)
+    first, later = depth(system, context), depth(system, context, 0.5)
+    assert (first != later).mean() > 0.99
+    np.testing.assert_array_equal(depth(system, context, 0.5), later)
+    np.testing.assert_array_equal(depth(system, context), first)
+    context.DisableCaching()
+    np.testing.assert_array_equal(depth(system, context), first)
+    again = DepthNoiseSystem(AXIAL, CAMERA, seed=3)
+    np.testing.assert_array_equal(depth(again, context_of(again)), first)
+    other = DepthNoiseSystem(AXIAL, CAMERA, seed=4)
+    assert (depth(other, context_of(other)) != first).mean() > 0.99
+
+
+def test_what_has_no_depth_is_infinite() -> None:
+    system = DepthNoiseSystem(AXIAL, CAMERA)
+    result = depth(system, context_of(system))
+    assert np.isposinf(result[0, :3]).all() and np.isinf(result).sum() == 3
+    assert result[1:].std() == pytest.approx(0.01, rel=0.05)
+
+
+def test_noise_stays_within_a_period() -> None:
+    system = DepthNoiseSystem(AXIAL, CAMERA, period=0.1)
+    context = context_of(system)
+    first = depth(system, context, 0.3)  # 2.9999999999999996 periods
+    np.testing.assert_array_equal(depth(system, context, 0.39), first)
+    assert (depth(system, context, 0.2) != first).any() and (
+        depth(system, context, 0.4) != first
+    ).any()
+
+
+def test_colours_and_normals_are_used() -> None:
+    noise = DepthNoise(
+        dark_below=10.0, dark_probability=1.0, grazing_from_deg=60.0, grazing_to_deg=60.0
+    )
+    system = DepthNoiseSystem(noise, CAMERA)
+    context = context_of(system)
+    assert np.isinf(depth(system, context)).sum() == 3
+    color = ImageRgba8U(64, 48)
+    color.mutable_data[:] = 255
+    color.mutable_data[:, :32, :3] = 0
+    system.GetInputPort("color_image").FixValue(context, color)
+    assert np.isinf(depth(system, context)).sum() == 32 * 48
+    normals = np.zeros((48, 64, 3), np.float32)
+    normals[..., 2] = -1.0
+    normals[24:] = [0.0, 1.0, 0.0]
+    system.GetInputPort("normals").FixValue(context, Value[object](normals))
+    assert np.isinf(depth(system, context)).sum() == 32 * 48 + 32 * 24
+
+
+def test_bad_input_is_refused() -> None:
+    with pytest.raises(InvalidInputError, match="seed -1 of depth noise must be 0 to"):
+        DepthNoiseSystem(AXIAL, CAMERA, seed=-1)
+    with pytest.raises(InvalidInputError, match="period 0 of depth noise must be above 0"):
+        DepthNoiseSystem(AXIAL, CAMERA, period=0.0)
+    system = DepthNoiseSystem(NOISES["d435"], CAMERA)
+    with pytest.raises(InvalidInputError, match="depth_noise: connect or fix port depth_image"):
+        depth(system, system.CreateDefaultContext())
+    with pytest.raises(InvalidInputError, match="the depth image has 32 x 48 pixels"):
+        depth(system, context_of(system, width=32))
