@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from burg_drake.core import DocumentError, quoted
+from burg_drake.core import quoted
 from burg_drake.core.documents import Reader, load_nodes, plain_data, save_document
 from burg_drake.core.paths import require_name
 
@@ -111,7 +111,9 @@ def _flat(value: Any, name: str) -> dict[str, Any]:
     if not isinstance(value, Mapping):
         return {name: value}
     return {
-        long: item for key, inner in value.items() for long, item in _flat(inner, f"{name}.{key}").items()
+        long: item
+        for key, inner in value.items()
+        for long, item in _flat(inner, f"{name}.{key}").items()
     }
 
 
@@ -132,9 +134,4 @@ def _plain(node: yaml.Node, reader: Reader, where: str) -> Any:
     if kind == "null":
         return None
     kinds: dict[str, type] = {"bool": bool, "int": int, "float": float}
-    try:
-        return reader.read(node, kinds.get(kind, str), where)
-    except DocumentError:
-        if kind == "str":
-            raise
-        return node.value  # 0x1F and 1_000 are numbers of YAML, but of no document of this project
+    return reader.read(node, kinds.get(kind, str), where)

@@ -52,7 +52,8 @@ def write_index(folder: str | Path, known: Mapping[str, ShardEntry] | None = Non
     document = load_dataset_document(folder / DOCUMENT_FILE)
     urls = {f"{FOLDER}/{number:06d}.tar" for number in shard_numbers(folder)}
     entries = [
-        known[url] if url in known else shard_entry(folder / url) for url in sorted(urls, key=_scene)
+        known[url] if url in known else shard_entry(folder / url)
+        for url in sorted(urls, key=_scene)
     ]
     values = {
         "wids_version": WIDS_VERSION,

@@ -23,7 +23,7 @@ from burg_drake.dataset.samples.sample_files import (
     read_parts,
     read_record,
 )
-from burg_drake.dataset.samples.tar import END, Extent, read_extent, tar_member, tar_members
+from burg_drake.dataset.samples.tar import END, MemberPlace, read_member, tar_member, tar_members
 
 FOLDER = "shards"
 AT_ONCE = 1 << 20
@@ -86,7 +86,9 @@ def write_shard(path: str | Path, samples: Iterable[Sample]) -> ShardEntry:
         for sample in samples:
             if f"{sample.scene:06d}" != path.stem or sample.key in seen:
                 where = "there already" if sample.key in seen else "of another scene"
-                raise InvalidInputError(f"cannot write sample {sample.key} to {path}: it is {where}")
+                raise InvalidInputError(
+                    f"cannot write sample {sample.key} to {path}: it is {where}"
+                )
             seen.add(sample.key)
             for name, data in encoded(sample):
                 write(tar_member(name, data))
@@ -132,15 +134,15 @@ class Shard:
     def __init__(self, path: Path) -> None:
         """Reads the headers; see `open_shard`."""
         self.path = path
-        self.samples: dict[str, dict[str, Extent]] = {}
+        self.samples: dict[str, dict[str, MemberPlace]] = {}
         self.strangers: list[str] = []
-        for name, extent in tar_members(path).items():
+        for name, place in tar_members(path).items():
             key_kind = member_kind(name)
             if key_kind is None or key_kind[0].partition("_")[0] != path.stem:
                 self.strangers.append(name)
                 continue
             key, kind = key_kind
-            self.samples.setdefault(key, {})[kind] = extent
+            self.samples.setdefault(key, {})[kind] = place
 
     @property
     def keys(self) -> list[str]:
@@ -194,15 +196,15 @@ class _Reader:
 
     path: Path
     key: str
-    extents: dict[str, Extent]
+    places: dict[str, MemberPlace]
 
     def __call__(self, kind: str, most: int) -> bytes:
         name = f"{self.key}.{SUFFIXES[kind]}"
-        if kind not in self.extents:
+        if kind not in self.places:
             raise DocumentError(f"{self.path}: {name} is missing")
-        if self.extents[kind].size > most:
+        if self.places[kind].size > most:
             raise DocumentError(f"{self.path}: {name} has more than {most} bytes, too much for it")
-        return read_extent(self.path, self.extents[kind])
+        return read_member(self.path, self.places[kind])
 
 
 @contextmanager

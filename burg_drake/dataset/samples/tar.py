@@ -27,7 +27,7 @@ MOST_MEMBERS = 1_000_000
 
 
 @dataclass(frozen=True)
-class Extent:
+class MemberPlace:
     """Where in an archive a member's content is [bytes]."""
 
     start: int
@@ -41,14 +41,14 @@ def tar_member(name: str, data: bytes) -> bytes:
     return info.tobuf(tarfile.USTAR_FORMAT) + data + bytes(-len(data) % BLOCK)
 
 
-def tar_members(path: Path) -> dict[str, Extent]:
+def tar_members(path: Path) -> dict[str, MemberPlace]:
     """The members of an archive by name, in their order.
 
     Raises:
         InvalidInputError: the archive is missing, cut off, damaged, has a member twice, or one that
             is no plain file; the message names archive and member.
     """
-    found: dict[str, Extent] = {}
+    found: dict[str, MemberPlace] = {}
     with open_regular(path) as stream:
         size = os.fstat(stream.fileno()).st_size
         at, last = 0, "its beginning"
@@ -58,18 +58,18 @@ def tar_members(path: Path) -> dict[str, Extent]:
                 raise InvalidInputError(f"{path} is cut off behind {last}")
             if not any(header):
                 return found
-            name, extent = _parsed(header, at, f"{path}, behind {last}")
-            if extent.start + extent.size > size:
+            name, place = _parsed(header, at, f"{path}, behind {last}")
+            if place.start + place.size > size:
                 raise InvalidInputError(f"{path} is cut off within {name}")
             if name in found:
                 raise InvalidInputError(f"{path} has {name} twice")
             if len(found) == MOST_MEMBERS:
                 raise InvalidInputError(f"{path} has more than {MOST_MEMBERS:,} members")
-            found[name], last = extent, name
-            at = extent.start + extent.size + -extent.size % BLOCK
+            found[name], last = place, name
+            at = place.start + place.size + -place.size % BLOCK
 
 
-def read_extent(path: Path, extent: Extent) -> bytes:
+def read_member(path: Path, place: MemberPlace) -> bytes:
     """The content of a member. The file is opened for each, so that processes share none.
 
     Raises:
@@ -77,16 +77,16 @@ def read_extent(path: Path, extent: Extent) -> bytes:
     """
     with open_regular(path) as stream:
         try:
-            data = os.pread(stream.fileno(), extent.size, extent.start)
+            data = os.pread(stream.fileno(), place.size, place.start)
         except OSError as error:
             raise InvalidInputError(f"cannot read {path}: {error.strerror or error}") from error
-    if len(data) != extent.size:
+    if len(data) != place.size:
         raise InvalidInputError(f"{path} is cut off")
     return data
 
 
-def _parsed(header: bytes, at: int, where: str) -> tuple[str, Extent]:
-    """Name and extent of the member whose header lies at this place."""
+def _parsed(header: bytes, at: int, where: str) -> tuple[str, MemberPlace]:
+    """Name and place of the member whose header lies at this place."""
     blank = header[: SUM.start] + b" " * 8 + header[SUM.stop :]
     try:
         if sum(blank) != _octal(header[SUM]):
@@ -102,7 +102,7 @@ def _parsed(header: bytes, at: int, where: str) -> tuple[str, Extent]:
             f"{where}, has {shown(name)!r}, which is no plain file with a short name; pack the"
             " shard with such files alone"
         )
-    return name, Extent(at + BLOCK, size)
+    return name, MemberPlace(at + BLOCK, size)
 
 
 def _octal(field: bytes) -> int:
