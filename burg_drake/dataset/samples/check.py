@@ -6,7 +6,7 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from burg_drake.core import BurgError, InvalidInputError
@@ -41,6 +41,8 @@ from burg_drake.scene.document import Scene, SceneDocument, load_scene
 
 Redraw = Callable[[Scene, Sample], Images]
 """Draws the labels and the depth of a sample anew, from its scene and its view."""
+SAMPLE_PARTS = ("sensor_depth", "grasps")
+"""Kinds of files that are fields of a sample; all others are of its images."""
 
 
 @dataclass(frozen=True)
@@ -180,24 +182,30 @@ def _sample_faults(
     unannounced = sorted({*shard.samples[key]} - {RECORD, *record.files})
     for kind in unannounced:
         yield kind, "the record does not have it"
-    sound = []
+    sample = record.sample
     for kind in record.files:
         if kind not in SUFFIXES or kind == RECORD:
             yield RECORD, f"files has {kind!r}, which no sample has"
             continue
         try:
-            shard.sample(record, [kind])
+            part = shard.sample(record, [kind])
         except InvalidInputError as error:
             yield kind, _short(error, shard, key, kind)
         else:
-            sound.append(kind)
-    sample = shard.sample(record, sound)
+            sample = _with_part(sample, part, kind)
     yield from _contradictions(sample, record, document)
     if scene is not None and redraw is not None:
         try:
             yield from drawing_faults(sample, redraw(scene, sample), record.depth_unit)
         except BurgError as error:
             yield RECORD, f"it cannot be drawn anew: {error}"
+
+
+def _with_part(sample: Sample, part: Sample, kind: str) -> Sample:
+    """A sample with that which another one was read with."""
+    if kind in SAMPLE_PARTS:
+        return replace(sample, **{kind: getattr(part, kind)})
+    return replace(sample, images=replace(sample.images, **{kind: getattr(part.images, kind)}))
 
 
 def _contradictions(

@@ -84,8 +84,16 @@ def require_fitting(grasps: LabelledGrasps, instances: int, where: str) -> None:
     Raises:
         InvalidInputError: they do.
     """
-    columns = {"width": grasps.width, "number": grasps.number, "outcome": grasps.outcome}
-    for name, column in (columns | grasps.margins).items():
+    if grasps.X_CG.shape != (len(grasps), 4, 4):
+        raise InvalidInputError(
+            f"{where}: X_CG of grasps has shape {grasps.X_CG.shape}; expected (N, 4, 4)"
+        )
+    columns: dict[str, NDArray[Any]] = {
+        "width": grasps.width,
+        "number": grasps.number,
+        "outcome": grasps.outcome,
+    }
+    for name, column in (columns | dict(grasps.margins)).items():
         if column.shape != (len(grasps),):
             raise InvalidInputError(
                 f"{where}: {name} of grasps has shape {column.shape}; there are {len(grasps)}"

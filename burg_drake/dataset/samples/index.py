@@ -1,8 +1,8 @@
 """The index of a data set: its shards, with how many samples each of them has.
 
 Its format is that of the library `wids` for random access to WebDataset's shards
-(https://webdataset.github.io/webdataset/wids). It follows from the shards, and can be made anew from
-them at any time.
+(https://webdataset.github.io/webdataset/wids). It follows from the shards, and can be made anew
+from them at any time.
 """
 
 from __future__ import annotations

@@ -10,6 +10,8 @@ from burg_drake.core import Array, DocumentError, InvalidInputError, check_pose,
 
 LARGEST = 1 << 53
 """Whole numbers up to it are the same in every JSON."""
+LARGEST_NUMBER = 1e300
+"""Below the largest that there is, so that what is computed with it stays finite."""
 
 
 class PlainFields:
@@ -134,4 +136,5 @@ class PlainFields:
 
 
 def _is_number(value: object) -> bool:
-    return type(value) in (int, float) and abs(value) < 1e300  # type: ignore[arg-type,operator]
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return is_number and abs(value) < LARGEST_NUMBER

@@ -127,10 +127,12 @@ def decode_image_of(
     if kind.channels == 3:
         pixels = cv2.cvtColor(pixels, cv2.COLOR_BGR2RGB)
     if name in ("depth", "sensor_depth"):
-        return pixels.astype(np.float32) * np.float32(depth_unit)
-    if name == "normals":
-        return (pixels.astype(np.float32) - ZERO_NORMAL) / np.float32(ONE_NORMAL)
-    return pixels.astype(np.uint16) if name == "labels" else pixels
+        pixels = pixels.astype(np.float32) * np.float32(depth_unit)
+    elif name == "normals":
+        pixels = (pixels.astype(np.float32) - ZERO_NORMAL) / np.float32(ONE_NORMAL)
+    elif name == "labels":
+        pixels = pixels.astype(np.uint16)
+    return np.asarray(pixels)
 
 
 def depth_unit_of(depth_range: tuple[float, float]) -> float:
@@ -149,7 +151,7 @@ def depth_unit_of(depth_range: tuple[float, float]) -> float:
 
 
 def _in_units(name: str, depth: Single, unit: float) -> NDArray[np.uint16]:
-    units = np.rint(depth * np.float32(1.0 / unit))
+    units: Single = np.rint(depth * np.float32(1.0 / unit))
     if not (units.min(initial=0.0) >= 0.0 and units.max(initial=0.0) <= LARGEST_DEPTH):
         raise InvalidInputError(
             f"{name.replace('_', ' ')} has values that are negative, not finite or beyond"
@@ -159,7 +161,7 @@ def _in_units(name: str, depth: Single, unit: float) -> NDArray[np.uint16]:
 
 
 def _whole_normals(normals: Single) -> NDArray[np.uint16]:
-    whole = np.rint(normals * np.float32(ONE_NORMAL))
+    whole: Single = np.rint(normals * np.float32(ONE_NORMAL))
     if not (whole.min(initial=0.0) >= -ONE_NORMAL and whole.max(initial=0.0) <= ONE_NORMAL):
         raise InvalidInputError("normals have components that are not finite or beyond 1")
     return (whole + ZERO_NORMAL).astype(np.uint16)

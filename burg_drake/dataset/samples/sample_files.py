@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from burg_drake.core import DocumentError, InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.files import DOCUMENT
 from burg_drake.dataset.rendering import Images
@@ -83,7 +85,11 @@ def require_consistent(sample: Sample) -> None:
     numbers = [one.number for one in sample.instances]
     if numbers != list(range(1, len(numbers) + 1)):
         raise InvalidInputError(f"{where}: instances have numbers {numbers}; expected 1, 2, ...")
-    labels = sample.images.labels
+    color, labels = sample.images.color, sample.images.labels
+    if color is not None and color.dtype != np.uint8:
+        raise InvalidInputError(f"{where}: color is of {color.dtype}; expected 8 bits a channel")
+    if labels is not None and labels.dtype.kind != "u":
+        raise InvalidInputError(f"{where}: labels are of {labels.dtype}; expected uint16")
     if labels is not None and labels.max(initial=0) > len(numbers):
         raise InvalidInputError(
             f"{where}: there is label {labels.max()}, but no instance of that number"
