@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array, Booleans, InvalidInputError, inverse, quoted
+from burg_drake.core import Array, Booleans, InvalidInputError, inverse, quoted, rotation_angle
 from burg_drake.core.grasps import Outcome
 from burg_drake.dataset.labels import Box, InstanceLabel
 from burg_drake.dataset.rendering import Images
@@ -132,9 +132,15 @@ def scene_faults(
             continue
         if one.object != placed[one.name]:
             yield RECORD, f"{one.name!r} is a {one.object!r}; the scene has a {placed[one.name]!r}"
-        off = np.abs(one.X_CO - inverse(sample.view.X_SC) @ X_SO[one.name]).max()
-        if off > POSE_TOLERANCE:
-            yield RECORD, f"X_CO of {one.name!r} is off by {off:.3g} from the scene's pose"
+        X_CO = inverse(sample.view.X_SC) @ X_SO[one.name]
+        if np.abs(one.X_CO - X_CO).max() > POSE_TOLERANCE:
+            distance = 1e3 * float(np.linalg.norm(one.X_CO[:3, 3] - X_CO[:3, 3]))
+            angle = float(np.rad2deg(rotation_angle(one.X_CO[:3, :3].T @ X_CO[:3, :3])))
+            yield (
+                RECORD,
+                f"X_CO of {one.name!r} is {distance:.3g} mm and {angle:.3g} degrees away from where"
+                " the scene has it",
+            )
 
 
 def drawing_faults(sample: Sample, drawn: Images, depth_unit: float) -> Iterator[Fault]:
