@@ -193,7 +193,7 @@ def test_one_process_writes_at_a_time(tmp_path: Path) -> None:
         pytest.raises(InvalidInputError, match="is being written by another process"),
     ):
         DatasetWriter(tmp_path, drawn.DOCUMENT)
-    DatasetWriter(tmp_path, drawn.DOCUMENT)
+    DatasetWriter(tmp_path, drawn.DOCUMENT).close()
 
 
 @pytest.mark.parametrize(
@@ -215,7 +215,7 @@ def test_other_content_is_refused(tmp_path: Path, change: dict[str, object], mes
     assert message in str(refused.value)
     elsewhere = replace(drawn.DOCUMENT, library="../elsewhere", versions={"burg_drake": "1"})
     elsewhere = replace(elsewhere, versions=elsewhere.versions | {"drake": "2", "editor": "9"})
-    DatasetWriter(tmp_path, elsewhere)
+    DatasetWriter(tmp_path, elsewhere).close()
 
 
 def test_folders_of_other_things_are_refused(tmp_path: Path) -> None:

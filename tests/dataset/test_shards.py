@@ -142,6 +142,13 @@ def test_webdataset_reads_a_shard(tmp_path: Path) -> None:
     assert {*NAMES, "grasps.npz"} <= found[0].keys()
 
 
+def huge(sample: Sample, width: int, height: int) -> Sample:
+    """A sample without images whose camera would make large ones."""
+    intrinsics = replace(sample.view.intrinsics, width=width, height=height)
+    view = replace(sample.view, intrinsics=intrinsics)
+    return replace(sample, view=view, images=Images(), sensor_depth=None, instances=(), grasps=None)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -158,6 +165,7 @@ def test_webdataset_reads_a_shard(tmp_path: Path) -> None:
         (lambda s: replace(s, appearance={"x": object()}), "values that are no plain data"),
         (lambda s: replace(s, view=replace(s.view, depth_range=(1, 99))), "up to 99 m cannot be"),
         (lambda s: replace(s, images=replace(s.images, color=s.images.normals)), "float32"),
+        (lambda s: huge(s, 10_000, 10_000), "10000 x 10000 pixels with 0 instances are more than"),
     ],
 )
 def test_samples_that_cannot_be_kept_are_refused(

@@ -15,7 +15,7 @@ from burg_drake.core.files import UNFINISHED
 from burg_drake.dataset.rendering import Images
 from burg_drake.dataset.samples.document import FILE as DOCUMENT_FILE, load_dataset_document
 from burg_drake.dataset.samples.index import FILE, read_index, scene_of, shard_numbers
-from burg_drake.dataset.samples.record import Record
+from burg_drake.dataset.samples.record import SampleRecord
 from burg_drake.dataset.samples.sample import Sample
 from burg_drake.dataset.samples.sample_checks import (
     Fault,
@@ -29,7 +29,7 @@ from burg_drake.dataset.samples.sample_checks import (
 from burg_drake.dataset.samples.sample_files import RECORD, SUFFIXES, member_kind
 from burg_drake.dataset.samples.shard import (
     FOLDER,
-    Shard,
+    SampleShard,
     ShardEntry,
     file_sum,
     open_shard,
@@ -157,7 +157,7 @@ def _wrong_entry(folder: Path, entry: ShardEntry) -> Iterator[DatasetFinding]:
         yield DatasetFinding("", entry.url, message)
 
 
-def _apart(shard: Shard, name: str) -> Iterator[DatasetFinding]:
+def _apart(shard: SampleShard, name: str) -> Iterator[DatasetFinding]:
     """Samples whose files do not lie next to each other, as readers of WebDataset expect."""
     kinds = filter(None, map(member_kind, tar_members(shard.path)))
     runs = Counter(key for key, _ in itertools.groupby(kinds, key=lambda kind: kind[0]))
@@ -167,7 +167,7 @@ def _apart(shard: Shard, name: str) -> Iterator[DatasetFinding]:
 
 
 def _sample_faults(
-    shard: Shard,
+    shard: SampleShard,
     key: str,
     document: SceneDocument | None,
     scene: Scene | None,
@@ -209,7 +209,7 @@ def _with_part(sample: Sample, part: Sample, kind: str) -> Sample:
 
 
 def _contradictions(
-    sample: Sample, record: Record, document: SceneDocument | None
+    sample: Sample, record: SampleRecord, document: SceneDocument | None
 ) -> Iterator[Fault]:
     yield from silhouette_faults(sample)
     yield from label_faults(sample)
@@ -226,7 +226,7 @@ def _finding(folder: Path, name: str, error: BurgError) -> DatasetFinding:
     return DatasetFinding("", name, str(error).removeprefix(f"{folder / name}: "))
 
 
-def _short(error: InvalidInputError, shard: Shard, key: str, kind: str) -> str:
+def _short(error: InvalidInputError, shard: SampleShard, key: str, kind: str) -> str:
     """What an error says of a member, without where it is."""
     text = str(error).removeprefix(f"{shard.path}: {key}.{SUFFIXES[kind]}")
     return text.removeprefix(":").strip()

@@ -19,7 +19,7 @@ from burg_drake.dataset.samples.document import (
 from burg_drake.dataset.samples.index import read_index, scene_of
 from burg_drake.dataset.samples.sample import Sample
 from burg_drake.dataset.samples.sample_files import PARTS, asked_parts
-from burg_drake.dataset.samples.shard import Shard, ShardEntry, open_shard
+from burg_drake.dataset.samples.shard import SampleShard, ShardEntry, open_shard
 from burg_drake.dataset.samples.writer import scene_name
 from burg_drake.scene.document import Scene, load_scene
 
@@ -116,8 +116,8 @@ class Dataset(Sequence[Sample]):
             raise UnknownNameError(f"{self.folder} has no scene {number}")
         return self.scenes.index(number)
 
-    def _place(self, index: int) -> tuple[Shard, str]:
-        """Shard and key of a sample."""
+    def _place(self, index: int) -> tuple[SampleShard, str]:
+        """SampleShard and key of a sample."""
         if not -len(self) <= index < len(self):
             raise IndexError(f"{self.folder} has no sample {index}; it has {len(self)}")
         index %= len(self)
@@ -125,7 +125,7 @@ class Dataset(Sequence[Sample]):
         shard = self._shard(number)
         return shard, shard.keys[index - self._ends[number] + self._entries[number].nsamples]
 
-    def _shard(self, number: int) -> Shard:
+    def _shard(self, number: int) -> SampleShard:
         entry = self._entries[number]
         shard = open_shard(self.folder / entry.url)
         if len(shard.keys) != entry.nsamples:

@@ -42,7 +42,7 @@ MOST_INSTANCES = 65535
 
 
 @dataclass(frozen=True, eq=False)
-class Record:
+class SampleRecord:
     """The record of a sample.
 
     Attributes:
@@ -70,8 +70,16 @@ def record_text(sample: Sample, files: Sequence[str]) -> str:
         files: kinds of those that it has besides.
 
     Raises:
-        InvalidInputError: its appearance is no plain data, or its depth range cannot be kept.
+        InvalidInputError: it is too large, its appearance is no plain data, or its depth range
+            cannot be kept.
     """
+    width, height = sample.view.intrinsics.width, sample.view.intrinsics.height
+    count = len(sample.instances)
+    if width * height > MOST_PIXELS or count * width * height > MOST_MASK_PIXELS:
+        raise InvalidInputError(
+            f"sample {sample.key}: {width} x {height} pixels with {count} instances are more than a"
+            f" sample may have: {MOST_PIXELS:,} pixels, and {MOST_MASK_PIXELS:,} in all masks"
+        )
     values = {
         "version": VERSION,
         "scene": sample.scene,
@@ -91,7 +99,7 @@ def record_text(sample: Sample, files: Sequence[str]) -> str:
         ) from error
 
 
-def parse_record(text: str, where: str) -> Record:
+def parse_record(text: str, where: str) -> SampleRecord:
     """The record of a sample.
 
     Args:
@@ -124,7 +132,7 @@ def parse_record(text: str, where: str) -> Record:
         appearance=fields.mapping("appearance"),
     )
     unit = fields.number("depth_unit", 1e-6, 1.0)
-    return Record(sample, tuple(fields.texts("files")), unit)
+    return SampleRecord(sample, tuple(fields.texts("files")), unit)
 
 
 def _rows(X: Array) -> list[list[float]]:

@@ -17,7 +17,7 @@ from burg_drake.core.files import DOCUMENT
 from burg_drake.dataset.rendering import Images
 from burg_drake.dataset.samples.grasps_file import decode_grasps, encode_grasps, require_fitting
 from burg_drake.dataset.samples.png import KINDS, decode_image_of, depth_unit_of, encode_image
-from burg_drake.dataset.samples.record import Record, parse_record, record_text
+from burg_drake.dataset.samples.record import SampleRecord, parse_record, record_text
 from burg_drake.dataset.samples.sample import Sample
 
 RECORD, GRASPS = "json", "grasps"
@@ -111,7 +111,7 @@ def asked_parts(parts: Iterable[str]) -> frozenset[str]:
     return asked
 
 
-def read_record(key: str, read: Callable[[str, int], bytes], where: str) -> Record:
+def read_record(key: str, read: Callable[[str, int], bytes], where: str) -> SampleRecord:
     """The record of a sample.
 
     Args:
@@ -134,7 +134,7 @@ def read_record(key: str, read: Callable[[str, int], bytes], where: str) -> Reco
 
 
 def read_parts(
-    record: Record, asked: Iterable[str], read: Callable[[str, int], bytes], where: str
+    record: SampleRecord, asked: Iterable[str], read: Callable[[str, int], bytes], where: str
 ) -> Sample:
     """A sample with those of its images and grasps that are asked for.
 

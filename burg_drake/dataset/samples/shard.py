@@ -14,7 +14,7 @@ from typing import BinaryIO
 
 from burg_drake.core import DocumentError, InvalidInputError, shown
 from burg_drake.core.files import open_regular
-from burg_drake.dataset.samples.record import Record
+from burg_drake.dataset.samples.record import SampleRecord
 from burg_drake.dataset.samples.sample import Sample
 from burg_drake.dataset.samples.sample_files import (
     SUFFIXES,
@@ -122,7 +122,7 @@ def file_sum(path: Path) -> tuple[int, str]:
     return size, digest.hexdigest()
 
 
-class Shard:
+class SampleShard:
     """A shard that is read; it holds no open file.
 
     Attributes:
@@ -149,7 +149,7 @@ class Shard:
         """Of its samples, in their order."""
         return list(self.samples)
 
-    def record(self, key: str) -> Record:
+    def record(self, key: str) -> SampleRecord:
         """The record of a sample.
 
         Raises:
@@ -157,7 +157,7 @@ class Shard:
         """
         return read_record(key, self._reader(key), str(self.path))
 
-    def sample(self, record: Record, parts: Iterable[str]) -> Sample:
+    def sample(self, record: SampleRecord, parts: Iterable[str]) -> Sample:
         """The sample of a record, with the parts that are asked for.
 
         Raises:
@@ -169,7 +169,7 @@ class Shard:
         return _Reader(self.path, key, self.samples[key])
 
 
-def open_shard(path: Path) -> Shard:
+def open_shard(path: Path) -> SampleShard:
     """A shard for reading; its headers are read once while the file is the same.
 
     Raises:
@@ -184,10 +184,10 @@ def open_shard(path: Path) -> Shard:
 
 
 @functools.lru_cache(maxsize=KEPT)
-def _open_shard(path: Path, size: int, changed: int) -> Shard:
+def _open_shard(path: Path, size: int, changed: int) -> SampleShard:
     """The shard as it was with this size and time of change."""
     del size, changed
-    return Shard(path)
+    return SampleShard(path)
 
 
 @dataclass(frozen=True)

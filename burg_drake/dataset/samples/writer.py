@@ -89,18 +89,19 @@ class DatasetWriter:
         """
         self.folder = writable_folder(folder)
         self._known: dict[str, ShardEntry] = {}
-        self._lock = os.open(self.folder, os.O_RDONLY)
+        lock = os.open(self.folder, os.O_RDONLY)
+        self._lock: int | None = lock
         try:
-            self._take()
+            self._take(lock)
             self._open(document)
         except BaseException:
-            os.close(self._lock)
+            self.close()
             raise
 
-    def _take(self) -> None:
+    def _take(self, lock: int) -> None:
         """Takes the lock; a file system without locks counts as one that others have."""
         with suppress(OSError):
-            if try_lock(self._lock):
+            if try_lock(lock):
                 return
         raise InvalidInputError(
             f"{self.folder} is being written by another process; wait for it, or choose another"
@@ -153,6 +154,12 @@ class DatasetWriter:
         """
         write_index(self.folder, self._known)
 
+    def close(self) -> None:
+        """Lets others write; what is there stays as it is."""
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
     def __enter__(self) -> DatasetWriter:
         return self
 
@@ -166,4 +173,4 @@ class DatasetWriter:
             if kind is None:
                 self.finish()
         finally:
-            os.close(self._lock)
+            self.close()
