@@ -22,7 +22,7 @@ from burg_drake.scene.document import Scene
 WIDTH, HEIGHT = 64, 48
 RADIUS = 0.05
 """Of the discs [m]."""
-TABLE = 0.9
+TABLE = 0.90007
 """Depth of what is no object [m]."""
 DOCUMENT = DatasetDocument(
     name="drawn",

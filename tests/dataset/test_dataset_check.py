@@ -6,6 +6,7 @@ import io
 import json
 import tarfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,9 @@ import pytest
 
 from burg_drake.core import InvalidInputError
 from burg_drake.dataset.rendering import Images
-from burg_drake.dataset.samples import DatasetFinding, check_dataset, write_index
+from burg_drake.dataset.samples import DatasetFinding, Sample, check_dataset, write_index
+from burg_drake.dataset.samples.png import encode_image
+from burg_drake.dataset.samples.sample_files import encoded
 from tests.dataset import drawn_samples as drawn
 
 SHARD = "shards/000012.tar"
@@ -52,6 +55,25 @@ def record(change: Callable[[Any], object]) -> Callable[[Files], object]:
     return apply
 
 
+def other_sample(change: Callable[[Sample], Sample]) -> Callable[[Files], object]:
+    """Puts files of a changed sample in place of the second one."""
+    return lambda files: files.update(encoded(change(drawn.sample(1, 12))))
+
+
+def unknown_outcome(sample: Sample) -> Sample:
+    """Says of a grasp what none is."""
+    assert sample.grasps is not None
+    outcome = np.array(["lifted", "flew", ""])
+    return replace(sample, grasps=replace(sample.grasps, outcome=outcome))
+
+
+def short_normals(sample: Sample) -> Sample:
+    """Halves the normals."""
+    assert sample.images.normals is not None
+    halves = (sample.images.normals * 0.5).astype(np.float32)
+    return replace(sample, images=replace(sample.images, normals=halves))
+
+
 def swap_poses(values: Any) -> None:
     """The mug's for the bottle's."""
     one, other = values["instances"][:2]
@@ -71,8 +93,6 @@ def truncated(files: Files) -> None:
 
 def of_another_size(files: Files) -> None:
     """Puts an image of another sample in place of one."""
-    from burg_drake.dataset.samples.png import encode_image
-
     small = np.ones((10, 12, 3), np.uint8)
     files["000012_001.color.png"] = encode_image("color", small, 1e-4)
 
@@ -105,6 +125,8 @@ def test_a_sound_data_set_has_no_findings(tmp_path: Path) -> None:
         (of_another_size, "color.png", "has 12 x 10 pixels, its view 64 x 48"),
         (lambda files: files.pop("000012_001.labels.png"), "labels.png", "is missing"),
         (lambda files: files.pop("000012_001.json"), "json", "is missing"),
+        (other_sample(unknown_outcome), "grasps.npz", "outcome 'flew' is none that a grasp can"),
+        (other_sample(short_normals), "normals.png", "normals have a length other than 1"),
         (record(lambda v: v["instances"][0].pop("amodal")), "json", "key 'amodal' is missing"),
         (record(lambda v: v["files"].remove("depth")), "depth.png", "the record does not have it"),
         (record(swap_poses), "json", "X_CO of 'mug' is 165 mm and 120 degrees away"),

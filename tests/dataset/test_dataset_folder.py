@@ -71,6 +71,8 @@ def test_scenes_come_back_with_their_library(tmp_path: Path) -> None:
     dataset = load_dataset(drawn.write(tmp_path))
     assert dataset.scenes == (12, 13) and dataset.indices(13) == range(2, 4)
     assert dataset.scene(13).content == drawn.scene().content
+    text = (tmp_path / "scenes/000013.yaml").read_text()
+    assert "library: package://burg_drake/models/" in text  # and no path of this machine
     with pytest.raises(UnknownNameError, match="has no scene 14"):
         dataset.scene(14)
 

@@ -105,6 +105,9 @@ def test_the_same_samples_give_the_same_bytes(tmp_path: Path) -> None:
     assert one == other and entries[0] == entries[1]
     assert entries[0].filesize == len(one) and entries[0].nsamples == 2
     assert entries[0].md5sum == hashlib.md5(one).hexdigest()
+    appearance = dict(reversed(drawn.sample(0).appearance.items()))
+    write_shard(paths[1], [drawn.sample(0, appearance=appearance), drawn.sample(1)])
+    assert paths[1].read_bytes() == one
     write_shard(paths[1], [drawn.sample(0), drawn.sample(1, sensor_depth=None)])
     assert paths[1].read_bytes() != one
 
@@ -132,6 +135,8 @@ def test_other_programs_read_a_shard(tmp_path: Path) -> None:
     with np.load(io.BytesIO(files["000012_000.grasps.npz"])) as grasps:
         assert grasps["outcome"].tolist() == ["lifted", "", "no_ik"]
         assert grasps["margin.clearance_m"][2] == -1 / 3
+    with zipfile.ZipFile(io.BytesIO(files["000012_000.grasps.npz"])) as archive:
+        assert {one.date_time for one in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
 
 
 def test_webdataset_reads_a_shard(tmp_path: Path) -> None:
@@ -226,6 +231,17 @@ def edited(key: str, value: Any) -> Callable[[dict[str, bytes]], object]:
     return change
 
 
+def flipped(name: str, near: bytes) -> Callable[[dict[str, bytes]], object]:
+    """Flips a bit of the first sample, where this is."""
+
+    def change(files: dict[str, bytes]) -> None:
+        data = bytearray(files[f"000012_000.{name}"])
+        data[data.index(near) + (50 if near == b"IDAT" else 0)] ^= 1
+        files[f"000012_000.{name}"] = bytes(data)
+
+    return change
+
+
 def file(name: str, data: bytes) -> Callable[[dict[str, bytes]], object]:
     """Puts another file in place of one of the first sample."""
     return lambda files: files.update({f"000012_000.{name}": data})
@@ -243,6 +259,8 @@ def file(name: str, data: bytes) -> Callable[[dict[str, bytes]], object]:
         (file("depth.png", png(64, 48, 16)), "colour type 2 of PNG; expected 16 bits"),
         (file("color.png", b"GIF89a"), "000012_000.color.png is not a PNG"),
         (file("color.png", png(64, 48) + b"x"), "color.png is cut off, or goes on behind its end"),
+        (flipped("color.png", b"IDAT"), "color.png is damaged: a check sum is wrong"),
+        (flipped("normals.png", b"IEND"), "normals.png is damaged: it has chunk b'HEND'"),
         (file("grasps.npz", pickled()), "000012_000.grasps.npz: outcome holds Python objects"),
         (file("grasps.npz", announcing("(9999999, 4, 4)")), "000012_000.grasps.npz: X_CG"),
         (file("grasps.npz", b"PK"), "000012_000.grasps.npz is not a .npz file of grasps"),
