@@ -7,3 +7,7 @@ from .instances import (
     label_instances as label_instances,
 )
 from .labelled_grasps import LabelledGrasps as LabelledGrasps
+from .run_length import (
+    decode_mask as decode_mask,
+    encode_mask as encode_mask,
+)
