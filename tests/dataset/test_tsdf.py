@@ -58,16 +58,15 @@ def test_one_image_of_the_table() -> None:
 
 
 def test_pixels_are_the_nearest_ones() -> None:
-    """Two halves of an image at different depths part at the middle between two columns."""
+    """Two halves of an image at different depths part in the middle between two columns: 0.12 and
+    0.36 pixels from there, each voxel is on its side."""
     depth = np.full((240, 320), 0.5, np.float32)
     depth[:, 160:] = 0.6
-    found = fuse_tsdf([depth], CAMERA, np.eye(4)[None], make_pose(p_AB=(-0.01, -0.01, 0.5)),
-                      size=0.02, voxels=4, truncation=1.0)  # fmt: skip
-    x = -0.01 + 0.005 * (np.arange(4) + 0.5)
-    z = 0.5 + 0.0025
-    left = 0.5 - z
-    expected = np.where(300.0 * x / z + 159.5 < 159.5, left, left + 0.1)
-    np.testing.assert_allclose(found.distance[:, 1, 0], expected, rtol=1e-3)
+    X_SV = make_pose(p_AB=(-0.0008, -0.0008, 0.5))
+    found = fuse_tsdf([depth], CAMERA, [np.eye(4)], X_SV, size=0.0016, voxels=4, truncation=1.0)
+    x = 0.0004 * (np.arange(4) - 1.5)
+    expected = np.where(x < 0.0, -0.0002, 0.0998)
+    np.testing.assert_allclose(found.distance[:, 1, 0], expected, atol=1e-6)
 
 
 def test_true_distances_of_ball_box_and_table(tmp_path: Path) -> None:
@@ -78,6 +77,13 @@ def test_true_distances_of_ball_box_and_table(tmp_path: Path) -> None:
     without = exact_tsdf(WORLD.scene(tmp_path), X_SV, table=False)
     below = centers()[:, 2] < -0.031
     assert (without.distance.reshape(-1)[below] == np.float32(0.03)).all()
+
+
+def test_objects_beside_the_volume_do_not_matter(tmp_path: Path) -> None:
+    scene = WORLD.scene(tmp_path)
+    found = exact_tsdf(scene, make_pose(p_AB=(1.0, 1.0, 0.0)), size=0.08, voxels=4)
+    height = 0.02 * (np.arange(4) + 0.5)
+    np.testing.assert_allclose(found.distance, np.broadcast_to(height, (4, 4, 4)), rtol=1e-6)
 
 
 def test_distances_of_a_box_are_exact() -> None:

@@ -78,12 +78,12 @@ def depth_cloud(
     for name, image in (("color", color), ("labels", labels)):
         if image is not None:
             require_image(image, intrinsics, f"the {name} image")
-    there = (metres > 0.0) & (metres < np.inf)
-    points = _directions(intrinsics)[there] * metres[there][:, None]
+    there = np.flatnonzero((metres > 0.0) & (metres < np.inf))
+    points = _directions(intrinsics).reshape(-1, 3)[there] * metres.reshape(-1, 1)[there]
     return DepthCloud(
         points,
-        None if color is None else np.asarray(color)[there],
-        None if labels is None else np.asarray(labels)[there],
+        None if color is None else np.asarray(color).reshape(-1, 3)[there],
+        None if labels is None else np.asarray(labels).reshape(-1)[there],
     )
 
 

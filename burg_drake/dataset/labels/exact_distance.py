@@ -3,11 +3,12 @@ are compared with."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from burg_drake.core import Array, Booleans, check_pose, inverse, transform_points
+from burg_drake.core import Array, Booleans, Indices, check_pose, inverse, transform_points
 from burg_drake.dataset.labels.scene_grasps import instance_numbers
 from burg_drake.dataset.labels.tsdf import SIZE, VOXELS, Tsdf, grid_lengths, voxel_centers
 from burg_drake.scene.document import SceneLike, as_scene
@@ -18,8 +19,10 @@ if TYPE_CHECKING:
 EDGE = 0.01
 """Faces are cut until their edges are no longer than this [m], or all faces around a point would be
 candidates for the nearest one."""
+MOST_EDGES = 100
+"""Along the diagonal of an object: faces of large ones are not cut that small."""
 MOST_CUTS = 20
-"""Of an edge into halves: a kilometre becomes a millimetre."""
+"""Of an edge into halves, more than it takes."""
 FIRST = 4
 """Faces that give a first bound of a distance."""
 TINY = 1e-300
@@ -84,56 +87,85 @@ def mesh_distance(mesh: trimesh.Trimesh, points: Array, reach: float) -> Array:
         (N,) [m].
     """
     lower, upper = np.asarray(mesh.bounds)
-    near = np.flatnonzero(((points > lower - reach) & (points < upper + reach)).all(axis=1))
     distance = np.full(len(points), float(reach))
-    distance[near] = np.minimum(_unsigned(mesh, points[near], reach), reach)
-    within = near[((points[near] > lower) & (points[near] < upper)).all(axis=1)]
-    within = within[_inside(mesh, points[within])]
-    distance[within] *= -1.0
-    return distance
-
-
-def _unsigned(mesh: trimesh.Trimesh, points: Array, reach: float) -> Array:
-    """(N,) distances to the nearest face [m]; above `reach` something above it.
-
-    Every face lies in a disk about its middle; those are measured whose disks are nearer than the
-    faces of the nearest middles.
-    """
-    from scipy.spatial import cKDTree
-    from trimesh.remesh import subdivide_to_size
-
-    vertices, faces = subdivide_to_size(mesh.vertices, mesh.faces, EDGE, max_iter=MOST_CUTS)
-    triangles = np.asarray(vertices)[np.asarray(faces)]
-    middle = triangles.mean(axis=1)
-    radius = np.linalg.norm(triangles - middle[:, None], axis=2).max(axis=1)
-    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), TINY)
-    largest = float(radius.max())
-    tree = cKDTree(middle)
-    apart, first = tree.query(points, k=min(FIRST, len(middle)))
-    apart, first = apart.reshape(len(points), -1), first.reshape(len(points), -1)
-    distance: Array = apart[:, 0].copy()
-    close = np.flatnonzero(distance <= reach + largest)
-    if not len(close):
+    near = np.flatnonzero(((points > lower - reach) & (points < upper + reach)).all(axis=1))
+    if not len(near):
         return distance
-    point = np.repeat(close, first.shape[1])
-    measured = _to_triangles(points[point], triangles[first[close].reshape(-1)])
-    distance[close] = measured.reshape(len(close), -1).min(axis=1)
-    close = close[distance[close] > 0.0]
-    for start in range(0, len(close), POINTS):
-        some = close[start : start + POINTS]
-        around = tree.query_ball_point(points[some], np.minimum(distance[some], reach) + largest)
-        counts = np.array([len(faces) for faces in around])
-        point = np.repeat(some, counts)
-        face = np.concatenate([np.asarray(faces, np.intp) for faces in around])
-        offset = points[point] - middle[face]
-        height = np.abs(np.einsum("ij,ij->i", offset, normal[face]))
-        square = np.einsum("ij,ij->i", offset, offset) - height**2
-        beside = np.maximum(np.sqrt(np.maximum(square, 0.0)) - radius[face], 0.0)
-        possible = height**2 + beside**2 < distance[point] ** 2
-        point, face = point[possible], face[possible]
-        np.minimum.at(distance, point, _to_triangles(points[point], triangles[face]))
+    distance[near] = np.minimum(_Faces.of(mesh).distance(points[near], reach), reach)
+    within = near[((points[near] > lower) & (points[near] < upper)).all(axis=1)]
+    if len(within):
+        distance[within[_inside(mesh, points[within])]] *= -1.0
     return distance
+
+
+@dataclass(frozen=True, eq=False)
+class _Faces:
+    """The faces of a surface, cut into small ones.
+
+    Attributes:
+        triangles: (T, 3, 3) their corners.
+        middle: (T, 3) middles.
+        radius: (T,) of the disks about the middles that they lie in.
+        normal: (T, 3) unit normals; 0 without area.
+        tree: of the middles.
+    """
+
+    triangles: Array
+    middle: Array
+    radius: Array
+    normal: Array
+    tree: Any
+
+    @classmethod
+    def of(cls, mesh: trimesh.Trimesh) -> _Faces:
+        """Cuts the faces of a mesh."""
+        from scipy.spatial import cKDTree
+        from trimesh.remesh import subdivide_to_size
+
+        edge = max(EDGE, float(np.linalg.norm(mesh.extents)) / MOST_EDGES)
+        vertices, faces = subdivide_to_size(mesh.vertices, mesh.faces, edge, max_iter=MOST_CUTS)
+        triangles = np.asarray(vertices)[np.asarray(faces)]
+        middle = triangles.mean(axis=1)
+        radius = np.linalg.norm(triangles - middle[:, None], axis=2).max(axis=1)
+        normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), TINY)
+        return cls(triangles, middle, radius, normal, cKDTree(middle))
+
+    def distance(self, points: Array, reach: float) -> Array:
+        """(N,) distances of points (N, 3) to the nearest face [m]; above `reach` something above
+        it.
+
+        Those to the faces of the nearest middles are a bound; all faces are measured whose disks
+        are nearer.
+        """
+        largest = float(self.radius.max())
+        bound, first = self.tree.query(points, k=[*range(1, 1 + min(FIRST, len(self.middle)))])
+        distance: Array = bound[:, 0].copy()
+        close = np.flatnonzero(distance <= reach + largest)
+        self._measure(distance, points, np.repeat(close, first.shape[1]), first[close].reshape(-1))
+        close = close[distance[close] > 0.0]
+        for start in range(0, len(close), POINTS):
+            some = close[start : start + POINTS]
+            radius = np.minimum(distance[some], reach) + largest
+            around = self.tree.query_ball_point(points[some], radius)
+            point = np.repeat(some, [len(faces) for faces in around])
+            face = np.concatenate([np.asarray(faces, np.intp) for faces in around])
+            nearer = self._bound(points[point], face) < distance[point]
+            self._measure(distance, points, point[nearer], face[nearer])
+        return distance
+
+    def _bound(self, points: Array, face: Indices) -> Array:
+        """(M,) distances of points (M, 3) to the disk of one face each [m]."""
+        offset = points - self.middle[face]
+        height = np.einsum("ij,ij->i", offset, self.normal[face])
+        along = np.einsum("ij,ij->i", offset, offset) - height**2
+        beside = np.maximum(np.sqrt(np.maximum(along, 0.0)) - self.radius[face], 0.0)
+        bound: Array = np.hypot(height, beside)
+        return bound
+
+    def _measure(self, distance: Array, points: Array, point: Indices, face: Indices) -> None:
+        """Lowers distances of points (N,) to those of some points to one face each."""
+        np.minimum.at(distance, point, _to_triangles(points[point], self.triangles[face]))
 
 
 def _to_triangles(points: Array, triangles: Array) -> Array:
@@ -155,7 +187,8 @@ def _to_triangles(points: Array, triangles: Array) -> Array:
         nearest = np.minimum(nearest, np.einsum("ij,ij->i", apart, apart))
     offset = points - triangles[:, 0]
     height = np.abs(np.einsum("ij,ij->i", offset, normal)) / np.maximum(length, TINY)
-    return np.where(above, height, np.sqrt(nearest))
+    distance: Array = np.where(above, height, np.sqrt(nearest))
+    return distance
 
 
 def _inside(mesh: trimesh.Trimesh, points: Array) -> Booleans:
