@@ -21,7 +21,7 @@ Those go to `grasps`, a folder of ours: files that the API's `GraspGroup.from_np
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -32,7 +32,7 @@ from scipy.io import savemat
 
 from burg_drake.cameras.optics import Intrinsics
 from burg_drake.core import Array, InvalidInputError, inverse, quaternion_from_rotation
-from burg_drake.core.grasps import Outcome
+from burg_drake.core.grasps import GraspSet, Outcome
 from burg_drake.dataset.exchange.folder import new_folder
 from burg_drake.dataset.exchange.image_files import depth_numbers, png
 from burg_drake.dataset.exchange.model_file import visual_model, write_ply
@@ -47,7 +47,6 @@ from burg_drake.dataset.exchange.source import (
 from burg_drake.dataset.labels import LabelledGrasps
 from burg_drake.dataset.samples import Sample
 from burg_drake.formats import write_grasp_file
-from burg_drake.core.grasps import GraspSet
 
 Rectangles = Callable[[LabelledGrasps, Intrinsics], Array]
 """Makes rectangles of grasps: (N, 5) center_x, center_y, open_x, open_y, height [pixels]; nan for a
@@ -186,6 +185,7 @@ class _Camera:
 
     def finish(self) -> None:
         """Writes what all views share."""
+        assert self._K is not None
         X_SC = np.stack(self._X_SC)
         np.save(self._folder / "camera_poses.npy", inverse(X_SC[0]) @ X_SC)
         np.save(self._folder / "cam0_wrt_table.npy", X_SC[0])
@@ -218,9 +218,7 @@ class _Camera:
     def _write_grasps(
         self, sample: Sample, grasps: LabelledGrasps, ids: list[int], name: str
     ) -> None:
-        by_number = {
-            label.number: k for label, k in zip(sample.instances, ids, strict=True)
-        }
+        by_number = {label.number: k for label, k in zip(sample.instances, ids, strict=True)}
         objects = np.array([by_number[int(n)] for n in grasps.number], dtype=np.int64)
         scores = grasp_scores(grasps)
         known = np.isfinite(scores)

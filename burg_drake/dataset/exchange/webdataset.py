@@ -11,7 +11,7 @@ import io
 import json
 import tarfile
 from collections.abc import Iterator
-from itertools import islice
+from itertools import groupby
 from pathlib import Path
 from typing import Any, Literal
 
@@ -65,22 +65,15 @@ def write_webdataset(
         )
     lost: set[str] = set()
     with new_folder(folder) as fresh:
-        waiting, count = iter(samples), 0
-        while part := list(islice(waiting, 1)):
-            path = fresh / f"shard-{count:06d}.tar"
+        for shard, part in groupby(enumerate(samples), key=lambda one: one[0] // shard_size):
+            path = fresh / f"shard-{shard:06d}.tar"
             with tarfile.open(path, "w", format=tarfile.USTAR_FORMAT) as tar:
-                for sample in _chain(part, islice(waiting, shard_size - 1)):
+                for _, sample in part:
                     for name, content in _files(samples.objects, sample, images, depth_unit):
                         _add(tar, f"{sample.key}.{name}", content)
                     if sample.images.normals is not None:
                         lost.add("Images of normals are left out.")
-            count += 1
     return tuple(sorted(lost))
-
-
-def _chain(first: list[Sample], rest: Iterator[Sample]) -> Iterator[Sample]:
-    yield from first
-    yield from rest
 
 
 def _add(tar: tarfile.TarFile, name: str, content: bytes) -> None:
