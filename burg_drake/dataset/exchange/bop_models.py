@@ -21,6 +21,8 @@ from burg_drake.objects.meshes import decimated
 
 MILLIMETRE = 1e-3
 """Unit of the files [m]."""
+DECIMALS = 6
+"""Of lengths in `models_info.json`."""
 EVALUATION_FACES = 5000
 """Of a model that errors of poses are computed with."""
 AT_ONCE = 1000
@@ -55,12 +57,10 @@ def write_models(library: ObjectLibrary, objects: Sequence[str], folder: Path) -
 def model_info(vertices: Array) -> dict[str, float]:
     """Box and diameter of a model's vertices (V, 3) [m], in millimetres, by BOP's names."""
     lower, upper = vertices.min(axis=0), vertices.max(axis=0)
-    info = {"diameter": diameter(vertices) / MILLIMETRE}
-    for k, axis in enumerate("xyz"):
-        info[f"min_{axis}"] = float(lower[k]) / MILLIMETRE
-    for k, axis in enumerate("xyz"):
-        info[f"size_{axis}"] = float(upper[k] - lower[k]) / MILLIMETRE
-    return info
+    info = {"diameter": diameter(vertices)}
+    info |= {f"min_{axis}": float(lower[k]) for k, axis in enumerate("xyz")}
+    info |= {f"size_{axis}": float(upper[k] - lower[k]) for k, axis in enumerate("xyz")}
+    return {name: round(length / MILLIMETRE, DECIMALS) + 0.0 for name, length in info.items()}
 
 
 def diameter(vertices: Array) -> float:

@@ -60,6 +60,7 @@ def write_card(
     chosen = [samples[k] for k in spread(len(samples), EXAMPLES)]
     charts = _charts(counted)
     pictures: dict[str, str | bytes] = {**charts, "examples.png": sheet_png(chosen, 1)}
+    made = {**(facts or {}), **software_versions(with_platform=False)}
     text = "\n\n".join(
         [
             MARK,
@@ -73,7 +74,7 @@ def write_card(
             "\n".join(f"![{Path(name).stem}](card/{name})" for name in charts),
             *(["## Grasps", _counts("outcome", counted.outcomes)] if counted.outcomes else []),
             "## How it was made",
-            _table(("", ""), list({**(facts or {}), **software_versions()}.items())),
+            _table(("", ""), list(made.items())),
         ]
     )
     contents = {folder / PICTURES / name: picture for name, picture in pictures.items()}
@@ -100,11 +101,13 @@ def _charts(counted: Tally) -> dict[str, str]:
         "distance.svg": histogram(
             counted.distances, "Distance of visible objects", "from the camera [m]"
         ),
-        "elevation.svg": histogram(degrees, "Views", "by which the camera looks down [°]"),
+        "elevation.svg": histogram(
+            degrees, "Elevation of views", "by which the camera looks down [°]"
+        ),
         "visibility.svg": histogram(
             percent, "Visibility of objects", "share of the silhouette [%]", limits=(0.0, 100.0)
         ),
-        "objects.svg": bars_of_counts(counted.objects, "Images", "visible objects"),
+        "objects.svg": bars_of_counts(counted.objects, "Objects in images", "visible objects"),
     }
 
 

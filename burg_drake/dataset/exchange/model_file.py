@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 from burg_drake.core import Array, Bytes, Indices
 from burg_drake.objects.library import ObjectLibrary
 
+DECIMALS = 9
+"""Of coordinates, so that zeros are written as such."""
+
 
 @dataclass(frozen=True, eq=False)
 class VisualModel:
@@ -76,7 +79,7 @@ def write_ply(model: VisualModel, path: Path, *, unit: float) -> None:
         path: of the file.
         unit: of its numbers [m].
     """
-    columns = [model.vertices / unit, model.normals]
+    columns = [(model.vertices / unit).round(DECIMALS), model.normals]
     forms = ["%.7g"] * 3 + ["%.5g"] * 3
     header = ["ply", "format ascii 1.0"]
     names = [f"float {axis}" for axis in ("x", "y", "z", "nx", "ny", "nz")]

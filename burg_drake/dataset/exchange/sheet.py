@@ -29,7 +29,9 @@ NOTHING = (70, 70, 70)
 MISSING = (225, 229, 233)
 """Of an image that the sample has not."""
 OPACITY = 0.5
-"""Of labels on colours."""
+"""Of labels on the picture."""
+LUMA = (0.299, 0.587, 0.114)
+"""Share of red, green and blue in the lightness of a colour (ITU-R BT.601)."""
 TEXT = 12
 SUFFIXES = (".png", ".html")
 STYLE = """
@@ -131,11 +133,13 @@ def caption(sample: Sample) -> str:
 
 
 def _labelled(sample: Sample, height: int) -> Bytes:
-    """Labels over colours, with names and boxes."""
+    """Labels over the picture in grey, with names and boxes."""
     labels, color = sample.images.labels, sample.images.color
     if labels is None:
         return _panel(None, height)
-    grey = np.full((*labels.shape, 3), 128.0) if color is None else color.astype(float)
+    grey = np.full((*labels.shape, 3), 128.0)
+    if color is not None:
+        grey[:] = (color @ np.array(LUMA))[..., None]
     tints = _tints(sample.instances)
     for label in sample.instances:
         mask = labels == label.number
@@ -168,8 +172,8 @@ def _tints(instances: Sequence[InstanceLabel]) -> dict[int, tuple[int, int, int]
 
 
 def _readable(tint: tuple[int, int, int]) -> tuple[int, int, int]:
-    """Black or white, whichever stands out (lightness by ITU-R BT.601)."""
-    return (0, 0, 0) if np.dot(tint, (0.299, 0.587, 0.114)) > 140.0 else (255, 255, 255)
+    """Black or white, whichever stands out."""
+    return (0, 0, 0) if np.dot(tint, LUMA) > 140.0 else (255, 255, 255)
 
 
 def _panel(image: Bytes | None, height: int) -> Bytes:

@@ -15,6 +15,7 @@ TOLERANCE = 0.01
 possible up to 0.1 (Hodan et al., "BOP Challenge 2020", section 2.2), and looks at the object then;
 nobody looks here."""
 MM = 1e3
+DECIMALS = 9
 
 
 def symmetries(entry: ObjectEntry, diameter: float) -> dict[str, Any]:
@@ -51,14 +52,18 @@ def symmetries(entry: ObjectEntry, diameter: float) -> dict[str, Any]:
 
 
 def _axis(X_OP: Array, k: int) -> dict[str, list[float]]:
-    return {"axis": X_OP[:3, k].tolist(), "offset": (MM * X_OP[:3, 3]).tolist()}
+    return {"axis": _listed(X_OP[:3, k]), "offset": _listed(MM * X_OP[:3, 3])}
 
 
 def _flat(X_OP: Array, R: Array) -> list[float]:
     """A rotation about the primitive's middle, in the object frame."""
     X = X_OP @ make_pose(R, np.zeros(3)) @ inverse(X_OP)
     X[:3, 3] *= MM
-    return [float(x) for x in (X + 0.0).reshape(-1)]
+    return _listed(X.reshape(-1))
+
+
+def _listed(values: Array) -> list[float]:
+    return [float(x) for x in values.round(DECIMALS) + 0.0]
 
 
 def _cube_rotations() -> list[Array]:
