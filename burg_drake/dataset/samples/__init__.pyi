@@ -1,1 +1,21 @@
+from .check import (
+    DatasetFinding as DatasetFinding,
+    Redraw as Redraw,
+    check_dataset as check_dataset,
+    check_shard as check_shard,
+)
+from .dataset import (
+    Dataset as Dataset,
+    load_dataset as load_dataset,
+)
+from .document import DatasetDocument as DatasetDocument
+from .index import write_index as write_index
 from .sample import Sample as Sample
+from .shard import (
+    ShardEntry as ShardEntry,
+    write_shard as write_shard,
+)
+from .writer import (
+    DatasetWriter as DatasetWriter,
+    write_scene as write_scene,
+)

@@ -1,0 +1,169 @@
+"""Reads a data set: any sample by its index, and of it what is asked for."""
+
+from __future__ import annotations
+
+import bisect
+import itertools
+import os
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import overload
+
+from burg_drake.core import DocumentError, InvalidInputError, UnknownNameError
+from burg_drake.dataset.samples.document import (
+    FILE as DOCUMENT_FILE,
+    DatasetDocument,
+    load_dataset_document,
+)
+from burg_drake.dataset.samples.index import read_index, scene_of
+from burg_drake.dataset.samples.sample import Sample
+from burg_drake.dataset.samples.sample_files import PARTS, asked_parts
+from burg_drake.dataset.samples.shard import SampleShard, ShardEntry, open_shard
+from burg_drake.dataset.samples.writer import scene_name
+from burg_drake.scene.document import Scene, load_scene
+
+
+class Dataset(Sequence[Sample]):
+    """The samples of a data set, in the order of their scenes.
+
+    It keeps no open files and no pixels, so that it can be pickled, and be read by several
+    processes and threads at once.
+
+    Attributes:
+        folder: of the data set.
+        document: what it holds, and was made with.
+    """
+
+    def __init__(
+        self, folder: Path, document: DatasetDocument, entries: Sequence[ShardEntry]
+    ) -> None:
+        self.folder = folder
+        self.document = document
+        self._entries = tuple(entries)
+        self._ends = tuple(itertools.accumulate(entry.nsamples for entry in entries))
+
+    def __repr__(self) -> str:
+        return f"Dataset({self.document.name!r}, {len(self)} samples, {str(self.folder)!r})"
+
+    def __len__(self) -> int:
+        return self._ends[-1] if self._ends else 0
+
+    @overload
+    def __getitem__(self, index: int) -> Sample: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Sample]: ...
+    def __getitem__(self, index: int | slice) -> Sample | list[Sample]:
+        if isinstance(index, slice):
+            return [self.read(i) for i in range(*index.indices(len(self)))]
+        return self.read(index)
+
+    def read(self, index: int, images: Iterable[str] = PARTS) -> Sample:
+        """A sample, with those of its images that are asked for.
+
+        Args:
+            index: from 0; negative ones count from the end.
+            images: of `color`, `depth`, `labels`, `normals` and `sensor_depth`, and `grasps`; no
+                others are decoded. What the sample does not have is None.
+
+        Raises:
+            IndexError: there is no such sample.
+            UnknownNameError: there are no such images.
+            InvalidInputError: the shard is missing or damaged, or a file of the sample is; the
+                message names both.
+        """
+        asked = asked_parts(images)
+        shard, key = self._place(index)
+        return shard.sample(shard.record(key), asked)
+
+    @cached_property
+    def keys(self) -> tuple[str, ...]:
+        """Of all samples, such as `000012_003`; reads the headers of all shards, once.
+
+        Raises:
+            InvalidInputError: a shard is missing or damaged.
+        """
+        return tuple(
+            key for number in range(len(self._entries)) for key in self._shard(number).keys
+        )
+
+    @property
+    def scenes(self) -> tuple[int, ...]:
+        """Numbers of the scenes."""
+        return tuple(map(scene_of, self._entries))
+
+    def indices(self, scene: int) -> range:
+        """Indices of the samples of a scene.
+
+        Raises:
+            UnknownNameError: no such scene.
+        """
+        place = self._scene_place(scene)
+        return range(self._ends[place] - self._entries[place].nsamples, self._ends[place])
+
+    def scene(self, number: int) -> Scene:
+        """A scene, with its library.
+
+        Raises:
+            UnknownNameError: no such scene, or no such library.
+            DocumentError: its document is damaged.
+        """
+        self._scene_place(number)
+        return load_scene(self.folder / scene_name(number))
+
+    def _scene_place(self, number: int) -> int:
+        if number not in self.scenes:
+            raise UnknownNameError(f"{self.folder} has no scene {number}")
+        return self.scenes.index(number)
+
+    def _place(self, index: int) -> tuple[SampleShard, str]:
+        """SampleShard and key of a sample."""
+        if not -len(self) <= index < len(self):
+            raise IndexError(f"{self.folder} has no sample {index}; it has {len(self)}")
+        index %= len(self)
+        number = bisect.bisect_right(self._ends, index)
+        shard = self._shard(number)
+        return shard, shard.keys[index - self._ends[number] + self._entries[number].nsamples]
+
+    def _shard(self, number: int) -> SampleShard:
+        entry = self._entries[number]
+        shard = open_shard(self.folder / entry.url)
+        if len(shard.keys) != entry.nsamples:
+            raise DocumentError(
+                f"{shard.path} has {len(shard.keys)} samples, the index {entry.nsamples}; make one"
+                " of them anew"
+            )
+        return shard
+
+
+def load_dataset(folder: str | Path) -> Dataset:
+    """Opens a data set for reading; no sample is read yet.
+
+    Args:
+        folder: of the data set.
+
+    Raises:
+        InvalidInputError: it is not finished, or a shard is missing or of another size than in the
+            index; the message names it.
+        DocumentError: it is of another version, or damaged.
+    """
+    folder = Path(folder)
+    if not (folder / DOCUMENT_FILE).is_file():
+        raise InvalidInputError(f"{folder} is no data set: {DOCUMENT_FILE} is missing")
+    document = load_dataset_document(folder / DOCUMENT_FILE)
+    entries = read_index(folder)
+    for entry in entries:
+        path = folder / entry.url
+        try:
+            size = os.stat(path).st_size
+        except OSError as error:
+            raise InvalidInputError(
+                f"shard {path} cannot be read: {error.strerror or error}; run the command that made"
+                " the data set once more, and it is made again"
+            ) from error
+        if size != entry.filesize:
+            raise InvalidInputError(
+                f"shard {path} has {size} bytes, the index {entry.filesize}: it is cut off or"
+                " changed; delete it, and run the command that made the data set once more"
+            )
+    return Dataset(folder, document, entries)

@@ -1,0 +1,176 @@
+"""Writes a data set scene by scene, and goes on where a run that ended early has stopped.
+
+A shard that is there is complete, whatever has become of the process that wrote it: it is written
+beside, and renamed last. The index is written in the end.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from types import TracebackType
+
+from burg_drake.core import InvalidInputError
+from burg_drake.core.files import remove_unfinished, try_lock, writable_folder
+from burg_drake.core.paths import portable_reference
+from burg_drake.dataset.samples.document import (
+    FILE as DOCUMENT_FILE,
+    DatasetDocument,
+    load_dataset_document,
+    save_dataset_document,
+)
+from burg_drake.dataset.samples.index import shard_numbers, write_index
+from burg_drake.dataset.samples.sample import Sample
+from burg_drake.dataset.samples.shard import FOLDER, ShardEntry, shard_name, write_shard
+from burg_drake.scene.document import Scene, save_scene
+
+SCENES = "scenes"
+
+
+def scene_name(number: int) -> str:
+    """Path of the document of a scene, relative to the data set."""
+    return f"{SCENES}/{number:06d}.yaml"
+
+
+def write_scene(
+    folder: str | Path, number: int, scene: Scene, samples: Iterable[Sample]
+) -> ShardEntry:
+    """Writes the document of a scene, then its shard; for processes that a writer has started.
+
+    Args:
+        folder: of the data set, which the writer has opened.
+        number: of the scene in it.
+        scene: the scene; its library is referred to from where the document will lie.
+        samples: of the scene; they may be made as they are asked for.
+
+    Returns:
+        The shard's line of the index, for `DatasetWriter.added`.
+
+    Raises:
+        InvalidInputError: the scene is there already, and see `write_shard`; nothing of the scene
+            stays then.
+    """
+    folder = Path(folder)
+    shard, document = folder / shard_name(number), folder / scene_name(number)
+    if shard.exists():
+        raise InvalidInputError(f"{shard} is there already; a scene can be added once")
+    library = portable_reference(scene.library.root, document.parent)
+    save_scene(replace(scene.document, library=library), document)
+    try:
+        return write_shard(shard, samples)
+    except BaseException:
+        document.unlink(missing_ok=True)
+        raise
+
+
+class DatasetWriter:
+    """A data set that is opened for writing; one process at a time can hold it.
+
+    When its block ends without an error, the index is written.
+
+    Attributes:
+        folder: of the data set.
+    """
+
+    def __init__(self, folder: str | Path, document: DatasetDocument) -> None:
+        """Opens or makes the folder, and removes what a process that was killed has begun.
+
+        Args:
+            folder: of the data set; new, empty, or one of the same content.
+            document: what its samples are made with.
+
+        Raises:
+            InvalidInputError: the folder cannot be written to, another process is writing it, it
+                holds samples that are made with other things, or something that is none of this.
+            DocumentError: its document is damaged, or of another version.
+        """
+        self.folder = writable_folder(folder)
+        self._known: dict[str, ShardEntry] = {}
+        lock = os.open(self.folder, os.O_RDONLY)
+        self._lock: int | None = lock
+        try:
+            self._take(lock)
+            self._open(document)
+        except BaseException:
+            self.close()
+            raise
+
+    def _take(self, lock: int) -> None:
+        """Takes the lock; a file system without locks counts as one that others have."""
+        with suppress(OSError):
+            if try_lock(lock):
+                return
+        raise InvalidInputError(
+            f"{self.folder} is being written by another process; wait for it, or choose another"
+            " folder"
+        ).about("folder")
+
+    def _open(self, document: DatasetDocument) -> None:
+        remove_unfinished(self.folder)
+        path = self.folder / DOCUMENT_FILE
+        if path.exists():
+            found = load_dataset_document(path).differences(document)
+            if found:
+                raise InvalidInputError(
+                    f"{self.folder} holds another data set ({'; '.join(found)}); choose another"
+                    " folder, or delete it"
+                ).about("folder")
+        elif any(self.folder.iterdir()):
+            raise InvalidInputError(
+                f"{self.folder} is not empty, and holds no data set ({DOCUMENT_FILE} is missing);"
+                " choose another folder"
+            ).about("folder")
+        else:
+            save_dataset_document(document, path)
+        for name in (SCENES, FOLDER):
+            remove_unfinished(writable_folder(self.folder / name))
+        complete = {self.folder / scene_name(number) for number in shard_numbers(self.folder)}
+        for path in (self.folder / SCENES).glob("*.yaml"):
+            if path not in complete:  # its shard was being written
+                path.unlink()
+
+    def missing(self, scenes: Iterable[int]) -> list[int]:
+        """Those of some scenes that are not complete, in the order given."""
+        there = set(shard_numbers(self.folder))
+        return [number for number in scenes if number not in there]
+
+    def add(self, number: int, scene: Scene, samples: Iterable[Sample]) -> None:
+        """Writes a scene and its samples; see `write_scene`."""
+        self.added(write_scene(self.folder, number, scene, samples))
+
+    def added(self, entry: ShardEntry) -> None:
+        """Takes note of what another process has written with `write_scene`, so that its check sum
+        need not be made again."""
+        self._known[entry.url] = entry
+
+    def finish(self) -> None:
+        """Writes the index of all that is there.
+
+        Raises:
+            InvalidInputError: a shard of an earlier run is damaged, or the disk is full.
+        """
+        write_index(self.folder, self._known)
+
+    def close(self) -> None:
+        """Lets others write; what is there stays as it is."""
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+    def __enter__(self) -> DatasetWriter:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            if kind is None:
+                self.finish()
+        finally:
+            self.close()
