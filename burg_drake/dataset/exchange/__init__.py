@@ -1,4 +1,7 @@
-"""Data sets in the formats of others."""
+"""Data sets in the formats of others, their card and contact sheet.
+
+Read `source` first, which says what a data set is here, then `bop`.
+"""
 
 import lazy_loader
 

@@ -1,0 +1,281 @@
+"""GraspNet-1Billion: the layout of its scenes, as the API and the networks of its authors read it.
+
+From the sources of github.com/graspnet/graspnetAPI (graspnet.py, utils/xmlhandler.py) and
+graspnet/graspnet-baseline (dataset/graspnet_dataset.py):
+
+- Objects have ids from 0, in names of files, `annotations` and `rect`; in the `label` images and in
+  `cls_indexes` of `meta` 1 is added. Labels tell objects and not instances, so that a scene can
+  have each object once.
+- Poses are in the camera's optical frame [m]; depth is in millimetres.
+- `camera_poses.npy` has each camera in the frame of the first one, `cam0_wrt_table.npy` that one in
+  the frame of the table: here of the scene.
+- `camK.npy` is one matrix for all views of a scene.
+- A row of `rect` is center_x, center_y, open_x, open_y, height, score, object id: the middle, the
+  middle of the edge of one finger, and the length of that edge [pixels].
+
+Its labels of grasps on whole objects (`grasp_label`, `collision_label`: 300 directions, 12 angles
+and 4 depths at each of thousands of points) cannot be made of grasps that were judged one by one.
+Those go to `grasps`, a folder of ours: files that the API's `GraspGroup.from_npy` reads.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.io import savemat
+
+from burg_drake.cameras.optics import Intrinsics
+from burg_drake.core import Array, InvalidInputError, inverse, quaternion_from_rotation
+from burg_drake.core.grasps import GraspSet, Outcome
+from burg_drake.dataset.exchange.folder import new_folder
+from burg_drake.dataset.exchange.image_files import depth_numbers, png
+from burg_drake.dataset.exchange.model_file import visual_model, write_ply
+from burg_drake.dataset.exchange.source import (
+    Samples,
+    depth_of,
+    object_index,
+    require_images,
+    require_pinhole,
+    scenes_of,
+)
+from burg_drake.dataset.labels import LabelledGrasps
+from burg_drake.dataset.samples import Sample
+from burg_drake.formats import write_grasp_file
+
+Rectangles = Callable[[LabelledGrasps, Intrinsics], Array]
+"""Makes rectangles of grasps: (N, 5) center_x, center_y, open_x, open_y, height [pixels]; nan for a
+grasp that has none."""
+
+DEPTH_UNIT = 1e-3
+"""What 1 stands for in a depth image [m]."""
+DEFAULT_CAMERA = "realsense"
+"""One of the two names that the API accepts, the other is `kinect`."""
+
+BEST_SCORE, DISTURBED_SCORE, SLIP_COST, LARGEST_SLIP = 1.0, 0.7, 0.3, 0.02
+"""Scores, see `grasp_scores`; `LARGEST_SLIP` is in metres."""
+
+HEADER = 116
+"""Bytes of text that a MAT file begins with; scipy writes the time of day there."""
+
+
+def grasp_scores(grasps: LabelledGrasps) -> Array:
+    """Scores as the API has them: higher is better, from 0 to 1.
+
+    There they are 1.1 less the friction coefficient that a grasp needs, and grasps from 0.7 on are
+    loaded unless asked otherwise. Here a grasp that lifts its object gets 1, less up to 0.3 in
+    proportion to how far the object slips in the hand (`slip`, up to 20 mm); if others were
+    disturbed, 0.7, less the same. A grasp that was tried and failed gets 0.
+
+    Returns:
+        (N,) scores; nan where nothing is known: grasps that were not judged, that are reachable
+        and were not tried, or whose simulation failed.
+    """
+    unknown = ("", Outcome.REACHABLE.value, Outcome.SIMULATION_FAILED.value)
+    slip = np.nan_to_num(grasps.margins.get("slip", np.zeros(len(grasps))), nan=0.0)
+    cost = SLIP_COST * np.clip(slip / LARGEST_SLIP, 0.0, 1.0)
+    scores = np.zeros(len(grasps))
+    scores[np.isin(grasps.outcome, unknown)] = np.nan
+    for outcome, best in (
+        (Outcome.LIFTED, BEST_SCORE),
+        (Outcome.LIFTED_DISTURBED, DISTURBED_SCORE),
+    ):
+        held = grasps.outcome == outcome.value
+        scores[held] = best - cost[held]
+    return scores
+
+
+def write_graspnet(
+    samples: Samples,
+    folder: str | Path,
+    *,
+    camera: str | None = DEFAULT_CAMERA,
+    rectangles: Rectangles | None = None,
+    sensor_depth: bool = False,
+) -> tuple[str, ...]:
+    """Writes a data set in the layout of GraspNet-1Billion. Object ids are positions in
+    `samples.objects`, from 0; views are counted from 0 in each scene.
+
+    Args:
+        samples: with colour, depth and labels.
+        folder: new or empty.
+        camera: name of the folder of all views; None for one folder for each camera of a scene, by
+            its own name.
+        rectangles: makes those of `rect`; there are none if None.
+        sensor_depth: depth of the simulated sensor, and not the exact one.
+
+    Returns:
+        What the layout cannot carry, one sentence each.
+
+    Raises:
+        InvalidInputError: a sample lacks an image, a lens has distortion, a depth is too large, a
+            scene has an object twice, views of one folder have different intrinsics, or the folder
+            has something in it or cannot be written.
+        UnknownNameError: an object is not in the list or the library.
+        MeshError: a mesh of the library is damaged.
+    """
+    lost = {
+        "GraspNet has no silhouettes behind other objects, and no visibilities.",
+        "Files grasp_label and collision_label are missing: they have all grasps of a grid on each"
+        " object, and not those that were judged; grasps are in the folder grasps of each camera.",
+    }
+    with new_folder(folder) as fresh:
+        for k, name in enumerate(samples.objects):
+            place = fresh / "models" / f"{k:03d}"
+            place.mkdir(parents=True)
+            write_ply(visual_model(samples.library, name), place / "nontextured.ply", unit=1.0)
+        for number, views in scenes_of(samples):
+            scene = fresh / "scenes" / f"scene_{number:04d}"
+            cameras: dict[str, _Camera] = {}
+            for sample in views:
+                name = camera or sample.view.camera
+                if name not in cameras:
+                    cameras[name] = _Camera(samples.objects, scene, name, rectangles)
+                cameras[name].add(sample, depth_of(sample, "GraspNet", sensor=sensor_depth))
+                if rectangles is None and sample.grasps is not None:
+                    lost.add("Rectangles of grasps were not asked for.")
+            for one in cameras.values():
+                one.finish()
+    return tuple(sorted(lost))
+
+
+class _Camera:
+    """The folder of a camera in a scene while it is written."""
+
+    def __init__(
+        self, objects: tuple[str, ...], scene: Path, name: str, rectangles: Rectangles | None
+    ) -> None:
+        self._objects, self._scene, self._folder = objects, scene, scene / name
+        self._rectangles = rectangles
+        self._X_SC: list[Array] = []
+        self._K: Array | None = None
+        self._ids: list[int] = []
+        for kind in ("rgb", "depth", "label", "meta", "annotations"):
+            (self._folder / kind).mkdir(parents=True)
+
+    def add(self, sample: Sample, depth: NDArray[np.float32]) -> None:
+        """Writes all of a view."""
+        require_images(sample, "GraspNet", "color", "labels")
+        require_pinhole(sample, "GraspNet")
+        K = sample.view.intrinsics.K
+        if self._K is not None and not np.array_equal(K, self._K):
+            raise InvalidInputError(
+                f"sample {sample.key} has other intrinsics than the views before it; GraspNet has"
+                " one matrix for all views of a camera: write a folder for each camera of the scene"
+                " (camera=None), or generate views with the same intrinsics"
+            )
+        self._K, ids = K, self._object_ids(sample)
+        self._ids = ids
+        name = f"{len(self._X_SC):04d}"
+        self._X_SC.append(sample.view.X_SC)
+        assert sample.images.color is not None and sample.images.labels is not None
+        self._write("rgb", f"{name}.png", png(sample.images.color))
+        numbers = depth_numbers(depth, DEPTH_UNIT, sample.key)
+        self._write("depth", f"{name}.png", png(numbers))
+        self._write("label", f"{name}.png", png(self._labels(sample, ids)))
+        self._write("meta", f"{name}.mat", _meta(sample, ids))
+        self._write("annotations", f"{name}.xml", _annotations(sample, ids))
+        if sample.grasps is not None:
+            self._write_grasps(sample, sample.grasps, ids, name)
+
+    def finish(self) -> None:
+        """Writes what all views share."""
+        assert self._K is not None
+        X_SC = np.stack(self._X_SC)
+        np.save(self._folder / "camera_poses.npy", inverse(X_SC[0]) @ X_SC)
+        np.save(self._folder / "cam0_wrt_table.npy", X_SC[0])
+        np.save(self._folder / "camK.npy", self._K)
+        ids = "".join(f"{k}\n" for k in self._ids)
+        (self._scene / "object_id_list.txt").write_text(ids, encoding="ascii")
+
+    def _object_ids(self, sample: Sample) -> list[int]:
+        """By instance."""
+        ids = [object_index(self._objects, sample, label) for label in sample.instances]
+        for k, number in enumerate(ids):
+            if number in ids[:k]:
+                raise InvalidInputError(
+                    f"scene {sample.scene} has object {self._objects[number]} twice; labels of"
+                    " GraspNet tell objects and not instances: write BOP or COCO instead"
+                )
+        return ids
+
+    def _labels(self, sample: Sample, ids: list[int]) -> NDArray[Any]:
+        """(H, W) object ids from 1; 0 for all else."""
+        labels = sample.images.labels
+        assert labels is not None
+        shown = np.zeros(int(labels.max(initial=0)) + 1, dtype=np.uint16)
+        for label, number in zip(sample.instances, ids, strict=True):
+            if label.number < len(shown):
+                shown[label.number] = number + 1
+        small = len(self._objects) <= np.iinfo(np.uint8).max
+        return np.asarray(shown[labels], dtype=np.uint8 if small else np.uint16)
+
+    def _write_grasps(
+        self, sample: Sample, grasps: LabelledGrasps, ids: list[int], name: str
+    ) -> None:
+        by_number = {label.number: k for label, k in zip(sample.instances, ids, strict=True)}
+        objects = np.array([by_number[int(n)] for n in grasps.number], dtype=np.int64)
+        scores = grasp_scores(grasps)
+        known = np.isfinite(scores)
+        if known.any():
+            (self._folder / "grasps").mkdir(exist_ok=True)
+            chosen = GraspSet.create(
+                grasps.X_CG[known],
+                object=np.array(self._objects)[objects[known]],
+                width=grasps.width[known],
+                score=scores[known],
+                columns={"object_id": objects[known]},
+            )
+            write_grasp_file(chosen, self._folder / "grasps" / f"{name}.npy", "graspnet")
+        if self._rectangles is not None:
+            (self._folder / "rect").mkdir(exist_ok=True)
+            shapes = self._rectangles(grasps, sample.view.intrinsics)
+            rows = np.column_stack([shapes, scores, objects]).astype(np.float32)
+            kept = rows[np.isfinite(rows).all(axis=1)]
+            np.save(self._folder / "rect" / f"{name}.npy", kept)
+
+    def _write(self, kind: str, name: str, content: bytes) -> None:
+        (self._folder / kind / name).write_bytes(content)
+
+
+def _meta(sample: Sample, ids: list[int]) -> bytes:
+    """A MAT file, the same whenever it is written."""
+    poses = np.zeros((3, 4, len(ids)))
+    for k, label in enumerate(sample.instances):
+        poses[:, :, k] = label.X_CO[:3]
+    content = {
+        "cls_indexes": np.array([ids], dtype=np.int32) + 1,
+        "factor_depth": np.array([[1.0 / DEPTH_UNIT]]),
+        "intrinsic_matrix": sample.view.intrinsics.K,
+        "poses": poses,
+    }
+    stream = io.BytesIO()
+    savemat(stream, content)
+    return b"MATLAB 5.0 MAT-file".ljust(HEADER) + stream.getvalue()[HEADER:]
+
+
+def _annotations(sample: Sample, ids: list[int]) -> bytes:
+    """Poses of the objects as XML; what is called world there is the camera's frame."""
+    top = ElementTree.Element("scene")
+    for label, number in zip(sample.instances, ids, strict=True):
+        entry = ElementTree.SubElement(top, "obj")
+        quaternion = quaternion_from_rotation(label.X_CO[:3, :3])
+        for tag, text in (
+            ("obj_id", str(number)),
+            ("obj_name", label.object),
+            ("obj_path", f"models/{number:03d}"),
+            ("pos_in_world", _numbers(label.X_CO[:3, 3])),
+            ("ori_in_world", _numbers(quaternion)),
+        ):
+            ElementTree.SubElement(entry, tag).text = text
+    ElementTree.indent(top, "    ")
+    return bytes(ElementTree.tostring(top, encoding="utf-8", xml_declaration=True)) + b"\n"
+
+
+def _numbers(values: Array) -> str:
+    return " ".join(f"{value:.9f}" for value in values)

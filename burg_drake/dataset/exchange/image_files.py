@@ -1,0 +1,61 @@
+"""Images as the bytes of files: PNG without loss, JPEG for colours, depth as whole numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import Bytes, InvalidInputError, Single
+
+QUALITY = 95
+"""Of JPEG, 0 to 100; OpenCV's own default."""
+DEEPEST = np.iinfo(np.uint16).max
+"""Largest number of a pixel in a depth image."""
+
+
+def png(image: NDArray[Any]) -> bytes:
+    """An image as PNG, without loss.
+
+    Args:
+        image: (H, W) of uint8 or uint16, or RGB (H, W, 3) of uint8.
+    """
+    return _encoded(".png", image, [])
+
+
+def jpg(image: Bytes) -> bytes:
+    """Colours (H, W, 3) as JPEG."""
+    return _encoded(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+
+
+def color_file(image: Bytes, suffix: str) -> bytes:
+    """Colours (H, W, 3) as `.jpg` or `.png`."""
+    return jpg(image) if suffix == ".jpg" else png(image)
+
+
+def depth_numbers(depth: Single, unit: float, key: str) -> NDArray[np.uint16]:
+    """Depth as whole numbers.
+
+    Args:
+        depth: (H, W) [m], 0 where there is none.
+        unit: what 1 stands for [m].
+        key: of the sample, for the message.
+
+    Raises:
+        InvalidInputError: a depth is beyond the largest number.
+    """
+    numbers = np.rint(depth / unit)
+    if numbers.max(initial=0.0) > DEEPEST:
+        raise InvalidInputError(
+            f"depth of sample {key} is up to {depth.max():.3g} m; images of 16 bits end at"
+            f" {DEEPEST * unit:.3g} m if 1 stands for {1e3 * unit:g} mm: take a larger unit"
+        )
+    return np.asarray(numbers, dtype=np.uint16)
+
+
+def _encoded(suffix: str, image: NDArray[Any], options: list[int]) -> bytes:
+    shown = image[..., ::-1] if image.ndim == 3 else image
+    _, data = cv2.imencode(suffix, np.ascontiguousarray(shown), options)
+    return bytes(data)

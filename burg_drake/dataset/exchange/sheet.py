@@ -1,0 +1,222 @@
+"""The contact sheet: samples as a person looks at them, with colour, depth and labels side by side.
+
+As one PNG, or as a page that stands alone.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from burg_drake.core import Bytes, InvalidInputError, Single, listing
+from burg_drake.core.files import atomic_write
+from burg_drake.core.terminal import distinct_colors
+from burg_drake.dataset.labels import InstanceLabel
+from burg_drake.dataset.samples import Sample
+from burg_drake.visualization.style import Html, element, html_document, map_colors
+
+PANEL = 320
+"""Width of each image [pixel]."""
+GAP, CAPTION = 6, 20
+PAPER, INK = (255, 255, 255), (29, 35, 40)
+NOTHING = (70, 70, 70)
+"""Where there is no depth."""
+MISSING = (225, 229, 233)
+"""Of an image that the sample has not."""
+OPACITY = 0.5
+"""Of labels on the picture."""
+LUMA = (0.299, 0.587, 0.114)
+"""Share of red, green and blue in the lightness of a colour (ITU-R BT.601)."""
+TEXT = 12
+SUFFIXES = (".png", ".html")
+STYLE = """
+body { font: 14px/1.4 system-ui, sans-serif; color: #1d2328; background: #fff; margin: 16px; }
+main { display: grid; gap: 16px; }
+figure { margin: 0; } img { max-width: 100%; height: auto; display: block; }
+figcaption { color: #5b656e; overflow-wrap: anywhere; }
+"""
+
+
+def contact_sheet(
+    samples: Sequence[Sample], path: str | Path, rows: int = 4, columns: int = 1, *, title: str = ""
+) -> None:
+    """Writes samples from all over a data set, evenly spaced: colour, depth and labels of each.
+
+    Depth is bright where it is near, and grey where there is none; its limits are in the caption.
+    Labels are colours of instances, with names and the boxes of what is visible.
+
+    Args:
+        samples: the data set.
+        path: file to write, `.png` or `.html`.
+        rows, columns: of samples.
+        title: of the page.
+
+    Raises:
+        InvalidInputError: another suffix, no samples, or the file cannot be written.
+    """
+    path = Path(path)
+    if path.suffix not in SUFFIXES:
+        raise InvalidInputError(f"{path} must end in {' or '.join(SUFFIXES)}")
+    if rows < 1 or columns < 1:
+        raise InvalidInputError(
+            f"a sheet of {rows} x {columns} samples shows nothing; give 1 or more"
+        )
+    chosen = [samples[k] for k in spread(len(samples), rows * columns)]
+    if not chosen:
+        raise InvalidInputError(f"cannot write {path}: the data set has no samples")
+    if path.suffix == ".html":
+        atomic_write(path, _page(chosen, columns, title))
+    else:
+        atomic_write(path, sheet_png(chosen, columns))
+
+
+def spread(count: int, wanted: int) -> list[int]:
+    """Positions in a sequence, evenly spaced, without repetitions."""
+    return [int(k) for k in np.unique(np.linspace(0, count - 1, min(count, wanted)).round())]
+
+
+def sheet_png(samples: Sequence[Sample], columns: int) -> bytes:
+    """Samples in rows, each with a caption, as a PNG file."""
+    cells = [_captioned(sample) for sample in samples]
+    tall, wide = (max(cell.shape[k] for cell in cells) for k in (0, 1))
+    columns = min(columns, len(cells))
+    rows = -(-len(cells) // columns)
+    size = (rows * (tall + GAP) + GAP, columns * (wide + GAP) + GAP, 3)
+    sheet = np.full(size, PAPER, dtype=np.uint8)
+    for k, cell in enumerate(cells):
+        y, x = GAP + k // columns * (tall + GAP), GAP + k % columns * (wide + GAP)
+        sheet[y : y + cell.shape[0], x : x + cell.shape[1]] = cell
+    return _png(sheet)
+
+
+def sample_picture(sample: Sample) -> Bytes:
+    """(h, w, 3) colour, depth and labels side by side."""
+    intrinsics = sample.view.intrinsics
+    height = max(1, round(PANEL * intrinsics.height / intrinsics.width))
+    panels = [
+        _panel(sample.images.color, height),
+        _panel(None if sample.images.depth is None else depth_colors(sample.images.depth), height),
+        _labelled(sample, height),
+    ]
+    gap = np.full((height, GAP, 3), PAPER, dtype=np.uint8)
+    return np.hstack([panels[0], gap, panels[1], gap, panels[2]])
+
+
+def depth_colors(depth: Single) -> Bytes:
+    """(H, W, 3) colours of a depth image, bright for near."""
+    lower, upper = depth_limits(depth)
+    share = 1.0 - (depth - lower) / max(upper - lower, 1e-6)
+    colors = np.rint(255.0 * map_colors(share)).astype(np.uint8)
+    colors[depth <= 0.0] = NOTHING
+    return colors
+
+
+def depth_limits(depth: Single) -> tuple[float, float]:
+    """Nearest and farthest depth of an image [m]; zeros if there is none."""
+    there = depth[depth > 0.0]
+    return (float(there.min()), float(there.max())) if there.size else (0.0, 0.0)
+
+
+def caption(sample: Sample) -> str:
+    """What a sample shows, in a line."""
+    seen = [label for label in sample.instances if label.visible_pixels]
+    text = f"{sample.key}, camera {sample.view.camera}, {len(seen)} of {len(sample.instances)} seen"
+    if sample.images.depth is not None:
+        lower, upper = depth_limits(sample.images.depth)
+        text += f", depth {lower:.2f} to {upper:.2f} m"
+    return text
+
+
+def _labelled(sample: Sample, height: int) -> Bytes:
+    """Labels over the picture in grey, with names and boxes."""
+    labels, color = sample.images.labels, sample.images.color
+    if labels is None:
+        return _panel(None, height)
+    grey = np.full((*labels.shape, 3), 128.0)
+    if color is not None:
+        grey[:] = (color @ np.array(LUMA))[..., None]
+    tints = _tints(sample.instances)
+    for label in sample.instances:
+        mask = labels == label.number
+        grey[mask] = (1.0 - OPACITY) * grey[mask] + OPACITY * np.array(tints[label.number])
+    picture = Image.fromarray(_panel(grey.astype(np.uint8), height))
+    draw = ImageDraw.Draw(picture)
+    scale = picture.width / labels.shape[1]
+    font = ImageFont.load_default(size=TEXT)
+    for label in sample.instances:
+        if label.visible_box is None:
+            continue
+        x, y, wide, tall = (scale * side for side in label.visible_box)
+        tint = tints[label.number]
+        draw.rectangle((x, y, x + max(wide - 1, 1), y + max(tall - 1, 1)), outline=tint)
+        box = draw.textbbox((0, 0), label.name, font=font)
+        top = y - box[3] - 2 if y > box[3] + 2 else y + tall + 1
+        left = float(np.clip(x, 0, max(0, picture.width - box[2] - 4)))
+        draw.rectangle((left, top, left + box[2] + 3, top + box[3] + 2), fill=tint)
+        draw.text((left + 2, top), label.name, fill=_readable(tint), font=font)
+    return np.asarray(picture)
+
+
+def _tints(instances: Sequence[InstanceLabel]) -> dict[int, tuple[int, int, int]]:
+    """Colours by number."""
+    found = {}
+    for label, color in zip(instances, distinct_colors(len(instances)), strict=True):
+        red, green, blue = (round(255 * c) for c in color)
+        found[label.number] = (red, green, blue)
+    return found
+
+
+def _readable(tint: tuple[int, int, int]) -> tuple[int, int, int]:
+    """Black or white, whichever stands out."""
+    return (0, 0, 0) if np.dot(tint, LUMA) > 140.0 else (255, 255, 255)
+
+
+def _panel(image: Bytes | None, height: int) -> Bytes:
+    if image is None:
+        return np.full((height, PANEL, 3), MISSING, dtype=np.uint8)
+    smaller = image.shape[1] > PANEL
+    how = Image.Resampling.BOX if smaller else Image.Resampling.NEAREST
+    return np.asarray(Image.fromarray(image).resize((PANEL, height), how))
+
+
+def _captioned(sample: Sample) -> Bytes:
+    picture = sample_picture(sample)
+    strip = Image.new("RGB", (picture.shape[1], CAPTION), PAPER)
+    font = ImageFont.load_default(size=TEXT)
+    ImageDraw.Draw(strip).text((1, 2), caption(sample), fill=INK, font=font)
+    return np.vstack([np.asarray(strip), picture])
+
+
+def _png(image: Bytes) -> bytes:
+    data = io.BytesIO()
+    Image.fromarray(image).save(data, format="PNG", optimize=True)
+    return data.getvalue()
+
+
+def _page(samples: Sequence[Sample], columns: int, title: str) -> str:
+    heading = title or "Samples"
+    grid = f"{STYLE}main {{ grid-template-columns: repeat({columns}, minmax(0, 1fr)); }}"
+    figures = [_figure(sample) for sample in samples]
+    return html_document(heading, grid, element("h1", heading), element("main", *figures))
+
+
+def _figure(sample: Sample) -> Html:
+    picture = sample_picture(sample)
+    data = base64.b64encode(_png(picture)).decode()
+    names = listing([label.name for label in sample.instances if label.visible_pixels])
+    return element(
+        "figure",
+        element(
+            "img",
+            src=f"data:image/png;base64,{data}",
+            alt=f"colour, depth and labels of sample {sample.key}: {names}",
+            width=picture.shape[1],
+            height=picture.shape[0],
+        ),
+        element("figcaption", caption(sample)),
+    )
