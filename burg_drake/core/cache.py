@@ -48,7 +48,7 @@ TOUCHED = 86_400.0
 ABANDONED = 3_600.0
 """A file that has not got its name for so long [s] is of a process that was killed."""
 TOLD = ".told-"
-"""What the name of an empty file begins with that says which version has told of others' entries."""
+"""What the name of an empty file begins with that says which version has told of other ones."""
 ROOMS = ("core", "geometry", "objects", "scene", "station", "grasping", "motion")
 """Packages whose code decides about what is kept."""
 VERSIONED_PACKAGES = ("numpy", "scipy", "drake")
