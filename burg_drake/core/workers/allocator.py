@@ -187,4 +187,10 @@ def _replaces_malloc(path: Path, changed: int, preload: str) -> bool:
 @functools.cache
 def _warn(given: str) -> None:
     """One line a process."""
-    _log.warning("%s: %s cannot be preloaded; workers do without", VARIABLE, given)
+    path = os.path.abspath(os.path.expanduser(given))
+    why = "is not an allocator that can be preloaded here"
+    if not os.path.exists(path):
+        why = "cannot be found"
+    elif any(separator in path for separator in SEPARATORS):
+        why = "has a space or colon in its path, so that it cannot be preloaded"
+    _log.warning("%s: %s %s; workers do without", VARIABLE, given, why)
