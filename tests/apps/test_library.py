@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 import trimesh
 
 from burg_drake.apps.cli import main
 from burg_drake.objects.library.document import load_library
+from burg_drake.pipeline import stages
+from burg_drake.pipeline.source import ObjectSource
 
 Capture = pytest.CaptureFixture[str]
 QUICK = "--no-confirm"
@@ -59,6 +62,7 @@ def test_one_broken_mesh_is_one_failure(mesh: Path, tmp_path: Path, capsys: Capt
     (line,) = captured.err.splitlines()
     assert line.startswith("burg-drake: error: ")
     assert "broken.obj: 1 of 3 vertices are NaN or infinite" in line
+    assert captured.out.splitlines()[-1].endswith(": 1 built, 0 up to date, 1 failed (broken)")
     assert list(load_library(tmp_path / "library").objects) == ["block"]
 
 
@@ -80,6 +84,28 @@ def test_nothing_could_be_built(
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"burg-drake: error: {path}: ") and message in line
     assert not (tmp_path / "library").exists()
+
+
+@pytest.mark.parametrize("others", [0, 1])
+def test_an_unexpected_error_names_the_object_and_is_told_in_full(
+    others: int, mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    original = stages.build_geometry
+
+    def fails_for_me(source: ObjectSource, *arguments: Any) -> Any:
+        if source.name == "me":
+            raise TypeError("name of me is wrong, supported are:\n  1. (int) -> str")
+        return original(source, *arguments)
+
+    monkeypatch.setattr(stages, "build_geometry", fails_for_me)
+    shutil.copy(mesh, tmp_path / "me.ply")
+    meshes = (tmp_path / "me.ply", mesh)[: 1 + others]
+    assert build(*meshes, QUICK, "-o", tmp_path / "library") == 2 - others
+    captured = capsys.readouterr()
+    text = "me: TypeError: name of me is wrong, supported are: 1. (int) -> str"
+    assert captured.err.splitlines() == [f"burg-drake: error: {text}"]
+    summary = f"{tmp_path / 'library'}: {others} built, 0 up to date, 1 failed (me)"
+    assert captured.out.splitlines()[-1] == summary
 
 
 def test_millimetres_are_pointed_out(tmp_path: Path, capsys: Capture) -> None:
