@@ -35,6 +35,30 @@ def test_build_and_list(mesh: Path, tmp_path: Path, capsys: Capture) -> None:
     assert "50 x 40 x 60" in listing and "200.0" in listing and "1 object in" in listing
 
 
+def test_build_and_check_say_what_pads_touch(mesh: Path, tmp_path: Path, capsys: Capture) -> None:
+    torus = trimesh.creation.torus(0.04, 0.012)
+    torus.export(tmp_path / "ring.ply")
+    library = tmp_path / "library"
+    masses = ("--mass", "block=0.2", "--mass", "ring=0.1")
+    assert build(mesh, tmp_path / "ring.ply", QUICK, "-o", library, *masses) == 0
+    faces = len(load_library(library).mesh("ring/contact.obj").faces)
+    expected = [
+        "block: pads touch a box, within ",
+        f"ring: pads touch a surface of {faces} faces, within 0.",
+    ]
+
+    def told() -> list[str]:
+        lines = [line for line in capsys.readouterr().out.splitlines() if "pads touch" in line]
+        return [line[: len(text)] for line, text in zip(lines, expected, strict=False)]
+
+    assert told() == expected
+    assert main(["library", "check", str(library)]) == 0
+    assert told() == expected
+    (library / "ring" / "contact.obj").unlink()
+    assert main(["library", "check", str(library)]) == 1
+    assert told() == expected[:1]
+
+
 def test_friction_of_one_and_of_all(mesh: Path, tmp_path: Path) -> None:
     shutil.copy(mesh, tmp_path / "Other-Block.ply")
     masses = tmp_path / "masses.yaml"

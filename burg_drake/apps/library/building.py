@@ -145,7 +145,10 @@ def _build(
 
 
 def _print_notes(report: BuildReport) -> None:
+    from burg_drake.apps.library.viewing import print_contact
+
     for name in report.built:
+        print_contact(report.library, [name])
         repairs = report.library.objects[name].source.repairs
         for note in dict.fromkeys([*repairs, *report.notes.get(name, ())]):
             print(f"{name}: {note}")
