@@ -95,6 +95,7 @@ class HandTrial(GraspTrial):
         friction: float | None = None,
         mass: float | None = None,
         lift: float | None = None,
+        without_hull: bool = False,
     ) -> TrialResult:
         """Executes one grasp.
 
@@ -104,6 +105,8 @@ class HandTrial(GraspTrial):
             friction: the target's friction coefficient, in place of the library's.
             mass: the target's mass [kg], in place of the library's; its inertia scales with it.
             lift: length of the lift [m], in place of the motion's.
+            without_hull: for who goes on in `world`: run where no part of the hand meets a hull in
+                the place of the target.
 
         Returns:
             The outcome with its margins. A failure of the simulator is an outcome, too.
@@ -119,7 +122,7 @@ class HandTrial(GraspTrial):
         def begin(world: TrialWorld) -> Execution:
             return self.begin(instance, X_WG, paths, friction=friction, mass=mass, world=world)
 
-        return self.execute(instance, X_WG, begin)
+        return self.execute(instance, X_WG, begin, without_hull=without_hull)
 
     def begin(
         self,
