@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cache, partial
+from functools import lru_cache, partial
 
 import numpy as np
 from pydrake.geometry import Meshcat
@@ -19,7 +19,7 @@ from burg_drake.core import Array, InvalidInputError
 from burg_drake.grasping.clearance import HandClearance
 from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.simulation.trials.execution import Execution
-from burg_drake.simulation.trials.grasp_trial import GraspTrial
+from burg_drake.simulation.trials.grasp_trial import KEPT_WORLDS, GraspTrial
 from burg_drake.simulation.trials.lift_carrier import LiftCarrier, LiftPath
 from burg_drake.simulation.trials.lift_clearance import HandLiftClearance
 from burg_drake.simulation.trials.result import TrialResult
@@ -78,7 +78,8 @@ class HandTrial(GraspTrial):
             lock=lock,
             meshcat=meshcat,
         )
-        self._lift_clearance = cache(partial(HandLiftClearance, self._plain))
+        kept = lru_cache(maxsize=KEPT_WORLDS)
+        self._lift_clearance = kept(partial(HandLiftClearance, self._plain))
 
     @property
     def hand(self) -> FloatingHand:
