@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 from typing import Any
@@ -57,6 +58,28 @@ def test_build_and_check_say_what_pads_touch(mesh: Path, tmp_path: Path, capsys:
     (library / "ring" / "contact.obj").unlink()
     assert main(["library", "check", str(library)]) == 1
     assert told() == expected[:1]
+
+
+def test_a_library_of_an_earlier_release_is_told_and_built_again(
+    tmp_path: Path, capsys: Capture
+) -> None:
+    """In releases of before, pads met the pieces of an object."""
+    torus, library = tmp_path / "ring.stl", tmp_path / "library"
+    trimesh.creation.torus(0.04, 0.012).export(torus)
+    assert build(torus, QUICK, "-o", library, "--mass", "ring=0.1") == 0
+    record = library / "ring" / "build.json"
+    data = json.loads(record.read_text())
+    del data["geometry"]["contact"]
+    record.write_text(json.dumps({**data, "version": data["version"] - 1}))
+    capsys.readouterr()
+    assert main(["library", "check", str(library)]) == 1
+    told = capsys.readouterr()
+    assert "ring was built by another release; build it again" in told.out + told.err
+    assert build(torus, QUICK, "-o", library, "--mass", "ring=0.1") == 0
+    told = capsys.readouterr()
+    assert "1 built, 0 up to date, 0 failed" in told.out
+    assert "built again: pads now touch the object's own surface" in told.out + told.err
+    assert main(["library", "check", str(library)]) == 0
 
 
 def test_friction_of_one_and_of_all(mesh: Path, tmp_path: Path) -> None:

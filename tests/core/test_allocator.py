@@ -163,6 +163,18 @@ def test_an_allocator_that_ends_the_process_is_refused(
 
 
 @linux
+def test_it_is_tried_in_the_environment_that_is_given(
+    library: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spoilt = "import os\nif 'SPOILT' in os.environ: raise SystemExit(1)\n"
+    monkeypatch.setattr(allocator, "PROBE", spoilt + allocator.PROBE)
+    monkeypatch.setenv("SPOILT", "1")
+    assert of(library, MARK="1") == {PRELOAD: str(library)}
+    monkeypatch.delenv("SPOILT")
+    assert of(library, SPOILT="1") == {}
+
+
+@linux
 def test_one_that_was_replaced_is_tried_again(library: Path, tmp_path: Path) -> None:
     copy = tmp_path / "libmimalloc.so"
     copy.write_bytes(library.read_bytes()[:2000])
