@@ -75,9 +75,7 @@ def scene_mjcf(scene: Scene, station: Station) -> str:
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def _add_object(
-    assets: Element, world: Element, contact: Element, scene: Scene, name: str
-) -> None:
+def _add_object(assets: Element, world: Element, contact: Element, scene: Scene, name: str) -> None:
     """A free body of convex pieces, whose contacts with the table are pairs of their own."""
     properties, body = scene.entry(name).mass_properties, SubElement(world, "body", name=name)
     SubElement(body, "freejoint", name=name)
@@ -150,8 +148,7 @@ def sphere_centers() -> Array:
     """(N, 3) of a pad's spheres in its frame: each in the middle of its share of the front [m]."""
     size = np.array(numbers(PAD_SIZE))
     x, z = (
-        ((np.arange(n) + 0.5) / n - 0.5) * length
-        for n, length in zip(GRID, size[::2], strict=True)
+        ((np.arange(n) + 0.5) / n - 0.5) * length for n, length in zip(GRID, size[::2], strict=True)
     )
     grid = np.stack(np.meshgrid(x, RADIUS - size[1] / 2, z, indexing="ij"), axis=-1)
     return np.asarray(grid.reshape(-1, 3))
