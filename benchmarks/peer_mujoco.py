@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import importlib.util
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -146,7 +145,7 @@ class Peer:
         polls = 2 * max(1, round(duration / DEFAULT_TRIAL.poll / 2))
         touching = (True, True)
         for poll in range(polls):
-            touching = self._advance(target, lambda k, p=poll: self._rise(k + p * self._steps))
+            touching = self._advance(target, poll * self._steps)
             if not any(touching):
                 return Outcome.SLIPPED
         risen = self._center(target)[2] - at_grip
@@ -171,14 +170,12 @@ class Peer:
                 return Outcome.DROPPED
         return Outcome.LIFTED if all(touching) else Outcome.DROPPED
 
-    def _advance(
-        self, target: int, command: Callable[[int], None] | None = None
-    ) -> tuple[bool, bool]:
+    def _advance(self, target: int, lifted: int | None = None) -> tuple[bool, bool]:
         """Steps to the next look at the contacts.
 
         Args:
             target: the body.
-            command: what to do before each step, by its number; None if nothing.
+            lifted: steps of the lift before these; None if the hand stands.
 
         Returns:
             Whether each finger touches the target.
@@ -186,11 +183,11 @@ class Peer:
         Raises:
             FloatingPointError: the state is not finite any more.
         """
-        if command is None:
+        if lifted is None:
             self._mj.mj_step(self.model, self.data, nstep=self._steps)
         else:
-            for k in range(self._steps):
-                command(k)
+            for k in range(lifted, lifted + self._steps):
+                self._rise(k)
                 self._mj.mj_step(self.model, self.data)
         if not np.isfinite(self.data.qpos).all():
             raise FloatingPointError

@@ -115,7 +115,7 @@ def _add_hand(world: Element, station: Station) -> None:
 def _add_link(parent: Element, link: Element, X_PB: Array) -> Element:
     """A link with its inertia and boxes, and what a pad consists of."""
     name = link.get("name", "")
-    body = SubElement(parent, "body", name=name, gravcomp="1", **_place(X_PB))
+    body = SubElement(parent, "body", {"name": name, "gravcomp": "1", **_place(X_PB)})
     moments = [link.findtext(f"inertial/inertia/{key}", "0") for key in INERTIA]
     SubElement(
         body, "inertial", pos=_text(numbers(link.findtext("inertial/pose"))[:3]),
@@ -161,9 +161,8 @@ def _add_box(body: Element, name: str, X_BG: Array, size: Array) -> None:
 def _add_geom(body: Element, name: str, X_BG: Array, **shape: str) -> None:
     """A geometry of the hand, which says how it touches objects (`priority`), and touches itself
     not."""
-    SubElement(
-        body, "geom", name=name, contype="1", conaffinity="0", priority="1", **_place(X_BG), **shape
-    )
+    touching = {"contype": "1", "conaffinity": "0", "priority": "1"}
+    SubElement(body, "geom", {"name": name, **touching, **_place(X_BG), **shape})
 
 
 def _add_drives(root: Element, station: Station) -> None:
