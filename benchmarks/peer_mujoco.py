@@ -2,7 +2,9 @@
 
 Force, speed, phases, geometry, masses and friction are those of a trial with the hand alone in
 Drake, and the pads are as stiff as there. Unlike there all objects are simulated from the start to
-the end of the trial, the fingers begin open, and an object is its convex pieces where pads meet it.
+the end of the trial, the fingers begin open, and an object is its convex pieces where pads meet it:
+a neck that tapers in them by two degrees is lost with little friction. Where a grasp meets the
+table or fixed things on its way, nothing is reported. The hand rises straight up, without retreat.
 The model is compiled once for a scene; a trial sets its state, friction and the stiffness of the
 pads, and nothing of an earlier one remains. See `peer_mujoco_model` for what is in it.
 """
@@ -44,9 +46,9 @@ PAD_MODULUS, HAND_FRICTION = 1e7, 0.24
 PAD_RATE = 400.0
 """Frequency of the pads' contacts in MuJoCo's terms [1/s]; a step is 0.8 of its inverse."""
 PAD_DAMPING = 0.1
-"""Damping ratio in the same terms. Force then rises with the speed of approach by 0.5 ms of it
-times the stiffness, as by Drake's 5 s/m of Hunt and Crossley's at a depth of 0.1 mm; with more,
-pads brake what pivots between them."""
+"""Damping ratio in the same terms. The force then grows by stiffness times 0.5 ms times the speed of
+approach, as it does by Drake's dissipation of 5 s/m at a depth of 0.1 mm. With a ratio of 1, pads
+hold what pivots between them: the oracle calls twice as many verdicts too strong."""
 
 
 def is_installed() -> bool:
