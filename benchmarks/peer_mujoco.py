@@ -46,9 +46,9 @@ PAD_MODULUS, HAND_FRICTION = 1e7, 0.24
 PAD_RATE = 400.0
 """Frequency of the pads' contacts in MuJoCo's terms [1/s]; a step is 0.8 of its inverse."""
 PAD_DAMPING = 0.1
-"""Damping ratio in the same terms. The force then grows by stiffness times 0.5 ms times the speed of
-approach, as it does by Drake's dissipation of 5 s/m at a depth of 0.1 mm. With a ratio of 1, pads
-hold what pivots between them: the oracle calls twice as many verdicts too strong."""
+"""Damping ratio in the same terms. The force then grows by stiffness times 0.5 ms times the speed
+of approach, as by Drake's dissipation of 5 s/m at a depth of 0.1 mm. With a ratio of 1, pads hold
+what pivots between them: the oracle finds twice as many verdicts too strong."""
 
 
 def is_installed() -> bool:
