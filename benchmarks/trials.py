@@ -1,12 +1,12 @@
-"""CPU time of grasp trials, beside a trial of the same grasps on PyBullet.
+"""CPU time of grasp trials, beside trials of the same grasps on PyBullet and MuJoCo.
 
     python benchmarks/trials.py [SCENE ...] [--station S] [--engine NAME ...] [--trials N]
 
 Samples grasps on every object, screens them one by one and all at a time, and executes clear ones
 with each engine. Every second one is executed with less friction, so that not all hold. With
-PyBullet installed (`pip install pybullet`) the same grasps are executed there, in this process.
-Without it the ratios are to published figures: BURG-Toolkit takes 0.45 s an executed trial and
-0.07 s a grasp that collides, CPU time of one core in a scene of five objects.
+PyBullet or MuJoCo installed (`pip install pybullet mujoco`) the same grasps are executed there, in
+this process. All engines are held against published figures as well: BURG-Toolkit takes 0.45 s an
+executed trial and 0.07 s a grasp that collides, CPU time of one core in a scene of five objects.
 """
 
 from __future__ import annotations
@@ -18,23 +18,39 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
+import peer_mujoco
+import peer_pybullet
 from mixed_grasps import clear_grasps, frictions, hand_only, sampled_grasps
-from peer_pybullet import Peer, is_installed
 
 import burg_drake as burg
+from burg_drake.core.arrays import Array
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.document.engine import ENGINES, as_engine
 from burg_drake.station.document.station_document import Station
 
 PUBLISHED_EXECUTED, PUBLISHED_REJECTED = 0.45, 0.07
-"""The peer's CPU times [s]."""
-PEER = "pybullet"
+"""BURG-Toolkit's CPU times [s]."""
 
 T = TypeVar("T")
+
+
+class Peer(Protocol):
+    """Another engine, which executes grasps of one scene."""
+
+    def run(self, instance: str, X_OG: Array, friction: float | None = None) -> Outcome:
+        """Executes a grasp (4, 4) on an instance, which may have another friction coefficient."""
+        ...
+
+
+PEERS: dict[str, tuple[Callable[[], bool], Callable[[Scene, Station], Peer]]] = {
+    "PyBullet": (peer_pybullet.is_installed, peer_pybullet.Peer),
+    "MuJoCo": (peer_mujoco.is_installed, peer_mujoco.Peer),
+}
+"""By name: whether it is installed, and what makes it."""
 
 
 @dataclass
@@ -42,9 +58,9 @@ class Rows:
     """What was measured on some objects.
 
     Attributes:
-        seconds: CPU time of every executed trial, by engine or `PEER`, in the same order.
-        held: whether the grasp held, by engine or `PEER`, in the same order.
-        outcomes: by engine or `PEER`.
+        seconds: CPU time of every executed trial, by engine or peer, in the same order.
+        held: whether the grasp held, by engine or peer, in the same order.
+        outcomes: by engine or peer.
         rejected: CPU time of every grasp that collides, screened alone [s].
         screened: CPU time of all grasps in one batch, and their number.
     """
@@ -80,14 +96,15 @@ def main() -> None:
     parser.add_argument("--grasps", type=int, default=400, help="screened for each object")
     parser.add_argument("--trials", type=int, default=12, help="executed for each object")
     arguments = parser.parse_args()
-    names = [*arguments.engines, *([PEER] if is_installed() else [])]
+    peers = [name for name, (is_installed, _) in PEERS.items() if is_installed()]
+    names = [*arguments.engines, *peers]
     print(f"{'object':22}{'executed':>9}" + "".join(f"{name:>24}" for name in names), "  outcomes")
     print(" " * 31 + "".join(f"{'median  mean  trials/s':>24}" for _ in names))
     overall = Rows()
     for scene_name in arguments.scenes:
         scene = burg.load_scene(scene_name)
         station = hand_only(burg.load_station(arguments.station))
-        bench = Bench(scene, station, arguments.engines)
+        bench = Bench(scene, station, arguments.engines, peers)
         for name in scene.instances:
             rows = bench.measure(name, arguments.grasps, arguments.trials)
             print_row(name, rows, names)
@@ -95,25 +112,28 @@ def main() -> None:
     print_row("all", overall, names)
     print_screen(overall)
     for name in arguments.engines:
-        print_ratio(name, overall)
+        print_ratios(name, overall, peers)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     print(f"peak memory {peak / (2**20 if sys.platform == 'darwin' else 2**10):.0f} MiB")
 
 
 class Bench:
-    """Executes grasps of one scene with each engine, and with the peer where it is installed.
+    """Executes grasps of one scene with each engine, and with peers.
 
     Args:
         scene: the scene.
         station: a station with the hand alone.
         engines: names of presets.
+        peers: names of those that are installed.
     """
 
-    def __init__(self, scene: Scene, station: Station, engines: Sequence[str]) -> None:
+    def __init__(
+        self, scene: Scene, station: Station, engines: Sequence[str], peers: Sequence[str]
+    ) -> None:
         self._trials = {
             name: burg.HandTrial(scene, station, engine=as_engine(name)) for name in engines
         }
-        self._peer = Peer(scene, station) if is_installed() else None
+        self._peers = {name: PEERS[name][1](scene, station) for name in peers}
 
     def measure(self, name: str, screened: int, executed: int) -> Rows:
         """Screens and executes grasps on one object."""
@@ -125,11 +145,9 @@ class Bench:
             for engine, one in self._trials.items():
                 seconds, result = timed(lambda o=one, X=X_OG, m=mu: o.run(name, X, friction=m))
                 rows.add(engine, seconds, result.outcome)
-            if self._peer is not None:
-                seconds, outcome = timed(
-                    lambda p=self._peer, X=X_OG, m=mu: p.run(name, X, friction=m)
-                )
-                rows.add(PEER, seconds, outcome)
+            for other, peer in self._peers.items():
+                seconds, outcome = timed(lambda p=peer, X=X_OG, m=mu: p.run(name, X, friction=m))
+                rows.add(other, seconds, outcome)
         return rows
 
     @staticmethod
@@ -182,25 +200,28 @@ def print_screen(rows: Rows) -> None:
         print(f"grasp screened in a batch: mean {1e3 * each:.3f} ms ({ratio:.0f} times)")
 
 
-def print_ratio(name: str, rows: Rows) -> None:
-    """Prints how an engine compares with the peer in time and verdicts."""
+def print_ratios(name: str, rows: Rows, peers: Sequence[str]) -> None:
+    """Prints how an engine compares in time with the published figure, and in time and verdicts
+    with each peer."""
     if not rows.seconds.get(name):
         return
     ours = rows.seconds[name]
-    line = (
-        f"{name}: {PUBLISHED_EXECUTED / np.mean(ours):.1f} times as fast as the published peer"
-        f" (mean; median {PUBLISHED_EXECUTED / np.median(ours):.1f})"
+    print(
+        f"{name}: {PUBLISHED_EXECUTED / np.mean(ours):.1f} times as fast as published for"
+        f" BURG-Toolkit (mean; median {PUBLISHED_EXECUTED / np.median(ours):.1f})"
     )
-    if PEER in rows.seconds:
-        theirs = rows.seconds[PEER]
-        same = np.equal(rows.held[name], rows.held[PEER])
-        line += (
-            f"; {np.mean(theirs) / np.mean(ours):.1f} times PyBullet in this process (median"
-            f" {np.median(theirs) / np.median(ours):.1f}), {same.sum()} of {same.size} verdicts"
-            f" alike: both hold {np.sum(same & rows.held[name])}, only this one"
-            f" {np.sum(~same & rows.held[name])}, only the peer {np.sum(~same & rows.held[PEER])}"
+    for peer in peers:
+        theirs = rows.seconds[peer]
+        same = np.equal(rows.held[name], rows.held[peer])
+        print(
+            f"{name}: {np.mean(theirs) / np.mean(ours):.1f} times as fast as {peer} in this process"
+            f" (mean; median {np.median(theirs) / np.median(ours):.1f}), {same.sum()} of"
+            f" {same.size} verdicts alike: both hold {np.sum(same & rows.held[name])}, only this"
+            f" one {np.sum(~same & rows.held[name])}, only {peer}"
+            f" {np.sum(~same & rows.held[peer])}"
         )
-    print(line + ("" if PEER in rows.seconds else "; PyBullet is not installed"))
+    for peer in (peer for peer in PEERS if peer not in peers):
+        print(f"{name}: {peer} is not installed")
 
 
 if __name__ == "__main__":

@@ -47,6 +47,8 @@ TOUCHED = 86_400.0
 """An entry in use is marked as such no more often than that [s]."""
 ABANDONED = 3_600.0
 """A file that has not got its name for so long [s] is of a process that was killed."""
+TOLD = ".told-"
+"""What the name of an empty file begins with that says which version has told of other ones."""
 ROOMS = ("core", "geometry", "objects", "scene", "station", "grasping", "motion")
 """Packages whose code decides about what is kept."""
 VERSIONED_PACKAGES = ("numpy", "scipy", "drake")
@@ -117,7 +119,19 @@ def _read(path: Path, made_by: str) -> Arrays | None:
 
 @functools.cache
 def _log_other_version(folder: Path) -> None:
-    """One line a process, as after an update that is so of all entries."""
+    """One line, as after an update that is so of all entries: the first process that finds one
+    leaves a mark for its workers and for those that come later."""
+    mark = folder / f"{TOLD}{content_hash(*_code_version())[:16]}"
+    try:
+        mark.touch(exist_ok=False)
+    except FileExistsError:
+        return
+    except OSError as error:
+        _log.debug("%s", error)  # a folder that is read-only: each process tells it
+    for other in folder.glob(f"{TOLD}*"):
+        if other != mark:
+            with contextlib.suppress(OSError):
+                other.unlink()
     _log.warning("cache: %s was made by another version; what is needed is computed anew", folder)
 
 

@@ -32,3 +32,4 @@ from .swept import (
     swept_body as swept_body,
     swept_shape as swept_shape,
 )
+from .triangles import triangle_distances as triangle_distances

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import trimesh
 
-from burg_drake.core import BurgError, InvalidInputError
+from burg_drake.core import BurgError, InvalidInputError, one_line
 from burg_drake.objects.library import (
     LIBRARY_FILE,
     LibraryDocument,
@@ -45,7 +45,8 @@ class BuildReport:
         library: the library as it is now, with the objects of earlier builds.
         built: names of the objects that were built or updated.
         cached: names of the objects that were up to date.
-        failed: one line for each object that could not be built.
+        failed: one line for each object that could not be built; of an unexpected error its kind
+            and its whole text.
         notes: remarks by object, such as a mass that came from a default density.
         seconds: CPU time by object and stage, of what was really built [s].
     """
@@ -103,13 +104,14 @@ def _build(named: Sequence[ObjectSource], tally: _Tally, confirm: bool, workers:
     todo: list[tuple[ObjectSource, StageKeys]] = []
     for source in named:
         checked = _confirms(source, confirm)
+        entry = tally.entries.get(source.name)
         try:
             keys = stage_keys(source, checked)
-        except BurgError as error:
+            current = entry is not None and is_current(entry, keys, source, root, checked)
+        except Exception as error:  # a broken mesh is one failure, whatever it breaks
             tally.fail(source.name, error)
             continue
-        entry = tally.entries.get(source.name)
-        if entry is not None and is_current(entry, keys, source, root, checked):
+        if current:
             tally.count(source.name, "cached")
         else:
             todo.append((source, keys))
@@ -167,9 +169,8 @@ class _Tally:
             self.progress(name, state, len(self.state), self.total)
 
     def fail(self, name: str, error: BaseException) -> None:
-        text = str(error).strip().splitlines() or [""]
-        expected = isinstance(error, BurgError)
-        self.failed[name] = text[0] if expected else f"{type(error).__name__}: {text[0]}"
+        text = " ".join(str(error).split())
+        self.failed[name] = text if isinstance(error, BurgError) else one_line(error)
         self.count(name, "failed")
 
     def publish(self, source: ObjectSource, built: Built, scratch: Path) -> None:

@@ -137,7 +137,7 @@ def _value_issues(name: str, entry: ObjectEntry) -> Iterator[LibraryIssue]:
         yield _issue(name, "implausible", text)
     yield from _fit_issues(name, entry)
     if entry.contact.reason:
-        yield _issue(name, "unsure", pieces_instead(entry.contact))
+        yield _issue(name, "unsure", pieces_instead(entry.contact, len(entry.pieces)))
     yield from _pose_issues(name, entry)
 
 

@@ -142,7 +142,7 @@ def _notes(source: ObjectSource, geometry: Geometry, properties: MassProperties)
         notes.append("the mesh is not closed; its volume is that of the convex pieces")
     notes += implausible(properties, geometry.lower, geometry.upper)
     diagonal = float(np.linalg.norm(np.subtract(geometry.upper, geometry.lower)))
-    notes.append(pieces_instead(geometry.contact))
+    notes.append(pieces_instead(geometry.contact, len(geometry.pieces)))
     notes += [geometry.cut, deviation_warning(geometry.fit, diagonal), *geometry.notes]
     return [note for note in notes if note]
 

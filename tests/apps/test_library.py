@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 import trimesh
 
 from burg_drake.apps.cli import main
 from burg_drake.objects.library.document import load_library
+from burg_drake.pipeline import stages
+from burg_drake.pipeline.source import ObjectSource
 
 Capture = pytest.CaptureFixture[str]
 QUICK = "--no-confirm"
@@ -30,6 +34,52 @@ def test_build_and_list(mesh: Path, tmp_path: Path, capsys: Capture) -> None:
     assert main(["library", "list", str(library)]) == 0
     listing = capsys.readouterr().out
     assert "50 x 40 x 60" in listing and "200.0" in listing and "1 object in" in listing
+
+
+def test_build_and_check_say_what_pads_touch(mesh: Path, tmp_path: Path, capsys: Capture) -> None:
+    torus = trimesh.creation.torus(0.04, 0.012)
+    torus.export(tmp_path / "ring.ply")
+    library = tmp_path / "library"
+    masses = ("--mass", "block=0.2", "--mass", "ring=0.1")
+    assert build(mesh, tmp_path / "ring.ply", QUICK, "-o", library, *masses) == 0
+    faces = len(load_library(library).mesh("ring/contact.obj").faces)
+    expected = [
+        "block: pads touch a box, within ",
+        f"ring: pads touch a surface of {faces} faces, within 0.",
+    ]
+
+    def told() -> list[str]:
+        lines = [line for line in capsys.readouterr().out.splitlines() if "pads touch" in line]
+        return [line[: len(text)] for line, text in zip(lines, expected, strict=False)]
+
+    assert told() == expected
+    assert main(["library", "check", str(library)]) == 0
+    assert told() == expected
+    (library / "ring" / "contact.obj").unlink()
+    assert main(["library", "check", str(library)]) == 1
+    assert told() == expected[:1]
+
+
+def test_a_library_of_an_earlier_release_is_told_and_built_again(
+    tmp_path: Path, capsys: Capture
+) -> None:
+    """In releases of before, pads met the pieces of an object."""
+    torus, library = tmp_path / "ring.stl", tmp_path / "library"
+    trimesh.creation.torus(0.04, 0.012).export(torus)
+    assert build(torus, QUICK, "-o", library, "--mass", "ring=0.1") == 0
+    record = library / "ring" / "build.json"
+    data = json.loads(record.read_text())
+    del data["geometry"]["contact"]
+    record.write_text(json.dumps({**data, "version": data["version"] - 1}))
+    capsys.readouterr()
+    assert main(["library", "check", str(library)]) == 1
+    told = capsys.readouterr()
+    assert "ring was built by another release; build it again" in told.out + told.err
+    assert build(torus, QUICK, "-o", library, "--mass", "ring=0.1") == 0
+    told = capsys.readouterr()
+    assert "1 built, 0 up to date, 0 failed" in told.out
+    assert "built again: pads now touch the object's own surface" in told.out + told.err
+    assert main(["library", "check", str(library)]) == 0
 
 
 def test_friction_of_one_and_of_all(mesh: Path, tmp_path: Path) -> None:
@@ -59,6 +109,7 @@ def test_one_broken_mesh_is_one_failure(mesh: Path, tmp_path: Path, capsys: Capt
     (line,) = captured.err.splitlines()
     assert line.startswith("burg-drake: error: ")
     assert "broken.obj: 1 of 3 vertices are NaN or infinite" in line
+    assert captured.out.splitlines()[-1].endswith(": 1 built, 0 up to date, 1 failed (broken)")
     assert list(load_library(tmp_path / "library").objects) == ["block"]
 
 
@@ -80,6 +131,28 @@ def test_nothing_could_be_built(
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"burg-drake: error: {path}: ") and message in line
     assert not (tmp_path / "library").exists()
+
+
+@pytest.mark.parametrize("others", [0, 1])
+def test_an_unexpected_error_names_the_object_and_is_told_in_full(
+    others: int, mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    original = stages.build_geometry
+
+    def fails_for_me(source: ObjectSource, *arguments: Any) -> Any:
+        if source.name == "me":
+            raise TypeError("name of me is wrong, supported are:\n  1. (int) -> str")
+        return original(source, *arguments)
+
+    monkeypatch.setattr(stages, "build_geometry", fails_for_me)
+    shutil.copy(mesh, tmp_path / "me.ply")
+    meshes = (tmp_path / "me.ply", mesh)[: 1 + others]
+    assert build(*meshes, QUICK, "-o", tmp_path / "library") == 2 - others
+    captured = capsys.readouterr()
+    text = "me: TypeError: name of me is wrong, supported are: 1. (int) -> str"
+    assert captured.err.splitlines() == [f"burg-drake: error: {text}"]
+    summary = f"{tmp_path / 'library'}: {others} built, 0 up to date, 1 failed (me)"
+    assert captured.out.splitlines()[-1] == summary
 
 
 def test_millimetres_are_pointed_out(tmp_path: Path, capsys: Capture) -> None:

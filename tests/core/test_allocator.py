@@ -140,11 +140,15 @@ def test_what_cannot_be_used_is_told_once_and_nothing_is_preloaded(
     spaced = tmp_path / "a b" / "libmimalloc.so"
     spaced.parent.mkdir()
     spaced.write_bytes(library.read_bytes())
-    for path in (cut, text, spaced, tmp_path, tmp_path / "absent.so", Path(maths)):
+    unsuitable = "is not an allocator that can be preloaded here"
+    unnamed = "has a space or colon in its path, so that it cannot be preloaded"
+    absent = tmp_path / "absent.so"
+    expected = dict.fromkeys((cut, text, tmp_path, Path(maths)), unsuitable)
+    for path, why in (expected | {spaced: unnamed, absent: "cannot be found"}).items():
         caplog.clear()
         with caplog.at_level(logging.WARNING, "burg_drake"):
             assert of(path) == of(path) == {}
-        assert caplog.messages == [f"{VARIABLE}: {path} cannot be preloaded; workers do without"]
+        assert caplog.messages == [f"{VARIABLE}: {path} {why}; workers do without"]
     assert capfd.readouterr() == ("", "")
 
 
@@ -156,6 +160,18 @@ def test_an_allocator_that_ends_the_process_is_refused(
     copy.write_bytes(library.read_bytes())
     monkeypatch.setattr(allocator, "PROBE", "import os, signal; os.kill(os.getpid(), 11)")
     assert of(copy) == {}
+
+
+@linux
+def test_it_is_tried_in_the_environment_that_is_given(
+    library: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spoilt = "import os\nif 'SPOILT' in os.environ: raise SystemExit(1)\n"
+    monkeypatch.setattr(allocator, "PROBE", spoilt + allocator.PROBE)
+    monkeypatch.setenv("SPOILT", "1")
+    assert of(library, MARK="1") == {PRELOAD: str(library)}
+    monkeypatch.delenv("SPOILT")
+    assert of(library, SPOILT="1") == {}
 
 
 @linux

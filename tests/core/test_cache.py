@@ -98,6 +98,26 @@ def test_an_entry_of_another_version_is_told_and_replaced(
         assert_same(cached(kind, KEY, never))
 
 
+def test_another_version_is_told_once_by_all_processes_of_one_version(folder: Path) -> None:
+    program = (
+        "import sys; from burg_drake.core import cache; import numpy as np\n"
+        "cache._code_version = lambda: (sys.argv[1],)\n"
+        "cache.cached(sys.argv[2], '0' * 64, lambda: {'x': np.zeros(3)})"
+    )
+
+    def told(version: str, *kinds: str) -> int:
+        """How often, by processes of a version that run at once."""
+        running = [
+            subprocess.Popen([sys.executable, "-c", program, version, kind], stderr=subprocess.PIPE)
+            for kind in kinds
+        ]
+        return b"".join(process.communicate()[1] for process in running).count(b"another version")
+
+    kinds = ("a", "b", "c")
+    assert [told(version, *kinds) for version in ("1", "2", "2", "1")] == [0, 1, 0, 1]
+    assert len(list(folder.glob(".told-*"))) == 1
+
+
 def test_a_package_without_metadata_is_no_obstacle(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

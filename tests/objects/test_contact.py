@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,9 +14,10 @@ from burg_drake.objects.collision.contact import (
     MESH_FACES,
     contact_geometry,
     pieces_instead,
+    touched_by_pads,
 )
 from burg_drake.objects.collision.contact_surface import MOST_DISTANCE
-from burg_drake.objects.library.document import load_library
+from burg_drake.objects.library.document import ObjectLibrary, load_library
 from burg_drake.objects.library.entry import ContactGeometry
 
 
@@ -42,11 +44,28 @@ def test_pads_meet_the_pieces_where_there_is_no_surface(tmp_path: Path) -> None:
     holey = trimesh.Trimesh(torus().vertices, torus().faces[1:], process=False)
     contact, written = contact_geometry(None, holey, False, [torus()], tmp_path)
     assert contact == ContactGeometry(reason="its surface is not closed") and written == ()
-    assert (
-        pieces_instead(contact)
-        == "pads meet its convex pieces and not its own surface: its surface is not closed"
+    assert pieces_instead(contact, 12) == (
+        "pads touch 12 convex pieces, because its surface is not closed; make the mesh watertight"
+        " and smooth it, or accept the pieces by 'contact: pieces' in an objects.yaml or by"
+        " --contact pieces"
     )
-    assert pieces_instead(ContactGeometry()) == ""
+    assert pieces_instead(ContactGeometry(), 12) == ""
+
+
+def test_what_pads_touch_is_told(tmp_path: Path) -> None:
+    household = load_library("household")
+    lines = household.path(household.entry("mug").contact.mesh).read_text().splitlines()
+    faces = sum(line.startswith("f ") for line in lines)
+    fit = household.entry("mug").contact.fit
+    assert fit is not None
+    expected = f"a surface of {faces} faces, within {1e3 * fit.hausdorff:.2g} mm"
+    assert touched_by_pads(household, "mug") == expected
+    assert touched_by_pads(household, "can").startswith("a cylinder, within 1.")
+    entry = replace(household.entry("mug"), contact=ContactGeometry())
+    document = replace(household.document, objects={"mug": entry})
+    assert touched_by_pads(ObjectLibrary(document, tmp_path), "mug") == (
+        f"{len(entry.pieces)} convex pieces"
+    )
 
 
 def test_the_volume_of_an_open_surface_is_that_of_its_pieces(tmp_path: Path) -> None:
@@ -80,7 +99,7 @@ def test_what_cannot_be_is_said(tmp_path: Path) -> None:
         contact_geometry("mesh", holey, False, [torus()], tmp_path)
     with pytest.raises(
         MeshError,
-        match=r"^contact 'surface': its surface is not closed; repair the mesh, or choose",
+        match=r"^contact 'surface': its surface is not closed; make the mesh watertight and",
     ):
         contact_geometry("surface", holey, False, [torus()], tmp_path)
     with pytest.raises(MeshError, match=r"no box, cylinder or sphere has about this volume"):

@@ -123,7 +123,7 @@ FILES: dict[str, tuple[str, Callable[[], bytes], str]] = {
     "truncated header": (
         "a.ply",
         lambda: b"ply\nformat ascii 1.0\nelement vertex 3\n",
-        "not a readable .ply mesh (cut off or damaged?): list index out of range",
+        "not a readable .ply mesh (cut off or damaged?): IndexError: list index out of range",
     ),
     "no faces": ("a.obj", lambda: b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "the mesh file has no triangles"),
     "no triangles": (
@@ -134,8 +134,8 @@ FILES: dict[str, tuple[str, Callable[[], bytes], str]] = {
     "index out of range": (
         "a.obj",
         lambda: b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n",
-        "not a readable .obj mesh (cut off or damaged?): index 3 is out of bounds for axis 0 with"
-        " size 3",
+        "not a readable .obj mesh (cut off or damaged?): IndexError: index 3 is out of bounds"
+        " for axis 0 with size 3",
     ),
 }
 
@@ -205,3 +205,19 @@ def test_textures_of_too_many_pixels(
     monkeypatch.setattr(size_limits, "MOST_PIXELS", 1000)
     with pytest.raises(MeshError, match=": 40 x 30 pixels; a texture may have 31 x 31: scale it"):
         load_mesh(mesh)
+
+
+def test_the_whole_of_what_a_reader_says_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stumble(*_: object, **__: object) -> None:
+        raise TypeError("incompatible arguments, supported are:\n  1. (int) -> str")
+
+    monkeypatch.setattr(trimesh, "load_scene", stumble)
+    (tmp_path / "a.obj").write_text("v 0 0 0\n")
+    with pytest.raises(MeshError) as caught:
+        load_mesh(tmp_path / "a.obj")
+    assert str(caught.value) == (
+        f"{tmp_path / 'a.obj'}: not a readable .obj mesh (cut off or damaged?): TypeError:"
+        " incompatible arguments, supported are: 1. (int) -> str"
+    )

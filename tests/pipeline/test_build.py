@@ -216,13 +216,30 @@ def test_programming_errors_in_one_object_do_not_stop_the_others(
 
     def fails_for_cans(surface, *args):  # type: ignore[no-untyped-def]
         if len(surface.vertices) > 8:
-            raise RuntimeError("unheard of\nwith details")
+            raise TypeError("incompatible arguments, supported are:\n  1. (int) -> str\n")
         return original(surface, *args)
 
     monkeypatch.setattr(cutting, "convex_pieces", fails_for_cans)
     report = build(_sources(meshes), tmp_path / "lib")
     assert report.built == ("box",)
-    assert report.failed == {"can": "RuntimeError: unheard of"}
+    expected = "TypeError: incompatible arguments, supported are: 1. (int) -> str"
+    assert report.failed == {"can": expected}
+
+
+def test_a_file_that_breaks_its_reader_fails_alone(
+    meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    original = keys.mesh_hash
+
+    def fails_for_cans(mesh):  # type: ignore[no-untyped-def]
+        if "box" not in str(mesh).lower():
+            raise RecursionError("too deep")
+        return original(mesh)
+
+    monkeypatch.setattr(keys, "mesh_hash", fails_for_cans)
+    report = build(_sources(meshes), tmp_path / "lib")
+    assert report.built == ("box",)
+    assert report.failed == {"can": "RecursionError: too deep"}
 
 
 def test_a_kill_loses_nothing_that_was_finished(

@@ -145,7 +145,12 @@ def test_pads_that_meet_pieces_are_told(tmp_path: Path) -> None:
     document = replace(library.document, objects={"ring": entry})
     told = [i for i in check_library(ObjectLibrary(document, library.root)) if "pads" in i.message]
     assert [(i.kind, i.message) for i in told] == [
-        ("unsure", f"pads meet its convex pieces and not its own surface: {reason}")
+        (
+            "unsure",
+            "pads touch 1 convex piece, because its surface is not closed; make the mesh watertight"
+            " and smooth it, or accept the pieces by 'contact: pieces' in an objects.yaml or by"
+            " --contact pieces",
+        )
     ]
 
 

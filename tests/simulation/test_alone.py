@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
-from trial_world import CENTRE, QUICK, make_station
+from trial_world import CENTRE, QUICK, from_above, make_station
 
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.simulation.trials import grasp_trial, hand_trial
 from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.simulation.trials.lift_clearance import HandLiftClearance
 from burg_drake.station.diagram.builder import build_station_diagram
@@ -41,6 +42,26 @@ def test_a_target_that_something_leans_on_is_never_alone(make_scene: MakeScene) 
     trial = HandTrial(scene, make_station(), engine=QUICK)
     trial.run("box", CENTRE)
     assert trial.world is trial.complete_world
+
+
+def test_worlds_that_were_dropped_are_built_again_with_the_same_results(
+    make_scene: MakeScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The one that was not used for longest is dropped, with the check of the way ahead in it."""
+    monkeypatch.setattr(grasp_trial, "KEPT_WORLDS", 2)
+    monkeypatch.setattr(hand_trial, "KEPT_WORLDS", 2)
+    names = ("box", "block", "can")
+    scene = make_scene(*((name, 0.1 + 0.2 * k, 0.2, 0.0) for k, name in enumerate(names)))
+    trial, built = HandTrial(scene, make_station(), engine=QUICK), []
+    build = trial._build
+    monkeypatch.setattr(trial, "_build", lambda alone: built.append(alone) or build(alone))
+    found: dict[str, str] = {}
+    for name in ("box", "block", "box", "can", "box", "block"):
+        result = trial.run(name, from_above(scene.entry(name).upper[2] - 0.015))
+        assert result.outcome is Outcome.LIFTED
+        assert found.setdefault(name, repr(result)) == repr(result)
+    assert built == ["box", "block", "can", "block"]
+    assert trial._lift_clearance.cache_info().currsize == 2
 
 
 def test_contact_at_points_meets_pieces_and_not_the_hull_of_a_surface() -> None:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
+from pydrake.geometry import Cylinder
 from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.systems.analysis import Simulator
@@ -16,13 +19,23 @@ from burg_drake.core.arrays import Array
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import make_pose, rot_z, rotation_from_rpy
 from burg_drake.objects.collision.feet import ANYWHERE, MOST_CARRYING, support_feet
-from burg_drake.scene.document.scene import Instance, Scene, load_scene
+from burg_drake.pipeline.build import build_library
+from burg_drake.pipeline.source import ObjectSource
+from burg_drake.scene.document.scene import (
+    Instance,
+    Scene,
+    SceneDocument,
+    load_scene,
+    save_scene,
+)
 from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.diagram.station_diagram import StationDiagram
 from burg_drake.station.document.station_document import load_station
 
 MakeScene = Callable[..., Scene]
 CAN_RADIUS = 0.03
+THIN = 0.0024
+"""Of a wire, and of a sheet [m]."""
 
 
 def on_feet(scene: Scene, engine: str = "standard") -> StationDiagram:
@@ -160,6 +173,52 @@ def test_what_stands_at_the_edge_of_the_table_keeps_its_pieces(make_scene: MakeS
     simulator.AdvanceTo(0.3)
     box = built.plant.get_body(built.free["box"])
     assert built.plant.EvalBodyPoseInWorld(context, box).translation()[2] > -1e-3
+
+
+def test_what_is_thinner_than_it_is_sunk_keeps_half_of_itself(tmp_path: Path) -> None:
+    wire = trimesh.creation.cylinder(radius=THIN / 2, height=0.04, sections=48)
+    sheet = trimesh.creation.box((0.05, 0.03, THIN))
+    sources = [
+        ObjectSource(name=name, mesh=mesh, mass=0.001, pieces=(mesh,), contact=contact)
+        for name, mesh, contact in (
+            ("wire", wire, "primitive"),
+            ("sheet", sheet, "primitive"),
+            ("card", sheet, "pieces"),
+        )
+    ]
+    assert not build_library(sources, tmp_path / "library", confirm=False).failed
+    lying = {"wire": (90.0, 0.0, 0.0), "sheet": (0.0, 0.0, 0.0), "card": (0.0, 0.0, 0.0)}
+    instances = tuple(
+        Instance(object=name, X_SO=Pose((0.1 * k + 0.1, 0.2, THIN / 2 - 0.0015), rpy_deg=rpy))
+        for k, (name, rpy) in enumerate(lying.items())
+    )
+    document = SceneDocument(name="thin", library="library", instances=instances)
+    save_scene(document, tmp_path / "scene.yaml")
+    built = on_feet(load_scene(tmp_path / "scene.yaml"))
+    inspector = built.scene_graph.model_inspector()
+    for name, index in built.free.items():
+        own = built.plant.GetCollisionGeometriesForBody(built.plant.get_body(index))
+        feet = [g for g in own if g in built.parts.feet]
+        discs = [shape for g in feet if isinstance(shape := inspector.GetShape(g), Cylinder)]
+        assert len(discs) == (2 if name == "wire" else 0)
+        assert all(disc.radius() >= 0.24 * THIN for disc in discs)
+        up = built.X_WO(name)[2, :3]
+        heights = [inspector.GetPoseInFrame(g).translation() @ up for g in feet]
+        assert min(heights) <= 1e-6, name  # no higher than the middle
+        assert name == "card" or max(heights) - min(heights) >= 0.49 * THIN, name
+
+
+def test_feet_meet_the_table_alone_and_balls_have_none(make_scene: MakeScene) -> None:
+    built = on_feet(make_scene(("box", 0.2, 0.2, 0.0), ("ball", 0.4, 0.2, 0.0)))
+    inspector = built.scene_graph.model_inspector()
+    box, ball, table = (
+        built.plant.GetCollisionGeometriesForBody(built.plant.get_body(index))
+        for index in (built.free["box"], built.free["ball"], built.table)
+    )
+    assert built.parts.feet and set(built.parts.feet) < set(box)
+    for foot in built.parts.feet:
+        assert all(inspector.CollisionFiltered(foot, other) for other in ball)
+        assert not any(inspector.CollisionFiltered(foot, other) for other in table)
 
 
 def prism(sides: int, radius: float, height: float) -> Array:

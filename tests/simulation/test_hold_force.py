@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import shutil
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +14,7 @@ from trial_world import FORCE, GRAVITY, QUICK, from_above, make_station
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.scene.document.scene import Instance
+from burg_drake.scene.document.scene import Instance, load_scene
 from burg_drake.simulation.robustness.grip import Grip, take_grip
 from burg_drake.simulation.robustness.hold_force import (
     HoldForces,
@@ -23,6 +26,7 @@ from burg_drake.simulation.robustness.settings import (
 )
 from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.simulation.trials.result import TrialResult
+from burg_drake.station.document.station_document import load_station
 
 CENTRE = from_above(0.025)
 """At the block's centre of mass."""
@@ -130,6 +134,26 @@ def test_what_stands_around_does_not_matter(trial: HandTrial, tugged, make_scene
     )
     found = tug(grip_of(crowded), FINE, directions=["-y"])
     assert found.forces["-y"] == pytest.approx(tugged.forces["-y"], rel=0.02)
+
+
+def test_hard_parts_of_a_hand_meet_a_bowl_and_not_its_hull(tmp_path: Path) -> None:
+    """The fingers over the pads stay clear of the bowl, and would meet its hull within `slide`."""
+    panda = load_station("panda_tabletop")
+    shutil.copytree(panda.hand_model.parent, tmp_path / "panda")
+    model = tmp_path / "panda" / panda.hand_model.name
+    before, *parts = model.read_text().split("<collision ")
+    soft = "<drake:compliant_hydroelastic/>"
+    hard = [part if part.startswith('name="pad"') else part.replace(soft, "") for part in parts]
+    model.write_text("<collision ".join([before, *hard]))
+    scene, limits = load_scene("tabletop_six"), []
+    rim = from_above(scene.entry("bowl").upper[2] - 0.004, 0.0, 0.07, yaw=math.pi / 2)
+    for station in (panda, replace(panda, hand_model=model)):
+        trial = HandTrial(scene, station, engine=QUICK)
+        grip = take_grip(trial, "bowl", rim)
+        assert isinstance(grip, Grip)
+        assert (trial.world is trial.complete_world) == (station is not panda)
+        limits.append(tug(grip, directions=["-z"]).accelerations["-z"])
+    assert limits[1] == limits[0]
 
 
 def test_what_is_not_held_has_no_grip(trial: HandTrial) -> None:

@@ -15,7 +15,7 @@ from burg_drake.apps.library.object_values import (
     with_common_values,
     with_frictions,
 )
-from burg_drake.core import InvalidInputError
+from burg_drake.core import InvalidInputError, listing
 
 if TYPE_CHECKING:
     from burg_drake.pipeline import BuildReport, ObjectSource
@@ -130,29 +130,44 @@ def _build(
             workers=arguments.workers or default_workers(),
             progress=progress,
         )
+    failures = [_failure(s, report.failed[s.name]) for s in sources if s.name in report.failed]
     done = {*report.built, *report.cached}
-    if report.failed and not done:
-        *others, last = report.failed.items()
+    if failures and not done:
+        *others, last = failures
         _print_failures(others)
-        raise InvalidInputError(last[1])
+        _print_summary(report)
+        raise InvalidInputError(last)
     print_library(report.library, only=done)
-    _print_report(report)
-    return 1 if report.failed else 0
+    _print_notes(report)
+    _print_failures(failures)
+    _print_summary(report)
+    return 1 if failures else 0
 
 
-def _print_report(report: BuildReport) -> None:
+def _print_notes(report: BuildReport) -> None:
+    from burg_drake.apps.library.viewing import print_contact
+
     for name in report.built:
+        print_contact(report.library, [name])
         repairs = report.library.objects[name].source.repairs
         for note in dict.fromkeys([*repairs, *report.notes.get(name, ())]):
             print(f"{name}: {note}")
-    _print_failures(report.failed.items())
+
+
+def _print_summary(report: BuildReport) -> None:
+    failed = f" ({listing(list(report.failed))})" if report.failed else ""
     print(
         f"{report.library.root}: {len(report.built)} built, {len(report.cached)} up to date,"
-        f" {len(report.failed)} failed"
+        f" {len(report.failed)} failed{failed}"
     )
 
 
-def _print_failures(failed: Iterable[tuple[str, str]]) -> None:
-    for name, message in failed:
-        text = message if name in message else f"{name}: {message}"
+def _failure(source: ObjectSource, message: str) -> str:
+    """A message that names the object or its mesh file."""
+    is_named = message.startswith(f"{source.name}: ") or str(source.mesh) in message
+    return message if is_named else f"{source.name}: {message}"
+
+
+def _print_failures(failures: Iterable[str]) -> None:
+    for text in failures:
         print(f"burg-drake: error: {text}", file=sys.stderr)

@@ -159,7 +159,8 @@ def _add_views(group: Any) -> None:
         group,
         "check",
         run_check,
-        "report what is missing, stale or implausible (exit code 1 if something has to be fixed)",
+        "report what pads touch, and what is missing, stale or implausible (exit code 1 if"
+        " something has to be fixed)",
         "burg-drake library check my_library",
     )
     show = add_verb(

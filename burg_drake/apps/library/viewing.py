@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
+from burg_drake.core import BurgError
 from burg_drake.core.terminal import TextTable, format_count, format_number
 
 if TYPE_CHECKING:
@@ -31,6 +33,7 @@ def run_check(arguments: argparse.Namespace) -> int:
 
     library = load_library(arguments.library)
     issues = check_library(library)
+    print_contact(library, library.objects)
     for issue in issues:
         where = f"{issue.object}: " if issue.object else ""
         print(f"{'error' if issue.is_error else 'warning'}: {where}{issue.kind}: {issue.message}")
@@ -76,6 +79,17 @@ def print_library(library: ObjectLibrary, only: Iterable[str] | None = None) -> 
     library_table(shown).show()
     if any(entry.mass_properties.source == "density" for entry in shown.values()):
         print("~ mass from volume and density; give the true one with --mass NAME=KG")
+
+
+def print_contact(library: ObjectLibrary, names: Iterable[str]) -> None:
+    """Prints what gripper pads touch of objects: not of those of which a check or build says more,
+    that they touch pieces for a reason, or that a file is missing or damaged."""
+    from burg_drake.objects.collision import touched_by_pads
+
+    for name in names:
+        if not library.entry(name).contact.reason:
+            with contextlib.suppress(BurgError):
+                print(f"{name}: pads touch {touched_by_pads(library, name)}")
 
 
 def library_table(objects: Mapping[str, ObjectEntry]) -> TextTable:

@@ -5,8 +5,9 @@ they have the same bits in less time. A library that replaces it has to be there
 starts (`LD_PRELOAD`), so workers are started with it; this process stays as it is.
 
 What the linker cannot load it complains about in every process, and an allocator that does not suit
-the machine ends them. So a library is tried in a process of its own before it is used: each time
-anew, as the next machine that sees the same folders may lack what it needs; that takes 20 ms.
+the machine ends them. So a library is tried in a process of its own before it is used, by each
+process that starts workers, as the next machine that sees the same folders may lack what it needs;
+that takes 20 ms.
 """
 
 from __future__ import annotations
@@ -36,6 +37,8 @@ SYSTEM_LIBRARIES = (
 """Of distributions, the best first (`benchmarks/allocators.py`)."""
 PATIENCE = 10.0
 """Time that a library has to show that it works [s]."""
+KEPT = 16
+"""Trials whose results are kept, the latest ones."""
 SEPARATORS = " :"
 """Between the libraries of `LD_PRELOAD`; there is no way to quote them."""
 IDENTITY = slice(4, 6)
@@ -68,7 +71,7 @@ def worker_preload(environment: Mapping[str, str] = os.environ) -> dict[str, str
     comes first and stays, and if that brings an allocator, nothing is added.
 
     Args:
-        environment: that of this process.
+        environment: that of this process; in it libraries are tried, too.
     """
     given = environment.get(VARIABLE, "").strip()
     if sys.platform != "linux" or given.lower() == OFF or _address_space_is_limited():
@@ -76,7 +79,8 @@ def worker_preload(environment: Mapping[str, str] = os.environ) -> dict[str, str
     before = environment.get(PRELOAD, "")
     for path in [Path(given).expanduser().absolute()] if given else installed_allocators():
         preload = f"{before}:{path}" if before else str(path)
-        if _can_be_preloaded(path) and _replaces_malloc(path, _changed(path), preload):
+        tried = tuple(sorted({**environment, PRELOAD: preload}.items()))
+        if _can_be_preloaded(path) and _replaces_malloc(path, _changed(path), tried):
             _log.debug("workers start with the allocator %s", path)
             return {PRELOAD: preload}
     if given:
@@ -157,21 +161,21 @@ def _changed(path: Path) -> int:
         return 0
 
 
-@functools.cache
-def _replaces_malloc(path: Path, changed: int, preload: str) -> bool:
+@functools.lru_cache(maxsize=KEPT)
+def _replaces_malloc(path: Path, changed: int, environment: tuple[tuple[str, str], ...]) -> bool:
     """Whether a process that is started with it works, has its malloc, and complains of nothing.
 
     Args:
         path: the library.
         changed: when [ns]; another one is tried again.
-        preload: all that is preloaded.
+        environment: of the process, with the library in `LD_PRELOAD`.
     """
     try:
         tried = subprocess.run(
             [sys.executable, "-I", "-S", "-c", PROBE],
             stdin=subprocess.DEVNULL,
             capture_output=True,
-            env={**os.environ, PRELOAD: preload},
+            env=dict(environment),
             timeout=PATIENCE,
             check=False,
         )
@@ -187,4 +191,10 @@ def _replaces_malloc(path: Path, changed: int, preload: str) -> bool:
 @functools.cache
 def _warn(given: str) -> None:
     """One line a process."""
-    _log.warning("%s: %s cannot be preloaded; workers do without", VARIABLE, given)
+    path = os.path.abspath(os.path.expanduser(given))
+    why = "is not an allocator that can be preloaded here"
+    if not os.path.exists(path):
+        why = "cannot be found"
+    elif any(separator in path for separator in SEPARATORS):
+        why = "has a space or colon in its path, so that it cannot be preloaded"
+    _log.warning("%s: %s %s; workers do without", VARIABLE, given, why)

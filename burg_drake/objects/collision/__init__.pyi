@@ -1,6 +1,7 @@
 from .contact import (
     contact_geometry as contact_geometry,
     pieces_instead as pieces_instead,
+    touched_by_pads as touched_by_pads,
 )
 from .decomposition import (
     Pieces as Pieces,

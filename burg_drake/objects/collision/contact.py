@@ -27,7 +27,13 @@ from burg_drake.core import MeshError
 from burg_drake.objects.collision.contact_surface import contact_surface, excess
 from burg_drake.objects.collision.fit import surface_distance, union_mesh
 from burg_drake.objects.collision.primitive import fit_primitive, nearest_primitive
-from burg_drake.objects.library import ContactGeometry, ContactKind, Fit, write_piece
+from burg_drake.objects.library import (
+    ContactGeometry,
+    ContactKind,
+    Fit,
+    ObjectLibrary,
+    write_piece,
+)
 from burg_drake.objects.meshes import decimated
 
 CONTACT_FILE = "contact.obj"
@@ -35,6 +41,10 @@ CONTACT_FILE = "contact.obj"
 
 MESH_FACES = 2000
 """Faces of the mesh of kind `mesh`, where so few stay within `solids.DECIMATION`."""
+
+
+MEND = "make the mesh watertight and smooth it"
+"""What gives most objects a surface that pads can touch."""
 
 
 def contact_geometry(
@@ -67,9 +77,7 @@ def contact_geometry(
         try:
             return _surface(surface, closed, pieces, folder), (CONTACT_FILE,)
         except MeshError as error:
-            raise MeshError(
-                f"contact 'surface': {error}; repair the mesh, or choose 'pieces'"
-            ) from error
+            raise MeshError(f"contact 'surface': {error}; {MEND}, or choose 'pieces'") from error
     if kind in ("pieces", "compliant_pieces"):
         return ContactGeometry(kind=kind), ()
     volume = float(surface.volume) if closed else float(union_mesh(pieces).volume)
@@ -85,11 +93,41 @@ def contact_geometry(
         return ContactGeometry(reason=str(error)), ()
 
 
-def pieces_instead(contact: ContactGeometry) -> str:
-    """What to say where pads meet pieces that were not asked for; empty elsewhere."""
+def pieces_instead(contact: ContactGeometry, pieces: int) -> str:
+    """What to say where pads touch pieces that were not asked for; empty elsewhere.
+
+    Args:
+        contact: of the object.
+        pieces: how many it has.
+    """
     if not contact.reason:
         return ""
-    return f"pads meet its convex pieces and not its own surface: {contact.reason}"
+    return (
+        f"pads touch {_pieces(pieces)}, because {contact.reason}; {MEND}, or accept the pieces by"
+        " 'contact: pieces' in an objects.yaml or by --contact pieces"
+    )
+
+
+def touched_by_pads(library: ObjectLibrary, name: str) -> str:
+    """What of an object gripper pads touch, such as `a surface of 412 faces, within 0.2 mm`.
+
+    Raises:
+        UnknownNameError: no such object, or the file of its surface is missing.
+        MeshError: that file is damaged.
+    """
+    entry = library.entry(name)
+    contact = entry.contact
+    if contact.primitive is not None:
+        what = f"a {contact.primitive.shape}"
+    elif contact.mesh:
+        what = f"a surface of {len(library.mesh(contact.mesh).faces)} faces"
+    else:
+        return _pieces(len(entry.pieces))
+    return what if contact.fit is None else f"{what}, within {1e3 * contact.fit.hausdorff:.2g} mm"
+
+
+def _pieces(count: int) -> str:
+    return f"{count} convex piece{'' if count == 1 else 's'}"
 
 
 def _surface(

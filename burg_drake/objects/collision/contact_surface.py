@@ -14,7 +14,8 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from burg_drake.core import Array, MeshError
-from burg_drake.objects.collision.fit import distances, surface_distance
+from burg_drake.geometry import triangle_distances
+from burg_drake.objects.collision.fit import surface_distance
 from burg_drake.objects.library import Fit
 from burg_drake.objects.meshes import coarser_surfaces
 from burg_drake.objects.physics import spread_over
@@ -123,7 +124,7 @@ class SurfaceNormals:
         _, near = self.places.query(points, min(CANDIDATES, len(self.every)))
         _, alike = self.alike.query(np.hstack([points, SMOOTHING * normals]), CANDIDATES)
         which = np.hstack([self.every[near], self.owner[alike]])
-        apart = distances(points[:, None], self.triangles[which])
+        apart = triangle_distances(points[:, None], self.triangles[which])
         facing = (self.normals[which] * normals[:, None]).sum(axis=2) > 0.0
         apart -= np.where(facing & (apart <= self.reach), self.reach, 0.0)
         return np.asarray(self.normals[which[np.arange(len(points)), apart.argmin(axis=1)]])

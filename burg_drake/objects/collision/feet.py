@@ -27,6 +27,8 @@ ROUND = 3e-4
 """About the axis that an object rolls on it is kept to this [m]."""
 DIRECTIONS = 600
 """In which the hull is looked at; 7 degrees apart."""
+LINE = 0.5
+"""Of what touches the plane, the width over the length from which on it is no line to roll on."""
 AROUND = 180
 """Directions about an axis; 2 degrees apart."""
 
@@ -117,11 +119,18 @@ def _lowest(corners: Array, up: Array) -> NDArray[np.intp]:
 
 def _around(corners: Array, up: Array) -> Array:
     """(D, 3) directions of O about the axis that an object rolls on: the line along which it
-    touches the plane."""
+    touches the plane. What touches it at a point, as an egg does, may roll on any axis: about two
+    of them."""
     low = corners[_lowest(corners, up)] @ _plane(up).T
-    along = np.linalg.svd(low - low.mean(axis=0))[2][0]
+    low = low - low.mean(axis=0)
+    axes = np.linalg.svd(low)[2]
+    along = axes[0]
     across = np.array((-along[1], along[0])) @ _plane(up)
     directions: Array = _circle(AROUND) @ np.stack([across, up])
+    length, width = np.linalg.norm(low @ axes.T, axis=0)
+    if width >= LINE * length:
+        other = _circle(AROUND) @ np.stack([along @ _plane(up), up])
+        directions = np.vstack([directions, other])
     return directions
 
 

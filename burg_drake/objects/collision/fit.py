@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from burg_drake.core import Array, MeshError
+from burg_drake.geometry import triangle_distances
 from burg_drake.objects.library import Fit
 from burg_drake.objects.physics import sample_surface, spread_over
 
@@ -175,12 +176,12 @@ def _farthest(points: Array, surface: trimesh.Trimesh, enough: float = np.inf) -
         if bound[order[start]] <= largest + RESOLUTION or largest > enough:
             break
         _, near = tree.query(some, k=min(CANDIDATES, len(samples)))
-        nearer = distances(some[:, None], triangles[faces[near]]).min(axis=1)
+        nearer = triangle_distances(some[:, None], triangles[faces[near]]).min(axis=1)
         for i in np.argsort(-nearer, kind="stable"):
             if nearer[i] <= largest + RESOLUTION or largest > enough:
                 break
             possible = np.linalg.norm(middle - some[i], axis=1) - reach <= nearer[i] + 1e-12
-            exact = distances(some[i][None], triangles[possible])
+            exact = triangle_distances(some[i][None], triangles[possible])
             largest = max(largest, float(exact.min()))
     return largest
 
@@ -190,25 +191,3 @@ def _spread(surface: trimesh.Trimesh) -> tuple[Array, Array]:
     points, face = spread_over(surface, TARGETS)
     middle = np.asarray(surface.triangles).mean(axis=1)
     return np.vstack([points, middle]), np.concatenate([face, np.arange(len(middle))])
-
-
-def distances(points: Array, triangles: Array) -> Array:
-    """Distances [m] of points (..., 1, 3) to triangles (..., K, 3, 3), as (..., K)."""
-    a, b, c = triangles[..., 0, :], triangles[..., 1, :], triangles[..., 2, :]
-    squared = np.minimum.reduce([_to_segment(points, p, q) for p, q in ((a, b), (b, c), (c, a))])
-    normal = np.cross(b - a, c - a)
-    length = np.sqrt((normal * normal).sum(axis=-1))
-    inside = length > 0.0
-    for p, q in ((a, b), (b, c), (c, a)):
-        inside &= (np.cross(q - p, points - p) * normal).sum(axis=-1) >= 0.0
-    height = ((points - a) * normal).sum(axis=-1) / np.where(length > 0.0, length, 1.0)
-    return np.where(inside, np.abs(height), np.sqrt(squared))
-
-
-def _to_segment(points: Array, start: Array, end: Array) -> Array:
-    """Squared distances of points to segments."""
-    along = end - start
-    square = np.maximum((along * along).sum(axis=-1), 1e-300)
-    at = np.clip(((points - start) * along).sum(axis=-1) / square, 0.0, 1.0)
-    apart = points - start - at[..., None] * along
-    return (apart * apart).sum(axis=-1)

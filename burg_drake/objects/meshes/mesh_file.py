@@ -11,7 +11,7 @@ from urllib.parse import quote
 import numpy as np
 import trimesh
 
-from burg_drake.core import MeshError, content_hash
+from burg_drake.core import MeshError, content_hash, one_line
 from burg_drake.core.files import without_warnings
 from burg_drake.objects.library import face_palette
 from burg_drake.objects.meshes.size_limits import (
@@ -180,10 +180,10 @@ def read_mesh(path: Path) -> trimesh.Trimesh:
         parts = [g for g in scene.dump() if isinstance(g, trimesh.Trimesh) and len(g.faces)]
         mesh = _joined(parts) if parts else None
     except Exception as error:  # the readers raise whatever their parsing stumbles over
-        reason = str(error).strip().splitlines() or [type(error).__name__]
+        reason = one_line(error)
         if isinstance(error, ImportError):  # of a package that guesses the encoding of a text
-            reason = [NEITHER]
-        raise _unreadable(path, _missing_bytes(path) or reason[0]) from error
+            reason = NEITHER
+        raise _unreadable(path, _missing_bytes(path) or reason) from error
     if mesh is None:
         # Where a package that guesses encodings is installed, trimesh takes any bytes for a text.
         damage = _missing_bytes(path) or _not_text(path)

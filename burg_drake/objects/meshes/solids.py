@@ -9,10 +9,10 @@ from __future__ import annotations
 import manifold3d
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from burg_drake.core import Array
+from burg_drake.geometry import triangle_distances
 from burg_drake.objects.meshes.cleaning import bodies, encloses, signed_volume
 from burg_drake.objects.meshes.quadrics import collapsed
 
@@ -179,23 +179,16 @@ def one_sided_hausdorff(points: Array, surface: trimesh.Trimesh) -> float:
     samples, face = trimesh.sample.sample_surface(surface, SAMPLES, seed=0)
     face = np.concatenate([face, np.arange(len(triangles))])
     _, near = cKDTree(np.vstack([samples, middles])).query(points, min(CANDIDATES, len(face)))
-    bound = _distances(points, triangles, face[near]).min(axis=1)
+    bound = triangle_distances(points[:, None], triangles[face[near]]).min(axis=1)
     radius = np.linalg.norm(triangles - middles[:, None], axis=2).max(axis=1)
     largest = 0.0
     for i in np.argsort(-bound):
         if bound[i] <= max(largest, RESOLVED):
             break
         possible = np.linalg.norm(middles - points[i], axis=1) - radius <= bound[i]
-        near = np.nonzero(possible)[0][None]
-        largest = max(largest, float(_distances(points[i : i + 1], triangles, near).min()))
+        exact = triangle_distances(points[i][None], triangles[possible])
+        largest = max(largest, float(exact.min()))
     return largest
-
-
-def _distances(points: Array, triangles: Array, which: NDArray[np.int64]) -> Array:
-    """Distances (N, K) of points (N, 3) from K triangles each, `which` (N, K) [m]."""
-    repeated = np.repeat(points, which.shape[1], axis=0)
-    closest = trimesh.triangles.closest_point(triangles[which.reshape(-1)], repeated)
-    return np.asarray(np.linalg.norm(closest - repeated, axis=1).reshape(which.shape))
 
 
 def _boxes_meet(parts: list[trimesh.Trimesh]) -> bool:

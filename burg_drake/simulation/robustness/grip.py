@@ -42,7 +42,7 @@ class Grip:
     the scene neither moves nor touches them.
 
     Args:
-        trial: its last run was one of this target, and held it.
+        trial: its last run was one of this target `without_hull`, and held it.
         instance: the target.
         friction: its coefficient in that run, if not the library's.
 
@@ -182,6 +182,9 @@ def take_grip(
 ) -> Grip | TrialResult:
     """Executes a grasp, and takes the hand as it then holds the target.
 
+    A load may bring the target to parts of the hand that the trial kept clear of. They have to meet
+    it as it is: a hull would hold a bowl by its hollow.
+
     Args:
         trial, instance, X_OG, friction, mass, lift: as for `HandTrial.run`.
 
@@ -192,5 +195,5 @@ def take_grip(
         InvalidInputError: as `HandTrial.run`.
         RuntimeError, SystemExit: from Drake.
     """
-    result = trial.run(instance, X_OG, friction=friction, mass=mass, lift=lift)
+    result = trial.run(instance, X_OG, friction=friction, mass=mass, lift=lift, without_hull=True)
     return Grip(trial, instance, friction) if result.outcome.held else result

@@ -8,7 +8,7 @@ before the hand closed.
 
 from __future__ import annotations
 
-from functools import cache, partial
+from functools import lru_cache, partial
 from itertools import pairwise
 
 import numpy as np
@@ -23,7 +23,7 @@ from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.simulation.trials.arm_carrier import ArmCarrier
 from burg_drake.simulation.trials.command_sequence import CommandSequence
 from burg_drake.simulation.trials.execution import Execution
-from burg_drake.simulation.trials.grasp_trial import GraspTrial
+from burg_drake.simulation.trials.grasp_trial import KEPT_WORLDS, GraspTrial
 from burg_drake.simulation.trials.lift_clearance import ArmLiftClearance
 from burg_drake.simulation.trials.result import TrialResult
 from burg_drake.simulation.trials.trial_settings import DEFAULT_TRIAL, TrialSettings
@@ -90,7 +90,8 @@ class ArmTrial(GraspTrial):
         self._X_WA = arm.X_WA.matrix()
         self._kinematics = ArmKinematics.of(self._plain)
         self.steps_per_check = max(1, round(settings.poll / self.engine.time_step))
-        self._lift_clearance = cache(partial(ArmLiftClearance, self._plain))
+        kept = lru_cache(maxsize=KEPT_WORLDS)
+        self._lift_clearance = kept(partial(ArmLiftClearance, self._plain))
 
     @property
     def hand(self) -> MountedHand:

@@ -133,7 +133,12 @@ class GraspTrial(ABC):
         return instance_pose(self.scene, self.station, instance) @ check_pose(X_OG, "X_OG")
 
     def execute(
-        self, instance: str, X_WG: Array, begin: Callable[[TrialWorld], Execution]
+        self,
+        instance: str,
+        X_WG: Array,
+        begin: Callable[[TrialWorld], Execution],
+        *,
+        without_hull: bool = False,
     ) -> TrialResult:
         """Executes a grasp, if the open hand is clear at it.
 
@@ -141,6 +146,7 @@ class GraspTrial(ABC):
             instance: the target.
             X_WG: (4, 4) grasp in the world.
             begin: brings the Context of a world to the start of the trial.
+            without_hull: not in a world in which parts of the robot meet the target's hull.
 
         Returns:
             The outcome with its margins. A failure of the simulator is an outcome, too.
@@ -149,6 +155,8 @@ class GraspTrial(ABC):
         if screen.outcome is not None:
             return collision(screen)
         world = self._world_of(instance)
+        if without_hull and world.robot_meets_hull:
+            world = self.complete_world
         try:
             try:
                 found = begin(world).run()

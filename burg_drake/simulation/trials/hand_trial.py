@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cache, partial
+from functools import lru_cache, partial
 
 import numpy as np
 from pydrake.geometry import Meshcat
@@ -19,7 +19,7 @@ from burg_drake.core import Array, InvalidInputError
 from burg_drake.grasping.clearance import HandClearance
 from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.simulation.trials.execution import Execution
-from burg_drake.simulation.trials.grasp_trial import GraspTrial
+from burg_drake.simulation.trials.grasp_trial import KEPT_WORLDS, GraspTrial
 from burg_drake.simulation.trials.lift_carrier import LiftCarrier, LiftPath
 from burg_drake.simulation.trials.lift_clearance import HandLiftClearance
 from burg_drake.simulation.trials.result import TrialResult
@@ -78,7 +78,8 @@ class HandTrial(GraspTrial):
             lock=lock,
             meshcat=meshcat,
         )
-        self._lift_clearance = cache(partial(HandLiftClearance, self._plain))
+        kept = lru_cache(maxsize=KEPT_WORLDS)
+        self._lift_clearance = kept(partial(HandLiftClearance, self._plain))
 
     @property
     def hand(self) -> FloatingHand:
@@ -95,6 +96,7 @@ class HandTrial(GraspTrial):
         friction: float | None = None,
         mass: float | None = None,
         lift: float | None = None,
+        without_hull: bool = False,
     ) -> TrialResult:
         """Executes one grasp.
 
@@ -104,6 +106,8 @@ class HandTrial(GraspTrial):
             friction: the target's friction coefficient, in place of the library's.
             mass: the target's mass [kg], in place of the library's; its inertia scales with it.
             lift: length of the lift [m], in place of the motion's.
+            without_hull: for who goes on in `world`: run where no part of the hand meets a hull in
+                the place of the target.
 
         Returns:
             The outcome with its margins. A failure of the simulator is an outcome, too.
@@ -119,7 +123,7 @@ class HandTrial(GraspTrial):
         def begin(world: TrialWorld) -> Execution:
             return self.begin(instance, X_WG, paths, friction=friction, mass=mass, world=world)
 
-        return self.execute(instance, X_WG, begin)
+        return self.execute(instance, X_WG, begin, without_hull=without_hull)
 
     def begin(
         self,

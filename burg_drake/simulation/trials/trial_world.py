@@ -89,6 +89,15 @@ class TrialWorld:
         meets something fixed: what happens then is for the complete world to say."""
         return bool(self._hulls) and self.contacts.has_any(results, self._hulls)
 
+    @property
+    def robot_meets_hull(self) -> bool:
+        """Whether, in a world of a target alone, parts of the robot meet the target's hull and not
+        the target as it is: those that are not hydroelastic."""
+        inspector = self.diagram.scene_graph.model_inspector()
+        robot = self._geometries(set(self.diagram.robot_bodies))
+        hulls = self.diagram.parts.hulls
+        return any(not inspector.CollisionFiltered(h, part) for h in hulls for part in robot)
+
     def prepare(
         self, instance: str, moving: set[BodyIndex], friction: float | None, mass: float | None
     ) -> None:

@@ -3,8 +3,8 @@
 In Drake two rigid objects meet at single points, and on a single point no block rests on a block:
 the contact jumps from corner to corner, and the upper one turns and slides by a millimetre in a few
 seconds. Free objects that touch others are therefore compliant, and meet them on patches. An object
-that stands by itself stays rigid: it meets table and pads, which are compliant, on patches anyway,
-in two thirds of the time.
+that stands by itself stays rigid: pads, which are compliant, it meets on patches anyway, and so it
+does a table unless it has feet (see `world.contact_parts`), in two thirds of the time.
 """
 
 from __future__ import annotations

@@ -155,19 +155,22 @@ def _parts(scene: Scene, name: str, X_WO: Array) -> Iterator[tuple[str, Array, S
         feet = _corner_feet(scene, name, X_WO)
     elif primitive.shape == "box":
         corners = np.array(list(product(*((-s / 2, s / 2) for s in primitive.size))))
-        feet = _drawn_in(transform_points(primitive.X_OP.matrix(), corners), X_WO)
+        corners = transform_points(primitive.X_OP.matrix(), corners)
+        feet = _drawn_in(corners, X_WO, corners)
     else:
         radius, length = primitive.size
+        apart = max(0.0, length - 3.0 * RIM)
         for k, end in enumerate((-0.5, 0.5)):
-            X_OD = primitive.X_OP.matrix() @ make_pose(p_AB=(0.0, 0.0, end * (length - 3.0 * RIM)))
+            X_OD = primitive.X_OP.matrix() @ make_pose(p_AB=(0.0, 0.0, end * apart))
             axis_height = float(up @ X_OD[:3, 2])
             reach = radius * math.sqrt(max(0.0, 1.0 - axis_height**2)) + RIM / 2 * abs(axis_height)
             sunk = max(0.0, reach - X_WO[2, 3] - float(up @ X_OD[:3, 3]))
             lies = abs(axis_height) < math.sqrt(0.5)
+            sunk = min(sunk, (radius if lies else apart) / 2)
             X_OD[:3, 3] += 0.0 if lies else sunk * up
             yield f"rim_{k}", X_OD, Cylinder(radius - (sunk if lies else 0.0), RIM)
         rims = transform_points(primitive.X_OP.matrix(), _rim_points(radius, length))
-        feet = _drawn_in(rims, X_WO)
+        feet = _drawn_in(rims, X_WO, rims)
     for k, foot in enumerate(feet):
         yield f"foot_{k:03d}", make_pose(p_AB=foot), Sphere(0.0)
 
@@ -181,17 +184,21 @@ def _corner_feet(scene: Scene, name: str, X_WO: Array) -> Array:
     center = np.array(entry.mass_properties.center_of_mass)
     carrying = carrying_corners(corners, up, center, SETTLED)
     placed = corners.copy()
-    placed[carrying] = _drawn_in(corners[carrying], X_WO, SETTLED)
+    placed[carrying] = _drawn_in(corners[carrying], X_WO, corners, SETTLED)
     chosen = support_feet(corners, [up, *ups], rolling, carrying)
-    return _drawn_in(placed[chosen], X_WO)
+    return _drawn_in(placed[chosen], X_WO, corners)
 
 
-def _drawn_in(points: Array, X_WO: Array, most: float = FLAT) -> Array:
+def _drawn_in(points: Array, X_WO: Array, corners: Array, most: float = FLAT) -> Array:
     """Points (N, 3) of O, those that are under the table's top or less than `most` above it moved
-    there, along the vertical."""
+    there, along the vertical: of its lower half, given its corners (M, 3), and no farther than to
+    its middle, so that something is left of what is thin."""
     up = np.round(X_WO[2, :3], 9)
-    heights = X_WO[2, 3] + points @ up
-    moved: Array = points - np.where(heights < most, heights, 0.0)[:, None] * up
+    heights, reach = X_WO[2, 3] + points @ up, X_WO[2, 3] + corners @ up
+    middle = (reach.min() + reach.max()) / 2
+    drawn = heights - min(0.0, middle)
+    low = (heights < most) & (heights <= middle)
+    moved: Array = points - np.where(low, drawn, 0.0)[:, None] * up
     return moved
 
 

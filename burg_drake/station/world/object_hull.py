@@ -12,6 +12,9 @@ from burg_drake.geometry import convex_hull
 from burg_drake.objects.collision import primitive_mesh
 from burg_drake.objects.library import ObjectEntry, ObjectLibrary
 
+KEPT = 1000
+"""Objects whose corners are kept, those that were read last; each takes some kilobytes."""
+
 _READ: dict[tuple[tuple[Path, int], ...], Array] = {}
 """Corners by the files with the times of their last change."""
 
@@ -44,4 +47,7 @@ def _corners(library: ObjectLibrary, files: Sequence[str]) -> Array:
     if key not in _READ:
         points = np.vstack([library.mesh(file).vertices for file in files])
         _READ[key] = points[convex_hull(points).vertices]
-    return _READ[key]
+    corners = _READ[key]
+    while len(_READ) > KEPT:
+        del _READ[next(iter(_READ))]
+    return corners
