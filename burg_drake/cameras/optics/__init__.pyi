@@ -14,7 +14,10 @@ from .intrinsics_file import (
     save_camera_info as save_camera_info,
     save_intrinsics as save_intrinsics,
 )
-from .sensors import SENSORS as SENSORS
+from .sensors import (
+    SENSORS as SENSORS,
+    sensor as sensor,
+)
 from .station_camera import (
     DEFAULT_CAMERA as DEFAULT_CAMERA,
     SIMULATED as SIMULATED,

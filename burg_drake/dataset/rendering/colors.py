@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -26,6 +27,10 @@ WIDEST = 4.0
 further needs another renderer."""
 
 
+Fill = Callable[[Bytes, Array, Intrinsics], Bytes]
+"""From colours (H, W, 3), camera's optical frame in the world and intrinsics to colours."""
+
+
 class DrakeColors:
     """Renders colours from any place.
 
@@ -33,10 +38,13 @@ class DrakeColors:
         query: of the diagram's scene graph, in a context.
         world: its world frame.
         renderer: name of the render engine.
+        fill: puts what is behind everything into its images, if anything.
     """
 
-    def __init__(self, query: QueryObject, world: Any, renderer: str) -> None:
-        self._query, self._world, self._renderer = query, world, renderer
+    def __init__(
+        self, query: QueryObject, world: Any, renderer: str, fill: Fill | None = None
+    ) -> None:
+        self._query, self._world, self._renderer, self._fill = query, world, renderer, fill
 
     def image(self, intrinsics: Intrinsics, X_WC: Array, depth_range: tuple[float, float]) -> Bytes:
         """(H, W, 3) what a camera at `X_WC` sees. A lens with distortion is a pinhole camera that
@@ -65,7 +73,8 @@ class DrakeColors:
         )
         camera = ColorRenderCamera(core, False)
         image = self._query.RenderColorImage(camera, self._world, RigidTransform(X_WC))
-        return np.ascontiguousarray(image.data[..., :3])
+        colors = np.ascontiguousarray(image.data[..., :3])
+        return colors if self._fill is None else self._fill(colors, X_WC, intrinsics)
 
 
 @lru_cache(maxsize=8)

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from functools import cached_property, partial
+from typing import Literal
 
 import numpy as np
 from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.core import Array, InvalidInputError, inverse, nearest, transform_points
+from burg_drake.dataset.appearance import (
+    Appearance,
+    apply_appearance,
+    photometric,
+    with_background,
+)
 from burg_drake.dataset.rendering.colors import DrakeColors
 from burg_drake.dataset.rendering.images import SURROUNDINGS, Images
 from burg_drake.dataset.rendering.ray_scene import RayScene, label_numbers
@@ -18,9 +24,6 @@ from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.station.diagram import build_station_diagram, visible_surfaces
 from burg_drake.station.document import StationLike, as_station
 from burg_drake.station.world import RENDERER
-
-if TYPE_CHECKING:
-    from burg_drake.dataset.appearance import Appearance
 
 ImageKind = Literal["color", "depth", "labels", "normals"]
 KINDS: tuple[ImageKind, ...] = ("color", "depth", "labels", "normals")
@@ -52,7 +55,8 @@ class SceneRenderer:
             station: what is around it.
             appearance: how it looks; as simulated cameras see it if None.
             arm: whether the station's arm is there.
-            colors: whether colours will be asked for; rays alone need no system libraries.
+            colors: whether colours will be asked for; without them, and without an appearance, no
+                system libraries are needed.
 
         Raises:
             MissingDependencyError: a system library of the renderer is missing.
@@ -62,15 +66,14 @@ class SceneRenderer:
         self.numbers = label_numbers((*self.scene.instances, *self.scene.background))
         self._appearance = appearance
         self._built = build_station_diagram(
-            self.scene, self.station, robot="arm" if arm else "none", cameras=colors
+            self.scene,
+            self.station,
+            robot="arm" if arm else "none",
+            cameras=colors or appearance is not None,
         )
-        self._renderer = None
+        self._renderer = RENDERER if colors else None
         if appearance is not None:
-            from burg_drake.dataset.appearance import apply_appearance
-
-            self._renderer = apply_appearance(self._built, appearance, renderer=colors)
-        elif colors:
-            self._renderer = RENDERER
+            self._renderer = apply_appearance(self._built, appearance)
         self._surfaces = visible_surfaces(self._built.plant, self._built.scene_graph)
         self._context = self._built.diagram.CreateDefaultContext()
         self._plant_context = self._built.plant.GetMyMutableContextFromRoot(self._context)
@@ -89,7 +92,7 @@ class SceneRenderer:
         Args:
             view: the camera.
             kinds: of images.
-            rng: draws the noise of the colours' sensor, where the appearance has one.
+            rng: draws the noise of colours, where the appearance has some.
 
         Raises:
             InvalidInputError: an image of another kind, or colours of a renderer without them.
@@ -100,17 +103,16 @@ class SceneRenderer:
                 raise InvalidInputError(f"no image of kind {kind!r}; {nearest(kind, KINDS)}")
         self._place_arm(view)
         by_rays = Images()
-        if {"depth", "labels", "normals"} & set(kinds) or self._colors_need_labels:
+        if {"depth", "labels", "normals"} & {*kinds} or self._appearance is not None:
             by_rays = self._ray_scene.images(view, normals="normals" in kinds)
         color = None
         if "color" in kinds:
             X_WC = self.station.document.X_WS.matrix() @ view.X_SC
             color = self._colors.image(view.intrinsics, X_WC, view.depth_range)
             if self._appearance is not None:
-                from burg_drake.dataset.appearance import photometric
-
-                assert by_rays.labels is not None
-                color = photometric(color, by_rays.labels, self._appearance, rng)
+                color = photometric(
+                    color, by_rays.labels, self._appearance, rng or np.random.default_rng(0)
+                )
         return Images(
             color,
             by_rays.depth if "depth" in kinds else None,
@@ -123,10 +125,6 @@ class SceneRenderer:
         self._place_arm(view)
         return self._ray_scene
 
-    @property
-    def _colors_need_labels(self) -> bool:
-        return self._appearance is not None
-
     @cached_property
     def _colors(self) -> DrakeColors:
         if self._renderer is None:
@@ -134,7 +132,10 @@ class SceneRenderer:
         scene_graph = self._built.scene_graph
         context = scene_graph.GetMyContextFromRoot(self._context)
         query = scene_graph.get_query_output_port().Eval(context)
-        return DrakeColors(query, scene_graph.world_frame_id(), self._renderer)
+        fill = None
+        if self._appearance is not None:
+            fill = partial(with_background, look=self._appearance)
+        return DrakeColors(query, scene_graph.world_frame_id(), self._renderer, fill)
 
     def _place_arm(self, view: View) -> None:
         if view.posture == self._posture:

@@ -8,7 +8,11 @@ from .dataset import (
     Dataset as Dataset,
     load_dataset as load_dataset,
 )
-from .document import DatasetDocument as DatasetDocument
+from .document import (
+    FILE as FILE,
+    DatasetDocument as DatasetDocument,
+    load_dataset_document as load_dataset_document,
+)
 from .index import write_index as write_index
 from .sample import Sample as Sample
 from .shard import (

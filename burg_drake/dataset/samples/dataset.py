@@ -10,7 +10,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import overload
 
-from burg_drake.core import DocumentError, InvalidInputError, UnknownNameError
+from burg_drake.core import DocumentError, InvalidInputError, UnknownNameError, nearest
+from burg_drake.core.paths import resolve
 from burg_drake.dataset.samples.document import (
     FILE as DOCUMENT_FILE,
     DatasetDocument,
@@ -21,6 +22,7 @@ from burg_drake.dataset.samples.sample import Sample
 from burg_drake.dataset.samples.sample_files import PARTS, asked_parts
 from burg_drake.dataset.samples.shard import SampleShard, ShardEntry, open_shard
 from burg_drake.dataset.samples.writer import scene_name
+from burg_drake.objects.library import ObjectLibrary, load_library
 from burg_drake.scene.document import Scene, load_scene
 
 
@@ -100,6 +102,38 @@ class Dataset(Sequence[Sample]):
         """
         place = self._scene_place(scene)
         return range(self._ends[place] - self._entries[place].nsamples, self._ends[place])
+
+    @property
+    def name(self) -> str:
+        """Of the data set."""
+        return self.document.name
+
+    @property
+    def objects(self) -> tuple[str, ...]:
+        """Names of the library's objects, in the order of their ids, which count from 1."""
+        return self.document.objects
+
+    @cached_property
+    def library(self) -> ObjectLibrary:
+        """Where these objects are.
+
+        Raises:
+            UnknownNameError: it is not there any more.
+        """
+        return load_library(resolve(self.document.library, "models", self.folder))
+
+    def index(self, value: Sample | str, start: int = 0, stop: int | None = None) -> int:
+        """Index of a sample, by its key or itself.
+
+        Raises:
+            UnknownNameError: no such sample.
+        """
+        key = value if isinstance(value, str) else value.key
+        if key not in self.keys[start:stop]:
+            raise UnknownNameError(
+                f"{self.folder} has no sample {key!r}; {nearest(key, self.keys)}"
+            )
+        return self.keys.index(key, start)
 
     def scene(self, number: int) -> Scene:
         """A scene, with its library.

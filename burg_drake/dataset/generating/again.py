@@ -1,0 +1,80 @@
+"""Makes samples of a data set again: alone, and for checks."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+from burg_drake.core import InvalidInputError
+from burg_drake.core.paths import resolve
+from burg_drake.dataset.generating.recipe import DatasetRecipe, read_recipe
+from burg_drake.dataset.generating.scene_samples import SceneSamples, appearance_of
+from burg_drake.dataset.rendering import Images
+from burg_drake.dataset.samples import (
+    FILE,
+    Dataset,
+    DatasetDocument,
+    DatasetFinding,
+    Sample,
+    check_dataset,
+    load_dataset_document,
+)
+from burg_drake.scene.document import Scene
+from burg_drake.station.document import Station, load_station
+
+
+def sample_again(dataset: Dataset, key: str) -> Sample:
+    """One sample of a generated data set, rendered anew from what is stored with it.
+
+    Args:
+        dataset: made by `generate_dataset`.
+        key: of the sample, such as `000012_003`.
+
+    Returns:
+        The same images, to the byte if all software is the same; without grasps.
+
+    Raises:
+        UnknownNameError: no such sample.
+        InvalidInputError: nobody generated the data set.
+    """
+    stored = dataset.read(dataset.index(key), images=())
+    recipe, station = _made_with(dataset.document, dataset.folder)
+    scene = dataset.scene(stored.scene)
+    samples = SceneSamples(scene, stored.scene, station, recipe, appearance_of(stored))
+    return samples.sample(stored.number, stored.view)
+
+
+def check_generated(folder: str | Path) -> list[DatasetFinding]:
+    """All that is wrong with a data set; depth and labels are rendered anew and compared.
+
+    Args:
+        folder: of a data set made by `generate_dataset`, or by anybody with `DatasetWriter`, whose
+            images are not rendered anew.
+
+    Raises:
+        DocumentError: its document is missing, damaged, or of another version.
+    """
+    folder = Path(folder)
+    document = load_dataset_document(folder / FILE)
+    if document.recipe is None:
+        return check_dataset(folder)
+    recipe, station = _made_with(document, folder)
+
+    @lru_cache(maxsize=1)
+    def renderer(number: int, appearance: str) -> SceneSamples:
+        return SceneSamples(current[0], number, station, recipe, appearance_of(current[1]))
+
+    current: list = []
+
+    def redraw(scene: Scene, sample: Sample) -> Images:
+        current[:] = [scene, sample]
+        return renderer(sample.scene, repr(sample.appearance)).redrawn(sample.view)
+
+    return check_dataset(folder, redraw)
+
+
+def _made_with(document: DatasetDocument, folder: Path) -> tuple[DatasetRecipe, Station]:
+    if document.recipe is None:
+        raise InvalidInputError(f"{folder} was not generated: its document has no recipe")
+    station = load_station(resolve(document.station, "stations", folder))
+    return read_recipe(document.recipe, f"recipe of {folder}"), station

@@ -1,0 +1,152 @@
+"""Data sets: samples of many scenes, by several processes, in a folder that can be continued."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from burg_drake.core import InvalidInputError, content_hash, one_line, software_versions
+from burg_drake.core.paths import name_from, portable_reference
+from burg_drake.core.workers import map_unordered
+from burg_drake.dataset.exchange import write_card
+from burg_drake.dataset.generating.recipe import DatasetRecipe
+from burg_drake.dataset.generating.work import DatasetInputs, SceneWork, make_scene
+from burg_drake.dataset.samples import DatasetDocument, DatasetWriter, load_dataset
+from burg_drake.objects.library import ObjectLibrary
+from burg_drake.scene.document import SceneLike, as_scene
+from burg_drake.station.document import Station, StationLike, as_station
+
+PACKAGES = {
+    "drake": "drake",
+    "numpy": "numpy",
+    "scipy": "scipy",
+    "embreex": "embreex",
+    "opencv": "opencv-python-headless",
+}
+"""What decides about samples, as it is called in `dataset.yaml` and installed."""
+HASH_DIGITS = 16
+
+
+@dataclass(frozen=True)
+class GeneratedDataset:
+    """What is in a folder after generating.
+
+    Attributes:
+        folder: of the data set.
+        new: numbers of the scenes whose samples were made now.
+        known: of those that were there already.
+        failed: one line for each scene that has no samples, by number: they are tried again the
+            next time.
+    """
+
+    folder: Path
+    new: tuple[int, ...]
+    known: tuple[int, ...]
+    failed: dict[int, str]
+
+
+def generate_dataset(
+    scenes: Sequence[SceneLike] | ObjectLibrary,
+    station: StationLike,
+    folder: str | Path,
+    recipe: DatasetRecipe | None = None,
+    *,
+    count: int | None = None,
+    workers: int = 1,
+    progress: Callable[[int, str], None] | None = None,
+) -> GeneratedDataset:
+    """Makes the samples of many scenes, but for those that the folder has.
+
+    Args:
+        scenes: given ones, with files, all of one library; or the library that scenes are sampled
+            from, as `recipe.sampled` says.
+        station: what they stand on.
+        folder: of the data set; new, or one that this function has begun.
+        recipe: how samples are made.
+        count: of sampled scenes; all given ones if None.
+        workers: number of processes; with one this process does it.
+        progress: called after each scene with its number and what has gone wrong, if anything.
+
+    Returns:
+        What is there now. A scene that cannot be sampled or rendered leaves the others as they are.
+
+    Raises:
+        InvalidInputError: the folder holds another data set or is being written, a scene has no
+            file, or the scenes are of several libraries.
+    """
+    station, recipe = as_station(station), recipe or DatasetRecipe()
+    if isinstance(scenes, ObjectLibrary):
+        if recipe.sampled is None or count is None:
+            raise InvalidInputError("sampled scenes need a recipe and their count")
+        library, paths = scenes, [None] * count
+    else:
+        library, recipe, paths = _given(scenes, recipe)
+    folder = Path(folder)
+    document = _document(folder, library, station, recipe)
+    with DatasetWriter(folder, document) as writer:
+        root = library.root if recipe.sampled is not None else None
+        inputs = DatasetInputs(recipe, writer.folder, station.path, root)
+        missing = writer.missing(range(len(paths)))
+        failed: dict[int, str] = {}
+        work = [SceneWork(inputs, number, paths[number]) for number in missing]
+        for one, outcome in map_unordered(make_scene, work, workers):
+            if isinstance(outcome, BaseException):
+                failed[one.number] = one_line(outcome)
+            else:
+                writer.added(outcome)
+            if progress is not None:
+                progress(one.number, failed.get(one.number, ""))
+        writer.finish()
+        _write_card(folder, recipe)
+    new = tuple(number for number in missing if number not in failed)
+    known = tuple(number for number in range(len(paths)) if number not in missing)
+    return GeneratedDataset(folder, new, known, dict(sorted(failed.items())))
+
+
+def _given(
+    scenes: Sequence[SceneLike], recipe: DatasetRecipe
+) -> tuple[ObjectLibrary, DatasetRecipe, list[Path]]:
+    """The library of given scenes, the recipe with their contents, and their files."""
+    if recipe.sampled is not None:
+        raise InvalidInputError("scenes are given or sampled, not both")
+    loaded = [as_scene(scene) for scene in scenes]
+    if not loaded:
+        raise InvalidInputError("no scenes are given")
+    library = loaded[0].library
+    for scene in loaded:
+        if scene.library.root.resolve() != library.root.resolve():
+            raise InvalidInputError(
+                f"{scene.path} is of library {scene.library.root}, {loaded[0].path} of"
+                f" {library.root}; a data set has one library"
+            )
+        if not scene.path.is_file():
+            raise InvalidInputError(f"scene {scene.name!r} has no file; save it first")
+    given = tuple(scene.content for scene in loaded)
+    return library, replace(recipe, given=given), [scene.path for scene in loaded]
+
+
+def _document(
+    folder: Path, library: ObjectLibrary, station: Station, recipe: DatasetRecipe
+) -> DatasetDocument:
+    name = name_from(folder.resolve().name)
+    return DatasetDocument(
+        name=name,
+        objects=tuple(library.objects),
+        library=portable_reference(library.root, folder),
+        station=portable_reference(station.path, folder),
+        library_content=content_hash(library.content)[:HASH_DIGITS],
+        station_content=station.content[:HASH_DIGITS],
+        versions=software_versions(PACKAGES),
+        recipe=recipe.plain(),
+    )
+
+
+def _write_card(folder: Path, recipe: DatasetRecipe) -> None:
+    dataset = load_dataset(folder)
+    if not len(dataset):
+        return
+    facts = {"seed": str(recipe.seed), "views of each scene": str(recipe.views)}
+    if recipe.sensor:
+        facts["sensor"] = recipe.sensor
+    write_card(dataset, folder, facts=facts)

@@ -1,0 +1,88 @@
+"""A scene and its samples, made and written by one process; what `generate` hands out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from burg_drake.core import InvalidInputError, SimulationError
+from burg_drake.dataset.generating.recipe import DatasetRecipe
+from burg_drake.dataset.generating.scene_samples import SceneSamples
+from burg_drake.dataset.samples import ShardEntry, write_scene
+from burg_drake.generation import SceneSampler
+from burg_drake.objects.library import load_library
+from burg_drake.scene.document import Scene, load_scene
+from burg_drake.station.document import Station, load_station
+
+
+@dataclass(frozen=True)
+class DatasetInputs:
+    """What all scenes of a data set are made with.
+
+    Attributes:
+        recipe: of the data set.
+        folder: of the data set.
+        station: its file.
+        library: folder of the objects of sampled scenes; None for given ones.
+    """
+
+    recipe: DatasetRecipe
+    folder: Path
+    station: Path
+    library: Path | None
+
+
+@dataclass(frozen=True)
+class SceneWork:
+    """A scene to make samples of.
+
+    Attributes:
+        inputs: of the data set.
+        number: of the scene.
+        path: of its document; None if it is sampled.
+    """
+
+    inputs: DatasetInputs
+    number: int
+    path: Path | None
+
+
+def make_scene(work: SceneWork) -> ShardEntry:
+    """Writes a scene and its samples.
+
+    Raises:
+        SimulationError: no scene was accepted, or Drake ended by a failed condition.
+        Exception: what cannot be rendered is one failure.
+    """
+    inputs = work.inputs
+    try:
+        station = _station(inputs.station)
+        scene = load_scene(work.path) if work.path is not None else _sampled(work)
+        if work.path is not None and scene.content != inputs.recipe.given[work.number]:
+            raise InvalidInputError(f"{work.path} was changed meanwhile; generate again")
+        samples = SceneSamples(scene, work.number, station, inputs.recipe)
+        return write_scene(inputs.folder, work.number, scene, samples)
+    except SystemExit as error:  # DRAKE_DEMAND ends this way
+        raise SimulationError(f"Drake gave up: {error}") from error
+
+
+def _sampled(work: SceneWork) -> Scene:
+    sampled = _sampler(work.inputs).sample(work.number, work.inputs.folder / "scenes")
+    if not sampled.accepted:
+        reasons = ", ".join(f"{count} x {reason}" for reason, count in sampled.refused.items())
+        raise SimulationError(f"no scene was accepted in {sampled.attempts} attempts ({reasons})")
+    return sampled.scene
+
+
+@lru_cache(maxsize=1)
+def _sampler(inputs: DatasetInputs) -> SceneSampler:
+    assert inputs.recipe.sampled is not None and inputs.library is not None
+    return SceneSampler(
+        inputs.recipe.sampled, load_library(inputs.library), _station(inputs.station)
+    )
+
+
+@lru_cache(maxsize=1)
+def _station(path: Path) -> Station:
+    return load_station(path)
