@@ -205,7 +205,12 @@ def scene_of(number: int, *, twice: bool = False, **more: object) -> list[Sample
 def some_grasps() -> LabelledGrasps:
     """Of instances 1 and 2, with every kind of outcome."""
     outcomes = ["lifted", "lifted", "lifted_disturbed", "slipped", "", "simulation_failed"]
-    X_CG = make_pose(rotation_from_rpy(np.arange(18.0).reshape(6, 3) / 9), np.eye(6)[:, :3] + 0.2)
+    rpy = np.zeros((6, 3))
+    rpy[:, 2] = np.arange(6) * 0.4  # about the optical axis
+    rpy[1, 0] = 0.8
+    X_CG = make_pose(
+        rotation_from_rpy(rpy), np.array([[0.02, -0.01, 0.3]] * 6) + 0.01 * np.eye(6, 3)
+    )
     slip = np.array([0.0, 0.01, 0.04, np.nan, np.nan, np.nan])
     return LabelledGrasps(
         X_CG=X_CG,

@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 
 from burg_drake.core import InvalidInputError, UnknownNameError
 from burg_drake.dataset.exchange import (
+    StoredSamples,
     contact_sheet,
     grasp_scores,
     write_bop,
@@ -29,8 +30,9 @@ from burg_drake.dataset.exchange import (
     write_graspnet,
     write_webdataset,
 )
-from burg_drake.dataset.labels import LabelledGrasps
+from burg_drake.dataset.samples import load_dataset
 from burg_drake.objects.library import ObjectLibrary
+from tests.dataset import drawn_samples
 from tests.dataset.polyhedra import CAMERA, COLORS, InMemory, scene_of, some_grasps, write_library
 
 
@@ -248,16 +250,10 @@ def test_coco_is_read_by_its_own_library(coco: Path) -> None:
 # --- GraspNet -------------------------------------------------------------------------------------
 
 
-def rectangles(grasps: LabelledGrasps, intrinsics: object) -> NDArray:
-    rows = np.arange(5.0 * len(grasps)).reshape(-1, 5)
-    rows[1] = np.nan
-    return rows
-
-
 @pytest.fixture(scope="module")
 def graspnet(single: InMemory, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("graspnet") / "data"
-    write_graspnet(single, folder, rectangles=rectangles)
+    write_graspnet(single, folder)
     return folder / "scenes/scene_0000/realsense"
 
 
@@ -294,8 +290,14 @@ def test_graspnet_has_grasps_with_scores(graspnet: Path) -> None:
     known = [1.0, 0.85, 0.4, 0.0]
     np.testing.assert_allclose(grasp_scores(grasps), [*known, np.nan, np.nan])
     rows = np.load(graspnet / "rect/0000.npy")
-    np.testing.assert_allclose(rows[:, 5], [1.0, 0.4, 0.0])  # the second has no rectangle
-    assert rows[:, 6].tolist() == [1, 1, 0] and rows[1, :5].tolist() == [10, 11, 12, 13, 14]
+    np.testing.assert_allclose(rows[:, 5:], [[1, 1], [0.4, 1], [0, 0]])  # the second is oblique
+    for row, X_CG in zip(rows, grasps.X_CG[[0, 2, 3]], strict=True):
+        p, closing = X_CG[:3, 3], X_CG[:3, 0]
+        ends = [(CAMERA.K @ q / q[2])[:2] for q in (p, p + 0.02 * closing, p - 0.02 * closing)]
+        np.testing.assert_allclose(row[:2], ends[0], atol=1e-3)
+        off = min(np.linalg.norm(row[2:4] - end) for end in ends[1:])  # either finger
+        assert off < 1e-3
+        assert row[4] == pytest.approx(91 * 0.02 / p[2], rel=0.02)
     rows = np.load(graspnet / "grasps/0000.npy")
     assert rows.shape == (4, 17) and rows[:, 16].tolist() == [1, 0, 1, 0]
     np.testing.assert_allclose(rows[:, 0], known, atol=1e-6)
@@ -402,6 +404,21 @@ def test_sheet_shows_colour_depth_and_labels(samples: InMemory, tmp_path: Path) 
     page = (tmp_path / "sheet.html").read_text()
     assert page.count("data:image/png;base64,") == 4 and "Two &lt;scenes&gt;" in page
     assert "000005_001, camera sphere, 3 of 3 seen" in page
+
+
+def test_a_data_set_on_disk_is_exported(tmp_path: Path) -> None:
+    dataset = load_dataset(drawn_samples.write(tmp_path / "data"))
+    stored = StoredSamples(dataset)
+    write_webdataset(stored, tmp_path / "out")
+    write_card(stored, tmp_path / "card")
+    with tarfile.open(tmp_path / "out/shard-000000.tar") as tar:
+        for sample in dataset:
+            content = json.load(tar.extractfile(f"{sample.key}.json"))
+            ids = {x["object"]: x["object_id"] for x in content["instances"]}
+            assert ids == {name: k for k, name in enumerate(dataset.document.objects, start=1)}
+            seg = decoded(tar.extractfile(f"{sample.key}.seg.png").read())
+            np.testing.assert_array_equal(seg, sample.images.labels)
+    assert "Object library `household`" in (tmp_path / "card/README.md").read_text()
 
 
 # --- what cannot be written -----------------------------------------------------------------------
