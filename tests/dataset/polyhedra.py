@@ -70,16 +70,21 @@ def first_depth(name: str, X_CO: NDArray, u: NDArray, v: NDArray) -> NDArray:
     return np.where((enter < leave) & (enter > 0) & ~outside, enter, np.inf)
 
 
-def write_library(folder: Path) -> ObjectLibrary:
-    """A library of both bodies, with colours."""
+def write_library(folder: Path, texture: bytes = b"") -> ObjectLibrary:
+    """A library of both bodies with colours, or a texture: corner k is at (k / 8, k / 16)."""
     entries = {}
     for name, (corners, faces) in SHAPES.items():
         place = folder / name
         place.mkdir(parents=True)
         rgb = " ".join(f"{c / 255:.6f}" for c in COLORS[name])
-        (place / "mesh.mtl").write_text(f"newmtl paint\nKd {rgb}\n")
+        (place / "image.png").write_bytes(texture)
+        map_Kd = "map_Kd image.png\n" if texture else ""
+        (place / "mesh.mtl").write_text(f"newmtl paint\nKd {rgb}\n{map_Kd}")
         lines = ["mtllib mesh.mtl", *(f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in corners)]
-        lines += ["usemtl paint", *(f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces)]
+        lines += [f"vt {k / 8} {k / 16}" for k in range(len(corners))] if texture else []
+        form = "{0}/{0}" if texture else "{0}"
+        lines.append("usemtl paint")
+        lines += [f"f {' '.join(form.format(k + 1) for k in face)}" for face in faces]
         (place / "mesh.obj").write_text("\n".join(lines) + "\n")
         entries[name] = ObjectEntry(
             mesh=f"{name}/mesh.obj",
@@ -204,13 +209,18 @@ def scene_of(number: int, *, twice: bool = False, **more: object) -> list[Sample
 
 def some_grasps() -> LabelledGrasps:
     """Of instances 1 and 2, with every kind of outcome."""
-    outcomes = ["lifted", "lifted", "lifted_disturbed", "slipped", "", "simulation_failed"]
-    X_CG = make_pose(rotation_from_rpy(np.arange(18.0).reshape(6, 3) / 9), np.eye(6)[:, :3] + 0.2)
-    slip = np.array([0.0, 0.01, 0.04, np.nan, np.nan, np.nan])
+    outcomes = ["", "lifted", "lifted", "lifted_disturbed", "slipped", "simulation_failed"]
+    rpy = np.zeros((6, 3))
+    rpy[:, 2] = np.arange(6) * 0.4  # about the optical axis
+    rpy[2, 0] = 0.8
+    X_CG = make_pose(
+        rotation_from_rpy(rpy), np.array([[0.02, -0.01, 0.3]] * 6) + 0.01 * np.eye(6, 3)
+    )
+    slip = np.array([np.nan, 0.0, 0.01, 0.04, np.nan, np.nan])
     return LabelledGrasps(
         X_CG=X_CG,
         width=np.full(6, 0.04),
-        number=np.array([1, 2, 1, 2, 1, 1], np.uint16),
+        number=np.array([1, 1, 2, 1, 2, 1], np.uint16),
         outcome=np.array(outcomes),
         margins={"slip": slip},
     )

@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 
 from burg_drake.core import InvalidInputError, UnknownNameError
 from burg_drake.dataset.exchange import (
+    StoredSamples,
     contact_sheet,
     grasp_scores,
     write_bop,
@@ -29,9 +30,18 @@ from burg_drake.dataset.exchange import (
     write_graspnet,
     write_webdataset,
 )
-from burg_drake.dataset.labels import LabelledGrasps
+from burg_drake.dataset.samples import load_dataset
 from burg_drake.objects.library import ObjectLibrary
-from tests.dataset.polyhedra import CAMERA, COLORS, InMemory, scene_of, some_grasps, write_library
+from tests.dataset import drawn_samples
+from tests.dataset.polyhedra import (
+    BOX_CORNERS,
+    CAMERA,
+    COLORS,
+    InMemory,
+    scene_of,
+    some_grasps,
+    write_library,
+)
 
 
 @pytest.fixture(scope="module")
@@ -176,6 +186,31 @@ def test_bop_describes_its_models(bop: Path) -> None:
         assert gaps.max() < 1e-6
 
 
+def test_bop_has_models_to_measure_errors_with(bop: Path) -> None:
+    for name, corners, (lower, upper) in (("1", 6, (-45, 45)), ("2", 8, (-30, 70))):
+        vertices, faces = read_ply(bop / f"models_eval/obj_00000{name}.ply")
+        points = np.stack([vertices[k] for k in "xyz"], axis=1)
+        assert len(np.unique(points, axis=0)) == corners and len(faces) == 2 * corners - 4
+        assert (points.min(), points.max()) == (lower, upper)
+    assert (bop / "models_eval/models_info.json").exists()
+
+
+def test_bop_has_textures(samples: InMemory, tmp_path: Path) -> None:
+    picture = np.arange(48, dtype=np.uint8).reshape(4, 4, 3)
+    library = write_library(tmp_path / "library", cv2.imencode(".png", picture)[1].tobytes())
+    write_bop(replace(samples, library=library), tmp_path / "out")
+    models = tmp_path / "out/models"
+    assert "comment TextureFile obj_000002.png\n" in (models / "obj_000002.ply").read_text()
+    np.testing.assert_array_equal(image(models / "obj_000002.png"), picture)
+    vertices, _ = read_ply(models / "obj_000002.ply")
+    points = np.stack([vertices[k] for k in "xyz"], axis=1)
+    for point, u, v in zip(points, vertices["texture_u"], vertices["texture_v"], strict=True):
+        k = np.linalg.norm(1000 * BOX_CORNERS - point, axis=1).argmin()
+        assert (u, v) == (k / 8, k / 16)
+    infos = json.loads((models / "models_info.json").read_text())
+    assert "symmetries_discrete" not in infos["2"]  # nobody knows what is on it
+
+
 def test_bop_has_targets_of_what_is_tested(samples: InMemory, tmp_path: Path) -> None:
     assert write_bop(samples, tmp_path / "out", split="test") == ()
     targets = json.loads((tmp_path / "out/test_targets_bop19.json").read_text())
@@ -248,16 +283,10 @@ def test_coco_is_read_by_its_own_library(coco: Path) -> None:
 # --- GraspNet -------------------------------------------------------------------------------------
 
 
-def rectangles(grasps: LabelledGrasps, intrinsics: object) -> NDArray:
-    rows = np.arange(5.0 * len(grasps)).reshape(-1, 5)
-    rows[1] = np.nan
-    return rows
-
-
 @pytest.fixture(scope="module")
 def graspnet(single: InMemory, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("graspnet") / "data"
-    write_graspnet(single, folder, rectangles=rectangles)
+    write_graspnet(single, folder)
     return folder / "scenes/scene_0000/realsense"
 
 
@@ -292,17 +321,34 @@ def test_graspnet_has_poses_labels_and_depth(graspnet: Path, single: InMemory) -
 def test_graspnet_has_grasps_with_scores(graspnet: Path) -> None:
     grasps = some_grasps()
     known = [1.0, 0.85, 0.4, 0.0]
-    np.testing.assert_allclose(grasp_scores(grasps), [*known, np.nan, np.nan])
+    np.testing.assert_allclose(grasp_scores(grasps), [np.nan, *known, np.nan])
     rows = np.load(graspnet / "rect/0000.npy")
-    np.testing.assert_allclose(rows[:, 5], [1.0, 0.4, 0.0])  # the second has no rectangle
-    assert rows[:, 6].tolist() == [1, 1, 0] and rows[1, :5].tolist() == [10, 11, 12, 13, 14]
+    np.testing.assert_allclose(rows[:, 5:], [[1, 1], [0.4, 1], [0, 0]])  # the second is oblique
+    for row, X_CG in zip(rows, grasps.X_CG[[1, 3, 4]], strict=True):
+        p, closing = X_CG[:3, 3], X_CG[:3, 0]
+        ends = [(CAMERA.K @ q / q[2])[:2] for q in (p, p + 0.02 * closing, p - 0.02 * closing)]
+        np.testing.assert_allclose(row[:2], ends[0], atol=1e-3)
+        off = min(np.linalg.norm(row[2:4] - end) for end in ends[1:])  # either finger
+        assert off < 1e-3
+        assert row[4] == pytest.approx(91 * 0.02 / p[2], rel=0.02)
     rows = np.load(graspnet / "grasps/0000.npy")
     assert rows.shape == (4, 17) and rows[:, 16].tolist() == [1, 0, 1, 0]
     np.testing.assert_allclose(rows[:, 0], known, atol=1e-6)
     R = rows[:, 4:13].reshape(-1, 3, 3)
-    np.testing.assert_allclose(R[..., 0], grasps.X_CG[:4, :3, 2], atol=1e-6)  # approach
-    closing = np.abs((R[..., 1] * grasps.X_CG[:4, :3, 0]).sum(axis=1))
+    np.testing.assert_allclose(R[..., 0], grasps.X_CG[1:5, :3, 2], atol=1e-6)  # approach
+    closing = np.abs((R[..., 1] * grasps.X_CG[1:5, :3, 0]).sum(axis=1))
     np.testing.assert_allclose(closing, 1.0, atol=1e-6)  # along x, either finger first
+
+
+def test_graspnet_has_a_folder_for_each_camera(single: InMemory, tmp_path: Path) -> None:
+    wrist = replace(zoomed(single)[1].view, camera="wrist")
+    data = replace(single, samples=(single[0], replace(single[1], view=wrist)))
+    write_graspnet(data, tmp_path / "out", camera=None)
+    scene = tmp_path / "out/scenes/scene_0000"
+    assert np.load(scene / "wrist/camK.npy")[0, 0] == 80 and (scene / "sphere/camK.npy").exists()
+    np.testing.assert_allclose(np.load(scene / "wrist/cam0_wrt_table.npy"), wrist.X_SC)
+    vertices, _ = read_ply(tmp_path / "out/models/000/nontextured.ply")
+    assert (vertices["x"].min(), vertices["z"].max()) == (-0.045, 0.045)
 
 
 def test_graspnet_is_the_same_each_time(graspnet: Path, single: InMemory, tmp_path: Path) -> None:
@@ -343,7 +389,7 @@ def test_webdataset_has_shards_of_whole_samples(samples: InMemory, tmp_path: Pat
             np.testing.assert_array_equal(mask_of(entry["amodal"]), label.amodal)
             assert data.objects[entry["object_id"] - 1] == label.object
     grasps = json.loads(files["000003_000.json"])["grasps"]
-    assert grasps["margins"]["slip"] == [0.0, 0.01, 0.04, None, None, None]
+    assert grasps["margins"]["slip"] == [None, 0.0, 0.01, 0.04, None, None]
     twice = decoded(files["000003_000.sensor.png"]).astype(int)
     assert np.abs(twice - 2 * decoded(files["000003_000.depth.png"])).max() <= 1
 
@@ -397,11 +443,27 @@ def test_sheet_shows_colour_depth_and_labels(samples: InMemory, tmp_path: Path) 
     there = depth > 0
     assert np.corrcoef(depth[there], brightness[there])[0, 1] < -0.9  # bright is near
     beside = first[:, 2 * panel + 12 : 3 * panel + 12].astype(int)
-    assert np.abs(beside - first[:, :panel])[inner].sum(axis=-1).min() > 10
+    assert np.ptp(beside[inner], axis=-1).min() > 10  # tinted, and the rest is grey
+    assert np.ptp(beside[labels == 0], axis=-1).min() == 0
     contact_sheet(samples, tmp_path / "sheet.html", title="Two <scenes>")
     page = (tmp_path / "sheet.html").read_text()
     assert page.count("data:image/png;base64,") == 4 and "Two &lt;scenes&gt;" in page
     assert "000005_001, camera sphere, 3 of 3 seen" in page
+
+
+def test_a_data_set_on_disk_is_exported(tmp_path: Path) -> None:
+    dataset = load_dataset(drawn_samples.write(tmp_path / "data"))
+    stored = StoredSamples(dataset)
+    write_webdataset(stored, tmp_path / "out")
+    write_card(stored, tmp_path / "card")
+    with tarfile.open(tmp_path / "out/shard-000000.tar") as tar:
+        for sample in dataset:
+            content = json.load(tar.extractfile(f"{sample.key}.json"))
+            ids = {x["object"]: x["object_id"] for x in content["instances"]}
+            assert ids == {name: k for k, name in enumerate(dataset.document.objects, start=1)}
+            seg = decoded(tar.extractfile(f"{sample.key}.seg.png").read())
+            np.testing.assert_array_equal(seg, sample.images.labels)
+    assert "Object library `household`" in (tmp_path / "card/README.md").read_text()
 
 
 # --- what cannot be written -----------------------------------------------------------------------
@@ -443,6 +505,8 @@ def zoomed(data: InMemory) -> InMemory:
         (write_graspnet, lambda d: d, "scene 5 has object gem twice"),
         (write_coco, lambda d: replace(d, objects=("gem",)), "object 'box' of sample 000003_000"),
         (lambda d, f: write_bop(d, f, sensor_depth=True), lambda d: d, "no depth of a simulated"),
+        (lambda d, f: write_bop(d, f, depth_unit=0.0), lambda d: d, "it must be above 0"),
+        (lambda d, f: write_webdataset(d, f, shard_size=0), lambda d: d, "shard size 0 must"),
     ],
 )
 def test_what_cannot_be_expressed_is_named(

@@ -1,6 +1,6 @@
 """COCO: images, and one JSON file of all instances in them.
 
-The format is that of cocodataset.org/#format-data. Masks are run lengths, see `run_length`; boxes
+The format is that of cocodataset.org/#format-data. Masks are run lengths as text; boxes
 and areas are those of what is visible. Boxes are [x, y, width, height] in whole pixels, from the
 edge of the first to that of the last.
 """
@@ -13,8 +13,8 @@ from typing import Any, Literal
 
 from burg_drake.dataset.exchange.folder import new_folder
 from burg_drake.dataset.exchange.image_files import color_file
-from burg_drake.dataset.exchange.run_length import mask_text
 from burg_drake.dataset.exchange.source import Samples, object_index, require_images
+from burg_drake.dataset.labels import encode_mask
 from burg_drake.dataset.samples import Sample
 
 IMAGES, INSTANCES = "images", "instances.json"
@@ -85,7 +85,7 @@ def _annotations(objects: tuple[str, ...], sample: Sample) -> list[dict[str, Any
                 "category_id": object_index(objects, sample, label) + 1,
                 "bbox": list(label.visible_box),
                 "area": int(mask.sum()),
-                "segmentation": {"size": list(mask.shape), "counts": mask_text(mask)},
+                "segmentation": {"size": list(mask.shape), "counts": encode_mask(mask)},
                 "iscrowd": 0,
             }
         )

@@ -11,7 +11,8 @@ graspnet/graspnet-baseline (dataset/graspnet_dataset.py):
   the frame of the table: here of the scene.
 - `camK.npy` is one matrix for all views of a scene.
 - A row of `rect` is center_x, center_y, open_x, open_y, height, score, object id: the middle, the
-  middle of the edge of one finger, and the length of that edge [pixels].
+  middle of the edge of one finger, and the length of that edge [pixels]. Only grasps that approach
+  along the optical axis have one, see `grasp_rectangles`.
 
 Its labels of grasps on whole objects (`grasp_label`, `collision_label`: 300 directions, 12 angles
 and 4 depths at each of thousands of points) cannot be made of grasps that were judged one by one.
@@ -21,7 +22,6 @@ Those go to `grasps`, a folder of ours: files that the API's `GraspGroup.from_np
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -30,8 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import savemat
 
-from burg_drake.cameras.optics import Intrinsics
-from burg_drake.core import Array, InvalidInputError, inverse, quaternion_from_rotation
+from burg_drake.core import Array, Booleans, InvalidInputError, inverse, quaternion_from_rotation
 from burg_drake.core.grasps import GraspSet, Outcome
 from burg_drake.dataset.exchange.folder import new_folder
 from burg_drake.dataset.exchange.image_files import depth_numbers, png
@@ -44,13 +43,9 @@ from burg_drake.dataset.exchange.source import (
     require_pinhole,
     scenes_of,
 )
-from burg_drake.dataset.labels import LabelledGrasps
+from burg_drake.dataset.labels import LabelledGrasps, grasp_rectangles
 from burg_drake.dataset.samples import Sample
 from burg_drake.formats import write_grasp_file
-
-Rectangles = Callable[[LabelledGrasps, Intrinsics], Array]
-"""Makes rectangles of grasps: (N, 5) center_x, center_y, open_x, open_y, height [pixels]; nan for a
-grasp that has none."""
 
 DEPTH_UNIT = 1e-3
 """What 1 stands for in a depth image [m]."""
@@ -95,7 +90,7 @@ def write_graspnet(
     folder: str | Path,
     *,
     camera: str | None = DEFAULT_CAMERA,
-    rectangles: Rectangles | None = None,
+    opening: float | None = None,
     sensor_depth: bool = False,
 ) -> tuple[str, ...]:
     """Writes a data set in the layout of GraspNet-1Billion. Object ids are positions in
@@ -106,7 +101,8 @@ def write_graspnet(
         folder: new or empty.
         camera: name of the folder of all views; None for one folder for each camera of a scene, by
             its own name.
-        rectangles: makes those of `rect`; there are none if None.
+        opening: distance of the pads, for rectangles of grasps [m]; each grasp's own width if None,
+            and no rectangle where it is not known.
         sensor_depth: depth of the simulated sensor, and not the exact one.
 
     Returns:
@@ -135,10 +131,8 @@ def write_graspnet(
             for sample in views:
                 name = camera or sample.view.camera
                 if name not in cameras:
-                    cameras[name] = _Camera(samples.objects, scene, name, rectangles)
+                    cameras[name] = _Camera(samples.objects, scene, name, opening)
                 cameras[name].add(sample, depth_of(sample, "GraspNet", sensor=sensor_depth))
-                if rectangles is None and sample.grasps is not None:
-                    lost.add("Rectangles of grasps were not asked for.")
             for one in cameras.values():
                 one.finish()
     return tuple(sorted(lost))
@@ -148,10 +142,10 @@ class _Camera:
     """The folder of a camera in a scene while it is written."""
 
     def __init__(
-        self, objects: tuple[str, ...], scene: Path, name: str, rectangles: Rectangles | None
+        self, objects: tuple[str, ...], scene: Path, name: str, opening: float | None
     ) -> None:
         self._objects, self._scene, self._folder = objects, scene, scene / name
-        self._rectangles = rectangles
+        self._opening = opening
         self._X_SC: list[Array] = []
         self._K: Array | None = None
         self._ids: list[int] = []
@@ -222,25 +216,44 @@ class _Camera:
         objects = np.array([by_number[int(n)] for n in grasps.number], dtype=np.int64)
         scores = grasp_scores(grasps)
         known = np.isfinite(scores)
-        if known.any():
-            (self._folder / "grasps").mkdir(exist_ok=True)
-            chosen = GraspSet.create(
-                grasps.X_CG[known],
-                object=np.array(self._objects)[objects[known]],
-                width=grasps.width[known],
-                score=scores[known],
-                columns={"object_id": objects[known]},
-            )
-            write_grasp_file(chosen, self._folder / "grasps" / f"{name}.npy", "graspnet")
-        if self._rectangles is not None:
-            (self._folder / "rect").mkdir(exist_ok=True)
-            shapes = self._rectangles(grasps, sample.view.intrinsics)
-            rows = np.column_stack([shapes, scores, objects]).astype(np.float32)
-            kept = rows[np.isfinite(rows).all(axis=1)]
-            np.save(self._folder / "rect" / f"{name}.npy", kept)
+        for kind in ("grasps", "rect"):
+            (self._folder / kind).mkdir(exist_ok=True)
+        chosen = GraspSet.create(
+            grasps.X_CG[known],
+            object=np.array(self._objects)[objects[known]],
+            width=grasps.width[known],
+            score=scores[known],
+            columns={"object_id": objects[known]},
+        )
+        write_grasp_file(chosen, self._folder / "grasps" / f"{name}.npy", "graspnet")
+        rows = self._rectangles(sample, grasps, np.column_stack([scores, objects]))
+        np.save(self._folder / "rect" / f"{name}.npy", rows.astype(np.float32))
+
+    def _rectangles(self, sample: Sample, grasps: LabelledGrasps, rated: Array) -> Array:
+        """(K, 7) rows of `rect` of the grasps whose score and opening are known; `rated` has scores
+        and object ids."""
+        known = np.isfinite(rated[:, 0])
+        if self._opening is None:
+            known &= np.isfinite(grasps.width)
+        found = grasp_rectangles(
+            _subset(grasps, known), sample.view.intrinsics, opening=self._opening
+        )
+        along = np.stack([np.cos(found.angle), np.sin(found.angle)], axis=-1)
+        edge = found.center + 0.5 * found.opening[:, None] * along
+        return np.column_stack([found.center, edge, found.height, rated[known][found.grasp]])
 
     def _write(self, kind: str, name: str, content: bytes) -> None:
         (self._folder / kind / name).write_bytes(content)
+
+
+def _subset(grasps: LabelledGrasps, kept: Booleans) -> LabelledGrasps:
+    return LabelledGrasps(
+        X_CG=grasps.X_CG[kept],
+        width=grasps.width[kept],
+        number=grasps.number[kept],
+        outcome=grasps.outcome[kept],
+        margins={name: values[kept] for name, values in grasps.margins.items()},
+    )
 
 
 def _meta(sample: Sample, ids: list[int]) -> bytes:

@@ -20,9 +20,8 @@ import numpy as np
 from burg_drake.core import InvalidInputError
 from burg_drake.dataset.exchange.folder import new_folder
 from burg_drake.dataset.exchange.image_files import color_file, depth_numbers, png
-from burg_drake.dataset.exchange.run_length import mask_text
 from burg_drake.dataset.exchange.source import Samples, object_index
-from burg_drake.dataset.labels import InstanceLabel, LabelledGrasps
+from burg_drake.dataset.labels import InstanceLabel, LabelledGrasps, encode_mask
 from burg_drake.dataset.samples import Sample
 
 DEPTH_UNIT = 1e-4
@@ -136,7 +135,7 @@ def _instance(objects: tuple[str, ...], sample: Sample, label: InstanceLabel) ->
         "visibility": label.visibility,
         "visible_box": label.visible_box,
         "amodal_box": label.amodal_box,
-        "amodal": {"size": list(label.amodal.shape), "counts": mask_text(label.amodal)},
+        "amodal": {"size": list(label.amodal.shape), "counts": encode_mask(label.amodal)},
     }
 
 
