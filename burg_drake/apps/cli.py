@@ -18,8 +18,9 @@ from collections.abc import Sequence
 from functools import cache
 
 from burg_drake import __version__
-from burg_drake.apps import ar, camera, grasps, hand, library, ros, scene, station, trials
+from burg_drake.apps import ar, camera, dataset, grasps, hand, library, ros, scene, station, trials
 from burg_drake.apps.comparison import compare, gap
+from burg_drake.apps.dataset import render
 from burg_drake.apps.grasps import frames
 from burg_drake.apps.options import Parser, examples
 from burg_drake.apps.runs import evaluate, merge, reach, replay, report, robustness, status
@@ -59,6 +60,8 @@ VERBS = (
     report,
     trials,
     compare,
+    render,
+    dataset,
     station,
     hand,
     frames,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from pathlib import Path
 
 from burg_drake.core import InvalidInputError
@@ -60,15 +59,14 @@ def check_generated(folder: str | Path) -> list[DatasetFinding]:
         return check_dataset(folder)
     recipe, station = _made_with(document, folder)
 
-    @lru_cache(maxsize=1)
-    def renderer(number: int, appearance: str) -> SceneSamples:
-        return SceneSamples(current[0], number, station, recipe, appearance_of(current[1]))
-
-    current: list = []
+    last: list[tuple[tuple[int, str], SceneSamples]] = []
 
     def redraw(scene: Scene, sample: Sample) -> Images:
-        current[:] = [scene, sample]
-        return renderer(sample.scene, repr(sample.appearance)).redrawn(sample.view)
+        key = sample.scene, repr(sample.appearance)
+        if not last or last[0][0] != key:
+            appearance = appearance_of(sample)
+            last[:] = [(key, SceneSamples(scene, sample.scene, station, recipe, appearance))]
+        return last[0][1].redrawn(sample.view)
 
     return check_dataset(folder, redraw)
 

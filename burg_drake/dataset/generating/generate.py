@@ -76,6 +76,7 @@ def generate_dataset(
             file, or the scenes are of several libraries.
     """
     station, recipe = as_station(station), recipe or DatasetRecipe()
+    paths: Sequence[Path | None]
     if isinstance(scenes, ObjectLibrary):
         if recipe.sampled is None or count is None:
             raise InvalidInputError("sampled scenes need a recipe and their count")

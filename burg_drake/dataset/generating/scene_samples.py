@@ -59,14 +59,17 @@ class SceneSamples:
         Raises:
             InvalidInputError: a view of the scene cannot be found.
         """
-        recipe, given = self._recipe, {}
+        recipe, intrinsics, depth_range = self._recipe, None, None
         if recipe.sensor:
             device = sensor(recipe.sensor)
-            given = {
-                "intrinsics": device.depth_camera(recipe.size),
-                "depth_range": device.depth_range,
-            }
-        views = ViewSampler(self._scene, self._station, recipe.viewpoints, **given)
+            intrinsics, depth_range = device.depth_camera(recipe.size), device.depth_range
+        views = ViewSampler(
+            self._scene,
+            self._station,
+            recipe.viewpoints,
+            intrinsics=intrinsics,
+            depth_range=depth_range,
+        )
         grasps = self._grasps()
         for number in range(recipe.views):
             view = views.sample(rng_from("dataset view", recipe.seed, self._number, number))

@@ -14,6 +14,10 @@ from .document import (
     load_dataset_document as load_dataset_document,
 )
 from .index import write_index as write_index
+from .png import (
+    depth_unit_of as depth_unit_of,
+    encode_image as encode_image,
+)
 from .sample import Sample as Sample
 from .shard import (
     ShardEntry as ShardEntry,

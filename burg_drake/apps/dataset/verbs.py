@@ -1,0 +1,308 @@
+"""`burg-drake dataset`: generate, check, show and export training data."""
+
+from __future__ import annotations
+
+import argparse
+import glob
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.options import (
+    Parser,
+    add_group,
+    add_options,
+    add_quiet,
+    add_station,
+    add_verb,
+    add_workers,
+    positive_int,
+)
+
+if TYPE_CHECKING:
+    from burg_drake.dataset.generating import DatasetRecipe
+    from burg_drake.objects.library import ObjectLibrary
+    from burg_drake.scene.document import Scene, SceneRecipe
+    from burg_drake.station.document import Station
+
+FORMATS = ("bop", "coco", "graspnet", "webdataset")
+
+
+def add_to(verbs: Any) -> None:
+    """Adds the verbs."""
+    group = add_group(verbs, "dataset", "training data: generate, check, show and export it")
+    add_verb(
+        group,
+        "generate",
+        run_generate,
+        "render views of many scenes with labels",
+        "burg-drake dataset generate --scenes 'scenes/*.yaml' --views 20 -o data",
+        "burg-drake dataset generate --sample household:1000 -n 6 --workers 2 -o data",
+        "burg-drake dataset generate --scenes tabletop_six --sensor d435 --grasps sample:100"
+        " -o data",
+        "burg-drake dataset generate --scenes tabletop_six --camera wrist --grasps runs/first"
+        " -o data",
+        "",
+        "Interrupt it whenever you like: the same command continues. Every choice follows from",
+        "the seed. --recipe takes a YAML file for all that has no option; data/dataset.yaml has",
+        "one under `recipe`.",
+        options=_add_generate_options,
+    )
+    add_verb(
+        group,
+        "check",
+        run_check,
+        "look for damaged files, and render depth and labels anew to compare them",
+        "burg-drake dataset check data",
+        options=_add_data,
+    )
+    add_verb(
+        group,
+        "show",
+        run_show,
+        "write a sheet of samples from all over a data set: colour, depth, labels",
+        "burg-drake dataset show data -o sheet.html",
+        "burg-drake dataset show data -o sheet.png --rows 6",
+        options=_add_show_options,
+    )
+    add_verb(
+        group,
+        "export",
+        run_export,
+        "write a data set in another project's format",
+        "burg-drake dataset export data --to bop -o data_bop",
+        options=_add_export_options,
+    )
+
+
+def _add_data(parser: Parser) -> None:
+    parser.add_argument("data", metavar="DATA", help="folder of a data set")
+
+
+def _add_generate_options(parser: Parser) -> None:
+    from burg_drake.dataset.generating import DatasetRecipe
+    from burg_drake.scene.document import SceneRecipe
+
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument(
+        "--scenes", metavar="SCENE", nargs="+", help="scenes: names, files or patterns of files"
+    )
+    source.add_argument(
+        "--sample", metavar="LIBRARY:COUNT", help="sample so many scenes of a library's objects"
+    )
+    parser.add_argument(
+        "-n",
+        metavar="N",
+        dest="objects",
+        type=positive_int,
+        default=SceneRecipe.count,
+        help="objects in a sampled scene (default: %(default)d)",
+    )
+    add_station(parser)
+    parser.add_argument(
+        "-o", "--output", metavar="DATA", required=True, help="folder to write, or to continue"
+    )
+    parser.add_argument(
+        "--camera",
+        metavar="NAME",
+        nargs="+",
+        help="sphere (around the scene), wrist, or cameras of the station (default: sphere)",
+    )
+    add_options(parser, DatasetRecipe, "views", "sensor", "normals", "seed", unset=True)
+    parser.add_argument(
+        "--plain",
+        action="store_true",
+        help="as simulated cameras always see it: no varied lights, textures, distractors, noise",
+    )
+    parser.add_argument(
+        "--grasps",
+        metavar="RUN|sample:N",
+        help="grasps of a run with their outcomes, or N sampled on each object",
+    )
+    parser.add_argument("--recipe", metavar="FILE", help="YAML file with what has no option")
+    add_workers(parser, "processes (default: %(default)d)", default=1)
+    add_quiet(parser)
+
+
+def run_generate(arguments: argparse.Namespace) -> int:
+    """Writes a data set; 1 if some scenes have no samples."""
+    from burg_drake.core.terminal import Progress, ProgressMeter, Reporter
+    from burg_drake.dataset.generating import generate_dataset
+    from burg_drake.dataset.samples import load_dataset
+    from burg_drake.station.document import load_station
+
+    station = load_station(arguments.station)
+    recipe = _recipe(arguments)
+    scenes: list[Scene] | ObjectLibrary
+    if arguments.sample is not None:
+        scenes, count, sampled = _sampling(arguments, station)
+        recipe = _replaced(recipe, sampled=sampled)
+    else:
+        scenes = _given_scenes(arguments.scenes)
+        count = len(scenes)
+    arguments.after_interrupt = "; what is done is kept, run the same command to continue"
+    with Reporter(not arguments.quiet) as reporter:
+        pace = ProgressMeter(reporter.show, Progress("rendering", 0, count, unit="scenes"))
+        found = generate_dataset(
+            scenes,
+            station,
+            arguments.output,
+            recipe,
+            count=count,
+            workers=arguments.workers,
+            progress=lambda number, error: pace.step(),
+        )
+    for number, error in found.failed.items():
+        print(f"burg-drake: scene {number}: {error}", file=sys.stderr)
+    samples = len(load_dataset(found.folder))
+    old = f", {len(found.known)} were there" if found.known else ""
+    print(f"{found.folder}: {samples} samples of {len(found.new)} new scenes{old}")
+    return 1 if found.failed else 0
+
+
+def _recipe(arguments: argparse.Namespace) -> DatasetRecipe:
+    from dataclasses import replace
+
+    from burg_drake.core.documents import load_document
+    from burg_drake.core.settings import declared
+    from burg_drake.dataset.generating import DatasetRecipe
+
+    recipe = DatasetRecipe()
+    if arguments.recipe is not None:
+        recipe = load_document(Path(arguments.recipe), DatasetRecipe)
+    given = {name: getattr(arguments, name, None) for name in declared(DatasetRecipe)}
+    values: dict[str, Any] = {name: value for name, value in given.items() if value}
+    if arguments.camera:
+        values["viewpoints"] = replace(recipe.viewpoints, cameras=tuple(arguments.camera))
+    if arguments.plain:
+        values["looks"] = None
+    return _replaced(recipe, **values, **_grasps(arguments.grasps))
+
+
+def _replaced(recipe: DatasetRecipe, **values: Any) -> DatasetRecipe:
+    from dataclasses import replace
+
+    return replace(recipe, **values)
+
+
+def _grasps(text: str | None) -> dict[str, Any]:
+    from burg_drake.core import InvalidInputError
+
+    if text is None:
+        return {}
+    if not text.startswith("sample:"):
+        return {"run": text, "grasps_per_object": 0}
+    number = text.removeprefix("sample:")
+    if not number.isdecimal() or int(number) < 1:
+        raise InvalidInputError(f"--grasps {text}: give a number of grasps, as in sample:100")
+    return {"grasps_per_object": int(number), "run": ""}
+
+
+def _given_scenes(references: list[str]) -> list[Scene]:
+    from burg_drake.core import InvalidInputError
+    from burg_drake.scene.document import load_scene
+
+    names: list[str] = []
+    for reference in references:
+        if glob.has_magic(reference):
+            files = sorted(glob.glob(reference))
+            if not files:
+                raise InvalidInputError(f"--scenes {reference}: there is no such file")
+            names += files
+        else:
+            names.append(reference)
+    return [load_scene(name) for name in names]
+
+
+def _sampling(
+    arguments: argparse.Namespace, station: Station
+) -> tuple[ObjectLibrary, int, SceneRecipe]:
+    from burg_drake.apps.scene import library_reference, station_reference
+    from burg_drake.core import InvalidInputError
+    from burg_drake.objects.library import load_library
+    from burg_drake.scene.document import SceneRecipe
+
+    name, colon, count = arguments.sample.rpartition(":")
+    if not colon or not count.isdecimal() or int(count) < 1:
+        raise InvalidInputError(
+            f"--sample {arguments.sample}: give a library and a number of scenes, as in"
+            " household:1000"
+        )
+    library = load_library(name)
+    folder = Path(arguments.output) / "scenes"
+    recipe = SceneRecipe(
+        library=library_reference(name, library, folder),
+        count=arguments.objects,
+        seed=arguments.seed or 0,
+        station=station_reference(arguments.station, station, folder),
+    )
+    return library, int(count), recipe
+
+
+def run_check(arguments: argparse.Namespace) -> int:
+    """Prints what is wrong with a data set; 1 if anything is."""
+    from burg_drake.dataset.generating import check_generated
+    from burg_drake.dataset.samples import load_dataset
+
+    found = check_generated(arguments.data)
+    for finding in found:
+        print(f"{finding.sample or arguments.data}: {finding.file}: {finding.message}")
+    if found:
+        return 1
+    print(f"{arguments.data}: {len(load_dataset(arguments.data))} samples, nothing is wrong")
+    return 0
+
+
+def _add_show_options(parser: Parser) -> None:
+    _add_data(parser)
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", required=True, help="file to write (.png or .html)"
+    )
+    parser.add_argument(
+        "--rows", metavar="N", type=positive_int, default=4, help="(default: %(default)d)"
+    )
+    parser.add_argument(
+        "--columns", metavar="N", type=positive_int, default=1, help="(default: %(default)d)"
+    )
+
+
+def run_show(arguments: argparse.Namespace) -> int:
+    """Writes a contact sheet."""
+    from burg_drake.dataset.exchange import contact_sheet
+    from burg_drake.dataset.samples import load_dataset
+
+    dataset = load_dataset(arguments.data)
+    contact_sheet(dataset, arguments.output, arguments.rows, arguments.columns, title=dataset.name)
+    print(f"wrote {arguments.output}")
+    return 0
+
+
+def _add_export_options(parser: Parser) -> None:
+    _add_data(parser)
+    parser.add_argument("--to", required=True, choices=FORMATS, help="format")
+    parser.add_argument(
+        "-o", "--output", metavar="FOLDER", required=True, help="folder to write, new or empty"
+    )
+
+
+def run_export(arguments: argparse.Namespace) -> int:
+    """Writes a data set in another format; what that cannot carry goes to stderr."""
+    from burg_drake.dataset.exchange import (
+        write_bop,
+        write_coco,
+        write_graspnet,
+        write_webdataset,
+    )
+    from burg_drake.dataset.samples import load_dataset
+
+    dataset = load_dataset(arguments.data)
+    writers: dict[str, Any] = {
+        "bop": write_bop,
+        "coco": write_coco,
+        "graspnet": write_graspnet,
+        "webdataset": write_webdataset,
+    }
+    for remark in writers[arguments.to](dataset, arguments.output):
+        print(f"burg-drake: warning: {remark}", file=sys.stderr)
+    print(f"wrote {arguments.output}: {len(dataset)} samples")
+    return 0
