@@ -46,8 +46,7 @@ def test_pads_meet_the_pieces_where_there_is_no_surface(tmp_path: Path) -> None:
     assert contact == ContactGeometry(reason="its surface is not closed") and written == ()
     assert pieces_instead(contact, 12) == (
         "pads touch 12 convex pieces, because its surface is not closed; make the mesh watertight"
-        " and smooth it, or accept the pieces by 'contact: pieces' in an objects.yaml or by"
-        " --contact pieces"
+        " and smooth it, or accept the pieces by 'contact: pieces' in an objects.yaml"
     )
     assert pieces_instead(ContactGeometry(), 12) == ""
 

@@ -148,8 +148,7 @@ def test_pads_that_meet_pieces_are_told(tmp_path: Path) -> None:
         (
             "unsure",
             "pads touch 1 convex piece, because its surface is not closed; make the mesh watertight"
-            " and smooth it, or accept the pieces by 'contact: pieces' in an objects.yaml or by"
-            " --contact pieces",
+            " and smooth it, or accept the pieces by 'contact: pieces' in an objects.yaml",
         )
     ]
 

@@ -104,7 +104,7 @@ def pieces_instead(contact: ContactGeometry, pieces: int) -> str:
         return ""
     return (
         f"pads touch {_pieces(pieces)}, because {contact.reason}; {MEND}, or accept the pieces by"
-        " 'contact: pieces' in an objects.yaml or by --contact pieces"
+        " 'contact: pieces' in an objects.yaml"
     )
 
 
