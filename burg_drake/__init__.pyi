@@ -2,6 +2,7 @@ from . import (
     arm as arm,
     cameras as cameras,
     compose as compose,
+    dataset as dataset,
     errors as errors,
     frames as frames,
     grasps as grasps,
@@ -22,8 +23,17 @@ from .core.grasps.outcome import (
     Outcome as Outcome,
     Stage as Stage,
 )
-from .dataset.rendering.render import (
+from .dataset.generating.generate import (
+    generate_dataset as generate_dataset,
+)
+from .dataset.rendering.one_view import (
     render as render,
+)
+from .dataset.samples.dataset import (
+    load_dataset as load_dataset,
+)
+from .dataset.samples.writer import (
+    DatasetWriter as DatasetWriter,
 )
 from .evaluation.candidates.sampling_settings import (
     SamplingSettings as SamplingSettings,

@@ -54,7 +54,15 @@ _announce_tools(Path(__file__).resolve().parents[1] / "tools")
 PHYSICS = tuple(
     Path(__file__).parent / name
     for name in (
-        *("apps", "cameras", "compose", "evaluation", "experiment/gap", "experiment/pages"),
+        *(
+            "apps",
+            "cameras",
+            "compose",
+            "dataset",
+            "evaluation",
+            "experiment/gap",
+            "experiment/pages",
+        ),
         *("experiment/test_trial_export.py", "export", "fuzzing", "generation"),
         *("grasping/test_clearance.py", "grasping/test_signed_clearance.py", "motion", "pipeline"),
         *("printout/test_board_printout.py", "ros", "simulation", "station", "ui"),

@@ -15,7 +15,8 @@ import pytest
 
 from burg_drake.core import InvalidInputError
 from burg_drake.dataset.rendering import Images
-from burg_drake.dataset.samples import DatasetFinding, Sample, check_dataset, write_index
+from burg_drake.dataset.samples import DatasetFinding, Sample, check_dataset
+from burg_drake.dataset.samples.index import write_index
 from burg_drake.dataset.samples.png import encode_image
 from burg_drake.dataset.samples.sample_files import encoded
 from tests.dataset import drawn_samples as drawn

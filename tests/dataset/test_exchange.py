@@ -21,15 +21,15 @@ from scipy.spatial.transform import Rotation
 
 from burg_drake.core import InvalidInputError, UnknownNameError
 from burg_drake.dataset.exchange import (
-    StoredSamples,
     contact_sheet,
-    grasp_scores,
     write_bop,
     write_card,
     write_coco,
     write_graspnet,
     write_webdataset,
 )
+from burg_drake.dataset.exchange.graspnet import grasp_scores
+from burg_drake.dataset.exchange.source import StoredSamples
 from burg_drake.dataset.samples import load_dataset
 from burg_drake.objects.library import ObjectLibrary
 from tests.dataset import drawn_samples

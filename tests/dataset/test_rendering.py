@@ -10,7 +10,8 @@ import burg_drake as burg
 from burg_drake.cameras.optics import Intrinsics
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import inverse, make_pose
-from burg_drake.dataset.labels import box_around, label_instances
+from burg_drake.dataset.labels import label_instances
+from burg_drake.dataset.labels.instances import box_around
 from burg_drake.dataset.rendering import RayScene, SceneRenderer, render, station_view
 from burg_drake.dataset.views import View
 from burg_drake.scene.document.scene import Scene

@@ -163,8 +163,8 @@ def run_generate(arguments: argparse.Namespace) -> int:
 def _recipe(arguments: argparse.Namespace) -> DatasetRecipe:
     from dataclasses import replace
 
+    from burg_drake.core import declared
     from burg_drake.core.documents import load_document
-    from burg_drake.core.settings import declared
     from burg_drake.dataset.generating import DatasetRecipe
 
     recipe = DatasetRecipe()

@@ -8,12 +8,8 @@ from .appearance import (
 )
 from .background import with_background as with_background
 from .drawing import draw_appearance as draw_appearance
-from .patterns import table_texture as table_texture
 from .photometry import photometric as photometric
 from .rendering import (
     apply_appearance as apply_appearance,
-    environment_file as environment_file,
-    render_parameters as render_parameters,
 )
-from .room import environment_map as environment_map
 from .settings import AppearanceSettings as AppearanceSettings

@@ -2,12 +2,10 @@ from .bop import write_bop as write_bop
 from .card import write_card as write_card
 from .coco import write_coco as write_coco
 from .graspnet import (
-    grasp_scores as grasp_scores,
     write_graspnet as write_graspnet,
 )
 from .sheet import contact_sheet as contact_sheet
 from .source import (
     Samples as Samples,
-    StoredSamples as StoredSamples,
 )
 from .webdataset import write_webdataset as write_webdataset

@@ -8,5 +8,4 @@ from .generate import (
 )
 from .recipe import (
     DatasetRecipe as DatasetRecipe,
-    read_recipe as read_recipe,
 )

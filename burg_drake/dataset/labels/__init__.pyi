@@ -19,7 +19,6 @@ from .instance_label import (
     InstanceLabel as InstanceLabel,
 )
 from .instances import (
-    box_around as box_around,
     label_instances as label_instances,
 )
 from .labelled_grasps import LabelledGrasps as LabelledGrasps

@@ -1,8 +1,6 @@
 from .check import (
     DatasetFinding as DatasetFinding,
-    Redraw as Redraw,
     check_dataset as check_dataset,
-    check_shard as check_shard,
 )
 from .dataset import (
     Dataset as Dataset,
@@ -13,7 +11,6 @@ from .document import (
     DatasetDocument as DatasetDocument,
     load_dataset_document as load_dataset_document,
 )
-from .index import write_index as write_index
 from .png import (
     depth_unit_of as depth_unit_of,
     encode_image as encode_image,
@@ -21,7 +18,6 @@ from .png import (
 from .sample import Sample as Sample
 from .shard import (
     ShardEntry as ShardEntry,
-    write_shard as write_shard,
 )
 from .writer import (
     DatasetWriter as DatasetWriter,

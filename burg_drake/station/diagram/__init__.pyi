@@ -14,7 +14,6 @@ from .station_diagram import (
 )
 from .visible_triangles import (
     Triangles as Triangles,
-    VisibleSurface as VisibleSurface,
     shape_triangles as shape_triangles,
     visible_surfaces as visible_surfaces,
 )

@@ -1,0 +1,115 @@
+"""Data sets of many scenes: the same by any number of workers, continued, and made again alone."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import burg_drake as burg
+from burg_drake.apps.cli import main
+from burg_drake.core.errors import FieldError, InvalidInputError
+from burg_drake.dataset.generating import DatasetRecipe, check_generated, sample_again
+from burg_drake.dataset.views import ViewpointSettings
+
+SCENES = ["tabletop_six", "tabletop_close"]
+RECIPE = DatasetRecipe(views=2, sensor="d435", size=(320, 240), grasps_per_object=5)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A data set."""
+    made = tmp_path_factory.mktemp("data") / "set"
+    found = burg.generate_dataset(SCENES, "panda_tabletop", made, RECIPE)
+    assert found.new == (0, 1) and not found.failed
+    return made
+
+
+def sums(folder: Path) -> dict[str, str]:
+    return {
+        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted((folder / "shards").iterdir())
+    }
+
+
+def test_the_same_bytes_by_two_workers_and_after_a_stop(folder: Path, tmp_path: Path) -> None:
+    again = tmp_path / "set"
+    burg.generate_dataset(SCENES, "panda_tabletop", again, RECIPE, workers=2)
+    assert sums(again) == sums(folder)
+    lost = again / "shards" / "000001.tar"
+    lost.unlink()  # as if the process had been killed before it was complete
+    (again / "shards" / ".unfinished").touch()
+    found = burg.generate_dataset(SCENES, "panda_tabletop", again, RECIPE)
+    assert (found.known, found.new) == ((0,), (1,))
+    assert sums(again)[lost.name] == sums(folder)[lost.name]
+    keys = burg.load_dataset(again).keys
+    assert keys == ("000000_000", "000000_001", "000001_000", "000001_001")
+
+
+def test_a_sample_made_again_alone(folder: Path) -> None:
+    dataset = burg.load_dataset(folder)
+    stored, again = dataset[3], sample_again(dataset, "000001_001")
+    assert np.array_equal(stored.images.color, again.images.color)
+    assert np.array_equal(stored.images.labels, again.images.labels)
+    assert np.abs(stored.images.depth - again.images.depth).max() < 5.1e-5
+    assert np.abs(stored.sensor_depth - again.sensor_depth).max() < 5.1e-5
+    assert np.array_equal(stored.view.X_SC, again.view.X_SC)
+    assert stored.grasps is not None and len(stored.grasps) > 10
+    assert stored.view.intrinsics.width == 320
+
+
+def test_a_sound_data_set_is_sound(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert check_generated(folder) == []
+    assert main(["dataset", "check", str(folder)]) == 0
+    assert "4 samples, nothing is wrong" in capsys.readouterr().out
+
+
+def test_other_content_is_refused(folder: Path) -> None:
+    other = DatasetRecipe(views=2, sensor="d435", size=(320, 240), grasps_per_object=5, seed=1)
+    with pytest.raises(InvalidInputError, match=r"holds another data set \(.*seed is 0 there"):
+        burg.generate_dataset(SCENES, "panda_tabletop", folder, other)
+
+
+def test_a_scene_that_fails_leaves_the_others(tmp_path: Path) -> None:
+    """No camera so far away sees an object's centre within its depth range."""
+    far = ViewpointSettings(cameras=("overview", "board"), in_view=1.0, draws=1)
+    recipe = DatasetRecipe(views=1, looks=None, viewpoints=far)
+    scenes = ["tabletop_six", "tabletop_twelve"]
+    found = burg.generate_dataset(scenes, "panda_tabletop", tmp_path / "set", recipe)
+    for error in found.failed.values():
+        assert "view" in error
+    assert len(found.new) + len(found.failed) == 2
+    assert len(burg.load_dataset(tmp_path / "set")) == len(found.new)
+
+
+def test_bad_requests(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(FieldError, match=r"sampled or taken from a run, not both"):
+        DatasetRecipe(run="runs/first", grasps_per_object=3)
+    with pytest.raises(InvalidInputError, match=r"no depth images of 640 x 100"):
+        DatasetRecipe(sensor="d435", size=(640, 100))
+    output = ["-o", str(tmp_path / "data")]
+    for arguments, told in (
+        (["--scenes", str(tmp_path / "*.yaml")], "there is no such file"),
+        (["--sample", "household"], "as in household:1000"),
+        (["--scenes", "tabletop_six", "--grasps", "sample:no"], "as in sample:100"),
+        (["--scenes", "tabletop_six", "--sensor", "d436"], "'d436'"),
+    ):
+        assert main(["dataset", "generate", *arguments, *output]) == 2
+        assert told in capsys.readouterr().err
+        assert not (tmp_path / "data").exists()
+
+
+def test_the_commands(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    view = tmp_path / "view.png"
+    options = ["--camera", "board", "-o", str(view), "--depth", "--labels", "--normals"]
+    assert main(["render", "tabletop_six", *options]) == 0
+    assert "5 bowl: 6025 pixels" in capsys.readouterr().out
+    names = ("view.depth.png", "view.labels.png", "view.normals.png", "view.png")
+    assert sorted(path.name for path in tmp_path.iterdir()) == list(names)
+    assert main(["render", "tabletop_six", "-o", str(tmp_path / "view.jpg")]) == 2
+    assert main(["dataset", "show", str(folder), "-o", str(tmp_path / "sheet.png")]) == 0
+    exported = tmp_path / "coco"
+    assert main(["dataset", "export", str(folder), "--to", "coco", "-o", str(exported)]) == 0
+    assert (exported / "instances.json").is_file()
