@@ -24,18 +24,13 @@ import numpy as np
 from burg_drake.cameras.optics import Intrinsics
 from burg_drake.dataset.labels import InstanceLabel, LabelledGrasps
 from burg_drake.dataset.rendering import Images
-from burg_drake.dataset.samples import (
-    Dataset,
-    DatasetDocument,
-    Sample,
-    load_dataset,
-    write_index,
-    write_shard,
-)
+from burg_drake.dataset.samples import Dataset, DatasetDocument, Sample, load_dataset
 from burg_drake.dataset.samples.document import save_dataset_document
 from burg_drake.dataset.samples.grasps_file import decode_grasps, encode_grasps
+from burg_drake.dataset.samples.index import write_index
 from burg_drake.dataset.samples.png import decode_image_of, encode_image
 from burg_drake.dataset.samples.record import parse_record, record_text
+from burg_drake.dataset.samples.shard import write_shard
 from burg_drake.dataset.views import View
 
 BALLS = 6

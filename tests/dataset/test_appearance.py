@@ -20,14 +20,13 @@ from burg_drake.dataset.appearance import (
     Photometry,
     TableSurface,
     draw_appearance,
-    environment_file,
-    environment_map,
     photometric,
     read_appearance,
-    render_parameters,
-    table_texture,
     with_background,
 )
+from burg_drake.dataset.appearance.patterns import table_texture
+from burg_drake.dataset.appearance.rendering import environment_file, render_parameters
+from burg_drake.dataset.appearance.room import environment_map
 from burg_drake.scene.document import load_scene
 from burg_drake.station.document import Obstacle, load_station
 

@@ -25,9 +25,9 @@ from burg_drake.dataset.samples import (
     Sample,
     check_dataset,
     load_dataset,
-    write_index,
     write_scene,
 )
+from burg_drake.dataset.samples.index import write_index
 from tests.dataset import drawn_samples as drawn
 
 
