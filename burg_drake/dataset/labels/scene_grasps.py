@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from burg_drake.core import Array, InvalidInputError, check_pose, inverse
 from burg_drake.dataset.labels.labelled_grasps import LabelledGrasps
-from burg_drake.scene.document import Scene
+from burg_drake.scene.document import Scene, SceneLike, as_scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class SceneGrasps:
         return len(self.X_OG)
 
 
-def label_grasps(grasps: SceneGrasps, scene: Scene, X_SC: Array) -> LabelledGrasps:
+def label_grasps(grasps: SceneGrasps, scene: SceneLike, X_SC: Array) -> LabelledGrasps:
     """Grasps as a camera has them: all of them, in their order, seen or not.
 
     Args:
@@ -60,6 +60,7 @@ def label_grasps(grasps: SceneGrasps, scene: Scene, X_SC: Array) -> LabelledGras
         UnknownNameError: the scene has no such instance.
         InvalidInputError: `X_SC` is no pose.
     """
+    scene = as_scene(scene)
     X_CS = inverse(check_pose(X_SC, "X_SC"))
     X_CG = np.empty((len(grasps), 4, 4))
     number = np.empty(len(grasps), np.uint16)

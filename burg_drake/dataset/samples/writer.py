@@ -25,7 +25,7 @@ from burg_drake.dataset.samples.document import (
 from burg_drake.dataset.samples.index import shard_numbers, write_index
 from burg_drake.dataset.samples.sample import Sample
 from burg_drake.dataset.samples.shard import FOLDER, ShardEntry, shard_name, write_shard
-from burg_drake.scene.document import Scene, save_scene
+from burg_drake.scene.document import Scene, SceneLike, as_scene, save_scene
 
 SCENES = "scenes"
 
@@ -137,9 +137,9 @@ class DatasetWriter:
         there = set(shard_numbers(self.folder))
         return [number for number in scenes if number not in there]
 
-    def add(self, number: int, scene: Scene, samples: Iterable[Sample]) -> None:
+    def add(self, number: int, scene: SceneLike, samples: Iterable[Sample]) -> None:
         """Writes a scene and its samples; see `write_scene`."""
-        self.added(write_scene(self.folder, number, scene, samples))
+        self.added(write_scene(self.folder, number, as_scene(scene), samples))
 
     def added(self, entry: ShardEntry) -> None:
         """Takes note of what another process has written with `write_scene`, so that its check sum
