@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 import burg_drake as burg
 from burg_drake.apps.cli import main
+from burg_drake.core.documents import Pose
 from burg_drake.core.errors import FieldError, InvalidInputError
 from burg_drake.dataset.generating import DatasetRecipe, check_generated, sample_again
 from burg_drake.dataset.views import ViewpointSettings
@@ -73,15 +75,21 @@ def test_other_content_is_refused(folder: Path) -> None:
 
 
 def test_a_scene_that_fails_leaves_the_others(tmp_path: Path) -> None:
-    """No camera so far away sees an object's centre within its depth range."""
-    far = ViewpointSettings(cameras=("overview", "board"), in_view=1.0, draws=1)
-    recipe = DatasetRecipe(views=1, looks=None, viewpoints=far)
-    scenes = ["tabletop_six", "tabletop_twelve"]
+    """No view shows all objects of a scene whose mug stands three metres away."""
+    scene = burg.load_scene("tabletop_six")
+    moved = [
+        replace(one, X_SO=Pose(translation=(3.0, 0.1, 0.0))) if name == "mug" else one
+        for name, one in scene.instances.items()
+    ]
+    library = str(scene.library.root)
+    document = replace(scene.document, library=library, instances=tuple(moved))
+    burg.save_scene(document, tmp_path / "apart.yaml")
+    recipe = DatasetRecipe(views=1, looks=None, viewpoints=ViewpointSettings(in_view=1.0))
+    scenes = [tmp_path / "apart.yaml", "tabletop_six"]
     found = burg.generate_dataset(scenes, "panda_tabletop", tmp_path / "set", recipe)
-    for error in found.failed.values():
-        assert "view" in error
-    assert len(found.new) + len(found.failed) == 2
-    assert len(burg.load_dataset(tmp_path / "set")) == len(found.new)
+    assert found.new == (1,) and list(found.failed) == [0]
+    assert "apart" in found.failed[0] and "view" in found.failed[0]
+    assert burg.load_dataset(tmp_path / "set").keys == ("000001_000",)
 
 
 def test_bad_requests(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -95,6 +103,8 @@ def test_bad_requests(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
         (["--sample", "household"], "as in household:1000"),
         (["--scenes", "tabletop_six", "--grasps", "sample:no"], "as in sample:100"),
         (["--scenes", "tabletop_six", "--sensor", "d436"], "'d436'"),
+        (["--scenes", "tabletop_six", "--camera", "sphre"], "did you mean 'sphere'"),
+        (["--scenes", "tabletop_six", "--grasps", "no/run"], "no/run holds no run"),
     ):
         assert main(["dataset", "generate", *arguments, *output]) == 2
         assert told in capsys.readouterr().err

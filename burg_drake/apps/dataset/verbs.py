@@ -171,7 +171,8 @@ def _recipe(arguments: argparse.Namespace) -> DatasetRecipe:
     if arguments.recipe is not None:
         recipe = load_document(Path(arguments.recipe), DatasetRecipe)
     given = {name: getattr(arguments, name, None) for name in declared(DatasetRecipe)}
-    values: dict[str, Any] = {name: value for name, value in given.items() if value}
+    values: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    values["normals"] = arguments.normals or recipe.normals
     if arguments.camera:
         values["viewpoints"] = replace(recipe.viewpoints, cameras=tuple(arguments.camera))
     if arguments.plain:

@@ -6,13 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from burg_drake.core import InvalidInputError, content_hash, one_line, software_versions
+from burg_drake.core import BurgError, InvalidInputError, content_hash, one_line, software_versions
 from burg_drake.core.paths import name_from, portable_reference
 from burg_drake.core.workers import map_unordered
 from burg_drake.dataset.exchange import write_card
 from burg_drake.dataset.generating.recipe import DatasetRecipe
 from burg_drake.dataset.generating.work import DatasetInputs, SceneWork, make_scene
 from burg_drake.dataset.samples import DatasetDocument, DatasetWriter, load_dataset
+from burg_drake.dataset.views import require_cameras
+from burg_drake.evaluation.store import open_results
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.station.document import Station, StationLike, as_station
@@ -73,7 +75,8 @@ def generate_dataset(
 
     Raises:
         InvalidInputError: the folder holds another data set or is being written, a scene has no
-            file, or the scenes are of several libraries.
+            file, the scenes are of several libraries, or there is no such run.
+        UnknownNameError: the station has no such camera.
     """
     station, recipe = as_station(station), recipe or DatasetRecipe()
     paths: Sequence[Path | None]
@@ -83,6 +86,7 @@ def generate_dataset(
         library, paths = scenes, [None] * count
     else:
         library, recipe, paths = _given(scenes, recipe)
+    _require_possible(recipe, station)
     folder = Path(folder)
     document = _document(folder, library, station, recipe)
     with DatasetWriter(folder, document) as writer:
@@ -93,7 +97,9 @@ def generate_dataset(
         work = [SceneWork(inputs, number, paths[number]) for number in missing]
         for one, outcome in map_unordered(make_scene, work, workers):
             if isinstance(outcome, BaseException):
-                failed[one.number] = one_line(outcome)
+                failed[one.number] = (
+                    str(outcome) if isinstance(outcome, BurgError) else one_line(outcome)
+                )
             else:
                 writer.added(outcome)
             if progress is not None:
@@ -103,6 +109,13 @@ def generate_dataset(
     new = tuple(number for number in missing if number not in failed)
     known = tuple(number for number in range(len(paths)) if number not in missing)
     return GeneratedDataset(folder, new, known, dict(sorted(failed.items())))
+
+
+def _require_possible(recipe: DatasetRecipe, station: Station) -> None:
+    """Refuses what no scene can have samples with, before a folder is made."""
+    require_cameras(recipe.viewpoints, station)
+    if recipe.run:
+        open_results(recipe.run)
 
 
 def _given(

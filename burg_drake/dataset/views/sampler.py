@@ -22,7 +22,7 @@ from burg_drake.dataset.views.surroundings import ViewedScene
 from burg_drake.dataset.views.view import DEPTH_RANGE, View
 from burg_drake.dataset.views.wrist import WristCamera
 from burg_drake.scene.document import SceneLike, as_scene
-from burg_drake.station.document import StationLike, as_station
+from burg_drake.station.document import Station, StationLike, as_station
 
 
 class ViewSampler:
@@ -62,13 +62,8 @@ class ViewSampler:
         self._seen = ViewedScene(self._scene, self._station)
         self._given, self._depth_range = intrinsics, depth_range
         self._fields: dict[Intrinsics, FieldOfView] = {}
+        require_cameras(self.settings, self._station)
         known = self._station.document.cameras
-        for name in self.settings.cameras:
-            if name not in (SPHERE, WRIST, *known):
-                raise UnknownNameError(
-                    f"station {self._station.name!r} ({self._station.path}) has no camera"
-                    f" {name!r}; {nearest(name, (SPHERE, WRIST, *known))}"
-                )
         if intrinsics is None and not known:
             raise InvalidInputError(
                 f"station {self._station.name!r} ({self._station.path}) has no camera that views"
@@ -177,3 +172,18 @@ class ViewSampler:
     def _wrist(self) -> WristCamera:
         X_HC = self.settings.X_HC
         return WristCamera(self._scene, self._station, None if X_HC is None else X_HC.matrix())
+
+
+def require_cameras(settings: ViewpointSettings, station: Station) -> None:
+    """Refuses cameras that a station does not have.
+
+    Raises:
+        UnknownNameError: there is no such camera.
+    """
+    known = (SPHERE, WRIST, *station.document.cameras)
+    for name in settings.cameras:
+        if name not in known:
+            raise UnknownNameError(
+                f"station {station.name!r} ({station.path}) has no camera {name!r};"
+                f" {nearest(name, known)}"
+            )
