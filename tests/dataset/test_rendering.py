@@ -12,7 +12,7 @@ from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import inverse, make_pose
 from burg_drake.dataset.labels import label_instances
 from burg_drake.dataset.labels.instances import box_around
-from burg_drake.dataset.rendering import RayScene, SceneRenderer, render, station_view
+from burg_drake.dataset.rendering import RayScene, RaySurface, SceneRenderer, render, station_view
 from burg_drake.dataset.views import View
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.diagram import StationDiagram, build_station_diagram
@@ -82,11 +82,11 @@ def test_the_table_is_flat_to_a_hundredth_of_a_millimetre(scene: Scene, station:
     assert np.minimum(np.abs(height), np.abs(height + 1e-4))[on_top].max() < 1e-5
 
 
-def ball(radius: float, p_SB: tuple[float, float, float], label: int) -> tuple:
+def ball(radius: float, p_SB: tuple[float, float, float], label: int) -> RaySurface:
     import trimesh
 
     mesh = trimesh.creation.icosphere(5, radius)
-    return label, np.asarray(mesh.vertices) + p_SB, np.asarray(mesh.faces)
+    return RaySurface(label, np.asarray(mesh.vertices) + p_SB, np.asarray(mesh.faces))
 
 
 def view_down(distance: float, **options: object) -> View:
@@ -111,7 +111,7 @@ def pixels_of_ball(view: View, p_CB: np.ndarray, radius: float, reach: int = 0) 
 
 def test_balls_by_formula() -> None:
     near, far = (0.02, 0.01, 0.1), (0.05, 0.02, 0.0)
-    rays = RayScene.joined([ball(0.03, near, 1), ball(0.05, far, 2)])
+    rays = RayScene([ball(0.03, near, 1), ball(0.05, far, 2)])
     view = view_down(0.6)
     images = rays.images(view, normals=True)
     X_CS = inverse(view.X_SC)
@@ -132,7 +132,7 @@ def test_balls_by_formula() -> None:
 
 def test_a_silhouette_goes_on_beyond_the_image() -> None:
     place = (-0.25, 0.0, 0.0)
-    rays = RayScene.joined([ball(0.06, place, 1)])
+    rays = RayScene([ball(0.06, place, 1)])
     view = view_down(0.5)
     inside = rays.images(view).labels == 1
     silhouette = rays.silhouette(1, view)

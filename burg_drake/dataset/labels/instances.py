@@ -32,9 +32,7 @@ def label_instances(
         silhouette = rays.silhouette(number, view)
         amodal = silhouette.within(height_width[1], height_width[0])
         visible = int(counts[number])
-        if visible:
-            amodal |= labels == number  # a ray along an edge may fall to either side
-        size = max(int(np.count_nonzero(silhouette.mask)), visible)
+        size = int(np.count_nonzero(silhouette.mask))
         rows, columns = silhouette.mask.shape
         found.append(
             InstanceLabel(

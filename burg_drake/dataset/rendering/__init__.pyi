@@ -9,6 +9,7 @@ from .ray_scene import (
     RayScene as RayScene,
     Silhouette as Silhouette,
 )
+from .ray_surface import RaySurface as RaySurface
 from .scene_renderer import (
     ImageKind as ImageKind,
     SceneRenderer as SceneRenderer,

@@ -1,25 +1,23 @@
 """What rays through the pixels' centres meet: exact depth, labels, normals and silhouettes.
 
-They are the same whatever renderer makes the colours, and where there is none.
+They are the same whatever renderer makes the colours, and where there is none. Rays are cast at
+each surface alone, within the pixels that can show it: an image is the nearest of all, and the
+silhouettes are there as well.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras.optics import NEAR, FieldOfView, Intrinsics
-from burg_drake.core import Array, Indices, Single, inverse, transform_points
+from burg_drake.core import Array, Single, inverse
 from burg_drake.dataset.rendering.images import SURROUNDINGS, Images
+from burg_drake.dataset.rendering.ray_surface import NONE, Met, RaySurface
 from burg_drake.dataset.views import View
-from burg_drake.geometry import RayCaster
-
-NONE = -1
-"""Face of a ray that meets nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,44 +49,47 @@ class RayScene:
     """Surfaces at their places in S, and rays at them.
 
     Args:
-        vertices: (V, 3) of all surfaces in S [m].
-        faces: (F, 3).
-        labels: (F,) label of each face.
+        surfaces: at most one of each label but for `SURROUNDINGS`.
+        X_SB: (4, 4) frame of each; all in S if None.
     """
 
-    def __init__(self, vertices: Array, faces: Indices, labels: Indices) -> None:
-        self._vertices, self._faces = vertices, faces
-        # One more for rays that meet nothing, at index -1.
-        self._labels = np.append(labels, SURROUNDINGS).astype(np.uint16)
-        self._alone: dict[int, tuple[Array, RayCaster]] = {}
-
-    @classmethod
-    def joined(cls, parts: Sequence[tuple[int, Array, Indices]]) -> RayScene:
-        """From surfaces: label, vertices (V, 3) in S [m] and faces (F, 3) of each."""
-        starts = np.cumsum([0, *(len(vertices) for _, vertices, _ in parts)])
-        return cls(
-            np.concatenate([np.empty((0, 3)), *(vertices for _, vertices, _ in parts)]),
-            np.concatenate(
-                [np.empty((0, 3), np.int64)]
-                + [faces + start for (_, _, faces), start in zip(parts, starts, strict=False)]
-            ),
-            np.repeat([label for label, _, _ in parts], [len(faces) for _, _, faces in parts]),
-        )
+    def __init__(
+        self, surfaces: Sequence[RaySurface], X_SB: Sequence[Array] | None = None
+    ) -> None:
+        poses = [np.eye(4)] * len(surfaces) if X_SB is None else X_SB
+        self._placed = list(zip(surfaces, poses, strict=True))
+        self._of_label = {one.label: (one, pose) for one, pose in self._placed}
+        self._last: tuple[View | None, dict[int, Met | None]] = None, {}
 
     def images(self, view: View, *, normals: bool = False) -> Images:
         """Depth and labels of a view; its normals as well if asked for."""
-        pixels = _pixel_rays(view.intrinsics)
         shape = view.intrinsics.height, view.intrinsics.width
-        rotation = view.X_SC[:3, :3].astype(np.float32)
-        face, distance = self._rays.seen_from(view.X_SC[:3, 3], _rotated(pixels.unit, rotation))
-        depth = distance * pixels.unit[:, 2]
+        depth: Single = np.full(shape, np.inf, np.float32)
+        labels = np.zeros(shape, np.uint16)
+        directions = np.zeros((*shape, 3), np.float32) if normals else None
+        self._last = view, {}
+        X_CS = inverse(view.X_SC)
+        for surface, X_SB in self._placed:
+            X_CB = X_CS @ X_SB
+            if surface.label == SURROUNDINGS and surface.box is not None:
+                seen = surface.box.seen(view.intrinsics, X_CB)
+                if seen is not None:
+                    _put_box(*seen, X_CB, depth, labels, directions)
+                    continue
+            met = surface.met(view.intrinsics, X_CB)
+            self._last[1][surface.label] = met
+            if met is None:
+                continue
+            left, top, right, bottom = met.pixels
+            part = np.s_[top:bottom, left:right]
+            nearest = met.depth < depth[part]
+            depth[part][nearest] = met.depth[nearest]
+            labels[part][nearest] = surface.label
+            if directions is not None:
+                directions[part][nearest] = surface.normals(met, X_CB)[nearest]
         near, far = view.depth_range
-        depth[(face == NONE) | (depth < near) | (depth > far)] = 0.0
-        return Images(
-            depth=depth.reshape(shape),
-            labels=self._labels[face].reshape(shape),
-            normals=self._normals_seen(face, pixels.unit, rotation, shape) if normals else None,
-        )
+        depth[(depth < near) | (depth > far)] = 0.0
+        return Images(depth=depth, labels=labels, normals=directions)
 
     def silhouette(self, number: int, view: View) -> Silhouette:
         """The silhouette of an object.
@@ -98,126 +99,46 @@ class RayScene:
             view: the camera. Without lens distortion up to one image size beyond each edge of the
                 image counts, with it the image alone: the model of a lens does not reach further.
         """
-        if number not in self._alone:
-            self._alone[number] = self._surface_of(number)
-        vertices, rays = self._alone[number]
-        box = _pixels_around(vertices, view)
-        if box is None:
-            return Silhouette(0, 0, np.zeros((0, 0), bool))
-        left, top, right, bottom = box
-        unit = _directions(view.intrinsics, left, top, right, bottom)
-        rotation = view.X_SC[:3, :3].astype(np.float32)
-        face, _ = rays.seen_from(view.X_SC[:3, 3], _rotated(unit, rotation))
-        mask = (face != NONE).reshape(bottom - top, right - left)
+        met = self._met_whole(number, view)
+        mask = np.zeros((0, 0), bool) if met is None else met.face != NONE
         rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-        if not len(rows):
+        if met is None or not len(rows):
             return Silhouette(0, 0, np.zeros((0, 0), bool))
         cut = mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+        left, top, _, _ = met.pixels
         return Silhouette(left + int(columns[0]), top + int(rows[0]), cut)
 
-    @cached_property
-    def _rays(self) -> RayCaster:
-        return RayCaster(self._vertices, self._faces)
-
-    @cached_property
-    def _normals(self) -> Single:
-        """(F + 1, 3) unit normals in S, zeros for a face without area and for no face."""
-        a, b, c = self._vertices[self._faces].transpose(1, 0, 2)
-        normals = np.cross(b - a, c - a)
-        length = np.linalg.norm(normals, axis=1, keepdims=True)
-        unit = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0.0)
-        normals_or_none: Single = np.append(unit, np.zeros((1, 3)), axis=0).astype(np.float32)
-        return normals_or_none
-
-    def _normals_seen(
-        self, face: NDArray[np.int32], unit: Single, rotation: Single, shape: tuple[int, int]
-    ) -> Single:
-        normals = (self._normals @ rotation)[face]
-        away = np.einsum("ij,ij->i", normals, unit) > 0.0
-        normals[away] *= -1.0
-        seen: Single = normals.reshape(*shape, 3)
-        return seen
-
-    def _surface_of(self, number: int) -> tuple[Array, RayCaster]:
-        faces = self._faces[self._labels[:-1] == number]
-        used, mine = np.unique(faces, return_inverse=True)
-        vertices = self._vertices[used]
-        return vertices, RayCaster(vertices, mine.reshape(-1, 3))
+    def _met_whole(self, number: int, view: View) -> Met | None:
+        """What rays in the image and beyond it meet of an object; what the last image found of it
+        if that is all."""
+        last, found = self._last
+        known = found.get(number) if last is view else None
+        if known is not None:
+            left, top, right, bottom = known.pixels
+            width, height = view.intrinsics.width, view.intrinsics.height
+            if left > 0 and top > 0 and right < width and bottom < height:
+                return known
+        surface, X_SB = self._of_label[number]
+        return surface.met(view.intrinsics, inverse(view.X_SC) @ X_SB, beyond=True)
 
 
-@dataclass(frozen=True, eq=False)
-class _PixelRays:
-    unit: Single
-
-
-def _pixel_rays(intrinsics: Intrinsics) -> _PixelRays:
-    return _pixel_rays_of(
-        (intrinsics.width, intrinsics.height),
-        intrinsics.focal,
-        intrinsics.center,
-        intrinsics.distortion,
-    )
-
-
-@lru_cache(maxsize=8)
-def _pixel_rays_of(
-    size: tuple[int, int],
-    focal: tuple[float, float],
-    center: tuple[float, float],
-    distortion: tuple[float, ...],
-) -> _PixelRays:
-    width, height = size
-    intrinsics = Intrinsics(
-        width=width, height=height, focal=focal, center=center, distortion=distortion
-    )
-    return _PixelRays(_unit(FieldOfView(intrinsics).directions))
-
-
-def _directions(intrinsics: Intrinsics, left: int, top: int, right: int, bottom: int) -> Single:
-    """Unit vectors through pixels of a rectangle, row by row; it may leave a pinhole's image."""
-    if not intrinsics.is_pinhole:
-        shape = (intrinsics.height, intrinsics.width, 3)
-        return _pixel_rays(intrinsics).unit.reshape(shape)[top:bottom, left:right].reshape(-1, 3)
-    (fx, fy), (cx, cy) = intrinsics.focal, intrinsics.center
-    x = (np.arange(left, right) - cx) / fx
-    y = (np.arange(top, bottom) - cy) / fy
-    flat = np.stack(np.meshgrid(x, y), axis=-1)
-    return _unit(np.concatenate([flat, np.ones((*flat.shape[:2], 1))], axis=-1))
-
-
-def _unit(directions: Array) -> Single:
-    """(N, 3) unit vectors in the order of the pixels."""
-    length = np.linalg.norm(directions, axis=-1, keepdims=True)
-    return np.ascontiguousarray((directions / length).reshape(-1, 3), np.float32)
-
-
-def _rotated(unit: Single, rotation: Single) -> Single:
-    """(N, 3) vectors turned; a matrix product of such a shape starts threads, and takes longer."""
-    import cv2
-
-    if not len(unit):
-        return unit
-    return np.asarray(cv2.transform(unit[:, None], rotation), np.float32).reshape(-1, 3)
-
-
-def _pixels_around(vertices: Array, view: View) -> tuple[int, int, int, int] | None:
-    """Rectangle of pixels that may show points (N, 3) in S: left, top, right, bottom, the last two
-    not within; None if there are none."""
-    intrinsics = view.intrinsics
-    width, height = intrinsics.width, intrinsics.height
-    low, high = np.array([0, 0]), np.array([width, height])
-    if intrinsics.is_pinhole:
-        low, high = -high, 2 * high
-    p_CQ = transform_points(inverse(view.X_SC), vertices)
-    if (p_CQ[:, 2] < NEAR).all():
-        return None
-    if (p_CQ[:, 2] >= NEAR).all() and intrinsics.is_pinhole:
-        pixels = intrinsics.project(p_CQ)
-        low = np.maximum(low, np.floor(pixels.min(axis=0)).astype(int))
-        high = np.minimum(high, np.ceil(pixels.max(axis=0)).astype(int) + 1)
-    if (low >= high).any():
-        return None
-    return int(low[0]), int(low[1]), int(high[0]), int(high[1])
+def _put_box(
+    nearness: Single,
+    plane: NDArray[np.int8],
+    X_CB: Array,
+    depth: Single,
+    labels: NDArray[np.uint16],
+    normals: Single | None,
+) -> None:
+    """Puts what is seen of a box where it is nearest."""
+    with np.errstate(divide="ignore"):
+        its = np.divide(1.0, nearness, out=nearness)
+    nearest = its < depth
+    np.copyto(depth, its, where=nearest)
+    labels[nearest] = SURROUNDINGS
+    if normals is not None:
+        along = np.concatenate([-X_CB[:3, :3].T, X_CB[:3, :3].T]).astype(np.float32)
+        normals[nearest] = along[plane[nearest]]
 
 
 def label_numbers(names: Sequence[str]) -> Mapping[str, int]:

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from pydrake.multibody.tree import BodyIndex
 
-from burg_drake.core import Array, InvalidInputError, inverse, nearest, transform_points
+from burg_drake.core import Array, InvalidInputError, inverse, nearest
 from burg_drake.dataset.appearance import (
     Appearance,
     apply_appearance,
@@ -19,6 +19,7 @@ from burg_drake.dataset.appearance import (
 from burg_drake.dataset.rendering.colors import DrakeColors
 from burg_drake.dataset.rendering.images import SURROUNDINGS, Images
 from burg_drake.dataset.rendering.ray_scene import RayScene, label_numbers
+from burg_drake.dataset.rendering.ray_surface import RaySurface, surfaces_of_body
 from burg_drake.dataset.views import View
 from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.station.diagram import build_station_diagram, visible_surfaces
@@ -74,7 +75,6 @@ class SceneRenderer:
         self._renderer = RENDERER if colors else None
         if appearance is not None:
             self._renderer = apply_appearance(self._built, appearance)
-        self._surfaces = visible_surfaces(self._built.plant, self._built.scene_graph)
         self._context = self._built.diagram.CreateDefaultContext()
         self._plant_context = self._built.plant.GetMyMutableContextFromRoot(self._context)
         self._posture: tuple[float, ...] | None = None
@@ -155,22 +155,25 @@ class SceneRenderer:
             joint.set_angle(self._plant_context, position)
         self._posture, self._rays = view.posture, None
 
+    @cached_property
+    def _seen(self) -> list[tuple[BodyIndex, RaySurface]]:
+        """The surfaces that rays meet, each in its body's frame."""
+        placed = {**self._built.free, **self._built.fixed}
+        owner = {placed[name]: number for name, number in self.numbers.items()}
+        found = []
+        surfaces = visible_surfaces(self._built.plant, self._built.scene_graph)
+        for body in dict.fromkeys(one.body for one in surfaces):
+            parts = [(one.vertices, one.faces) for one in surfaces if one.body == body]
+            label = owner.get(body, SURROUNDINGS)
+            found += [(body, surface) for surface in surfaces_of_body(label, parts)]
+        return found
+
     @property
     def _ray_scene(self) -> RayScene:
         if self._rays is None:
             X_SW = inverse(self.station.document.X_WS.matrix())
-            placed = {**self._built.free, **self._built.fixed}
-            owner = {placed[name]: number for name, number in self.numbers.items()}
-            self._rays = RayScene.joined(
-                [
-                    (
-                        owner.get(one.body, SURROUNDINGS),
-                        transform_points(X_SW @ self._X_WB(one.body), one.vertices),
-                        one.faces,
-                    )
-                    for one in self._surfaces
-                ]
-            )
+            poses = [X_SW @ self._X_WB(body) for body, _ in self._seen]
+            self._rays = RayScene([surface for _, surface in self._seen], poses)
         return self._rays
 
     def _X_WB(self, body: BodyIndex) -> Array:
