@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
+import cv2
 import numpy as np
 from pydrake.geometry import (
     ClippingRange,
@@ -55,8 +56,6 @@ class DrakeColors:
         """
         if intrinsics.is_pinhole:
             return self._pinhole(intrinsics, X_WC, depth_range)
-        import cv2
-
         wide, at = _covering(intrinsics)
         image = self._pinhole(wide, X_WC, depth_range)
         return np.asarray(cv2.remap(image, at, None, cv2.INTER_LINEAR), np.uint8)
@@ -73,7 +72,7 @@ class DrakeColors:
         )
         camera = ColorRenderCamera(core, False)
         image = self._query.RenderColorImage(camera, self._world, RigidTransform(X_WC))
-        colors = np.ascontiguousarray(image.data[..., :3])
+        colors = np.asarray(cv2.cvtColor(image.data, cv2.COLOR_RGBA2RGB), np.uint8)
         return colors if self._fill is None else self._fill(colors, X_WC, intrinsics)
 
 

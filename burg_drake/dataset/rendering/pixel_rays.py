@@ -27,9 +27,9 @@ def unit_directions(intrinsics: Intrinsics, pixels: Pixels) -> Single:
         unit = _Grid.of(intrinsics).unit[top:bottom, left:right]
         return np.ascontiguousarray(unit).reshape(-1, 3)
     (fx, fy), (cx, cy) = intrinsics.focal, intrinsics.center
-    x = (np.arange(left, right) - cx) / fx
-    y = ((np.arange(top, bottom) - cy) / fy)[:, None]
-    return _unit(x, y).reshape(-1, 3)
+    x = (np.arange(left, right, dtype=float) - cx) / fx
+    y = (np.arange(top, bottom, dtype=float) - cy) / fy
+    return _unit(x, y[:, None]).reshape(-1, 3)
 
 
 def pixels_around(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,8 @@ from burg_drake.cameras.optics import Intrinsics
 from burg_drake.core import Array, Indices, Single, inverse
 from burg_drake.dataset.rendering.pixel_rays import flat_directions
 
+NORMALS = np.concatenate([-np.eye(3), np.eye(3)])
+"""Of a box's planes: the lower ones along x, y and z, then the upper ones."""
 SAME = 1e-9
 """Lengths of a surface that are smaller count as 0 [m]."""
 SAME_AREA = 1e-6
@@ -48,38 +51,52 @@ class RayBox:
             return None
         return cls(lower, upper)
 
-    def seen(self, intrinsics: Intrinsics, X_CB: Array) -> tuple[Single, NDArray[np.int8]] | None:
-        """What a camera outside sees of it.
+    def nearness(self, intrinsics: Intrinsics, X_CB: Array) -> Single | None:
+        """(H, W) 1 / z [1/m] of where a camera's rays meet it, 0 where they do not; None if the
+        camera is within it or in one of its planes.
 
-        Of a plane n . p = d, a ray along (x, y, 1) meets 1 / z = n . (x, y, 1) / d, which is linear
-        in x and y: the ray enters where 1 / z is least among the planes whose front the camera
-        sees, if it does so before it leaves by another one.
-
-        Returns:
-            (H, W) 1 / z [1/m], 0 where it is not met, and (H, W) which plane is met: 0 to 2 for the
-            lower ones along x, y and z, 3 to 5 for the upper ones; None if the camera is within it
-            or in one of its planes.
+        Of a plane n . p = d, d from the camera, a ray along (x, y, 1) meets 1 / z =
+        n . (x, y, 1) / d, which is linear in x and y. The ray enters where 1 / z is least among
+        the planes that the camera sees from outside, if that is before it leaves by another one.
         """
-        x, y = flat_directions(intrinsics)
-        normals = np.concatenate([-np.eye(3), np.eye(3)])
-        offsets = np.concatenate([-self.lower, self.upper])
-        distances = offsets - normals @ inverse(X_CB)[:3, 3]  # of the camera, below 0 outside
-        if (distances >= 0.0).all() or (np.abs(distances) < SAME).any():
-            return None
-        planes = (normals @ X_CB[:3, :3].T / distances[:, None]).astype(np.float32)
         enter: Single | None = None
         leave: Single | None = None
-        plane = np.zeros((intrinsics.height, intrinsics.width), np.int8)
-        for number, (a, b, c) in enumerate(planes):
-            nearness = (a * x + c) + b * y
+        distances = self._distances(X_CB)
+        if (distances >= 0.0).all() or (np.abs(distances) < SAME).any():
+            return None
+        for number, image in self._planes(intrinsics, X_CB):
             if distances[number] > 0.0:
-                leave = nearness if leave is None else np.maximum(leave, nearness, out=leave)
-            elif enter is None:
-                enter = nearness
-                plane[:] = number
+                leave = image if leave is None else np.maximum(leave, image, out=leave)
             else:
-                plane[nearness < enter] = number
-                np.minimum(enter, nearness, out=enter)
+                enter = image if enter is None else np.minimum(enter, image, out=enter)
         assert enter is not None and leave is not None
         enter[enter < np.maximum(leave, 0.0, out=leave)] = 0.0
-        return enter, plane
+        return enter
+
+    def planes(self, intrinsics: Intrinsics, X_CB: Array) -> NDArray[np.int16]:
+        """(H, W) number in `NORMALS` of the plane by which rays enter; where none does, any."""
+        enter: Single | None = None
+        found = np.zeros((intrinsics.height, intrinsics.width), np.int16)
+        distances = self._distances(X_CB)
+        for number, image in self._planes(intrinsics, X_CB):
+            if distances[number] < 0.0:
+                if enter is None:
+                    enter = image
+                    found[:] = number
+                else:
+                    np.copyto(found, number, where=image < enter)
+                    np.minimum(enter, image, out=enter)
+        return found
+
+    def _distances(self, X_CB: Array) -> Array:
+        """(6,) of the camera to each plane, below 0 outside [m]."""
+        offsets: Array = np.concatenate([-self.lower, self.upper])
+        return offsets - NORMALS @ inverse(X_CB)[:3, 3]
+
+    def _planes(self, intrinsics: Intrinsics, X_CB: Array) -> Iterator[tuple[int, Single]]:
+        """The number of each plane, and (H, W) 1 / z of where rays meet it, below 0 behind the
+        camera."""
+        x, y = flat_directions(intrinsics)
+        planes = NORMALS @ X_CB[:3, :3].T / self._distances(X_CB)[:, None]
+        for number, (a, b, c) in enumerate(planes.astype(np.float32)):
+            yield number, (a * x + c) + b * y

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import Array, Single, inverse
 from burg_drake.dataset.rendering.images import SURROUNDINGS, Images
+from burg_drake.dataset.rendering.ray_box import NORMALS
 from burg_drake.dataset.rendering.ray_surface import NONE, Met, RaySurface
 from burg_drake.dataset.views import View
 
@@ -53,9 +53,7 @@ class RayScene:
         X_SB: (4, 4) frame of each; all in S if None.
     """
 
-    def __init__(
-        self, surfaces: Sequence[RaySurface], X_SB: Sequence[Array] | None = None
-    ) -> None:
+    def __init__(self, surfaces: Sequence[RaySurface], X_SB: Sequence[Array] | None = None) -> None:
         poses = [np.eye(4)] * len(surfaces) if X_SB is None else X_SB
         self._placed = list(zip(surfaces, poses, strict=True))
         self._of_label = {one.label: (one, pose) for one, pose in self._placed}
@@ -63,19 +61,10 @@ class RayScene:
 
     def images(self, view: View, *, normals: bool = False) -> Images:
         """Depth and labels of a view; its normals as well if asked for."""
-        shape = view.intrinsics.height, view.intrinsics.width
-        depth: Single = np.full(shape, np.inf, np.float32)
-        labels = np.zeros(shape, np.uint16)
-        directions = np.zeros((*shape, 3), np.float32) if normals else None
+        depth, directions, meshes = self._boxes_seen(view, normals)
+        labels = np.full(depth.shape, SURROUNDINGS, np.uint16)
         self._last = view, {}
-        X_CS = inverse(view.X_SC)
-        for surface, X_SB in self._placed:
-            X_CB = X_CS @ X_SB
-            if surface.label == SURROUNDINGS and surface.box is not None:
-                seen = surface.box.seen(view.intrinsics, X_CB)
-                if seen is not None:
-                    _put_box(*seen, X_CB, depth, labels, directions)
-                    continue
+        for surface, X_CB in meshes:
             met = surface.met(view.intrinsics, X_CB)
             self._last[1][surface.label] = met
             if met is None:
@@ -108,6 +97,31 @@ class RayScene:
         left, top, _, _ = met.pixels
         return Silhouette(left + int(columns[0]), top + int(rows[0]), cut)
 
+    def _boxes_seen(
+        self, view: View, normals: bool
+    ) -> tuple[Single, Single | None, list[tuple[RaySurface, Array]]]:
+        """Depth and normals of what is seen of boxes alone, and what rays have to be cast at."""
+        shape = view.intrinsics.height, view.intrinsics.width
+        nearness: Single = np.zeros(shape, np.float32)
+        plane, directions = np.zeros(shape, np.int16), [np.zeros((1, 3))]
+        meshes, X_CS = [], inverse(view.X_SC)
+        for surface, X_SB in self._placed:
+            X_CB, box, seen = X_CS @ X_SB, surface.box, None
+            if box is not None and surface.label == SURROUNDINGS:
+                seen = box.nearness(view.intrinsics, X_CB)
+            if box is None or seen is None:
+                meshes.append((surface, X_CB))
+                continue
+            if normals:
+                planes = box.planes(view.intrinsics, X_CB)
+                np.copyto(plane, planes + sum(map(len, directions)), where=seen > nearness)
+                directions.append(NORMALS @ X_CB[:3, :3].T)
+            np.maximum(nearness, seen, out=nearness)
+        of_plane = np.concatenate(directions).astype(np.float32)
+        with np.errstate(divide="ignore"):
+            depth = np.divide(1.0, nearness, out=nearness)
+        return depth, np.take(of_plane, plane, axis=0) if normals else None, meshes
+
     def _met_whole(self, number: int, view: View) -> Met | None:
         """What rays in the image and beyond it meet of an object; what the last image found of it
         if that is all."""
@@ -120,25 +134,6 @@ class RayScene:
                 return known
         surface, X_SB = self._of_label[number]
         return surface.met(view.intrinsics, inverse(view.X_SC) @ X_SB, beyond=True)
-
-
-def _put_box(
-    nearness: Single,
-    plane: NDArray[np.int8],
-    X_CB: Array,
-    depth: Single,
-    labels: NDArray[np.uint16],
-    normals: Single | None,
-) -> None:
-    """Puts what is seen of a box where it is nearest."""
-    with np.errstate(divide="ignore"):
-        its = np.divide(1.0, nearness, out=nearness)
-    nearest = its < depth
-    np.copyto(depth, its, where=nearest)
-    labels[nearest] = SURROUNDINGS
-    if normals is not None:
-        along = np.concatenate([-X_CB[:3, :3].T, X_CB[:3, :3].T]).astype(np.float32)
-        normals[nearest] = along[plane[nearest]]
 
 
 def label_numbers(names: Sequence[str]) -> Mapping[str, int]:
