@@ -172,8 +172,8 @@ KINECT_NOISE = DepthNoise(
 for improved 3D reconstruction and tracking", 3DIMPVT 2012, section 2); steps of 1/8 pixel, as
 Khoshelham and Elberink have them: 2.85 mm at 1 m, growing with the square ("Accuracy and resolution
 of Kinect depth data for indoor mapping applications", Sensors 12, 2012). What Nguyen measured has
-the steps in it, so that both together are too much, by 1 % at 0.5 m, 9 % at 1 m and 14 % at 2 m.
-Holes are estimates."""
+the steps in it, so that both together are too much: by 1 % about 0.5 m, 9 % about 1 m and 14 %
+about 2 m. Holes are estimates."""
 
 AZURE_KINECT_NOISE = DepthNoise(
     axial_base=0.001,
