@@ -157,8 +157,8 @@ def _cut(whole: Intrinsics, width: int, height: int) -> Intrinsics:
     )
 
 
-def _rational(k: tuple[float, ...], p: tuple[float, float]) -> tuple[float, ...]:
-    """OpenCV's distortion, which has p1 and p2 after k2, of the radial k1 to k6 apart from them."""
+def _distortion(k: tuple[float, ...], p: tuple[float, float]) -> tuple[float, ...]:
+    """Radial k1, k2, k3[, k4, k5, k6] and tangential p1, p2 in OpenCV's order: p follows k2."""
     return (*k[:2], *p, *k[2:])
 
 
@@ -193,7 +193,7 @@ D455 = Sensor(
         (632.4, 632.0),
         (639.8, 403.3),
         ((640, 480), (1280, 720)),
-        _rational(k=(-0.056522, 0.068801, -0.022386), p=(-0.000717, -0.000025)),
+        _distortion(k=(-0.056522, 0.068801, -0.022386), p=(-0.000717, -0.000025)),
     ),
     depth=_images(
         "d455 depth",
@@ -217,7 +217,7 @@ AZURE_KINECT = Sensor(
         (964.418, 963.756),
         (1016.870, 784.185),
         ((1280, 720), (2048, 1536)),
-        _rational(
+        _distortion(
             k=(0.722746, -2.885590, 1.632723, 0.602199, -2.719626, 1.565053),
             p=(0.000783, -0.000143),
         ),
@@ -227,7 +227,7 @@ AZURE_KINECT = Sensor(
         (640, 576),
         (503.928, 503.979),
         (332.064, 325.881),
-        distortion=_rational(
+        distortion=_distortion(
             k=(3.130577, 2.324939, 0.130416, 3.458652, 3.350115, 0.662942),
             p=(0.000081, -0.000051),
         ),
