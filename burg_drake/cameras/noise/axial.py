@@ -13,7 +13,8 @@ from burg_drake.core import Single
 STEEP = math.radians(60.0)
 """Up to this angle axial noise does not depend on it (Nguyen et al. 2012)."""
 STEEPEST = math.radians(82.0)
-"""Beyond this angle nothing was measured; noise is that of this one."""
+"""Beyond this angle noise is that of this one, as the formulas' grow to infinity at 90 degrees; an
+estimate of how far they hold."""
 
 
 def axial_sigma(depth: Single, angle: Single | None, noise: DepthNoise) -> Single:
@@ -21,7 +22,8 @@ def axial_sigma(depth: Single, angle: Single | None, noise: DepthNoise) -> Singl
 
     `a + b (z - c)^2`, and beyond 60 degrees in addition `d / sqrt(z) (t / (pi/2 - t))^2`, with the
     angle t (Nguyen, Izadi and Lovell 2012, equations of the axial noise). Their angle is that of a
-    turned plane in the image's middle; here it is the one against the ray.
+    turned plane in the image's middle; here it is the one against the ray. The second term begins
+    with a step, as theirs does, of 0.4 mm at 1 m.
 
     Args:
         depth: (H, W) [m], 0 for none.
@@ -55,10 +57,11 @@ def disparity_errors(
 ) -> Single:
     """Depth of disparities with normal errors of `disparity_sigma`, in steps of `disparity_step`.
 
-    As long as they are small against z, the depth's standard deviation is `z^2 sigma / (f b)`, as
-    Intel's papers on tuning the D400 cameras have it, and steps are `z^2 step / (f b)` apart
-    (Khoshelham and Elberink, "Accuracy and resolution of Kinect depth data for indoor mapping
-    applications", Sensors 12, 2012). A disparity that is 0 or below, gives no depth.
+    As long as they are small against z, the depth's standard deviation is `z^2 sigma / (f b)`
+    (Grunnet-Jepsen, Sweetser and Woodfill, "Tuning depth cameras for best performance"; Keselman et
+    al., "Intel RealSense stereoscopic depth cameras", CVPR workshops 2017, equation 2), and steps
+    are `z^2 step / (f b)` apart (Khoshelham and Elberink, Sensors 12, 2012). A disparity that is 0
+    or below, gives no depth.
 
     Args:
         depth: (H, W) [m], 0 for none.

@@ -1,4 +1,9 @@
-"""The figures of a depth camera's noise, as a document, with presets of real cameras."""
+"""The figures of a depth camera's noise, as a document, with presets of real cameras.
+
+Where a preset's docstring names no source for a figure, it is an estimate. What `DepthNoise` does
+not have: errors that are the same in every image, such as a bent depth scale or interference of
+paths of light, and errors that neighbouring pixels share.
+"""
 
 from __future__ import annotations
 
@@ -119,11 +124,16 @@ def depth_noise(name: str | Path) -> DepthNoise:
 
 
 def _realsense(name: str) -> DepthNoise:
-    """Disparity: 0.08 pixels of error (Grunnet-Jepsen, Sweetser and Woodfill, "Best-known methods
-    for tuning Intel RealSense D400 depth cameras", which say it of a well textured target), in
-    steps of 1/32 ("Subpixel linearity improvement for Intel RealSense depth camera D400 series").
-    The band at the left that the second imager does not see is in the data sheet. Edges as of the
-    Kinect; shares of holes and flying pixels are estimates, for want of published ones."""
+    """Disparity: 0.08 pixels of error, which Grunnet-Jepsen recommends (librealsense, issue 3904,
+    2019); of a well textured target "Tuning depth cameras for best performance"
+    (Grunnet-Jepsen, Sweetser and Woodfill, Intel) expects 0.05 to 0.1. Steps of 1/32: "Subpixel
+    linearity improvement for Intel RealSense depth camera D400 series" (Grunnet-Jepsen, Sweetser,
+    Khuong, Tong and Woodfill, Intel). Depth in millimetres is the devices' default. The band at
+    the left that the second imager does not see is in the data sheet.
+
+    Edges, holes and flying pixels are estimates: edges are the Kinect's. Ahn et al. ("Analysis and
+    noise modeling of the Intel RealSense D435 for mobile robots", UR 2019) measured some of it;
+    their figures are not in here."""
     return DepthNoise(
         baseline=SENSORS[name].baseline,
         second_view="same",
@@ -159,9 +169,11 @@ KINECT_NOISE = DepthNoise(
     depth_step=0.001,
 )
 """Axial and lateral noise as Nguyen, Izadi and Lovell measured them ("Modeling Kinect sensor noise
-for improved 3D reconstruction and tracking", 3DIMPVT 2012; up to 82 degrees, where few pixels are
-left); steps of Khoshelham and Elberink (Sensors 12, 2012). What was measured has the steps in it,
-so that both together are up to a tenth too much at 1 m. Holes of dark surfaces are an estimate."""
+for improved 3D reconstruction and tracking", 3DIMPVT 2012, section 2); steps of 1/8 pixel, as
+Khoshelham and Elberink have them: 2.85 mm at 1 m, growing with the square ("Accuracy and resolution
+of Kinect depth data for indoor mapping applications", Sensors 12, 2012). What Nguyen measured has
+the steps in it, so that both together are too much: by 1 % about 0.5 m, 9 % about 1 m and 14 %
+about 2 m. Holes are estimates."""
 
 AZURE_KINECT_NOISE = DepthNoise(
     axial_base=0.001,
@@ -176,9 +188,13 @@ AZURE_KINECT_NOISE = DepthNoise(
     hole_size=1.0,
     depth_step=0.001,
 )
-"""An estimate: the specification, which Tölgyessy et al. confirmed (Sensors 21, 413, 2021), only
-says that the standard deviation is at most 17 mm, and flying pixels and holes on dark surfaces are
-described, not counted."""
+"""An estimate: the hardware specifications, which Tölgyessy et al. confirmed ("Evaluation of the
+Azure Kinect and its comparison to Kinect v1 and Kinect v2", Sensors 21, 413, 2021), say that the
+standard deviation is at most 17 mm, which is a bound for all modes, depths and surfaces. This one
+is within 0.6 mm of what BlenderProc derived from that paper (`add_kinect_azure_noise`: 0.5 mm up to
+0.5 m, and 1 mm more for each metre). Flying pixels and holes on dark surfaces are described there,
+not counted; BlenderProc has edges of 0.25 pixels. The systematic error, less than 11 mm and 0.1 %
+of the distance, is not simulated."""
 
 ZIVID_TWO_NOISE = DepthNoise(
     baseline=SENSORS["zivid_two"].baseline,
@@ -191,8 +207,9 @@ ZIVID_TWO_NOISE = DepthNoise(
     dark_probability=0.3,
     hole_size=2.0,
 )
-"""Point precision of 55 um at 0.7 m (data sheet of the Zivid 2 M70), which grows with the square of
-the depth, as of all triangulation. Shares of holes and flying pixels are estimates."""
+"""Point precision of 55 um at 0.7 m (data sheet of the Zivid 2 M70), that is the local random error
+of a point along all three axes (Zivid knowledge base), here all of it along z; it is taken to grow
+with the square of the depth, as of all triangulation. Holes and flying pixels are estimates."""
 
 NOISES = {
     "none": DepthNoise(),

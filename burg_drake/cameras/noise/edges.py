@@ -11,13 +11,15 @@ from burg_drake.cameras.noise.surfaces import EDGE
 from burg_drake.core import Array, Booleans, Single
 
 REACH = 3.0
-"""Standard deviations by which edges are moved at most."""
+"""Standard deviations within which pixels beside an edge may show what is beyond it; 0.3 % of the
+steps would be longer."""
 
 
 def lateral_sigma(angle: Single | Array, noise: DepthNoise) -> Array:
     """Standard deviation of where an edge is, along rows and along columns [pixels].
 
-    `a + b t / (pi/2 - t)`, with the angle of incidence t (Nguyen, Izadi and Lovell 2012).
+    `a + b t / (pi/2 - t)`, with the angle of incidence t (Nguyen, Izadi and Lovell 2012, the
+    equation of the lateral noise in pixels).
 
     Args:
         angle: of incidence, of any shape [rad].
@@ -37,8 +39,10 @@ def lateral_noise(
     """Depth with frayed edges: pixels near them show what is a random step away.
 
     Only pixels within reach of an edge do: their noise was measured at edges, and within a surface
-    it would add to the axial noise, which was measured as a whole. Bohg et al. ("Robot arm pose
-    estimation through pixel-wise part classification", ICRA 2014) displace all pixels.
+    it would add to the axial noise, which was measured as a whole. Barron and Malik ("Intrinsic
+    scene properties from a single RGB-D image", CVPR 2013) and Handa et al. ("A benchmark for RGB-D
+    visual odometry, 3D reconstruction and SLAM", ICRA 2014) displace all pixels, by a standard
+    deviation of half a pixel, and interpolate, which puts pixels in between.
 
     Args:
         depth: (H, W) [m], 0 for none.
@@ -66,9 +70,9 @@ def flying_pixels(
 ) -> Single:
     """Depth in which a share of the pixels at edges lie anywhere between near and far.
 
-    A pixel that sees two surfaces measures a mixture; of which of their parts, is random here
-    (Sabov and Krüger, "Identification and correction of flying pixels in range camera data", SCCG
-    2008). There is none at an edge beyond which nothing is.
+    A pixel that sees two surfaces measures a mixture ("Color-guided flying pixel correction in
+    depth images", arXiv 2410.08084); of which of their parts, is random here, an estimate. There
+    is none at an edge beyond which nothing is.
 
     Args:
         depth: (H, W) [m], 0 for none.

@@ -1,8 +1,9 @@
 """Holes: surfaces that send too little light back, as they are seen from aside or are dark.
 
 Mallick, Das and Majumdar ("Characterizations of noise in Kinect depth images: a review", IEEE
-Sensors Journal 14, 2014) name these as causes; probabilities have not been published, so that
-their course here is the simplest one.
+Sensors Journal 14, 2014) name these as causes. Probabilities are estimates, and their course is
+the simplest one; others lose all that is darker than a threshold, such as 15 of 255 (BlenderProc,
+of the Azure Kinect).
 """
 
 from __future__ import annotations

@@ -9,7 +9,8 @@ from burg_drake.cameras.noise.surfaces import inverse_depth
 from burg_drake.core import Booleans, Indices, Single
 
 BEFORE = 0.5
-"""A surface hides another one if its disparity is larger by this [pixels]."""
+"""A surface hides another one if its disparity is larger by this [pixels], as images are
+rasters."""
 
 
 def hidden_from_second(

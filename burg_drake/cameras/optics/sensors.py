@@ -24,7 +24,7 @@ class Sensor:
     Attributes:
         name: of the preset.
         color, depth: intrinsics of its images, one for every aspect; the first is the usual one.
-        depth_range: nearest and farthest depth that it is made for [m].
+        depth_range: nearest and farthest depth that it is made for [m]; some measure nearer.
         baseline: x of the second imager, or of the projector, in the frame of the depth camera
             [m]; 0 of a time-of-flight camera, which has none.
         source: where the figures are from.
@@ -113,13 +113,36 @@ def _same_aspect(intrinsics: Intrinsics, width: int, height: int) -> bool:
     return width > 0 and height > 0 and abs(height - fitting) <= 0.5
 
 
-def _modes(whole: Intrinsics, *sizes: Size) -> tuple[Intrinsics, ...]:
+def _images(
+    camera: str,
+    whole: Size,
+    focal: tuple[float, float],
+    center: tuple[float, float],
+    sizes: tuple[Size, ...] = (),
+    distortion: tuple[float, ...] = (),
+) -> tuple[Intrinsics, ...]:
     """Images of several sizes, from one calibration: scaled so that the whole just covers them,
-    then cut evenly. `whole` itself may be a cut of the sensor, which covers smaller scales."""
-    return tuple(_mode(whole, *size) for size in sizes)
+    then cut evenly. The whole itself may be a cut of the sensor, which covers smaller scales.
+
+    Args:
+        camera: what the calibrations are called.
+        whole: size of the calibrated images.
+        focal, center: of these [pixels].
+        sizes: of the images, the usual one first; the whole if none is given.
+        distortion: OpenCV's, of all sizes.
+    """
+    calibrated = Intrinsics(
+        camera=camera,
+        width=whole[0],
+        height=whole[1],
+        focal=focal,
+        center=center,
+        distortion=distortion,
+    )
+    return tuple(_cut(calibrated, *size) for size in sizes or (whole,))
 
 
-def _mode(whole: Intrinsics, width: int, height: int) -> Intrinsics:
+def _cut(whole: Intrinsics, width: int, height: int) -> Intrinsics:
     scale = max(width / whole.width, height / whole.height)
     (fx, fy), (cx, cy) = whole.focal, whole.center
     return replace(
@@ -134,166 +157,110 @@ def _mode(whole: Intrinsics, width: int, height: int) -> Intrinsics:
     )
 
 
+def _distortion(k: tuple[float, ...], p: tuple[float, float]) -> tuple[float, ...]:
+    """Radial k1, k2, k3[, k4, k5, k6] and tangential p1, p2 in OpenCV's order: p follows k2."""
+    return (*k[:2], *p, *k[2:])
+
+
+_D400 = (
+    "Intel RealSense Product Family D400 Series, data sheet 337029-009 of June 2020 (baseline,"
+    " ideal range); a device's own calibration as librealsense tells it"
+)
+
 D435 = Sensor(
     name="d435",
-    color=_modes(
-        Intrinsics(
-            camera="d435 color",
-            width=1280,
-            height=720,
-            focal=(920.7, 920.8),
-            center=(635.6, 373.1),
-        ),
-        (640, 480),
-        (1280, 720),
+    color=_images(
+        "d435 color", (1280, 720), (920.7, 920.8), (635.6, 373.1), ((640, 480), (1280, 720))
     ),
-    depth=_modes(
-        Intrinsics(
-            camera="d435 depth",
-            width=1280,
-            height=800,
-            focal=(637.6, 637.6),
-            center=(638.3, 410.5),
-        ),
-        (640, 480),
-        (848, 480),
-        (1280, 720),
+    depth=_images(
+        "d435 depth",
+        (1280, 800),
+        (637.6, 637.6),
+        (638.3, 410.5),
+        ((640, 480), (848, 480), (1280, 720)),
     ),
     depth_range=(0.3, 3.0),
     baseline=0.050,
-    source="Intel RealSense Product Family D400 Series, data sheet 337029-009 (baseline, ideal"
-    " range); a device's own calibration as librealsense tells it; no distortion is told",
+    source=f"{_D400}; no distortion is told",
 )
 """Intel RealSense D435, whose depth is that of its left imager."""
 
 D455 = Sensor(
     name="d455",
-    color=_modes(
-        Intrinsics(
-            camera="d455 color",
-            width=1280,
-            height=800,
-            focal=(632.4, 632.0),
-            center=(639.8, 403.3),
-            distortion=(-0.056522, 0.068801, -0.000717, -0.000025, -0.022386),
-        ),
-        (640, 480),
-        (1280, 720),
+    color=_images(
+        "d455 color",
+        (1280, 800),
+        (632.4, 632.0),
+        (639.8, 403.3),
+        ((640, 480), (1280, 720)),
+        _distortion(k=(-0.056522, 0.068801, -0.022386), p=(-0.000717, -0.000025)),
     ),
-    depth=_modes(
-        Intrinsics(
-            camera="d455 depth",
-            width=1280,
-            height=800,
-            focal=(641.5, 641.5),
-            center=(640.4, 403.8),
-        ),
-        (640, 480),
-        (848, 480),
-        (1280, 720),
+    depth=_images(
+        "d455 depth",
+        (1280, 800),
+        (641.5, 641.5),
+        (640.4, 403.8),
+        ((640, 480), (848, 480), (1280, 720)),
     ),
     depth_range=(0.6, 6.0),
     baseline=0.095,
-    source="Intel RealSense Product Family D400 Series, data sheet 337029-009 (baseline, ideal"
-    " range); a device's own calibration as librealsense tells it. It calls the distortion"
-    " inverse; users found that OpenCV's model, as here, is meant",
+    source=f"{_D400}. It calls the distortion inverse; users found that OpenCV's model, as here, is"
+    " meant",
 )
 """Intel RealSense D455, whose depth is that of its left imager."""
 
 AZURE_KINECT = Sensor(
     name="azure_kinect",
-    color=_modes(
-        Intrinsics(
-            camera="azure_kinect color",
-            width=2048,
-            height=1536,
-            focal=(964.418, 963.756),
-            center=(1016.870, 784.185),
-            distortion=(
-                *(0.722746, -2.885590, 0.000783, -0.000143),
-                *(1.632723, 0.602199, -2.719626, 1.565053),
-            ),
-        ),
-        (1280, 720),
+    color=_images(
+        "azure_kinect color",
         (2048, 1536),
-    ),
-    depth=_modes(
-        Intrinsics(
-            camera="azure_kinect depth",
-            width=640,
-            height=576,
-            focal=(503.928, 503.979),
-            center=(332.064, 325.881),
-            distortion=(
-                *(3.130577, 2.324939, 0.000081, -0.000051),
-                *(0.130416, 3.458652, 3.350115, 0.662942),
-            ),
+        (964.418, 963.756),
+        (1016.870, 784.185),
+        ((1280, 720), (2048, 1536)),
+        _distortion(
+            k=(0.722746, -2.885590, 1.632723, 0.602199, -2.719626, 1.565053),
+            p=(0.000783, -0.000143),
         ),
+    ),
+    depth=_images(
+        "azure_kinect depth",
         (640, 576),
+        (503.928, 503.979),
+        (332.064, 325.881),
+        distortion=_distortion(
+            k=(3.130577, 2.324939, 0.130416, 3.458652, 3.350115, 0.662942),
+            p=(0.000081, -0.000051),
+        ),
     ),
     depth_range=(0.5, 3.86),
     baseline=0.0,
-    source="Microsoft, Azure Kinect DK hardware specification (range of NFOV unbinned); a device's"
-    " own calibration as the Sensor SDK tells it",
+    source="Microsoft, Azure Kinect DK hardware specifications (NFOV unbinned: 640 x 576, 0.5 to"
+    " 3.86 m); a device's own calibration as the Sensor SDK tells it",
 )
 """Microsoft Azure Kinect: time of flight, in the mode NFOV unbinned."""
 
+_ZIVID_IMAGES = _images("zivid_two", (1944, 1200), (1805.0, 1805.0), (971.5, 599.5))
+
 ZIVID_TWO = Sensor(
     name="zivid_two",
-    color=_modes(
-        Intrinsics(
-            camera="zivid_two color",
-            width=1944,
-            height=1200,
-            focal=(1805.0, 1805.0),
-            center=(971.5, 599.5),
-        ),
-        (1944, 1200),
-    ),
-    depth=_modes(
-        Intrinsics(
-            camera="zivid_two depth",
-            width=1944,
-            height=1200,
-            focal=(1805.0, 1805.0),
-            center=(971.5, 599.5),
-        ),
-        (1944, 1200),
-    ),
+    color=_ZIVID_IMAGES,
+    depth=_ZIVID_IMAGES,
     depth_range=(0.3, 1.5),
     baseline=0.11,
-    source="Zivid 2 M70, data sheet: 754 mm over 1944 pixels at a distance of 700 mm. The baseline"
-    " is not published: an estimate from the housing, 169 mm wide. Points are told without"
-    " distortion",
+    source="Zivid 2 M70, data sheet (range; 754 mm over 1944 pixels at a distance of 700 mm). The"
+    " projector is on the side of x (Zivid knowledge base, camera coordinate system); how far is"
+    " an estimate from the housing, 169 mm wide. Points are told without distortion",
 )
 """Zivid 2 M70: coded light, colour and depth through the same lens."""
 
 KINECT = Sensor(
     name="kinect",
-    color=_modes(
-        Intrinsics(
-            camera="kinect color",
-            width=640,
-            height=480,
-            focal=(525.0, 525.0),
-            center=(319.5, 239.5),
-        ),
-        (640, 480),
-    ),
-    depth=_modes(
-        Intrinsics(
-            camera="kinect depth",
-            width=640,
-            height=480,
-            focal=(585.0, 585.0),
-            center=(319.5, 239.5),
-        ),
-        (640, 480),
-    ),
+    color=_images("kinect color", (640, 480), (525.0, 525.0), (319.5, 239.5)),
+    depth=_images("kinect depth", (640, 480), (586.3, 586.3), (319.5, 239.5)),
     depth_range=(0.5, 5.0),
     baseline=0.075,
-    source="Khoshelham and Elberink, Sensors 12, 2012 (baseline, range); Nguyen, Izadi and Lovell,"
-    " 3DIMPVT 2012 (focal length); the colour camera's is the one usually taken",
+    source="Khoshelham and Elberink, Sensors 12, 2012 (baseline, range, and of depth the focal"
+    " length: 5.453 mm over pixels of 9.3 um); the colour camera's is the one usually taken",
 )
 """Microsoft Kinect, the first: projected dots."""
 
