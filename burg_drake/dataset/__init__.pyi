@@ -45,7 +45,6 @@ from .labels import (
 )
 from .rendering import (
     Images as Images,
-    RayScene as RayScene,
     SceneRenderer as SceneRenderer,
     Silhouette as Silhouette,
 )

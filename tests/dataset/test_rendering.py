@@ -12,7 +12,9 @@ from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import inverse, make_pose
 from burg_drake.dataset.labels import label_instances
 from burg_drake.dataset.labels.instances import box_around
-from burg_drake.dataset.rendering import RayScene, RaySurface, SceneRenderer, render, station_view
+from burg_drake.dataset.rendering import SceneRenderer, render, station_view
+from burg_drake.dataset.rendering.ray_scene import RayScene
+from burg_drake.dataset.rendering.ray_surface import RaySurface
 from burg_drake.dataset.views import View
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.diagram import StationDiagram, build_station_diagram
@@ -243,3 +245,53 @@ def test_bad_requests(scene: Scene, station: Station) -> None:
     wide = View(camera="fish", intrinsics=fish, X_SC=station_view(station, "board").X_SC)
     with pytest.raises(InvalidInputError, match=r"sees further than 76 degrees"):
         render(scene, station, wide, ("color",))
+
+
+@pytest.mark.parametrize("distortion", [(), (-0.28, 0.09, 0.001, -0.0005)])
+@pytest.mark.parametrize("place", [(0.0, 0.0, 0.0), (0.3, 0.1, 0.2), (-0.2, 0.3, 0.6)])
+def test_boxes_in_closed_form_are_as_their_triangles(
+    distortion: tuple[float, ...], place: tuple[float, float, float]
+) -> None:
+    """From above, from aside, from among two boxes; the same box turned slightly has rays cast."""
+    import trimesh
+
+    eye = np.array(place) + np.array([0.0, 0.0, 0.9])
+    flat = np.array([[-0.3, -0.2, 0.0], [0.3, -0.2, 0.0], [0.3, 0.2, 0.0], [-0.3, 0.2, 0.0]])
+    block = trimesh.creation.box((0.2, 0.1, 0.3)).apply_translation((0.35, 0.1, 0.4))
+    parts = [
+        (flat, np.array([[0, 1, 2], [0, 2, 3]])),
+        (np.asarray(block.vertices), np.asarray(block.faces)),
+    ]
+    z = np.array([0.1, 0.05, 0.0]) - eye
+    z /= np.linalg.norm(z)
+    x = np.cross(z, (0.0, 1.0, 0.0))
+    x /= np.linalg.norm(x)
+    X_SC = make_pose(np.column_stack([x, np.cross(z, x), z]), eye)
+    settings = {"width": 200, "height": 160, "focal": (180.0, 170.0), "center": (90.0, 80.0)}
+    view = View(camera="v", intrinsics=Intrinsics(**settings, distortion=distortion), X_SC=X_SC)
+    boxes = [RaySurface(0, *part) for part in parts]
+    assert all(one.box is not None for one in boxes)
+    meshes = [RaySurface(k, *part) for k, part in enumerate(parts, 1)]
+    closed = RayScene(boxes).images(view, normals=True)
+    cast = RayScene(meshes).images(view, normals=True)
+    met = closed.depth > 0.0
+    assert met.mean() > 0.1
+    assert np.count_nonzero(met != (cast.depth > 0.0)) <= 3
+    both = met & (cast.depth > 0.0)
+    assert np.count_nonzero(np.abs(closed.depth - cast.depth)[both] > 1e-6) <= 3
+    apart = np.abs(closed.normals - cast.normals).max(axis=2)
+    assert np.count_nonzero(apart[both] > 1e-6) <= 3 and not closed.normals[~met].any()
+
+
+def test_what_is_no_box_is_not_taken_for_one() -> None:
+    import trimesh
+
+    box = trimesh.creation.box((0.2, 0.1, 0.3))
+    open_box = np.asarray(box.vertices), np.asarray(box.faces)[2:]
+    ell = np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [1, 2, 0], [0, 2, 0]], float)
+    for vertices, faces in (
+        open_box,
+        (ell, np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]])),
+        (np.asarray(trimesh.creation.icosphere().vertices), trimesh.creation.icosphere().faces),
+    ):
+        assert RaySurface(0, vertices, np.asarray(faces)).box is None

@@ -25,11 +25,11 @@ def label_instances(
     if labels is None:
         labels = renderer.images(view, ("labels",)).labels
         assert labels is not None
-    rays, X_CS, height_width = renderer.rays(view), inverse(view.X_SC), labels.shape
+    X_CS, height_width = inverse(view.X_SC), labels.shape
     counts = np.bincount(labels.ravel(), minlength=len(renderer.numbers) + 1)
     found = []
     for name, number in renderer.numbers.items():
-        silhouette = rays.silhouette(number, view)
+        silhouette = renderer.silhouette(number, view)
         amodal = silhouette.within(height_width[1], height_width[0])
         visible = int(counts[number])
         size = int(np.count_nonzero(silhouette.mask))

@@ -6,10 +6,8 @@ from .one_view import (
     station_view as station_view,
 )
 from .ray_scene import (
-    RayScene as RayScene,
     Silhouette as Silhouette,
 )
-from .ray_surface import RaySurface as RaySurface
 from .scene_renderer import (
     ImageKind as ImageKind,
     SceneRenderer as SceneRenderer,

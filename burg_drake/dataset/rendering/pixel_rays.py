@@ -9,7 +9,7 @@ import numpy as np
 from burg_drake.cameras.optics import NEAR, FieldOfView, Intrinsics
 from burg_drake.core import Array, Indices, Single
 
-Pixels = tuple[int, int, int, int]
+PixelBox = tuple[int, int, int, int]
 """A rectangle: left, top, right, bottom, the last two not within; it may leave the image."""
 
 
@@ -19,7 +19,7 @@ def flat_directions(intrinsics: Intrinsics) -> tuple[Single, Single]:
     return _Grid.of(intrinsics).flat
 
 
-def unit_directions(intrinsics: Intrinsics, pixels: Pixels) -> Single:
+def unit_directions(intrinsics: Intrinsics, pixels: PixelBox) -> Single:
     """(N, 3) unit vectors through the pixels of a rectangle, row by row; it may leave the image of
     a camera without distortion."""
     left, top, right, bottom = pixels
@@ -34,7 +34,7 @@ def unit_directions(intrinsics: Intrinsics, pixels: Pixels) -> Single:
 
 def pixels_around(
     p_CQ: Array, faces: Indices, intrinsics: Intrinsics, *, beyond: bool = False
-) -> Pixels | None:
+) -> PixelBox | None:
     """A rectangle of pixels that holds all that can show a surface before the camera.
 
     Args:
@@ -100,7 +100,7 @@ class _Grid:
         one = intrinsics
         return _grid_of(one.width, one.height, one.focal, one.center, one.distortion)
 
-    def within(self, lower: Array, upper: Array) -> Pixels | None:
+    def within(self, lower: Array, upper: Array) -> PixelBox | None:
         """The pixels that look between bounds of x / z and y / z."""
         x, y = self.flat
         inside = (x >= lower[0]) & (x <= upper[0]) & (y >= lower[1]) & (y <= upper[1])

@@ -81,13 +81,7 @@ class RayScene:
         return Images(depth=depth, labels=labels, normals=directions)
 
     def silhouette(self, number: int, view: View) -> Silhouette:
-        """The silhouette of an object.
-
-        Args:
-            number: its label.
-            view: the camera. Without lens distortion up to one image size beyond each edge of the
-                image counts, with it the image alone: the model of a lens does not reach further.
-        """
+        """As `SceneRenderer.silhouette`."""
         met = self._met_whole(number, view)
         mask = np.zeros((0, 0), bool) if met is None else met.face != NONE
         rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from burg_drake.cameras.optics import Intrinsics
 from burg_drake.core import Array, Indices, Single, transform_points
 from burg_drake.dataset.rendering.images import SURROUNDINGS
-from burg_drake.dataset.rendering.pixel_rays import Pixels, pixels_around, unit_directions
+from burg_drake.dataset.rendering.pixel_rays import PixelBox, pixels_around, unit_directions
 from burg_drake.dataset.rendering.ray_box import RayBox
 from burg_drake.geometry import RayCaster
 
@@ -31,7 +31,7 @@ class Met:
         depth: (h, w) along the optical axis [m], infinite for none.
     """
 
-    pixels: Pixels
+    pixels: PixelBox
     unit: Single
     face: NDArray[np.int32]
     depth: Single

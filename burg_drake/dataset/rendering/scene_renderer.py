@@ -18,7 +18,7 @@ from burg_drake.dataset.appearance import (
 )
 from burg_drake.dataset.rendering.colors import DrakeColors
 from burg_drake.dataset.rendering.images import SURROUNDINGS, Images
-from burg_drake.dataset.rendering.ray_scene import RayScene, label_numbers
+from burg_drake.dataset.rendering.ray_scene import RayScene, Silhouette, label_numbers
 from burg_drake.dataset.rendering.ray_surface import RaySurface, surfaces_of_body
 from burg_drake.dataset.views import View
 from burg_drake.scene.document import SceneLike, as_scene
@@ -120,10 +120,16 @@ class SceneRenderer:
             by_rays.normals,
         )
 
-    def rays(self, view: View) -> RayScene:
-        """All surfaces as they stand in a view."""
+    def silhouette(self, number: int, view: View) -> Silhouette:
+        """All that a camera would see of an object if it were alone.
+
+        Args:
+            number: its label.
+            view: the camera. Without lens distortion up to one image size beyond each edge of the
+                image counts, with it the image alone: the model of a lens does not reach further.
+        """
         self._place_arm(view)
-        return self._ray_scene
+        return self._ray_scene.silhouette(number, view)
 
     @cached_property
     def _colors(self) -> DrakeColors:
