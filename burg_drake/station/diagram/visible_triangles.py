@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 import trimesh
@@ -92,11 +94,19 @@ def _trimesh(shape: Shape) -> trimesh.Trimesh:
 def _mesh(shape: Mesh) -> trimesh.Trimesh:
     source = shape.source()
     if source.is_path():
-        mesh = trimesh.load(source.path(), force="mesh", process=False, skip_materials=True)
+        path = Path(source.path())
+        read = _read_mesh(path, None, path.suffix, path.stat().st_mtime_ns)
     else:
         file = source.in_memory().mesh_file
-        data = io.BytesIO(file.contents())
-        kind = file.extension().lstrip(".")
-        mesh = trimesh.load(data, file_type=kind, force="mesh", process=False)
-    mesh.vertices = np.asarray(mesh.vertices) * shape.scale3()
-    return mesh
+        read = _read_mesh(None, file.contents(), file.extension(), 0)
+    return trimesh.Trimesh(read.vertices * shape.scale3(), read.faces, process=False)
+
+
+@lru_cache(maxsize=64)
+def _read_mesh(path: Path | None, content: bytes | None, kind: str, age: int) -> trimesh.Trimesh:
+    """A mesh file, or what would be in it; `age` tells a file from a later one. The objects of many
+    scenes are the same few."""
+    source = str(path) if content is None else io.BytesIO(content)
+    return trimesh.load(
+        source, file_type=kind.lstrip("."), force="mesh", process=False, skip_materials=True
+    )
