@@ -6,15 +6,13 @@ beside, and renamed last. The index is written in the end.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 
 from burg_drake.core import InvalidInputError
-from burg_drake.core.files import remove_unfinished, try_lock, writable_folder
+from burg_drake.core.files import FolderLock, remove_unfinished, writable_folder
 from burg_drake.core.paths import portable_reference
 from burg_drake.dataset.samples.document import (
     FILE as DOCUMENT_FILE,
@@ -89,24 +87,12 @@ class DatasetWriter:
         """
         self.folder = writable_folder(folder)
         self._known: dict[str, ShardEntry] = {}
-        lock = os.open(self.folder, os.O_RDONLY)
-        self._lock: int | None = lock
+        self._lock = FolderLock(self.folder)
         try:
-            self._take(lock)
             self._open(document)
         except BaseException:
             self.close()
             raise
-
-    def _take(self, lock: int) -> None:
-        """Takes the lock; a file system without locks counts as one that others have."""
-        with suppress(OSError):
-            if try_lock(lock):
-                return
-        raise InvalidInputError(
-            f"{self.folder} is being written by another process; wait for it, or choose another"
-            " folder"
-        ).about("folder")
 
     def _open(self, document: DatasetDocument) -> None:
         remove_unfinished(self.folder)
@@ -156,9 +142,7 @@ class DatasetWriter:
 
     def close(self) -> None:
         """Lets others write; what is there stays as it is."""
-        if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
+        self._lock.release()
 
     def __enter__(self) -> DatasetWriter:
         return self
