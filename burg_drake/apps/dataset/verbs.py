@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from burg_drake.apps.dataset.colors import require_renderer_for, warn_without_colors
 from burg_drake.apps.options import (
     Parser,
     add_group,
@@ -108,7 +109,8 @@ def _add_generate_options(parser: Parser) -> None:
         nargs="+",
         help="sphere (around the scene), wrist, or cameras of the station (default: sphere)",
     )
-    add_options(parser, DatasetRecipe, "views", "sensor", "normals", "seed", unset=True)
+    known = ("views", "sensor", "normals", "colors", "seed")
+    add_options(parser, DatasetRecipe, *known, unset=True)
     parser.add_argument(
         "--plain",
         action="store_true",
@@ -140,6 +142,8 @@ def run_generate(arguments: argparse.Namespace) -> int:
     else:
         scenes = _given_scenes(arguments.scenes)
         count = len(scenes)
+    if recipe.colors:
+        recipe = _with_possible_colors(recipe, Path(arguments.output))
     arguments.after_interrupt = "; what is done is kept, run the same command to continue"
     with Reporter(not arguments.quiet) as reporter:
         pace = ProgressMeter(reporter.show, Progress("rendering", 0, count, unit="scenes"))
@@ -173,11 +177,20 @@ def _recipe(arguments: argparse.Namespace) -> DatasetRecipe:
     given = {name: getattr(arguments, name, None) for name in declared(DatasetRecipe)}
     values: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     values["normals"] = arguments.normals or recipe.normals
+    values["colors"] = recipe.colors and not arguments.no_colors
     if arguments.camera:
         values["viewpoints"] = replace(recipe.viewpoints, cameras=tuple(arguments.camera))
     if arguments.plain:
         values["looks"] = None
     return _replaced(recipe, **values, **_grasps(arguments.grasps))
+
+
+def _with_possible_colors(recipe: DatasetRecipe, folder: Path) -> DatasetRecipe:
+    """Without colours where they cannot be rendered, but not in a folder that has some."""
+    require_renderer_for(folder)
+    dark = ", and its sensor depth no holes at dark surfaces" if recipe.sensor else ""
+    possible = not warn_without_colors(f"the data set has no colours{dark}")
+    return _replaced(recipe, colors=possible)
 
 
 def _replaced(recipe: DatasetRecipe, **values: Any) -> DatasetRecipe:

@@ -60,12 +60,10 @@ OLD = 86_400.0
 
 
 def apply_appearance(built: StationDiagram, appearance: Appearance) -> str:
-    """Makes a diagram look like that: adds a renderer, gives the table its pattern, takes the
-    printed board away, and puts distractors onto the table. Contact and poses stay as they are.
+    """Makes a diagram look like that: `place_appearance`, and a renderer with its light.
 
     Args:
-        built: with cameras, so that its board has markers, and before a context of it is created.
-        appearance: how it shall look.
+        built, appearance: see there.
 
     Returns:
         The renderer's name, for `RenderCameraCore`. Its images need `with_background`, then
@@ -80,6 +78,24 @@ def apply_appearance(built: StationDiagram, appearance: Appearance) -> str:
         raise MissingDependencyError(
             f"rendering needs the system libraries {', '.join(missing)}; run: {apt_command()}"
         )
+    place_appearance(built, appearance)
+    engine = MakeRenderEngineVtk(render_parameters(appearance))
+    built.scene_graph.AddRenderer(RENDERER, engine)
+    return RENDERER
+
+
+def place_appearance(built: StationDiagram, appearance: Appearance) -> None:
+    """Gives a diagram the surfaces of an appearance, which rays meet, too: covers the table with
+    its pattern, takes the printed board away, and puts distractors onto the table. Contact and
+    poses stay as they are; no system libraries are needed.
+
+    Args:
+        built: whose board has markers, and before a context of it is created.
+        appearance: how it shall look.
+
+    Raises:
+        UnknownNameError: there is no such library of distractors, or no such object in it.
+    """
     if appearance.table is not None:
         _cover_table(built, appearance)
     if not appearance.board:
@@ -87,9 +103,6 @@ def apply_appearance(built: StationDiagram, appearance: Appearance) -> str:
     _add_distractors(built, appearance)
     if any(light.shadows for light in appearance.lights):
         _add_speck(built)
-    engine = MakeRenderEngineVtk(render_parameters(appearance))
-    built.scene_graph.AddRenderer(RENDERER, engine)
-    return RENDERER
 
 
 def render_parameters(appearance: Appearance) -> RenderEngineVtkParams:

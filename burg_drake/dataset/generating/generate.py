@@ -6,7 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from burg_drake.core import BurgError, InvalidInputError, content_hash, one_line, software_versions
+from burg_drake.core import (
+    BurgError,
+    InvalidInputError,
+    MissingDependencyError,
+    content_hash,
+    one_line,
+    software_versions,
+)
 from burg_drake.core.paths import name_from, portable_reference
 from burg_drake.core.workers import map_unordered
 from burg_drake.dataset.exchange import write_card
@@ -18,6 +25,7 @@ from burg_drake.evaluation.store import open_results
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.station.document import Station, StationLike, as_station
+from burg_drake.system_libraries import describe_missing, missing_render_libraries
 
 PACKAGES = {
     "drake": "drake",
@@ -77,6 +85,8 @@ def generate_dataset(
         InvalidInputError: the folder holds another data set or is being written, a scene has no
             file, the scenes are of several libraries, or there is no such run.
         UnknownNameError: the station has no such camera.
+        MissingDependencyError: the recipe has colours, and a system library of the renderer is
+            missing.
     """
     station, recipe = as_station(station), recipe or DatasetRecipe()
     paths: Sequence[Path | None]
@@ -116,6 +126,11 @@ def _require_possible(recipe: DatasetRecipe, station: Station) -> None:
     require_cameras(recipe.viewpoints, station)
     if recipe.run:
         open_results(recipe.run)
+    missing = missing_render_libraries() if recipe.colors else []
+    if missing:
+        raise MissingDependencyError(
+            f"the recipe has colours (colors=False leaves them out): {describe_missing(missing)}"
+        )
 
 
 def _given(
@@ -163,4 +178,6 @@ def _write_card(folder: Path, recipe: DatasetRecipe) -> None:
     facts = {"seed": str(recipe.seed), "views of each scene": str(recipe.views)}
     if recipe.sensor:
         facts["sensor"] = recipe.sensor
+    if not recipe.colors:
+        facts["colours"] = "none"
     write_card(dataset, folder, facts=facts)

@@ -37,6 +37,9 @@ class DatasetRecipe:
         size: width and height of the sensor's images [pixels].
         looks: how the looks of scenes vary, drawn once a scene; as simulated cameras always see
             them if None.
+        colors: whether there are images of colours, which need Drake's renderer and its system
+            libraries. All other images are the same without them, but for `sensor_depth`, whose
+            noise is drawn anew and has no holes at dark surfaces.
         normals: whether there are images of normals.
         grasps_per_object: grasps that are sampled on each object and screened by the open hand.
         run: folder of a run whose grasps and outcomes are taken; none if empty.
@@ -55,6 +58,9 @@ class DatasetRecipe:
     )
     size: tuple[int, int] = (640, 480)
     looks: AppearanceSettings | None = AppearanceSettings()
+    colors: bool = setting(
+        True, "write no images of colours, which alone need Drake's renderer", name="no_colors"
+    )
     normals: bool = setting(False, "write images of normals, too")
     grasps_per_object: int = 0
     run: str = ""
