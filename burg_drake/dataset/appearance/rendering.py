@@ -16,7 +16,6 @@ from pydrake.geometry import (
     EquirectangularMap,
     GeometryInstance,
     LightParameter,
-    MakeRenderEngineVtk,
     Mesh,
     PerceptionProperties,
     RenderEngineVtkParams,
@@ -29,7 +28,6 @@ from pydrake.multibody.tree import RigidBody
 
 from burg_drake.core import (
     InvalidInputError,
-    MissingDependencyError,
     cache_folder,
     content_hash,
     make_pose,
@@ -42,8 +40,7 @@ from burg_drake.dataset.appearance.patterns import EXTENT, table_texture
 from burg_drake.dataset.appearance.room import room_radiance
 from burg_drake.dataset.appearance.textured_box import textured_box
 from burg_drake.station.diagram import StationDiagram
-from burg_drake.station.world import LIGHTS
-from burg_drake.system_libraries import apt_command, missing_render_libraries
+from burg_drake.station.world import LIGHTS, add_renderer
 
 RENDERER = "appearance"
 FAR = 50.0
@@ -70,17 +67,11 @@ def apply_appearance(built: StationDiagram, appearance: Appearance) -> str:
         `photometric`.
 
     Raises:
-        MissingDependencyError: a system library of the renderer is missing.
+        MissingDependencyError, InvalidInputError: see `add_renderer`.
         UnknownNameError: there is no such library of distractors, or no such object in it.
     """
-    missing = missing_render_libraries()
-    if missing:
-        raise MissingDependencyError(
-            f"rendering needs the system libraries {', '.join(missing)}; run: {apt_command()}"
-        )
     place_appearance(built, appearance)
-    engine = MakeRenderEngineVtk(render_parameters(appearance))
-    built.scene_graph.AddRenderer(RENDERER, engine)
+    add_renderer(built.scene_graph, RENDERER, render_parameters(appearance))
     return RENDERER
 
 

@@ -82,8 +82,8 @@ def generate_dataset(
         What is there now. A scene that cannot be sampled or rendered leaves the others as they are.
 
     Raises:
-        InvalidInputError: the folder holds another data set or is being written, a scene has no
-            file, the scenes are of several libraries, or there is no such run.
+        InvalidInputError: the folder holds another data set, is being written or is full, a scene
+            has no file, the scenes are of several libraries, or there is no such run.
         UnknownNameError: the station has no such camera.
         MissingDependencyError: the recipe has colours, and a system library of the renderer is
             missing.
@@ -102,10 +102,13 @@ def generate_dataset(
     with DatasetWriter(folder, document) as writer:
         root = library.root if recipe.sampled is not None else None
         inputs = DatasetInputs(recipe, writer.folder, station.path, root)
+        writer.discard_damaged()
         missing = writer.missing(range(len(paths)))
         failed: dict[int, str] = {}
         work = [SceneWork(inputs, number, paths[number]) for number in missing]
         for one, outcome in map_unordered(make_scene, work, workers):
+            if isinstance(outcome, BurgError) and "folder" in outcome.arguments:
+                raise outcome  # a full disk is so for all others, too
             if isinstance(outcome, BaseException):
                 failed[one.number] = (
                     str(outcome) if isinstance(outcome, BurgError) else one_line(outcome)

@@ -7,6 +7,7 @@ beside, and renamed last. The index is written in the end.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -20,9 +21,15 @@ from burg_drake.dataset.samples.document import (
     load_dataset_document,
     save_dataset_document,
 )
-from burg_drake.dataset.samples.index import shard_numbers, write_index
+from burg_drake.dataset.samples.index import read_index, shard_numbers, write_index
 from burg_drake.dataset.samples.sample import Sample
-from burg_drake.dataset.samples.shard import FOLDER, ShardEntry, shard_name, write_shard
+from burg_drake.dataset.samples.shard import (
+    FOLDER,
+    ShardEntry,
+    shard_entry,
+    shard_name,
+    write_shard,
+)
 from burg_drake.scene.document import Scene, SceneLike, as_scene, save_scene
 
 SCENES = "scenes"
@@ -48,15 +55,19 @@ def write_scene(
         The shard's line of the index, for `DatasetWriter.added`.
 
     Raises:
-        InvalidInputError: the scene is there already, and see `write_shard`; nothing of the scene
-            stays then.
+        InvalidInputError: the scene is there already; or the disk is full or cannot be written to,
+            which is `about` the folder; and see `write_shard`. Nothing of the scene stays then.
     """
     folder = Path(folder)
     shard, document = folder / shard_name(number), folder / scene_name(number)
     if shard.exists():
         raise InvalidInputError(f"{shard} is there already; a scene can be added once")
     library = portable_reference(scene.library.root, document.parent)
-    save_scene(replace(scene.document, library=library), document)
+    try:
+        save_scene(replace(scene.document, library=library), document)
+    except InvalidInputError as error:
+        error.about("folder")
+        raise
     try:
         return write_shard(shard, samples)
     except BaseException:
@@ -117,6 +128,31 @@ class DatasetWriter:
         for path in (self.folder / SCENES).glob("*.yaml"):
             if path not in complete:  # its shard was being written
                 path.unlink()
+
+    def discard_damaged(self) -> list[int]:
+        """Removes shards that are cut off, have damaged headers, or are not those of the index, so
+        that they can be made anew. All shards are read for it, and need not be in the end.
+
+        Returns:
+            Numbers of their scenes.
+        """
+        listed: dict[str, ShardEntry] = {}
+        with suppress(InvalidInputError):  # an index that is missing or damaged tells nothing
+            listed = {entry.url: entry for entry in read_index(self.folder)}
+        found = []
+        for number in shard_numbers(self.folder):
+            shard = self.folder / shard_name(number)
+            try:
+                entry = shard_entry(shard)
+            except InvalidInputError:
+                entry = None
+            if entry is not None and listed.get(entry.url, entry) == entry:
+                self._known[entry.url] = entry
+                continue
+            shard.unlink()
+            (self.folder / scene_name(number)).unlink(missing_ok=True)
+            found.append(number)
+        return found
 
     def missing(self, scenes: Iterable[int]) -> list[int]:
         """Those of some scenes that are not complete, in the order given."""

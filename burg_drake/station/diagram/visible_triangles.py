@@ -22,7 +22,8 @@ from pydrake.geometry import (
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex
 
-from burg_drake.core import Array, Indices, transform_points
+from burg_drake.core import Array, Indices, MeshError, transform_points
+from burg_drake.core.files import reporting_read_errors
 
 Triangles = tuple[Array, Indices]
 
@@ -48,7 +49,7 @@ def visible_surfaces(plant: MultibodyPlant, scene_graph: SceneGraph) -> list[Vis
     Balls and cylinders are as fine as those of Drake's renderer, not round.
 
     Raises:
-        InvalidInputError: a mesh file cannot be read.
+        InvalidInputError: a mesh file cannot be read, or has no faces.
     """
     inspector = scene_graph.model_inspector()
     everything = GeometrySet(inspector.GetAllGeometryIds())
@@ -64,7 +65,11 @@ def visible_surfaces(plant: MultibodyPlant, scene_graph: SceneGraph) -> list[Vis
 
 
 def shape_triangles(shape: Shape) -> Triangles:
-    """Vertices (V, 3) [m] and faces (F, 3) of a visual shape; none of one without a surface."""
+    """Vertices (V, 3) [m] and faces (F, 3) of a visual shape; none of one without a surface.
+
+    Raises:
+        InvalidInputError: a mesh file cannot be read, or has no faces.
+    """
     mesh = _trimesh(shape)
     return np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64).reshape(-1, 3)
 
@@ -91,12 +96,15 @@ def _trimesh(shape: Shape) -> trimesh.Trimesh:
 
 def _mesh(shape: Mesh) -> trimesh.Trimesh:
     source = shape.source()
-    if source.is_path():
-        mesh = trimesh.load(source.path(), force="mesh", process=False, skip_materials=True)
-    else:
-        file = source.in_memory().mesh_file
-        data = io.BytesIO(file.contents())
-        kind = file.extension().lstrip(".")
-        mesh = trimesh.load(data, file_type=kind, force="mesh", process=False)
+    with reporting_read_errors(source.description(), "a mesh that can be seen"):
+        if source.is_path():
+            mesh = trimesh.load(source.path(), force="mesh", process=False, skip_materials=True)
+        else:
+            file = source.in_memory().mesh_file
+            data = io.BytesIO(file.contents())
+            kind = file.extension().lstrip(".")
+            mesh = trimesh.load(data, file_type=kind, force="mesh", process=False)
+        if not len(mesh.faces):
+            raise MeshError("there are no faces in it; build the library that has it again")
     mesh.vertices = np.asarray(mesh.vertices) * shape.scale3()
     return mesh
