@@ -71,8 +71,8 @@ def test_a_scene_that_a_station_camera_does_not_see(scenes: list[Path], tmp_path
     ("damage", "said"),
     [
         (None, "mug.sdf cannot be loaded (.*mesh.obj' which does not exist"),
-        (b"", "mesh.obj: there are no faces in it; build the library"),
-        (b"v 0 0 0\nv 1 0 0\n", "mesh.obj: there are no faces in it; build the library"),
+        (b"", "mesh.obj: it has no faces, or vertices that"),
+        (b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "mesh.obj: it has no faces, or vertices that"),
         (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "mesh.obj is not a mesh that can be seen"),
     ],
 )

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.dataset.colors import require_renderer_for, warn_without_colors
+from burg_drake.apps.dataset.colors import with_possible_colors
 from burg_drake.apps.options import (
     Parser,
     add_group,
@@ -142,8 +142,7 @@ def run_generate(arguments: argparse.Namespace) -> int:
     else:
         scenes = _given_scenes(arguments.scenes)
         count = len(scenes)
-    if recipe.colors:
-        recipe = _with_possible_colors(recipe, Path(arguments.output))
+    recipe = with_possible_colors(recipe, Path(arguments.output))
     arguments.after_interrupt = "; what is done is kept, run the same command to continue"
     with Reporter(not arguments.quiet) as reporter:
         pace = ProgressMeter(reporter.show, Progress("rendering", 0, count, unit="scenes"))
@@ -183,14 +182,6 @@ def _recipe(arguments: argparse.Namespace) -> DatasetRecipe:
     if arguments.plain:
         values["looks"] = None
     return _replaced(recipe, **values, **_grasps(arguments.grasps))
-
-
-def _with_possible_colors(recipe: DatasetRecipe, folder: Path) -> DatasetRecipe:
-    """Without colours where they cannot be rendered, but not in a folder that has some."""
-    require_renderer_for(folder)
-    dark = ", and its sensor depth no holes at dark surfaces" if recipe.sensor else ""
-    possible = not warn_without_colors(f"the data set has no colours{dark}")
-    return _replaced(recipe, colors=possible)
 
 
 def _replaced(recipe: DatasetRecipe, **values: Any) -> DatasetRecipe:

@@ -104,7 +104,10 @@ def _mesh(shape: Mesh) -> trimesh.Trimesh:
             data = io.BytesIO(file.contents())
             kind = file.extension().lstrip(".")
             mesh = trimesh.load(data, file_type=kind, force="mesh", process=False)
-        if not len(mesh.faces):
-            raise MeshError("there are no faces in it; build the library that has it again")
+        if not len(mesh.faces) or not np.isfinite(mesh.vertices).all():
+            raise MeshError(
+                "it has no faces, or vertices that are not finite; build the library that has it"
+                " again"
+            )
     mesh.vertices = np.asarray(mesh.vertices) * shape.scale3()
     return mesh
