@@ -10,9 +10,7 @@ from __future__ import annotations
 
 import csv
 import io
-import os
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -20,10 +18,10 @@ from types import TracebackType
 from burg_drake.core import DocumentError, InvalidInputError
 from burg_drake.core.documents import load_document, save_document
 from burg_drake.core.files import (
+    FolderLock,
     atomic_write,
     open_regular,
     remove_unfinished,
-    try_lock,
     writable_folder,
 )
 from burg_drake.generation.sample import SampledScene
@@ -122,22 +120,12 @@ class SceneFolder:
             DocumentError: its recipe or a scene is damaged.
         """
         self.path = writable_folder(path)
-        self._lock = os.open(self.path, os.O_RDONLY)
+        self._lock = FolderLock(self.path)
         try:
-            self._take(path)
             self._open(provenance)
         except BaseException:
-            os.close(self._lock)
+            self._lock.release()
             raise
-
-    def _take(self, path: str | Path) -> None:
-        """Takes the lock; a file system without locks counts as one that others have."""
-        with suppress(OSError):
-            if try_lock(self._lock):
-                return
-        raise InvalidInputError(
-            f"{path} is being written by another process; wait for it, or choose another folder"
-        )
 
     def _open(self, provenance: SamplingProvenance) -> None:
         remove_unfinished(self.path)
@@ -206,7 +194,7 @@ class SceneFolder:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        os.close(self._lock)
+        self._lock.release()
 
 
 def _require_readable(path: Path) -> None:

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from burg_drake.apps.dataset.colors import warn_without_colors
 from burg_drake.apps.options import Parser, add_scene, add_station, add_verb
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def _add_options(parser: Parser) -> None:
 
 
 def run_render(arguments: argparse.Namespace) -> int:
-    """Writes the images."""
+    """Writes the images; 1 if there is none that can be made."""
     from burg_drake.core import InvalidInputError
     from burg_drake.core.files import atomic_write, require_writable
     from burg_drake.dataset.rendering import ImageKind, render, station_view
@@ -58,13 +59,17 @@ def run_render(arguments: argparse.Namespace) -> int:
     output = Path(arguments.output)
     if output.suffix.lower() != ".png":
         raise InvalidInputError(f"{output}: only PNG is written; end the name with .png")
-    kinds: list[ImageKind] = ["color"]
+    kinds: list[ImageKind] = []
+    if not warn_without_colors(f"{output} is not written, as it has colours"):
+        kinds.append("color")
     if arguments.depth:
         kinds.append("depth")
     if arguments.labels:
         kinds.append("labels")
     if arguments.normals:
         kinds.append("normals")
+    if not kinds:
+        return 1
     scene, station = load_scene(arguments.scene), load_station(arguments.station)
     view = station_view(station, arguments.camera, arm=arguments.arm)
     require_writable(output)

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from burg_drake.apps.dataset.colors import with_possible_colors
 from burg_drake.apps.options import (
     Parser,
     add_group,
@@ -108,7 +109,8 @@ def _add_generate_options(parser: Parser) -> None:
         nargs="+",
         help="sphere (around the scene), wrist, or cameras of the station (default: sphere)",
     )
-    add_options(parser, DatasetRecipe, "views", "sensor", "normals", "seed", unset=True)
+    known = ("views", "sensor", "normals", "colors", "seed")
+    add_options(parser, DatasetRecipe, *known, unset=True)
     parser.add_argument(
         "--plain",
         action="store_true",
@@ -140,6 +142,7 @@ def run_generate(arguments: argparse.Namespace) -> int:
     else:
         scenes = _given_scenes(arguments.scenes)
         count = len(scenes)
+    recipe = with_possible_colors(recipe, Path(arguments.output))
     arguments.after_interrupt = "; what is done is kept, run the same command to continue"
     with Reporter(not arguments.quiet) as reporter:
         pace = ProgressMeter(reporter.show, Progress("rendering", 0, count, unit="scenes"))
@@ -173,6 +176,7 @@ def _recipe(arguments: argparse.Namespace) -> DatasetRecipe:
     given = {name: getattr(arguments, name, None) for name in declared(DatasetRecipe)}
     values: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     values["normals"] = arguments.normals or recipe.normals
+    values["colors"] = recipe.colors and not arguments.no_colors
     if arguments.camera:
         values["viewpoints"] = replace(recipe.viewpoints, cameras=tuple(arguments.camera))
     if arguments.plain:

@@ -152,11 +152,18 @@ def camera_info(intrinsics: Intrinsics) -> Any:
     """Drake's `CameraInfo`.
 
     Raises:
-        InvalidInputError: the camera has distortion, which Drake's does not.
+        InvalidInputError: the camera has distortion, which Drake's does not, or its principal point
+            is outside of the image.
     """
     from pydrake.systems.sensors import CameraInfo
 
     if not intrinsics.is_pinhole:
         raise InvalidInputError("Drake's cameras have no lens distortion; undistort the images")
     (fx, fy), (cx, cy) = intrinsics.focal, intrinsics.center
+    width, height = intrinsics.width, intrinsics.height
+    if not 0 < cx + HALF_PIXEL < width or not 0 < cy + HALF_PIXEL < height:
+        raise InvalidInputError(
+            f"the principal point {cx:g}, {cy:g} is outside of the image, which has {width} x"
+            f" {height} pixels; give intrinsics of images of this size"
+        )
     return CameraInfo(intrinsics.width, intrinsics.height, fx, fy, cx + HALF_PIXEL, cy + HALF_PIXEL)

@@ -26,7 +26,10 @@ from .hdf5 import (
     is_hdf5 as is_hdf5,
     open_hdf5 as open_hdf5,
 )
-from .lock import try_lock as try_lock
+from .lock import (
+    FolderLock as FolderLock,
+    try_lock as try_lock,
+)
 from .numpy_file import (
     NpzFile as NpzFile,
     npy_shape as npy_shape,

@@ -7,6 +7,11 @@ lock stands for, and who waits how long for it, is said where it is used.
 from __future__ import annotations
 
 import fcntl
+import os
+from contextlib import suppress
+from pathlib import Path
+
+from burg_drake.core.errors import InvalidInputError
 
 
 def try_lock(file: int, *, shared: bool = False) -> bool:
@@ -25,3 +30,32 @@ def try_lock(file: int, *, shared: bool = False) -> bool:
     except BlockingIOError:
         return False
     return True
+
+
+class FolderLock:
+    """A folder that one process at a time writes, locked itself: no file is left in it."""
+
+    def __init__(self, folder: Path) -> None:
+        """Locks a folder that is there; a file system without locks counts as one that others have.
+
+        Raises:
+            InvalidInputError: another process is writing it, or it cannot be opened.
+        """
+        try:
+            file = os.open(folder, os.O_RDONLY)
+        except OSError as error:
+            raise InvalidInputError(f"cannot open {folder}: {error.strerror}") from error
+        with suppress(OSError):
+            if try_lock(file):
+                self._file: int | None = file
+                return
+        os.close(file)
+        raise InvalidInputError(
+            f"{folder} is being written by another process; wait for it, or choose another folder"
+        ).about("folder")
+
+    def release(self) -> None:
+        """Lets others write; a second time does nothing."""
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None

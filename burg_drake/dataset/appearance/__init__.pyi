@@ -11,5 +11,6 @@ from .drawing import draw_appearance as draw_appearance
 from .photometry import photometric as photometric
 from .rendering import (
     apply_appearance as apply_appearance,
+    place_appearance as place_appearance,
 )
 from .settings import AppearanceSettings as AppearanceSettings

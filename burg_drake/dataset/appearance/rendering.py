@@ -16,7 +16,6 @@ from pydrake.geometry import (
     EquirectangularMap,
     GeometryInstance,
     LightParameter,
-    MakeRenderEngineVtk,
     Mesh,
     PerceptionProperties,
     RenderEngineVtkParams,
@@ -29,7 +28,6 @@ from pydrake.multibody.tree import RigidBody
 
 from burg_drake.core import (
     InvalidInputError,
-    MissingDependencyError,
     cache_folder,
     content_hash,
     make_pose,
@@ -42,8 +40,7 @@ from burg_drake.dataset.appearance.patterns import EXTENT, table_texture
 from burg_drake.dataset.appearance.room import room_radiance
 from burg_drake.dataset.appearance.textured_box import textured_box
 from burg_drake.station.diagram import StationDiagram
-from burg_drake.station.world import LIGHTS
-from burg_drake.system_libraries import apt_command, missing_render_libraries
+from burg_drake.station.world import LIGHTS, add_renderer
 
 RENDERER = "appearance"
 FAR = 50.0
@@ -60,26 +57,36 @@ OLD = 86_400.0
 
 
 def apply_appearance(built: StationDiagram, appearance: Appearance) -> str:
-    """Makes a diagram look like that: adds a renderer, gives the table its pattern, takes the
-    printed board away, and puts distractors onto the table. Contact and poses stay as they are.
+    """Makes a diagram look like that: `place_appearance`, and a renderer with its light.
 
     Args:
-        built: with cameras, so that its board has markers, and before a context of it is created.
-        appearance: how it shall look.
+        built, appearance: see there.
 
     Returns:
         The renderer's name, for `RenderCameraCore`. Its images need `with_background`, then
         `photometric`.
 
     Raises:
-        MissingDependencyError: a system library of the renderer is missing.
+        MissingDependencyError, InvalidInputError: see `add_renderer`.
         UnknownNameError: there is no such library of distractors, or no such object in it.
     """
-    missing = missing_render_libraries()
-    if missing:
-        raise MissingDependencyError(
-            f"rendering needs the system libraries {', '.join(missing)}; run: {apt_command()}"
-        )
+    place_appearance(built, appearance)
+    add_renderer(built.scene_graph, RENDERER, render_parameters(appearance))
+    return RENDERER
+
+
+def place_appearance(built: StationDiagram, appearance: Appearance) -> None:
+    """Gives a diagram the surfaces of an appearance, which rays meet, too: covers the table with
+    its pattern, takes the printed board away, and puts distractors onto the table. Contact and
+    poses stay as they are; no system libraries are needed.
+
+    Args:
+        built: whose board has markers, and before a context of it is created.
+        appearance: how it shall look.
+
+    Raises:
+        UnknownNameError: there is no such library of distractors, or no such object in it.
+    """
     if appearance.table is not None:
         _cover_table(built, appearance)
     if not appearance.board:
@@ -87,9 +94,6 @@ def apply_appearance(built: StationDiagram, appearance: Appearance) -> str:
     _add_distractors(built, appearance)
     if any(light.shadows for light in appearance.lights):
         _add_speck(built)
-    engine = MakeRenderEngineVtk(render_parameters(appearance))
-    built.scene_graph.AddRenderer(RENDERER, engine)
-    return RENDERER
 
 
 def render_parameters(appearance: Appearance) -> RenderEngineVtkParams:

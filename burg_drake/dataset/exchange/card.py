@@ -67,7 +67,7 @@ def write_card(
             f"# {samples.name}",
             *([description] if description else []),
             _summary(counted),
-            "![colour, depth and labels of some samples](card/examples.png)",
+            "![images of some samples](card/examples.png)",
             "## Objects",
             _objects(samples, counted, licences or {}),
             "## Distributions",

@@ -27,7 +27,7 @@ PAPER, INK = (255, 255, 255), (29, 35, 40)
 NOTHING = (70, 70, 70)
 """Where there is no depth."""
 MISSING = (225, 229, 233)
-"""Of an image that the sample has not."""
+"""In place of labels that the sample has not."""
 OPACITY = 0.5
 """Of labels on the picture."""
 LUMA = (0.299, 0.587, 0.114)
@@ -95,16 +95,16 @@ def sheet_png(samples: Sequence[Sample], columns: int) -> bytes:
 
 
 def sample_picture(sample: Sample) -> Bytes:
-    """(h, w, 3) colour, depth and labels side by side."""
+    """(h, w, 3) colour, depth and labels side by side; what the sample has not is left out."""
     intrinsics = sample.view.intrinsics
     height = max(1, round(PANEL * intrinsics.height / intrinsics.width))
-    panels = [
-        _panel(sample.images.color, height),
-        _panel(None if sample.images.depth is None else depth_colors(sample.images.depth), height),
-        _labelled(sample, height),
-    ]
+    color, depth = sample.images.color, sample.images.depth
     gap = np.full((height, GAP, 3), PAPER, dtype=np.uint8)
-    return np.hstack([panels[0], gap, panels[1], gap, panels[2]])
+    panels = []
+    for image in (color, None if depth is None else depth_colors(depth)):
+        if image is not None:
+            panels += [_panel(image, height), gap]
+    return np.hstack([*panels, _labelled(sample, height)])
 
 
 def depth_colors(depth: Single) -> Bytes:
@@ -136,7 +136,7 @@ def _labelled(sample: Sample, height: int) -> Bytes:
     """Labels over the picture in grey, with names and boxes."""
     labels, color = sample.images.labels, sample.images.color
     if labels is None:
-        return _panel(None, height)
+        return np.full((height, PANEL, 3), MISSING, dtype=np.uint8)
     grey = np.full((*labels.shape, 3), 128.0)
     if color is not None:
         grey[:] = (color @ np.array(LUMA))[..., None]
@@ -176,9 +176,7 @@ def _readable(tint: tuple[int, int, int]) -> tuple[int, int, int]:
     return (0, 0, 0) if np.dot(tint, LUMA) > 140.0 else (255, 255, 255)
 
 
-def _panel(image: Bytes | None, height: int) -> Bytes:
-    if image is None:
-        return np.full((height, PANEL, 3), MISSING, dtype=np.uint8)
+def _panel(image: Bytes, height: int) -> Bytes:
     smaller = image.shape[1] > PANEL
     how = Image.Resampling.BOX if smaller else Image.Resampling.NEAREST
     return np.asarray(Image.fromarray(image).resize((PANEL, height), how))
@@ -214,7 +212,7 @@ def _figure(sample: Sample) -> Html:
         element(
             "img",
             src=f"data:image/png;base64,{data}",
-            alt=f"colour, depth and labels of sample {sample.key}: {names}",
+            alt=f"images of sample {sample.key}: {names}",
             width=picture.shape[1],
             height=picture.shape[0],
         ),

@@ -106,7 +106,7 @@ def require_images(sample: Sample, format: str, *names: str) -> None:
     for name in names:
         if getattr(sample.images, name) is None:
             raise InvalidInputError(
-                f"sample {sample.key} has no {name} image, which {format} needs; generate the data"
+                f"sample {sample.key} has no {name} image, which {format} needs; generate a data"
                 f" set with {name}"
             )
 

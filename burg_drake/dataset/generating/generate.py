@@ -6,7 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from burg_drake.core import BurgError, InvalidInputError, content_hash, one_line, software_versions
+from burg_drake.core import (
+    BurgError,
+    InvalidInputError,
+    MissingDependencyError,
+    content_hash,
+    one_line,
+    software_versions,
+)
 from burg_drake.core.paths import name_from, portable_reference
 from burg_drake.core.workers import map_unordered
 from burg_drake.dataset.exchange import write_card
@@ -18,6 +25,7 @@ from burg_drake.evaluation.store import open_results
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.station.document import Station, StationLike, as_station
+from burg_drake.system_libraries import describe_missing, missing_render_libraries
 
 PACKAGES = {
     "drake": "drake",
@@ -74,9 +82,11 @@ def generate_dataset(
         What is there now. A scene that cannot be sampled or rendered leaves the others as they are.
 
     Raises:
-        InvalidInputError: the folder holds another data set or is being written, a scene has no
-            file, the scenes are of several libraries, or there is no such run.
+        InvalidInputError: the folder holds another data set, is being written or is full, a scene
+            has no file, the scenes are of several libraries, or there is no such run.
         UnknownNameError: the station has no such camera.
+        MissingDependencyError: the recipe has colours, and a system library of the renderer is
+            missing.
     """
     station, recipe = as_station(station), recipe or DatasetRecipe()
     paths: Sequence[Path | None]
@@ -92,10 +102,13 @@ def generate_dataset(
     with DatasetWriter(folder, document) as writer:
         root = library.root if recipe.sampled is not None else None
         inputs = DatasetInputs(recipe, writer.folder, station.path, root)
+        writer.discard_damaged()
         missing = writer.missing(range(len(paths)))
         failed: dict[int, str] = {}
         work = [SceneWork(inputs, number, paths[number]) for number in missing]
         for one, outcome in map_unordered(make_scene, work, workers):
+            if isinstance(outcome, BurgError) and "folder" in outcome.arguments:
+                raise outcome  # a full disk is so for all others, too
             if isinstance(outcome, BaseException):
                 failed[one.number] = (
                     str(outcome) if isinstance(outcome, BurgError) else one_line(outcome)
@@ -116,6 +129,11 @@ def _require_possible(recipe: DatasetRecipe, station: Station) -> None:
     require_cameras(recipe.viewpoints, station)
     if recipe.run:
         open_results(recipe.run)
+    missing = missing_render_libraries() if recipe.colors else []
+    if missing:
+        raise MissingDependencyError(
+            f"the recipe has colours (colors=False leaves them out): {describe_missing(missing)}"
+        )
 
 
 def _given(
@@ -163,4 +181,6 @@ def _write_card(folder: Path, recipe: DatasetRecipe) -> None:
     facts = {"seed": str(recipe.seed), "views of each scene": str(recipe.views)}
     if recipe.sensor:
         facts["sensor"] = recipe.sensor
+    if not recipe.colors:
+        facts["colours"] = "none"
     write_card(dataset, folder, facts=facts)

@@ -9,11 +9,12 @@ from typing import Any, ClassVar
 
 from burg_drake.cameras.noise import depth_noise
 from burg_drake.cameras.optics import sensor
-from burg_drake.core import LARGEST_SEED, FieldError, setting
+from burg_drake.core import LARGEST_SEED, FieldError, InvalidInputError, setting
 from burg_drake.core.documents import parse_document, plain_data, require_ranges
 from burg_drake.dataset.appearance import AppearanceSettings
 from burg_drake.dataset.views import ViewpointSettings
 from burg_drake.scene.document import SceneRecipe
+from burg_drake.station.document import MAX_SIDE
 
 RANGES = {
     "seed": (0, LARGEST_SEED),
@@ -34,9 +35,12 @@ class DatasetRecipe:
         sensor: depth camera that all views are taken with, see `cameras.sensor`: its intrinsics,
             its range, and its noise as `sensor_depth`; cameras of the station, or like them,
             without noise, if empty.
-        size: width and height of the sensor's images [pixels].
+        size: width and height of the sensor's images [pixels]; its usual ones if None.
         looks: how the looks of scenes vary, drawn once a scene; as simulated cameras always see
             them if None.
+        colors: whether there are images of colours, which need Drake's renderer and its system
+            libraries. All other images are the same without them, but for `sensor_depth`, whose
+            noise is drawn anew and has no holes at dark surfaces.
         normals: whether there are images of normals.
         grasps_per_object: grasps that are sampled on each object and screened by the open hand.
         run: folder of a run whose grasps and outcomes are taken; none if empty.
@@ -53,8 +57,11 @@ class DatasetRecipe:
     sensor: str = setting(
         "", "depth camera with its intrinsics and noise: d435, d455, azure_kinect, ..."
     )
-    size: tuple[int, int] = (640, 480)
+    size: tuple[int, int] | None = None
     looks: AppearanceSettings | None = AppearanceSettings()
+    colors: bool = setting(
+        True, "write no images of colours, which alone need Drake's renderer", name="no_colors"
+    )
     normals: bool = setting(False, "write images of normals, too")
     grasps_per_object: int = 0
     run: str = ""
@@ -64,10 +71,23 @@ class DatasetRecipe:
     def __post_init__(self) -> None:
         require_ranges(self, RANGES)
         if self.sensor:
-            sensor(self.sensor).depth_camera(self.size)
+            self._require_size()
             depth_noise(self.sensor)
         if self.run and self.grasps_per_object:
             raise FieldError("grasps are sampled or taken from a run, not both", "run")
+
+    def _require_size(self) -> None:
+        """Refuses images that the sensor does not have, or that are too large to be rendered."""
+        try:
+            camera = sensor(self.sensor).depth_camera(self.size)
+        except InvalidInputError as error:
+            raise FieldError(str(error), "size") from error
+        if max(camera.width, camera.height) > MAX_SIDE:
+            raise FieldError(
+                f"images of {camera.width} x {camera.height} pixels; a side has at most"
+                f" {MAX_SIDE:,}",
+                "size",
+            )
 
     def plain(self) -> dict[str, Any]:
         """As dicts, lists, numbers and texts; `read_recipe` reads it."""

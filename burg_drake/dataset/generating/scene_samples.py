@@ -51,7 +51,7 @@ class SceneSamples:
             rng = rng_from("dataset looks", recipe.seed, number)
             appearance = draw_appearance(recipe.looks, scene, station, rng)
         self._appearance = appearance
-        self._renderers: dict[bool, SceneRenderer] = {}
+        self._renderers: dict[tuple[bool, bool], SceneRenderer] = {}
 
     def __iter__(self) -> Iterator[Sample]:
         """The samples, as they are made.
@@ -83,9 +83,11 @@ class SceneSamples:
             view: the camera.
             grasps: on the scene's objects.
         """
-        recipe, renderer = self._recipe, self._renderer(view.posture is not None)
+        recipe, renderer = self._recipe, self._renderer(view, self._recipe.colors)
         rng = rng_from("dataset image", recipe.seed, self._number, number)
-        kinds: list[ImageKind] = ["color", "depth", "labels"]
+        kinds: list[ImageKind] = ["depth", "labels"]
+        if recipe.colors:
+            kinds.append("color")
         if recipe.normals or recipe.sensor:
             kinds.append("normals")
         images = renderer.images(view, kinds, rng=rng)
@@ -103,14 +105,15 @@ class SceneSamples:
 
     def redrawn(self, view: View) -> Images:
         """Depth and labels of a view, for checks."""
-        return self._renderer(view.posture is not None).images(view, ("depth", "labels"))
+        return self._renderer(view, colors=False).images(view, ("depth", "labels"))
 
-    def _renderer(self, arm: bool) -> SceneRenderer:
-        if arm not in self._renderers:
-            self._renderers[arm] = SceneRenderer(
-                self._scene, self._station, appearance=self._appearance, arm=arm
+    def _renderer(self, view: View, colors: bool) -> SceneRenderer:
+        arm = view.posture is not None
+        if (arm, colors) not in self._renderers:
+            self._renderers[arm, colors] = SceneRenderer(
+                self._scene, self._station, appearance=self._appearance, arm=arm, colors=colors
             )
-        return self._renderers[arm]
+        return self._renderers[arm, colors]
 
     def _measured(self, view: View, images: Images, rng: np.random.Generator) -> np.ndarray:
         assert images.depth is not None

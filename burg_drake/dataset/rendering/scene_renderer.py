@@ -14,6 +14,7 @@ from burg_drake.dataset.appearance import (
     Appearance,
     apply_appearance,
     photometric,
+    place_appearance,
     with_background,
 )
 from burg_drake.dataset.rendering.colors import DrakeColors
@@ -56,8 +57,8 @@ class SceneRenderer:
             station: what is around it.
             appearance: how it looks; as simulated cameras see it if None.
             arm: whether the station's arm is there.
-            colors: whether colours will be asked for; without them, and without an appearance, no
-                system libraries are needed.
+            colors: whether colours will be asked for; without them no system libraries are needed,
+                and all other images are the same.
 
         Raises:
             MissingDependencyError: a system library of the renderer is missing.
@@ -70,11 +71,13 @@ class SceneRenderer:
             self.scene,
             self.station,
             robot="arm" if arm else "none",
-            cameras=colors or appearance is not None,
+            cameras=colors or (),  # the board has markers in any case
         )
         self._renderer = RENDERER if colors else None
-        if appearance is not None:
+        if appearance is not None and colors:
             self._renderer = apply_appearance(self._built, appearance)
+        elif appearance is not None:
+            place_appearance(self._built, appearance)
         self._context = self._built.diagram.CreateDefaultContext()
         self._plant_context = self._built.plant.GetMyMutableContextFromRoot(self._context)
         self._posture: tuple[float, ...] | None = None

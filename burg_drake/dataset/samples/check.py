@@ -223,7 +223,7 @@ def _contradictions(
 
 def _finding(folder: Path, name: str, error: BurgError) -> DatasetFinding:
     """Of an error about a file of the data set."""
-    return DatasetFinding("", name, str(error).removeprefix(f"{folder / name}: "))
+    return DatasetFinding("", name, str(error).removeprefix(str(folder / name)).lstrip(":, "))
 
 
 def _short(error: InvalidInputError, shard: SampleShard, key: str, kind: str) -> str:

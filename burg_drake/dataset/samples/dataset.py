@@ -164,8 +164,8 @@ class Dataset(Sequence[Sample]):
         shard = open_shard(self.folder / entry.url)
         if len(shard.keys) != entry.nsamples:
             raise DocumentError(
-                f"{shard.path} has {len(shard.keys)} samples, the index {entry.nsamples}; make one"
-                " of them anew"
+                f"{shard.path} has {len(shard.keys)} samples, the index {entry.nsamples}; run the"
+                " command that made the data set once more, and it is made again"
             )
         return shard
 

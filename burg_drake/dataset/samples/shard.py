@@ -237,4 +237,4 @@ def _reporting(path: Path) -> Iterator[None]:
         raise InvalidInputError(
             f"cannot write {shown(str(path), 500)}: {error.strerror or error}; nothing of this"
             " shard is kept, and all others are: make room, and run the same command to continue"
-        ) from error
+        ).about("folder") from error

@@ -6,7 +6,6 @@ beside, and renamed last. The index is written in the end.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import replace
@@ -14,7 +13,7 @@ from pathlib import Path
 from types import TracebackType
 
 from burg_drake.core import InvalidInputError
-from burg_drake.core.files import remove_unfinished, try_lock, writable_folder
+from burg_drake.core.files import FolderLock, remove_unfinished, writable_folder
 from burg_drake.core.paths import portable_reference
 from burg_drake.dataset.samples.document import (
     FILE as DOCUMENT_FILE,
@@ -22,9 +21,15 @@ from burg_drake.dataset.samples.document import (
     load_dataset_document,
     save_dataset_document,
 )
-from burg_drake.dataset.samples.index import shard_numbers, write_index
+from burg_drake.dataset.samples.index import read_index, shard_numbers, write_index
 from burg_drake.dataset.samples.sample import Sample
-from burg_drake.dataset.samples.shard import FOLDER, ShardEntry, shard_name, write_shard
+from burg_drake.dataset.samples.shard import (
+    FOLDER,
+    ShardEntry,
+    shard_entry,
+    shard_name,
+    write_shard,
+)
 from burg_drake.scene.document import Scene, SceneLike, as_scene, save_scene
 
 SCENES = "scenes"
@@ -50,15 +55,19 @@ def write_scene(
         The shard's line of the index, for `DatasetWriter.added`.
 
     Raises:
-        InvalidInputError: the scene is there already, and see `write_shard`; nothing of the scene
-            stays then.
+        InvalidInputError: the scene is there already; or the disk is full or cannot be written to,
+            which is `about` the folder; and see `write_shard`. Nothing of the scene stays then.
     """
     folder = Path(folder)
     shard, document = folder / shard_name(number), folder / scene_name(number)
     if shard.exists():
         raise InvalidInputError(f"{shard} is there already; a scene can be added once")
     library = portable_reference(scene.library.root, document.parent)
-    save_scene(replace(scene.document, library=library), document)
+    try:
+        save_scene(replace(scene.document, library=library), document)
+    except InvalidInputError as error:
+        error.about("folder")
+        raise
     try:
         return write_shard(shard, samples)
     except BaseException:
@@ -89,24 +98,12 @@ class DatasetWriter:
         """
         self.folder = writable_folder(folder)
         self._known: dict[str, ShardEntry] = {}
-        lock = os.open(self.folder, os.O_RDONLY)
-        self._lock: int | None = lock
+        self._lock = FolderLock(self.folder)
         try:
-            self._take(lock)
             self._open(document)
         except BaseException:
             self.close()
             raise
-
-    def _take(self, lock: int) -> None:
-        """Takes the lock; a file system without locks counts as one that others have."""
-        with suppress(OSError):
-            if try_lock(lock):
-                return
-        raise InvalidInputError(
-            f"{self.folder} is being written by another process; wait for it, or choose another"
-            " folder"
-        ).about("folder")
 
     def _open(self, document: DatasetDocument) -> None:
         remove_unfinished(self.folder)
@@ -132,6 +129,31 @@ class DatasetWriter:
             if path not in complete:  # its shard was being written
                 path.unlink()
 
+    def discard_damaged(self) -> list[int]:
+        """Removes shards that are cut off, have damaged headers, or are not those of the index, so
+        that they can be made anew. All shards are read for it, and need not be in the end.
+
+        Returns:
+            Numbers of their scenes.
+        """
+        listed: dict[str, ShardEntry] = {}
+        with suppress(InvalidInputError):  # an index that is missing or damaged tells nothing
+            listed = {entry.url: entry for entry in read_index(self.folder)}
+        found = []
+        for number in shard_numbers(self.folder):
+            shard = self.folder / shard_name(number)
+            try:
+                entry = shard_entry(shard)
+            except InvalidInputError:
+                entry = None
+            if entry is not None and listed.get(entry.url, entry) == entry:
+                self._known[entry.url] = entry
+                continue
+            shard.unlink()
+            (self.folder / scene_name(number)).unlink(missing_ok=True)
+            found.append(number)
+        return found
+
     def missing(self, scenes: Iterable[int]) -> list[int]:
         """Those of some scenes that are not complete, in the order given."""
         there = set(shard_numbers(self.folder))
@@ -156,9 +178,7 @@ class DatasetWriter:
 
     def close(self) -> None:
         """Lets others write; what is there stays as it is."""
-        if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
+        self._lock.release()
 
     def __enter__(self) -> DatasetWriter:
         return self

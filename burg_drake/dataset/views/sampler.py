@@ -103,8 +103,8 @@ class ViewSampler:
         why = "; ".join(f"{count} {reason}" for reason, count in refused.most_common())
         raise InvalidInputError(
             f"scene {self._scene.name!r} ({self._scene.path}) is outside the camera's view: of"
-            f" {refused.total()} views from {camera!r}, {why}; let views be drawn nearer to where"
-            " the camera sees the objects"
+            f" {refused.total()} views from {camera!r}, {why}; move the camera or the objects, or"
+            " let views be drawn nearer to them"
         )
 
     def _draw(self, camera: str, rng: np.random.Generator) -> View | str:

@@ -24,7 +24,8 @@ from pydrake.geometry import (
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex
 
-from burg_drake.core import Array, Indices, transform_points
+from burg_drake.core import Array, Indices, MeshError, transform_points
+from burg_drake.core.files import reporting_read_errors
 
 Triangles = tuple[Array, Indices]
 
@@ -50,7 +51,7 @@ def visible_surfaces(plant: MultibodyPlant, scene_graph: SceneGraph) -> list[Vis
     Balls and cylinders are as fine as those of Drake's renderer, not round.
 
     Raises:
-        InvalidInputError: a mesh file cannot be read.
+        InvalidInputError: a mesh file cannot be read, or has no faces.
     """
     inspector = scene_graph.model_inspector()
     everything = GeometrySet(inspector.GetAllGeometryIds())
@@ -66,7 +67,11 @@ def visible_surfaces(plant: MultibodyPlant, scene_graph: SceneGraph) -> list[Vis
 
 
 def shape_triangles(shape: Shape) -> Triangles:
-    """Vertices (V, 3) [m] and faces (F, 3) of a visual shape; none of one without a surface."""
+    """Vertices (V, 3) [m] and faces (F, 3) of a visual shape; none of one without a surface.
+
+    Raises:
+        InvalidInputError: a mesh file cannot be read, or has no faces.
+    """
     mesh = _trimesh(shape)
     return np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64).reshape(-1, 3)
 
@@ -93,12 +98,18 @@ def _trimesh(shape: Shape) -> trimesh.Trimesh:
 
 def _mesh(shape: Mesh) -> trimesh.Trimesh:
     source = shape.source()
-    if source.is_path():
-        path = Path(source.path())
-        read = _read_mesh(path, None, path.suffix, path.stat().st_mtime_ns)
-    else:
-        file = source.in_memory().mesh_file
-        read = _read_mesh(None, file.contents(), file.extension(), 0)
+    with reporting_read_errors(source.description(), "a mesh that can be seen"):
+        if source.is_path():
+            path = Path(source.path())
+            read = _read_mesh(path, None, path.suffix, path.stat().st_mtime_ns)
+        else:
+            file = source.in_memory().mesh_file
+            read = _read_mesh(None, file.contents(), file.extension(), 0)
+        if not len(read.faces) or not np.isfinite(read.vertices).all():
+            raise MeshError(
+                "it has no faces, or vertices that are not finite; build the library that has it"
+                " again"
+            )
     return trimesh.Trimesh(read.vertices * shape.scale3(), read.faces, process=False)
 
 

@@ -20,6 +20,7 @@ from .gripper_document import (
 )
 from .station_document import (
     HALF_PIXEL as HALF_PIXEL,
+    MAX_SIDE as MAX_SIDE,
     MODEL_NAMES as MODEL_NAMES,
     Arm as Arm,
     Camera as Camera,

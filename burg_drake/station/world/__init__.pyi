@@ -6,6 +6,7 @@ from .camera_sensors import (
     LIGHTS as LIGHTS,
     RENDERER as RENDERER,
     add_cameras as add_cameras,
+    add_renderer as add_renderer,
 )
 from .contact_parts import (
     ContactParts as ContactParts,

@@ -14,13 +14,14 @@ from pydrake.geometry import (
     MakeRenderEngineVtk,
     RenderCameraCore,
     RenderEngineVtkParams,
+    SceneGraph,
 )
 from pydrake.math import RigidTransform
 from pydrake.perception import BaseField, DepthImageToPointCloud
 from pydrake.planning import RobotDiagramBuilder
 from pydrake.systems.sensors import CameraInfo, PixelType, RgbdSensor
 
-from burg_drake.core import MissingDependencyError
+from burg_drake.core import InvalidInputError, MissingDependencyError
 from burg_drake.station.document import HALF_PIXEL, Camera, Station
 from burg_drake.station.world.area_camera import AreaCamera, finer
 from burg_drake.system_libraries import apt_command, missing_render_libraries
@@ -60,17 +61,12 @@ def add_cameras(
 
     Raises:
         UnknownNameError: the station has no such camera.
-        MissingDependencyError: a system library of the renderer is missing (it would crash).
+        MissingDependencyError, InvalidInputError: see `add_renderer`.
     """
     names = station.document.cameras if names is None else names
     cameras = {name: station.camera(name) for name in names}
-    missing = missing_render_libraries()
-    if missing:
-        raise MissingDependencyError(
-            f"cameras need the system libraries {', '.join(missing)}; run: {apt_command()}"
-        )
     scene_graph, system = builder.scene_graph(), builder.builder()
-    scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(RenderEngineVtkParams(lights=LIGHTS)))
+    add_renderer(scene_graph, RENDERER, RenderEngineVtkParams(lights=LIGHTS))
     for name, camera in cameras.items():
         color, depth = render_cameras(camera)
         sensor = system.AddSystem(
@@ -105,6 +101,32 @@ def add_cameras(
         system.Connect(X_WC, cloud.camera_pose_input_port())
         system.ExportOutput(X_WC, f"camera.{name}.pose")
         system.ExportOutput(cloud.point_cloud_output_port(), f"camera.{name}.point_cloud")
+
+
+def add_renderer(scene_graph: SceneGraph, name: str, parameters: RenderEngineVtkParams) -> None:
+    """Adds Drake's renderer, of all that is there and will be.
+
+    Args:
+        scene_graph: to add it to.
+        name: of the renderer.
+        parameters: its lights, for example.
+
+    Raises:
+        MissingDependencyError: a system library of the renderer is missing (it would crash).
+        InvalidInputError: it cannot read a visual mesh.
+    """
+    missing = missing_render_libraries()
+    if missing:
+        raise MissingDependencyError(
+            f"cameras need the system libraries {', '.join(missing)}; run: {apt_command()}"
+        )
+    try:
+        scene_graph.AddRenderer(name, MakeRenderEngineVtk(parameters))
+    except RuntimeError as error:
+        raise InvalidInputError(
+            f"what is to be rendered cannot be read ({' '.join(str(error).split())}); build the"
+            " library that has it again"
+        ) from error
 
 
 def _point_cloud(camera: Camera) -> DepthImageToPointCloud:
