@@ -83,7 +83,7 @@ def generate_dataset(
         UnknownNameError: the station has no such camera.
         ClusterError: no scheduler is reached, or it is lost; a worker has other versions; scenes
             that are there stay, and the same call continues.
-        MissingDependencyError: a cluster needs Dask.
+        MissingDependencyError: Dask is asked for, and not installed.
     """
     station, recipe = as_station(station), recipe or DatasetRecipe()
     paths: Sequence[Path | None]

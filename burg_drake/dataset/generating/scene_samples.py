@@ -48,11 +48,11 @@ class SceneSamples:
         grasps: SceneGrasps | None = None,
     ) -> None:
         self._scene, self._number = scene, number
-        self._station, self._recipe = station, recipe
+        self._station, self._recipe, self._grasps = station, recipe, grasps
         if appearance is None and recipe.looks is not None:
             rng = rng_from("dataset looks", recipe.seed, number)
             appearance = draw_appearance(recipe.looks, scene, station, rng)
-        self._appearance, self._grasps = appearance, grasps
+        self._appearance = appearance
         self._renderers: dict[bool, SceneRenderer] = {}
 
     def __iter__(self) -> Iterator[Sample]:
