@@ -76,7 +76,7 @@ def _make_on_cluster(
             yield one, error
     if not able:
         return
-    world = make_bundle(_catalogue(library, scenes.values()), station, looks=True)
+    world = make_bundle(catalogue(library, scenes.values()), station, looks=True)
     run = open_results(recipe.run) if recipe.run else None
     sent = replace(recipe, given=(), run="")
 
@@ -92,7 +92,7 @@ def _make_on_cluster(
             yield one, made if isinstance(made, BaseException) else _kept(one, library, made)
 
 
-def _catalogue(library: ObjectLibrary, scenes: Collection[Scene]) -> Scene:
+def catalogue(library: ObjectLibrary, scenes: Collection[Scene]) -> Scene:
     """A scene of all objects of some scenes, to be packed; of the whole library if there are none,
     as scenes are sampled from that."""
     used = {one.object for scene in scenes for one in scene.document.instances}
