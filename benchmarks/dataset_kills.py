@@ -52,20 +52,28 @@ def main() -> None:
         place = Path(folder)
         (place / "recipe.yaml").write_text(RECIPE)
         print(
-            f"{asked.samples} samples: {asked.samples // asked.views} scenes of {asked.views} views,"
-            f" {SIZE[0]} x {SIZE[1]} pixels, plain looks, {asked.workers} workers",
+            f"{asked.samples} samples, {asked.views} of a scene, {SIZE[0]} x {SIZE[1]} pixels,"
+            f" plain looks, {asked.workers} workers",
             flush=True,
         )
         start = time.monotonic()
-        if finished(begun(asked, place, "whole")) != 0:
+        process, first = begun(asked, place, "whole"), 0.0
+        while process.poll() is None and not first:
+            time.sleep(0.1)
+            first = (time.monotonic() - start) * any(place.glob("whole/shards/[0-9]*.tar"))
+        if finished(process) != 0:
             raise SystemExit("the undisturbed command failed")
         usual = time.monotonic() - start
-        print(f"undisturbed: {usual:.0f} s, {content(place / 'whole')[:16]}", flush=True)
-        kill_and_continue(asked, place, usual)
+        print(
+            f"undisturbed: {usual:.0f} s, the first scene after {first:.0f} s; content"
+            f" {content(place / 'whole')[:16]}",
+            flush=True,
+        )
+        kill_and_continue(asked, place, first + (usual - first) / max(asked.kills, 1))
 
 
-def kill_and_continue(asked: argparse.Namespace, place: Path, usual: float) -> None:
-    """Makes the data set with kills; tells what has become of it."""
+def kill_and_continue(asked: argparse.Namespace, place: Path, mean: float) -> None:
+    """Makes the data set with kills, each so long after a start, on average [s]."""
     rng, kills, attempts = random.Random(asked.seed), 0, 0
     killed = place / "killed" / "whole"  # of the same name, which is in the index
     while True:
@@ -73,7 +81,7 @@ def kill_and_continue(asked: argparse.Namespace, place: Path, usual: float) -> N
         attempts += 1
         if kills < asked.kills:
             with contextlib.suppress(subprocess.TimeoutExpired):
-                process.wait(rng.uniform(0.05, 1.5) * usual / asked.kills)
+                process.wait(rng.uniform(0.0, 2.0) * mean)
             if process.poll() is None:
                 kill_all(process)
                 kills += 1
