@@ -67,7 +67,10 @@ from .statistics import (
     clustered_interval as clustered_interval,
     wilson_interval as wilson_interval,
 )
-from .versions import software_versions as software_versions
+from .versions import (
+    JUDGING as JUDGING,
+    software_versions as software_versions,
+)
 from .web_access import (
     HEADERS as HEADERS,
     LOCALHOST as LOCALHOST,

@@ -175,7 +175,7 @@ def test_other_versions_are_refused(
     try:
         connection.send(cluster.nodes.address)
         address = connection.recv()
-        other = rf"^worker {address} has code of burg_drake \w{{12}} \(here \w{{12}}\); verdicts"
+        other = rf"^worker {address} has code of burg_drake \w{{12}} \(here \w{{12}}\); results"
         with pytest.raises(ClusterError, match=other):
             list(cluster.executor.judge([Job("job", Make(KnownJudge()), grasps(3))]))
     finally:
@@ -268,7 +268,7 @@ def test_a_scheduler_that_dies_is_said_in_one_line(
     job = Job("job", Make(KnownJudge(pause=0.05)), grasps(200))
     factory = StationJudgeFactory(scene, station, ENGINES["standard"], "hand", GraspMotion())
     answers = []
-    lost = r"^the scheduler at tcp://127\S+ does not answer any more; verdicts so far are kept"
+    lost = r"^the scheduler at tcp://127\S+ does not answer any more; what is done is kept"
     with connect_cluster(nodes.address) as executor, connect_cluster(nodes.address) as other:
         with pytest.raises(ClusterError, match=lost):
             for answer in executor.judge([job]):
@@ -298,7 +298,7 @@ def test_a_scheduler_that_dies_at_the_start_is_said_in_one_line(
 
     monkeypatch.setattr(ClusterWorkers, "update", look_and_kill)
     try:
-        lost = r"^the scheduler at tcp://127\S+ does not answer any more; verdicts so far are kept"
+        lost = r"^the scheduler at tcp://127\S+ does not answer any more; what is done is kept"
         with pytest.raises(ClusterError, match=lost), connect_cluster(nodes.address) as executor:
             list(executor.judge([Job("job", Make(KnownJudge()), grasps(3))]))
     finally:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from burg_drake.apps.dataset.colors import with_possible_colors
 from burg_drake.apps.options import (
     Parser,
+    add_cluster,
     add_group,
     add_options,
     add_quiet,
@@ -43,6 +44,7 @@ def add_to(verbs: Any) -> None:
         " -o data",
         "burg-drake dataset generate --scenes tabletop_six --camera wrist --grasps runs/first"
         " -o data",
+        "burg-drake dataset generate --scenes scenes/*.yaml --cluster cluster.yaml -o data",
         "",
         "Interrupt it whenever you like: the same command continues. Every choice follows from",
         "the seed. --recipe takes a YAML file for all that has no option; data/dataset.yaml has",
@@ -122,7 +124,9 @@ def _add_generate_options(parser: Parser) -> None:
         help="grasps of a run with their outcomes, or N sampled on each object",
     )
     parser.add_argument("--recipe", metavar="FILE", help="YAML file with what has no option")
-    add_workers(parser, "processes (default: %(default)d)", default=1)
+    who = parser.add_mutually_exclusive_group()
+    add_workers(who, "processes (default: %(default)d)", default=1)
+    add_cluster(who)
     add_quiet(parser)
 
 
@@ -153,6 +157,7 @@ def run_generate(arguments: argparse.Namespace) -> int:
             recipe,
             count=count,
             workers=arguments.workers,
+            cluster=arguments.cluster,
             progress=lambda number, error: pace.step(),
         )
     for number, error in found.failed.items():

@@ -1,4 +1,4 @@
-"""The option --cluster of verbs that can judge on other machines."""
+"""The option --cluster of verbs that can use other machines."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def add_cluster(group: Any) -> None:
     group.add_argument(
         "--cluster",
         metavar="WHERE",
-        help="judge on a cluster of Dask: tls://HOST:PORT of a scheduler, a cluster.yaml, or"
+        help="work on a cluster of Dask: tls://HOST:PORT of a scheduler, a cluster.yaml, or"
         " local:N for N workers on this machine (needs burg-drake[dask]; see docs/scale.md)",
     )
 

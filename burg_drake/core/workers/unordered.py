@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future, as_completed
 from typing import TypeVar
 
@@ -14,7 +14,7 @@ Result = TypeVar("Result")
 
 def map_unordered(
     function: Callable[[Work], Result], work: Sequence[Work], workers: int
-) -> Iterator[tuple[Work, Result | BaseException]]:
+) -> Generator[tuple[Work, Result | BaseException], None, None]:
     """Results of a function as they come; one that fails does not end the others.
 
     Args:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,10 +16,10 @@ from burg_drake.core import (
     software_versions,
 )
 from burg_drake.core.paths import name_from, portable_reference
-from burg_drake.core.workers import map_unordered
 from burg_drake.dataset.exchange import write_card
+from burg_drake.dataset.generating.makers import scene_maker
 from burg_drake.dataset.generating.recipe import DatasetRecipe
-from burg_drake.dataset.generating.work import DatasetInputs, SceneWork, make_scene
+from burg_drake.dataset.generating.work import DatasetInputs, SceneWork
 from burg_drake.dataset.samples import DatasetDocument, DatasetWriter, load_dataset
 from burg_drake.dataset.views import require_cameras
 from burg_drake.evaluation.store import open_results
@@ -64,6 +65,7 @@ def generate_dataset(
     *,
     count: int | None = None,
     workers: int = 1,
+    cluster: str | None = None,
     progress: Callable[[int, str], None] | None = None,
 ) -> GeneratedDataset:
     """Makes the samples of many scenes, but for those that the folder has.
@@ -76,6 +78,8 @@ def generate_dataset(
         recipe: how samples are made.
         count: of sampled scenes; all given ones if None.
         workers: number of processes; with one this process does it.
+        cluster: in their place, workers of Dask, which need none of this machine's files: as
+            `burg.runs.connect_cluster` takes it, such as `local:4` or the path of a cluster file.
         progress: called after each scene with its number and what has gone wrong, if anything.
 
     Returns:
@@ -86,7 +90,9 @@ def generate_dataset(
             has no file, the scenes are of several libraries, or there is no such run.
         UnknownNameError: the station has no such camera.
         MissingDependencyError: the recipe has colours, and a system library of the renderer is
-            missing.
+            missing; or Dask is asked for, and not installed.
+        ClusterError: no scheduler is reached, or it is lost; a worker has other versions; scenes
+            that are there stay, and the same call continues.
     """
     station, recipe = as_station(station), recipe or DatasetRecipe()
     paths: Sequence[Path | None]
@@ -99,24 +105,28 @@ def generate_dataset(
     _require_possible(recipe, station)
     folder = Path(folder)
     document = _document(folder, library, station, recipe)
-    with DatasetWriter(folder, document) as writer:
+    with (
+        scene_maker(cluster, workers, recipe, library, station) as make,
+        DatasetWriter(folder, document) as writer,
+    ):
         root = library.root if recipe.sampled is not None else None
         inputs = DatasetInputs(recipe, writer.folder, station.path, root)
         writer.discard_damaged()
         missing = writer.missing(range(len(paths)))
         failed: dict[int, str] = {}
         work = [SceneWork(inputs, number, paths[number]) for number in missing]
-        for one, outcome in map_unordered(make_scene, work, workers):
-            if isinstance(outcome, BurgError) and "folder" in outcome.arguments:
-                raise outcome  # a full disk is so for all others, too
-            if isinstance(outcome, BaseException):
-                failed[one.number] = (
-                    str(outcome) if isinstance(outcome, BurgError) else one_line(outcome)
-                )
-            else:
-                writer.added(outcome)
-            if progress is not None:
-                progress(one.number, failed.get(one.number, ""))
+        with closing(make(work)) as made:
+            for one, outcome in made:
+                if isinstance(outcome, BurgError) and "folder" in outcome.arguments:
+                    raise outcome  # a full disk is so for all others, too
+                if isinstance(outcome, BaseException):
+                    failed[one.number] = (
+                        str(outcome) if isinstance(outcome, BurgError) else one_line(outcome)
+                    )
+                else:
+                    writer.added(outcome)
+                if progress is not None:
+                    progress(one.number, failed.get(one.number, ""))
         writer.finish()
         _write_card(folder, recipe)
     new = tuple(number for number in missing if number not in failed)

@@ -35,6 +35,7 @@ class SceneSamples:
         station: what it stands on.
         recipe: how samples are made.
         appearance: how it looks; drawn by the recipe if None.
+        grasps: on its objects; those that the recipe asks for if None.
     """
 
     def __init__(
@@ -44,9 +45,10 @@ class SceneSamples:
         station: Station,
         recipe: DatasetRecipe,
         appearance: Appearance | None = None,
+        grasps: SceneGrasps | None = None,
     ) -> None:
         self._scene, self._number = scene, number
-        self._station, self._recipe = station, recipe
+        self._station, self._recipe, self._grasps = station, recipe, grasps
         if appearance is None and recipe.looks is not None:
             rng = rng_from("dataset looks", recipe.seed, number)
             appearance = draw_appearance(recipe.looks, scene, station, rng)
@@ -70,7 +72,7 @@ class SceneSamples:
             intrinsics=intrinsics,
             depth_range=depth_range,
         )
-        grasps = self._grasps()
+        grasps = self._wanted_grasps() if self._grasps is None else self._grasps
         for number in range(recipe.views):
             view = views.sample(rng_from("dataset view", recipe.seed, self._number, number))
             yield self.sample(number, view, grasps)
@@ -126,7 +128,7 @@ class SceneSamples:
             color=images.color,
         )
 
-    def _grasps(self) -> SceneGrasps | None:
+    def _wanted_grasps(self) -> SceneGrasps | None:
         recipe = self._recipe
         if recipe.run:
             return grasps_of_run(recipe.run, self._scene)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -11,7 +13,7 @@ from burg_drake.dataset.generating.recipe import DatasetRecipe
 from burg_drake.dataset.generating.scene_samples import SceneSamples
 from burg_drake.dataset.samples import ShardEntry, write_scene
 from burg_drake.generation import SceneSampler
-from burg_drake.objects.library import load_library
+from burg_drake.objects.library import ObjectLibrary, load_library
 from burg_drake.scene.document import Scene, load_scene
 from burg_drake.station.document import Station, load_station
 
@@ -56,23 +58,65 @@ def make_scene(work: SceneWork) -> ShardEntry:
         Exception: what cannot be rendered is one failure.
     """
     inputs = work.inputs
-    try:
+    with drake_errors():
         station = _station(inputs.station)
-        scene = load_scene(work.path) if work.path is not None else _sampled(work)
-        if work.path is not None and scene.content != inputs.recipe.given[work.number]:
-            raise InvalidInputError(f"{work.path} was changed meanwhile; generate again")
+        if work.path is not None:
+            scene = given_scene(work)
+        else:
+            scene = accepted_scene(_sampler(inputs), work.number, inputs.folder)
         samples = SceneSamples(scene, work.number, station, inputs.recipe)
         return write_scene(inputs.folder, work.number, scene, samples)
-    except SystemExit as error:  # DRAKE_DEMAND ends this way
-        raise SimulationError(f"Drake gave up: {error}") from error
 
 
-def _sampled(work: SceneWork) -> Scene:
-    sampled = _sampler(work.inputs).sample(work.number, work.inputs.folder / "scenes")
+def given_scene(
+    work: SceneWork, library: Callable[[str, Path | None], ObjectLibrary] = load_library
+) -> Scene:
+    """The scene of a document, as it was when the data set was begun.
+
+    Args:
+        work: with a path.
+        library: as in `load_scene`.
+
+    Raises:
+        InvalidInputError: it is another one by now.
+        UnknownNameError, DocumentError: as `load_scene`.
+    """
+    assert work.path is not None
+    scene = load_scene(work.path, library=library)
+    if scene.content != work.inputs.recipe.given[work.number]:
+        raise InvalidInputError(f"{work.path} was changed meanwhile; generate again")
+    return scene
+
+
+def accepted_scene(sampler: SceneSampler, number: int, folder: Path) -> Scene:
+    """The sampled scene of a number.
+
+    Args:
+        sampler: of the recipe.
+        number: of the scene.
+        folder: of the data set.
+
+    Raises:
+        SimulationError: none was accepted.
+    """
+    sampled = sampler.sample(number, folder / "scenes")
     if not sampled.accepted:
         reasons = ", ".join(f"{count} x {reason}" for reason, count in sampled.refused.items())
         raise SimulationError(f"no scene was accepted in {sampled.attempts} attempts ({reasons})")
     return sampled.scene
+
+
+@contextmanager
+def drake_errors() -> Iterator[None]:
+    """Around what Drake does: a failed condition of its own ends this alone.
+
+    Raises:
+        SimulationError: in the place of `SystemExit`.
+    """
+    try:
+        yield
+    except SystemExit as error:  # DRAKE_DEMAND ends this way
+        raise SimulationError(f"Drake gave up: {error}") from error
 
 
 @lru_cache(maxsize=1)

@@ -18,8 +18,11 @@ from .png import (
 from .sample import Sample as Sample
 from .shard import (
     ShardEntry as ShardEntry,
+    shard_name as shard_name,
+    write_shard as write_shard,
 )
 from .writer import (
     DatasetWriter as DatasetWriter,
+    write_made_scene as write_made_scene,
     write_scene as write_scene,
 )

@@ -96,6 +96,16 @@ def write_shard(path: str | Path, samples: Iterable[Sample]) -> ShardEntry:
     return ShardEntry(f"{FOLDER}/{path.name}", len(seen), size, digest.hexdigest())
 
 
+def write_made_shard(path: Path, data: bytes) -> None:
+    """Writes the bytes of a shard that was made elsewhere, as `write_shard` does.
+
+    Raises:
+        InvalidInputError: the disk is full or cannot be written to; nothing stays of it then.
+    """
+    with _renamed_when_whole(path) as stream, _reporting(path):
+        stream.write(data)
+
+
 def shard_entry(path: Path) -> ShardEntry:
     """The line of the index of a shard that is there.
 

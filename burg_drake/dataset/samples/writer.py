@@ -6,7 +6,7 @@ beside, and renamed last. The index is written in the end.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -28,6 +28,7 @@ from burg_drake.dataset.samples.shard import (
     ShardEntry,
     shard_entry,
     shard_name,
+    write_made_shard,
     write_shard,
 )
 from burg_drake.scene.document import Scene, SceneLike, as_scene, save_scene
@@ -58,7 +59,36 @@ def write_scene(
         InvalidInputError: the scene is there already; or the disk is full or cannot be written to,
             which is `about` the folder; and see `write_shard`. Nothing of the scene stays then.
     """
-    folder = Path(folder)
+    return _written(Path(folder), number, scene, lambda shard: write_shard(shard, samples))
+
+
+def write_made_scene(
+    folder: str | Path, number: int, scene: Scene, shard: bytes, entry: ShardEntry
+) -> ShardEntry:
+    """Writes a scene whose shard another machine has made; as `write_scene`.
+
+    Args:
+        folder, number, scene: as in `write_scene`.
+        shard: the bytes of its shard.
+        entry: its line of the index.
+
+    Returns:
+        The line.
+
+    Raises:
+        InvalidInputError: as `write_scene`.
+    """
+
+    def write(path: Path) -> ShardEntry:
+        write_made_shard(path, shard)
+        return entry
+
+    return _written(Path(folder), number, scene, write)
+
+
+def _written(
+    folder: Path, number: int, scene: Scene, write: Callable[[Path], ShardEntry]
+) -> ShardEntry:
     shard, document = folder / shard_name(number), folder / scene_name(number)
     if shard.exists():
         raise InvalidInputError(f"{shard} is there already; a scene can be added once")
@@ -69,7 +99,7 @@ def write_scene(
         error.about("folder")
         raise
     try:
-        return write_shard(shard, samples)
+        return write(shard)
     except BaseException:
         document.unlink(missing_ok=True)
         raise

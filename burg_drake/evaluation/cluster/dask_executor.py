@@ -1,4 +1,4 @@
-"""Judges jobs on a cluster of Dask."""
+"""Judges jobs, and calls functions, on a cluster of Dask."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ import contextlib
 import logging
 import queue
 import threading
-from collections.abc import Callable, Generator, Iterable, Iterator
-from typing import Any
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
 
 from burg_drake.core import ClusterError, MissingDependencyError
 from burg_drake.core.grasps import Verdict
 from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.cluster.bundles import Bundle
 from burg_drake.evaluation.cluster.connection_failure import unreached_reason
 from burg_drake.evaluation.cluster.document import Cluster, TlsFiles, read_cluster, require_safe
 from burg_drake.evaluation.workers import Job, OnFailure, WorkerLimits
@@ -20,6 +22,8 @@ REACH = 5.0
 """Time in which a scheduler has to be reached [s]."""
 HANDSHAKES = 3
 """So many times longer a connection may take whose steps all keep to that time."""
+Work = TypeVar("Work")
+Result = TypeVar("Result")
 
 
 class DaskExecutor:
@@ -75,6 +79,33 @@ class DaskExecutor:
         from burg_drake.evaluation.cluster.dispatch import Dispatch
 
         yield from Dispatch(self.client, self.limits, self._maintain).run(jobs, on_failure)
+
+    def map_unordered(
+        self,
+        function: Callable[[Any, Path], Result],
+        work: Sequence[Work],
+        bundle: Bundle,
+        pack: Callable[[Work], Any],
+    ) -> Generator[tuple[Work, Result | BaseException], None, None]:
+        """Results of a function as they come, as `core.workers.map_unordered` gives them.
+
+        Args:
+            function: importable; called in a child process of a worker with what `pack` gives and
+                the folder of the bundle.
+            work: what is to be done, begun in this order.
+            bundle: which all calls need; each machine gets it once.
+            pack: makes of work what is sent; called when a worker is free.
+
+        Yields:
+            The work, and the result or the error: of the function, of `pack`, or because workers
+            were lost at it one after the other. Closing the iterator ends the children.
+
+        Raises:
+            ClusterError: a worker has other versions of what decides, or the scheduler is lost.
+        """
+        from burg_drake.evaluation.cluster.cluster_map import ClusterMap
+
+        yield from ClusterMap(self.client, function, bundle, pack).run(work, self._maintain)
 
 
 @contextlib.contextmanager

@@ -19,9 +19,8 @@ from distributed import KilledWorker
 from burg_drake.core import BurgError, ClusterError, SimulationError, one_line
 from burg_drake.core.grasps import Outcome, Stage, Verdict
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.cluster.delivery import ATTEMPTS, deliver_bundle
+from burg_drake.evaluation.cluster.delivery import deliver_bundle, end_run, register_plugin
 from burg_drake.evaluation.cluster.members import (
-    LOST,
     ClusterWorker,
     ClusterWorkers,
     lost_scheduler,
@@ -68,7 +67,7 @@ class Dispatch:
     ) -> Generator[Answer, None, None]:
         """See `executor.Executor.judge`."""
         self._coming, self._on_failure = iter(jobs), on_failure
-        self.begin()
+        register_plugin(self.client, self.cluster, Supervisor(self._name))
         try:
             while True:
                 if time.monotonic() > self._seen + LOOK:
@@ -82,19 +81,6 @@ class Dispatch:
                 yield from self.collect()
         finally:
             self.end()
-
-    def begin(self) -> None:
-        """Has the workers, and those that join later, supervise children of this run. A worker that
-        dies meanwhile is no reason to stop."""
-        for attempt in range(1, ATTEMPTS + 1):
-            self.cluster.update()  # before anything is registered where others would not know it
-            try:
-                self.client.register_plugin(Supervisor(self._name), name=self._name)
-                return
-            except LOST as error:
-                if self.client.status != "running" or attempt == ATTEMPTS:
-                    raise lost_scheduler(self.client) from error
-                time.sleep(LOOK)
 
     def update_workers(self) -> Iterator[Answer]:
         """Sees who is there."""
@@ -296,10 +282,4 @@ class Dispatch:
         futures = [chunk.future for chunk, _ in self._sent.values()]
         self._sent.clear()
         self._waiting.end()
-        if self.client.status != "running":
-            return
-        try:
-            self.client.cancel(futures, force=True)
-            self.client.unregister_worker_plugin(self._name)
-        except LOST:
-            pass  # the scheduler is lost, and its workers end with it
+        end_run(self.client, self._name, futures)

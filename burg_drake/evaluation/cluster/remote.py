@@ -157,7 +157,7 @@ class Supervisor(WorkerPlugin):
 def judge_chunk(chunk: Chunk) -> Answers:
     """The task of Dask."""
     worker = get_worker()
-    make_judge = chunk.recipe.load(_place(worker))
+    make_judge = chunk.recipe.load(bundle_place(worker))
     if make_judge is None:
         return Answers(missing=True)
     supervisor: Supervisor | None = worker.plugins.get(chunk.run)
@@ -168,9 +168,9 @@ def judge_chunk(chunk: Chunk) -> Answers:
 
 def deliver(data: bytes, name: str, dask_worker: Any = None) -> None:
     """Unpacks a bundle on a worker's machine; runs in the worker, see `Client.run`."""
-    unpack(data, _place(dask_worker), name)
+    unpack(data, bundle_place(dask_worker), name)
 
 
-def _place(worker: Any) -> Path:
+def bundle_place(worker: Any) -> Path:
     """A folder that all workers of a machine share."""
     return Path(worker.local_directory).parent

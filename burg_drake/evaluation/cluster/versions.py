@@ -1,4 +1,4 @@
-"""What has to be the same on all machines, so that they come to the same verdicts."""
+"""What has to be the same on all machines, so that they come to the same verdicts and images."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import burg_drake
-from burg_drake.core import ClusterError, content_hash, software_versions
+from burg_drake.core import JUDGING, ClusterError, content_hash, software_versions
+
+DECIDING = {**JUDGING, "opencv": "opencv-python-headless"}
+"""Packages that decide about verdicts or images, as they are called and installed."""
 
 
 @functools.cache
@@ -17,7 +20,7 @@ def software() -> dict[str, str]:
     files = sorted(package.rglob("*.py"))
     names = [file.relative_to(package).as_posix() for file in files]
     code = content_hash(names, files)[:12]
-    return {**software_versions(with_platform=False), "code of burg_drake": code}
+    return {**software_versions(DECIDING, with_platform=False), "code of burg_drake": code}
 
 
 def require_same(workers: Mapping[str, Mapping[str, str] | BaseException]) -> None:
@@ -45,7 +48,7 @@ def require_same(workers: Mapping[str, Mapping[str, str] | BaseException]) -> No
     if refused:
         more = f", and {len(refused) - 1} more differ" if len(refused) > 1 else ""
         raise ClusterError(
-            f"{refused[0]}{more}; verdicts are the same only with the same versions: install the"
+            f"{refused[0]}{more}; results are the same only with the same versions: install the"
             " same environment on all machines"
         )
 

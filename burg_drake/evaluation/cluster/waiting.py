@@ -40,6 +40,6 @@ class Waiting:
         if time.monotonic() > self._since + PATIENCE:
             raise ClusterError(
                 f"the scheduler at {self._client.scheduler.address} has had no worker for"
-                f" {PATIENCE / 60:.0f} minutes; verdicts so far are kept; run the same command"
+                f" {PATIENCE / 60:.0f} minutes; what is done is kept; run the same command"
                 " to continue when there are workers"
             )

@@ -1,4 +1,5 @@
 from .cleaning import signed_volume as signed_volume
+from .mesh_file import companions as companions
 from .offset import (
     folded as folded,
     offsets as offsets,

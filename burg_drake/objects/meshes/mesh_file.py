@@ -61,7 +61,7 @@ def mesh_hash(mesh: str | Path | trimesh.Trimesh) -> str:
     path = Path(mesh)
     _check_file(path)
     try:
-        return content_hash(path, *((p.name, p) for p in _companions(path)))
+        return content_hash(path, *((p.name, p) for p in companions(path)))
     except OSError as error:
         raise MeshError(f"{path}: cannot read the mesh: {error.strerror or error}") from error
 
@@ -121,9 +121,17 @@ def make_opaque(mesh: trimesh.Trimesh) -> float | None:
     return lowest
 
 
-def _companions(path: Path) -> list[Path]:
-    """Files in the mesh's folder, or in a folder in it, that its text names, and that those name in
-    turn."""
+def companions(path: Path) -> list[Path]:
+    """Materials, textures and buffers of a mesh: files in its folder, or in a folder in it, that
+    its text names, and that those name in turn.
+
+    Args:
+        path: of the mesh.
+
+    Raises:
+        MeshError: one of them is too large.
+        OSError: one of them cannot be read.
+    """
     if path.suffix.lower() not in REFERRING:
         return []
     folder = path.parent
@@ -170,7 +178,7 @@ def read_mesh(path: Path) -> trimesh.Trimesh:
     """
     _check_file(path)
     check_triangles(announced_triangles(path), str(path))
-    check_textures(path, _companions(path))
+    check_textures(path, companions(path))
     log = logging.getLogger("trimesh")
     if not log.handlers:  # or remarks on materials would go to standard error
         log.addHandler(logging.NullHandler())

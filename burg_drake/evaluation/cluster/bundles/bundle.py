@@ -25,6 +25,7 @@ from burg_drake.objects.library import (
     load_library,
     package_manifest,
 )
+from burg_drake.objects.meshes import companions
 from burg_drake.scene.document import Scene, SceneDocument
 from burg_drake.station.document import Hand, Station, StationDocument, world_content
 
@@ -52,10 +53,15 @@ class Bundle:
     station_content: str
 
 
-def make_bundle(scene: Scene, station: Station) -> Bundle:
+def make_bundle(scene: Scene, station: Station, *, looks: bool = False) -> Bundle:
     """Packs a scene and a station.
 
+    Args:
+        scene, station: the two.
+        looks: with materials and textures, for images; no grasp depends on them.
+
     Raises:
+        MeshError: a texture is too large.
         InvalidInputError: a file cannot be read.
         UnknownNameError: a model names a package that is nowhere.
     """
@@ -70,6 +76,8 @@ def make_bundle(scene: Scene, station: Station) -> Bundle:
     trees = [library, hand]
     if station.arm_model is not None:
         trees.append(_BundleTree.of(ARM_TOP, station.arm_model, [station.arm_model], [], packages))
+    if looks:
+        trees = [tree.with_looks() for tree in trees]
     folders = {name: folder for tree in trees for name, folder in tree.packages.items()}
     places = {
         "library": library.anchor,
@@ -191,6 +199,15 @@ class _BundleTree:
             return (PurePosixPath(package) / inside.as_posix()).as_posix()
 
         return cls(name(anchor), {name(file): file for file in files}, folders)
+
+    def with_looks(self) -> _BundleTree:
+        """The same with the materials and textures that its meshes refer to."""
+        beside = {
+            (PurePosixPath(name).parent / file.relative_to(path.parent).as_posix()).as_posix(): file
+            for name, path in self.files.items()
+            for file in companions(path)
+        }
+        return replace(self, files=beside | dict(self.files))
 
 
 def _package(path: Path, folders: Mapping[str, Path]) -> str | None:
