@@ -122,7 +122,7 @@ def depth_limits(depth: Single) -> tuple[float, float]:
     return (float(there.min()), float(there.max())) if there.size else (0.0, 0.0)
 
 
-def caption(sample: Sample) -> str:
+def sample_caption(sample: Sample) -> str:
     """What a sample shows, in a line."""
     seen = [label for label in sample.instances if label.visible_pixels]
     text = f"{sample.key}, camera {sample.view.camera}, {len(seen)} of {len(sample.instances)} seen"
@@ -188,7 +188,7 @@ def _captioned(sample: Sample) -> Bytes:
     picture = sample_picture(sample)
     strip = Image.new("RGB", (picture.shape[1], CAPTION), PAPER)
     font = ImageFont.load_default(size=TEXT)
-    ImageDraw.Draw(strip).text((1, 2), caption(sample), fill=INK, font=font)
+    ImageDraw.Draw(strip).text((1, 2), sample_caption(sample), fill=INK, font=font)
     return np.vstack([np.asarray(strip), picture])
 
 
@@ -218,5 +218,5 @@ def _figure(sample: Sample) -> Html:
             width=picture.shape[1],
             height=picture.shape[0],
         ),
-        element("figcaption", caption(sample)),
+        element("figcaption", sample_caption(sample)),
     )
