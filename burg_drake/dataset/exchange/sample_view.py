@@ -35,7 +35,9 @@ LIFT = 2e-3
 PICTURE_DEPTH = 0.15
 """At which the camera's image is drawn [m]."""
 CAMERA_COLOR, MODELS_COLOR = "#b3471d", "#9aa3ad"
-EXACT_RGB, SENSOR_RGB = (0.19, 0.41, 0.56), (0.84, 0.14, 0.62)
+_EXACT = "depth", (0.19, 0.41, 0.56), 0.0
+_SENSOR = "depth of the sensor", (0.84, 0.14, 0.62), 0.4
+"""Names of clouds, their colours, and the share of these in the picture's."""
 ASIDE_DEG, DOWN = 50.0, 0.45
 """Where the eye looks from: turned about the vertical against the camera, and downward by such a
 slope."""
@@ -99,8 +101,8 @@ def _publish(built: StationDiagram, posture: tuple[float, ...]) -> None:
 def _draw_depth(
     meshcat: Meshcat, path: str, depth: Single, sample: Sample, X_WC: Array
 ) -> LegendEntry:
-    """Points of a depth image: the exact one's in the colours of the picture, the sensor's, which
-    are hidden at first, in one that tells them apart."""
+    """Points of a depth image, in the colours of the picture; the sensor's, which are hidden at
+    first, are tinted."""
     there = np.count_nonzero(depth)
     step = max(1, int(np.ceil(np.sqrt(there / MOST_POINTS))))
     shown = np.zeros_like(depth)
@@ -108,18 +110,16 @@ def _draw_depth(
     intrinsics = sample.view.intrinsics
     cloud = depth_cloud(shown, intrinsics, color=sample.images.color)
     exact = path == CLOUD_PATH
-    if exact and cloud.color is not None and len(cloud):
-        colors, name = cloud.color / 255.0, "depth, in the colours of the image"
-    else:
-        name = "depth" if exact else "depth of the sensor"
-        colors = np.tile(EXACT_RGB if exact else SENSOR_RGB, (len(cloud), 1))
+    name, rgb, tint = _EXACT if exact else _SENSOR
+    colors = np.tile(rgb, (len(cloud), 1))
+    if cloud.color is not None:
+        colors = (1.0 - tint) * cloud.color / 255.0 + tint * colors
     if len(cloud):
         side = SPREAD * step * float(np.quantile(cloud.points[:, 2], FAR)) / intrinsics.focal[0]
         _draw_points(meshcat, path, cloud.points, colors, side)
         meshcat.SetTransform(path, RigidTransform(X_WC))
         meshcat.SetProperty(path, "visible", exact)
-    mean = hex_color(colors.mean(axis=0) if len(cloud) else EXACT_RGB)
-    return LegendEntry(f"{name} ({there:,} points)", mean, (path,), shown=exact)
+    return LegendEntry(f"{name} ({there:,} points)", hex_color(rgb), (path,), shown=exact)
 
 
 def _draw_points(meshcat: Meshcat, path: str, points: Single, colors: Array, side: float) -> None:
