@@ -167,7 +167,7 @@ def test_nothing_solid_is_around_the_camera_or_before_all_objects() -> None:
 def test_cameras_on_the_sphere_see_past_what_is_besides() -> None:
     middle = centres().mean(axis=0)
     X_SB = np.eye(4)
-    X_SB[:3, 3] = middle + [0.0, 0.45, 0.5]
+    X_SB[:3, 3] = np.add(middle, (0.0, 0.45, 0.5))
     wall = PlacedBox("wall", X_SB, np.array([1.5, 0.15, 1.5]))
     near = ViewpointSettings(aim=0.0, cameras=("sphere", "overview"))
     plain, walled = (ViewSampler(SCENE, STATION, near, besides=b) for b in ((), (wall,)))

@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform
 from pydrake.perception import BaseField, Fields, PointCloud
 
 from burg_drake.cameras.optics import Intrinsics
-from burg_drake.core import Array, Bytes, Single, rot_z, transform_points
+from burg_drake.core import Array, Bytes, InvalidInputError, Single, rot_z, transform_points
 from burg_drake.core.grasps import Outcome
 from burg_drake.dataset.labels import LabelledGrasps, depth_cloud
 from burg_drake.dataset.samples import Sample
@@ -23,11 +23,11 @@ from burg_drake.visualization.style import LegendEntry, hex_color, linear_light
 MODELS_PATH, NAMES_PATH = "/drake/visualizer", "/drake/labels"
 CLOUD_PATH, SENSOR_PATH, CAMERA_PATH = "/drake/cloud", "/drake/sensor", "/drake/camera"
 MOST_POINTS = 80_000
-"""Of a cloud, 1 MB of a page: a larger image is shown by every second pixel of its rows and columns,
-or fewer."""
+"""Of a cloud, 3 MB of a page: a larger image is shown by every second pixel of its rows and
+columns, or fewer."""
 SPREAD = 3.5
-"""Side of a point, as a share of the distance between far neighbours: three.js draws points 2.4 times
-too small for the eye's angle of view, and slanted surfaces have them farther apart."""
+"""Side of a point, as a share of the distance between far neighbours: three.js draws points 2.4
+times too small for the eye's angle of view, and on slanted surfaces they are farther apart."""
 FAR = 0.9
 """Share of points that are nearer than far ones."""
 LIFT = 2e-3
@@ -59,6 +59,9 @@ def show_sample(
 
     Returns:
         A legend that switches what is shown.
+
+    Raises:
+        InvalidInputError: the view's posture is of another arm.
     """
     view = sample.view
     X_WC = sample.X_WS @ view.X_SC
@@ -91,6 +94,11 @@ def picture_corners(intrinsics: Intrinsics, depth: float) -> Array:
 
 def _publish(built: StationDiagram, posture: tuple[float, ...]) -> None:
     """Shows the arm in a posture."""
+    if len(posture) != len(built.arm_joints):
+        raise InvalidInputError(
+            f"the view has a posture of {len(posture)} joints; the arm of the station has"
+            f" {len(built.arm_joints)}"
+        )
     context = built.diagram.CreateDefaultContext()
     plant_context = built.plant.GetMyMutableContextFromRoot(context)
     for joint, position in zip(built.arm_joints, posture, strict=True):

@@ -100,7 +100,10 @@ def sample_picture(sample: Sample) -> Bytes:
     intrinsics = sample.view.intrinsics
     height = max(1, round(PANEL * intrinsics.height / intrinsics.width))
     limits = _limits(sample)
-    panels = [_panel(sample.images.color, height), _depth_panel(sample.images.depth, limits, height)]
+    panels = [
+        _panel(sample.images.color, height),
+        _depth_panel(sample.images.depth, limits, height),
+    ]
     if sample.sensor_depth is not None:
         panels.append(_depth_panel(sample.sensor_depth, limits, height))
     panels.append(_labelled(sample, height))
@@ -168,7 +171,7 @@ def _labelled(sample: Sample, height: int) -> Bytes:
     taken: list[Array] = []
     for label in seen:
         tint = tints[label.number]
-        size = np.array(draw.textbbox((0, 0), label.name, font=font)[2:]) + (4, 3)
+        size = np.add(draw.textbbox((0, 0), label.name, font=font)[2:], (4, 3))
         place = tag_place(boxes[label.number], size, picture.size, taken)
         taken.append(place)
         draw.rectangle((*place[:2], *(place[2:] - 1)), fill=tint)
@@ -176,11 +179,9 @@ def _labelled(sample: Sample, height: int) -> Bytes:
     return np.asarray(picture)
 
 
-def tag_place(
-    box: Array, size: Array, image: tuple[int, int], taken: Sequence[Array]
-) -> Array:
-    """Where a name is written: at one of the sides of its box, or in it, wherever it covers least of
-    the names that are there.
+def tag_place(box: Array, size: Array, image: tuple[int, int], taken: Sequence[Array]) -> Array:
+    """Where a name is written: at one of the sides of its box, or in it, wherever it covers least
+    of the names that are there.
 
     Args:
         box: (4,) left, top, width, height [pixel].
