@@ -54,6 +54,8 @@ def points(meshcat: Meshcat, path: str) -> tuple[np.ndarray, np.ndarray]:
 
 def test_points_are_where_the_pixels_saw_something(meshcat: Meshcat) -> None:
     made = sample()
+    holes = np.where(np.arange(drawn.WIDTH) % 3 == 0, 0.0, made.images.depth).astype(np.float32)
+    made = replace(made, sensor_depth=holes)
     show_sample(made, drawn.scene(), STATION, meshcat)
     p_W, color = points(meshcat, "/drake/cloud")
     rows, columns = np.mgrid[: drawn.HEIGHT, : drawn.WIDTH]
@@ -73,7 +75,7 @@ def test_what_is_shown_and_what_is_not(meshcat: Meshcat) -> None:
     legend = show_sample(sample(), drawn.scene(), STATION, meshcat)
     assert [entry.label.partition(" (")[0] for entry in legend] == [
         "models", "depth", "depth of the sensor", "camera with its image",
-        "lifted", "arm does not get there", "not judged",
+        "lifted", "arm cannot reach", "not judged",
     ]  # fmt: skip
     assert [entry.shown for entry in legend] == [True, True, False, True, True, True, True]
     for entry in legend:
@@ -92,14 +94,14 @@ def test_the_arm_is_where_the_view_has_it(meshcat: Meshcat) -> None:
     posture = (*STATION.document.arm.home[:-1], STATION.document.arm.home[-1] + 0.5)
     view = replace(drawn.view(), posture=posture)
     show_sample(sample(), drawn.scene(), STATION, meshcat)
-    assert not meshcat.HasPath("/drake/visualizer/panda/panda_link7")
+    assert not meshcat.HasPath("/drake/visualizer/arm/panda_link7")
     show_sample(sample(view=view), drawn.scene(), STATION, meshcat)
-    turned = transform(meshcat, "/drake/visualizer/panda/panda_link7")
+    turned = transform(meshcat, "/drake/visualizer/arm/panda_link7")
     show_sample(
         sample(view=replace(view, posture=STATION.document.arm.home)),
         drawn.scene(), STATION, meshcat,
     )  # fmt: skip
-    home = transform(meshcat, "/drake/visualizer/panda/panda_link7")
+    home = transform(meshcat, "/drake/visualizer/arm/panda_link7")
     turn = home[:3, :3].T @ turned[:3, :3]
     assert np.arccos((np.trace(turn) - 1) / 2) == pytest.approx(0.5)
     with pytest.raises(

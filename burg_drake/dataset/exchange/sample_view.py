@@ -15,7 +15,12 @@ from burg_drake.dataset.samples import Sample
 from burg_drake.scene.document import Scene
 from burg_drake.station.diagram import StationDiagram
 from burg_drake.station.document import Station
-from burg_drake.visualization.grasps import by_outcome, draw_grasps, group_entries
+from burg_drake.visualization.grasps import (
+    GRASPS_PATH,
+    by_outcome,
+    draw_grasps,
+    group_entries,
+)
 from burg_drake.visualization.meshcat import aim_at, picture_mesh
 from burg_drake.visualization.scenes import scene_points, show_scene
 from burg_drake.visualization.style import LegendEntry, hex_color, linear_light
@@ -69,8 +74,9 @@ def show_sample(
     if view.posture is not None:
         _publish(built, view.posture)
     legend = [LegendEntry("models", MODELS_COLOR, (MODELS_PATH, NAMES_PATH))]
+    for path in (CLOUD_PATH, SENSOR_PATH, CAMERA_PATH, GRASPS_PATH):
+        meshcat.Delete(path)  # of a sample that was shown before
     for depth, path in ((sample.images.depth, CLOUD_PATH), (sample.sensor_depth, SENSOR_PATH)):
-        meshcat.Delete(path)
         if depth is not None:
             legend.append(_draw_depth(meshcat, path, depth, sample, X_WC))
     corners = picture_corners(view.intrinsics, PICTURE_DEPTH)
@@ -134,7 +140,7 @@ def _draw_points(meshcat: Meshcat, path: str, points: Single, colors: Array, sid
     """Draws points (N, 3) with colours (N, 3), sRGB in [0, 1], as squares of a side [m]. They are
     nearer to the camera than they should be by as much as lets them be seen on a model's surface.
     """
-    cloud = PointCloud(len(points), Fields(BaseField.kXYZs | BaseField.kRGBs))
+    cloud = PointCloud(len(points), Fields(int(BaseField.kXYZs) | int(BaseField.kRGBs)))
     nearer = 1.0 - LIFT / np.linalg.norm(points, axis=1, keepdims=True)
     cloud.mutable_xyzs()[:] = (nearer * points).T
     cloud.mutable_rgbs()[:] = np.rint(255.0 * linear_light(colors)).T
@@ -144,7 +150,6 @@ def _draw_points(meshcat: Meshcat, path: str, points: Single, colors: Array, sid
 
 def _draw_camera(meshcat: Meshcat, corners: Array, color: Bytes | None, X_WC: Array) -> None:
     """The pyramid over the image, with the picture on it."""
-    meshcat.Delete(CAMERA_PATH)
     rgba = Rgba(*(int(CAMERA_COLOR[k : k + 2], 16) / 255.0 for k in (1, 3, 5)))
     outline = np.asfortranarray(np.vstack([corners, corners[:1]]).T)
     meshcat.SetLine(f"{CAMERA_PATH}/image", outline, 2.0, rgba)
@@ -170,4 +175,5 @@ def _forward(X_WC: Array) -> Array:
     if np.linalg.norm(ahead) < 1e-3:
         ahead = -X_WC[:3, 1] * (1.0, 1.0, 0.0)
     level = rot_z(np.deg2rad(ASIDE_DEG)) @ (ahead / np.linalg.norm(ahead))
-    return level - np.array([0.0, 0.0, DOWN])
+    forward: Array = level - np.array([0.0, 0.0, DOWN])
+    return forward

@@ -6,6 +6,7 @@ from .legend import (
     with_unit as with_unit,
 )
 from .mesh import (
+    GRASPS_PATH as GRASPS_PATH,
     draw_grasps as draw_grasps,
     grasp_triangles as grasp_triangles,
 )
