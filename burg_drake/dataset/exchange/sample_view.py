@@ -70,7 +70,7 @@ def show_sample(
     """
     view = sample.view
     X_WC = sample.X_WS @ view.X_SC
-    built = show_scene(scene, station, meshcat, robot="arm" if view.posture else "none")
+    built = show_scene(scene, station, meshcat, robot="none" if view.posture is None else "arm")
     if view.posture is not None:
         _publish(built, view.posture)
     legend = [LegendEntry("models", MODELS_COLOR, (MODELS_PATH, NAMES_PATH))]
