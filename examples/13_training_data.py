@@ -14,9 +14,9 @@ import numpy as np
 import burg_drake as burg
 
 try:
-    from torch.utils.data import Dataset
+    from torch.utils.data import DataLoader, Dataset
 except ImportError:
-    Dataset = object
+    DataLoader, Dataset = None, object
 
 
 class Views(Dataset):
@@ -34,11 +34,21 @@ class Views(Dataset):
         return {"color": color, "depth": images.depth, "labels": images.labels.astype(np.int64)}
 
 
-with tempfile.TemporaryDirectory() as folder:
-    recipe = burg.dataset.DatasetRecipe(views=2)
-    burg.generate_dataset(["tabletop_six"], "panda_tabletop", folder, recipe)
-    views = Views(Path(folder))
-    for k in range(len(views)):
-        view = views[k]
-        numbers = np.unique(view["labels"])
-        print(f"{view['color'].shape}, objects {numbers[numbers > 0].tolist()}")
+def main() -> None:
+    """Makes a small data set and reads it in batches, by two processes."""
+    with tempfile.TemporaryDirectory() as folder:
+        recipe = burg.dataset.DatasetRecipe(views=4)
+        burg.generate_dataset(["tabletop_six"], "panda_tabletop", folder, recipe)
+        views = Views(Path(folder))
+        if DataLoader is None:
+            print("PyTorch is not installed: views are read one by one")
+            batches = ({key: array[None] for key, array in view.items()} for view in views)
+        else:
+            batches = DataLoader(views, batch_size=2, num_workers=2)
+        for batch in batches:
+            numbers = np.unique(batch["labels"])
+            print(f"{tuple(batch['color'].shape)}, objects {numbers[numbers > 0].tolist()}")
+
+
+if __name__ == "__main__":  # the processes of a DataLoader may read this file, too
+    main()

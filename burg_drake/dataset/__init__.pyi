@@ -56,6 +56,7 @@ from .samples import (
     ShardEntry as ShardEntry,
 )
 from .views import (
+    PlacedBox as PlacedBox,
     View as View,
     ViewpointSettings as ViewpointSettings,
     ViewSampler as ViewSampler,

@@ -19,6 +19,7 @@ from burg_drake.dataset.appearance import (
     Distractor,
     Photometry,
     TableSurface,
+    distractor_boxes,
     draw_appearance,
     photometric,
     read_appearance,
@@ -135,6 +136,17 @@ def test_distractors_stand_on_the_table_clear_of_all() -> None:
         for a, b in combinations(hulls, 2):
             assert a is taken[0] or cv2.intersectConvexConvex(a, b)[0] == 0.0
     assert count > 30
+
+
+def test_boxes_of_distractors_hold_them_and_no_more() -> None:
+    settings = AppearanceSettings(distractors=(6, 6))
+    look = draw_appearance(settings, SCENE, STATION, np.random.default_rng(1))
+    boxes = distractor_boxes(look)
+    assert len(boxes) == len(look.distractors) > 2
+    for one, box in zip(look.distractors, boxes, strict=True):
+        X_BO = np.linalg.inv(box.X_SB) @ one.X_SO.matrix()
+        p_BO = SCENE.library.surface(one.object).vertices @ X_BO[:3, :3].T + X_BO[:3, 3]
+        np.testing.assert_allclose(np.abs(p_BO).max(axis=0), box.half, atol=2e-3)
 
 
 def test_distractors_may_stand_on_the_board_if_they_are_allowed_to() -> None:

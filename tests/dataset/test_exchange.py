@@ -29,6 +29,7 @@ from burg_drake.dataset.exchange import (
     write_webdataset,
 )
 from burg_drake.dataset.exchange.graspnet import grasp_scores
+from burg_drake.dataset.exchange.sheet import tag_place
 from burg_drake.dataset.exchange.source import StoredSamples
 from burg_drake.dataset.samples import load_dataset
 from burg_drake.objects.library import ObjectLibrary
@@ -394,6 +395,19 @@ def test_webdataset_has_shards_of_whole_samples(samples: InMemory, tmp_path: Pat
     assert np.abs(twice - 2 * decoded(files["000003_000.depth.png"])).max() <= 1
 
 
+def test_webdataset_is_read_by_its_own_library(samples: InMemory, tmp_path: Path) -> None:
+    webdataset = pytest.importorskip("webdataset")
+    write_webdataset(samples, tmp_path / "out", images="png")
+    shard = str(tmp_path / "out/shard-000000.tar")
+    found = list(webdataset.WebDataset(shard, shardshuffle=False).decode())
+    assert [one["__key__"] for one in found] == [sample.key for sample in samples]
+    for one, sample in zip(found, samples, strict=True):
+        np.testing.assert_array_equal(decoded(one["seg.png"]), sample.images.labels)
+        assert [entry["name"] for entry in one["json"]["instances"]] == [
+            label.name for label in sample.instances
+        ]
+
+
 def decoded(data: bytes) -> NDArray:
     return cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
 
@@ -449,6 +463,34 @@ def test_sheet_shows_colour_depth_and_labels(samples: InMemory, tmp_path: Path) 
     page = (tmp_path / "sheet.html").read_text()
     assert page.count("data:image/png;base64,") == 4 and "Two &lt;scenes&gt;" in page
     assert "000005_001, camera sphere, 3 of 3 seen" in page
+
+
+def test_sheet_shows_the_sensor_s_depth_in_the_same_colours(
+    samples: InMemory, tmp_path: Path
+) -> None:
+    exact = samples[0].images.depth
+    half = np.where(np.arange(exact.shape[1]) % 2 == 1, exact, 0.0).astype(np.float32)
+    contact_sheet([replace(samples[0], sensor_depth=half)], tmp_path / "sheet.png")
+    panels = image(tmp_path / "sheet.png")[26:266, 6:].astype(int)
+    assert panels.shape[1] == 4 * 320 + 3 * 6 + 6
+    one, other = panels[:, 326:646], panels[:, 652:972]
+    shown = (other != 70).any(axis=-1)
+    assert 0.3 < shown.mean() < 0.6
+    np.testing.assert_array_equal(one[shown], other[shown])
+
+
+def test_names_on_a_sheet_stay_in_it_and_beside_each_other() -> None:
+    corners = [(100.0, 100.0), (110.0, 104.0), (128.0, 98.0), (104.0, 118.0)]
+    boxes = [np.array([*corner, 40.0, 30.0]) for corner in corners]
+    boxes += [np.array([300.0, 230.0, 40.0, 30.0]), np.array([-20.0, -20.0, 30.0, 30.0])]
+    taken: list[NDArray] = []
+    for box in boxes:
+        place = tag_place(box, np.array([55, 15]), (320, 240), taken)
+        assert (place[2:] - place[:2]).tolist() == [55, 15]
+        assert (place[:2] >= 0).all() and (place[2:] <= [320, 240]).all()
+        for other in taken:
+            assert (place[:2] >= other[2:]).any() or (place[2:] <= other[:2]).any()
+        taken.append(place)
 
 
 def test_a_data_set_on_disk_is_exported(tmp_path: Path) -> None:

@@ -120,6 +120,16 @@ def test_the_commands(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixtur
     assert sorted(path.name for path in tmp_path.iterdir()) == list(names)
     assert main(["render", "tabletop_six", "-o", str(tmp_path / "view.jpg")]) == 2
     assert main(["dataset", "show", str(folder), "-o", str(tmp_path / "sheet.png")]) == 0
+    page, one = tmp_path / "sample.html", tmp_path / "one.html"
+    chosen = ["--sample", "000001_001"]
+    assert main(["dataset", "show", str(folder), *chosen, "--html", str(page), "-o", str(one)]) == 0
+    assert f"wrote {one}" in capsys.readouterr().out
+    assert "<summary>set 000001_001</summary>" in page.read_text(encoding="utf-8")
+    assert one.read_text(encoding="utf-8").count("<figure>") == 1
+    assert main(["dataset", "show", str(folder), "--no-wait"]) == 0
+    assert "set 000000_000: not kept open" in capsys.readouterr().out
+    assert main(["dataset", "show", str(folder), "--sample", "000001_009", "--no-wait"]) == 2
+    assert "has no sample '000001_009'; did you mean" in capsys.readouterr().err
     exported = tmp_path / "coco"
     assert main(["dataset", "export", str(folder), "--to", "coco", "-o", str(exported)]) == 0
     assert (exported / "instances.json").is_file()

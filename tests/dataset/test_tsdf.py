@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,12 @@ import pytest
 import trimesh
 
 from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.core.documents import Pose
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import make_pose, rotation_from_rpy
 from burg_drake.dataset.labels.exact_distance import exact_tsdf, mesh_distance
 from burg_drake.dataset.labels.tsdf import Tsdf, fuse_tsdf
+from burg_drake.station.document import Obstacle, load_station
 from tests.dataset.shapes_scene import SphereAndBox, looking_at
 
 CAMERA = Intrinsics(width=320, height=240, focal=(300.0, 300.0), center=(159.5, 119.5))
@@ -77,6 +80,21 @@ def test_true_distances_of_ball_box_and_table(tmp_path: Path) -> None:
     without = exact_tsdf(WORLD.scene(tmp_path), X_SV, table=False)
     below = centers()[:, 2] < -0.031
     assert (without.distance.reshape(-1)[below] == np.float32(0.03)).all()
+
+
+def test_true_distances_of_obstacles(tmp_path: Path) -> None:
+    """A turned one on a station whose board is elsewhere, in the frame of the scene."""
+    station = load_station("panda_tabletop")
+    X_SB = make_pose(rotation_from_rpy((0.2, 0.1, 0.7)), (0.12, 0.2, 0.12))
+    X_WB = Pose.from_matrix(station.document.X_WS.matrix() @ X_SB)
+    wall = Obstacle(X_WB=X_WB, size=(0.2, 0.02, 0.12))
+    station = replace(station, document=replace(station.document, background={"wall": wall}))
+    found = exact_tsdf(WORLD.scene(tmp_path), X_SV, station=station).distance.reshape(-1)
+    p_BQ = (centers() - X_SB[:3, 3]) @ X_SB[:3, :3]
+    beside = mesh_distance(trimesh.creation.box((0.2, 0.02, 0.12)), p_BQ, 0.03)
+    assert (beside < 0.0).sum() > 500
+    expected = np.minimum(np.clip(WORLD.distance(centers()), -0.03, 0.03), beside)
+    assert np.abs(found - expected).max() < 2e-4
 
 
 def test_objects_beside_the_volume_do_not_matter(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 from burg_drake.cameras import Intrinsics
 from burg_drake.core import DocumentError, InvalidInputError, UnknownNameError
 from burg_drake.core.documents import Pose, dump_document, parse_document
-from burg_drake.dataset.views import View, ViewpointSettings, ViewSampler
+from burg_drake.dataset.views import PlacedBox, View, ViewpointSettings, ViewSampler
 from burg_drake.scene.document import load_scene
 from burg_drake.station.diagram import build_station_diagram
 from burg_drake.station.document import Camera, Obstacle, Station, load_station
@@ -162,6 +162,29 @@ def test_nothing_solid_is_around_the_camera_or_before_all_objects() -> None:
             within = np.abs(line - [x, y + 0.45, 0.5]) < [1.5, 0.15, 0.5]
             assert not within.all(axis=1).any()
     assert not (np.abs(p_W - [x, y + 0.45, 0.5]) < [1.5, 0.15, 0.5]).all(axis=1).any()
+
+
+def test_cameras_on_the_sphere_see_past_what_is_besides() -> None:
+    middle = centres().mean(axis=0)
+    X_SB = np.eye(4)
+    X_SB[:3, 3] = np.add(middle, (0.0, 0.45, 0.5))
+    wall = PlacedBox("wall", X_SB, np.array([1.5, 0.15, 1.5]))
+    near = ViewpointSettings(aim=0.0, cameras=("sphere", "overview"))
+    plain, walled = (ViewSampler(SCENE, STATION, near, besides=b) for b in ((), (wall,)))
+    turn = [np.random.default_rng(k) for k in range(40)]
+    free = [plain.sample(rng, "sphere") for rng in turn]
+    turn = [np.random.default_rng(k) for k in range(40)]
+    kept = [walled.sample(rng, "sphere") for rng in turn]
+    side = np.array([view.X_SC[1, 3] - middle[1] for view in free])
+    assert (side > 0.3).any()
+    for view, other, y in zip(free, kept, side, strict=True):
+        assert other.X_SC[1, 3] - middle[1] < 0.3  # neither in the wall nor behind it
+        if y < 0.3:  # as it is without the wall
+            assert (view.X_SC == other.X_SC).all()
+    X_SB[:3, 3] = (np.linalg.inv(X_WS) @ STATION.document.cameras["overview"].X_WC.matrix())[:3, 3]
+    around = PlacedBox("post", X_SB, np.array([0.2, 0.2, 0.2]))
+    still = ViewSampler(SCENE, STATION, near, besides=(around,))
+    assert still.sample(np.random.default_rng(0), "overview").camera == "overview"
 
 
 @pytest.mark.parametrize(

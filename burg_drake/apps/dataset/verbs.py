@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from burg_drake.apps.dataset import show
 from burg_drake.apps.dataset.colors import with_possible_colors
 from burg_drake.apps.options import (
     Parser,
@@ -59,15 +60,7 @@ def add_to(verbs: Any) -> None:
         "burg-drake dataset check data",
         options=_add_data,
     )
-    add_verb(
-        group,
-        "show",
-        run_show,
-        "write a sheet of samples from all over a data set: colour, depth, labels",
-        "burg-drake dataset show data -o sheet.html",
-        "burg-drake dataset show data -o sheet.png --rows 6",
-        options=_add_show_options,
-    )
+    show.add_to(group)
     add_verb(
         group,
         "export",
@@ -260,30 +253,6 @@ def run_check(arguments: argparse.Namespace) -> int:
     if found:
         return 1
     print(f"{arguments.data}: {len(load_dataset(arguments.data))} samples, nothing is wrong")
-    return 0
-
-
-def _add_show_options(parser: Parser) -> None:
-    _add_data(parser)
-    parser.add_argument(
-        "-o", "--output", metavar="FILE", required=True, help="file to write (.png or .html)"
-    )
-    parser.add_argument(
-        "--rows", metavar="N", type=positive_int, default=4, help="(default: %(default)d)"
-    )
-    parser.add_argument(
-        "--columns", metavar="N", type=positive_int, default=1, help="(default: %(default)d)"
-    )
-
-
-def run_show(arguments: argparse.Namespace) -> int:
-    """Writes a contact sheet."""
-    from burg_drake.dataset.exchange import contact_sheet
-    from burg_drake.dataset.samples import load_dataset
-
-    dataset = load_dataset(arguments.data)
-    contact_sheet(dataset, arguments.output, arguments.rows, arguments.columns, title=dataset.name)
-    print(f"wrote {arguments.output}")
     return 0
 
 

@@ -7,6 +7,7 @@ from .appearance import (
     read_appearance as read_appearance,
 )
 from .background import with_background as with_background
+from .distractors import distractor_boxes as distractor_boxes
 from .drawing import draw_appearance as draw_appearance
 from .photometry import photometric as photometric
 from .rendering import (

@@ -17,8 +17,9 @@ from burg_drake.core import (
     transform_points,
 )
 from burg_drake.core.documents import Pose
-from burg_drake.dataset.appearance.appearance import Distractor
+from burg_drake.dataset.appearance.appearance import Appearance, Distractor
 from burg_drake.dataset.appearance.settings import AppearanceSettings
+from burg_drake.dataset.views import PlacedBox, box_around
 from burg_drake.objects.library import ObjectEntry, ObjectLibrary, load_library
 from burg_drake.scene.document import Scene
 from burg_drake.station.document import Station, boxes_in_scene
@@ -102,6 +103,21 @@ def place_distractors(
             X_SO[:2, 3] += place - middle
             found.append(Distractor(object=name, X_SO=Pose.readable(X_SO)))
     return tuple(found)
+
+
+def distractor_boxes(look: Appearance) -> tuple[PlacedBox, ...]:
+    """Boxes around the things of a look, in the scene frame.
+
+    Raises:
+        UnknownNameError: there is no such library, or no such object in it.
+    """
+    if not look.distractors:
+        return ()
+    library = distractor_library(look.library)
+    return tuple(
+        box_around(f"distractor {k}", library.entry(one.object), one.X_SO.matrix())
+        for k, one in enumerate(look.distractors)
+    )
 
 
 @lru_cache(maxsize=4)

@@ -4,7 +4,11 @@ from .coco import write_coco as write_coco
 from .graspnet import (
     write_graspnet as write_graspnet,
 )
-from .sheet import contact_sheet as contact_sheet
+from .sample_view import show_sample as show_sample
+from .sheet import (
+    contact_sheet as contact_sheet,
+    sample_caption as sample_caption,
+)
 from .source import (
     Samples as Samples,
 )

@@ -12,7 +12,8 @@ graspnet/graspnet-baseline (dataset/graspnet_dataset.py):
 - `camK.npy` is one matrix for all views of a scene.
 - A row of `rect` is center_x, center_y, open_x, open_y, height, score, object id: the middle, the
   middle of the edge of one finger, and the length of that edge [pixels]. Only grasps that approach
-  along the optical axis have one, see `grasp_rectangles`.
+  along the optical axis have one, see `grasp_rectangles`. The API makes 6D grasps of them with the
+  intrinsics of its two cameras, whatever `camK.npy` says: right for views like theirs alone.
 
 Its labels of grasps on whole objects (`grasp_label`, `collision_label`: 300 directions, 12 angles
 and 4 depths at each of thousands of points) cannot be made of grasps that were judged one by one.

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from burg_drake.core import Bytes, InvalidInputError, Single, listing
+from burg_drake.core import Array, Bytes, InvalidInputError, Single, listing
 from burg_drake.core.files import atomic_write
 from burg_drake.core.terminal import distinct_colors
 from burg_drake.dataset.labels import InstanceLabel
@@ -48,6 +48,7 @@ def contact_sheet(
     """Writes samples from all over a data set, evenly spaced: colour, depth and labels of each.
 
     Depth is bright where it is near, and grey where there is none; its limits are in the caption.
+    Beside it is that of the sensor, if there is one, in the same colours.
     Labels are colours of instances, with names and the boxes of what is visible.
 
     Args:
@@ -95,22 +96,24 @@ def sheet_png(samples: Sequence[Sample], columns: int) -> bytes:
 
 
 def sample_picture(sample: Sample) -> Bytes:
-    """(h, w, 3) colour, depth and labels side by side; what the sample has not is left out."""
+    """(h, w, 3) colour, depth, that of the sensor and labels side by side; what the sample has not
+    is left out."""
     intrinsics = sample.view.intrinsics
     height = max(1, round(PANEL * intrinsics.height / intrinsics.width))
-    color, depth = sample.images.color, sample.images.depth
+    color, limits = sample.images.color, _limits(sample)
+    panels = [] if color is None else [_panel(color, height)]
+    for depth in (sample.images.depth, sample.sensor_depth):
+        if depth is not None:
+            panels.append(_panel(depth_colors(depth, limits), height))
+    panels.append(_labelled(sample, height))
     gap = np.full((height, GAP, 3), PAPER, dtype=np.uint8)
-    panels = []
-    for image in (color, None if depth is None else depth_colors(depth)):
-        if image is not None:
-            panels += [_panel(image, height), gap]
-    return np.hstack([*panels, _labelled(sample, height)])
+    return np.hstack([image for panel in panels for image in (gap, panel)][1:])
 
 
-def depth_colors(depth: Single) -> Bytes:
-    """(H, W, 3) colours of a depth image, bright for near."""
-    lower, upper = depth_limits(depth)
-    share = 1.0 - (depth - lower) / max(upper - lower, 1e-6)
+def depth_colors(depth: Single, limits: tuple[float, float]) -> Bytes:
+    """(H, W, 3) colours of a depth image, bright for near, between two depths [m]."""
+    lower, upper = limits
+    share = np.clip(1.0 - (depth - lower) / max(upper - lower, 1e-6), 0.0, 1.0)
     colors = np.rint(255.0 * map_colors(share)).astype(np.uint8)
     colors[depth <= 0.0] = NOTHING
     return colors
@@ -122,14 +125,21 @@ def depth_limits(depth: Single) -> tuple[float, float]:
     return (float(there.min()), float(there.max())) if there.size else (0.0, 0.0)
 
 
-def caption(sample: Sample) -> str:
+def sample_caption(sample: Sample) -> str:
     """What a sample shows, in a line."""
     seen = [label for label in sample.instances if label.visible_pixels]
     text = f"{sample.key}, camera {sample.view.camera}, {len(seen)} of {len(sample.instances)} seen"
-    if sample.images.depth is not None:
-        lower, upper = depth_limits(sample.images.depth)
+    if sample.images.depth is not None or sample.sensor_depth is not None:
+        lower, upper = _limits(sample)
         text += f", depth {lower:.2f} to {upper:.2f} m"
     return text
+
+
+def _limits(sample: Sample) -> tuple[float, float]:
+    """Limits of the exact depth, else of the sensor's [m]."""
+    exact = sample.images.depth
+    depth = sample.sensor_depth if exact is None else exact
+    return (0.0, 0.0) if depth is None else depth_limits(depth)
 
 
 def _labelled(sample: Sample, height: int) -> Bytes:
@@ -148,18 +158,48 @@ def _labelled(sample: Sample, height: int) -> Bytes:
     draw = ImageDraw.Draw(picture)
     scale = picture.width / labels.shape[1]
     font = ImageFont.load_default(size=TEXT)
-    for label in sample.instances:
-        if label.visible_box is None:
-            continue
-        x, y, wide, tall = (scale * side for side in label.visible_box)
+    seen = [label for label in sample.instances if label.visible_box is not None]
+    boxes = {label.number: scale * np.array(label.visible_box, dtype=float) for label in seen}
+    for number, (x, y, wide, tall) in boxes.items():
+        corners = (x, y, x + max(wide - 1, 1), y + max(tall - 1, 1))
+        draw.rectangle(corners, outline=tints[number])
+    taken: list[Array] = []
+    for label in seen:
         tint = tints[label.number]
-        draw.rectangle((x, y, x + max(wide - 1, 1), y + max(tall - 1, 1)), outline=tint)
-        box = draw.textbbox((0, 0), label.name, font=font)
-        top = y - box[3] - 2 if y > box[3] + 2 else y + tall + 1
-        left = float(np.clip(x, 0, max(0, picture.width - box[2] - 4)))
-        draw.rectangle((left, top, left + box[2] + 3, top + box[3] + 2), fill=tint)
-        draw.text((left + 2, top), label.name, fill=_readable(tint), font=font)
+        size = np.add(draw.textbbox((0, 0), label.name, font=font)[2:], (4, 3))
+        place = tag_place(boxes[label.number], size, picture.size, taken)
+        taken.append(place)
+        draw.rectangle((*place[:2], *(place[2:] - 1)), fill=tint)
+        draw.text((place[0] + 2, place[1]), label.name, fill=_readable(tint), font=font)
     return np.asarray(picture)
+
+
+def tag_place(box: Array, size: Array, image: tuple[int, int], taken: Sequence[Array]) -> Array:
+    """Where a name is written: at one of the sides of its box, or in it, wherever it covers least
+    of the names that are there.
+
+    Args:
+        box: (4,) left, top, width, height [pixel].
+        size: (2,) width and height of the name.
+        image: width and height of the picture, which it does not leave.
+        taken: (4,) left, top, right, bottom of each name that is there.
+
+    Returns:
+        (4,) left, top, right, bottom.
+    """
+    (x, y, wide, tall), (w, h) = box, size
+    columns = (x, x + wide - w, x + (wide - w) / 2)
+    places = [(column, row) for row in (y - h, y + tall) for column in columns]
+    places += [(x + wide, y + (tall - h) / 2), (x - w, y + (tall - h) / 2), (x, y)]
+    room = np.maximum(np.array(image) - size, 0)
+    found = [np.concatenate([p, p + size]) for p in np.clip(np.rint(places), 0, room)]
+    return min(found, key=lambda place: sum(_shared(place, other) for other in taken))
+
+
+def _shared(one: Array, other: Array) -> float:
+    """Area that two rectangles share."""
+    sides = np.minimum(one[2:], other[2:]) - np.maximum(one[:2], other[:2])
+    return float(np.prod(np.maximum(sides, 0.0)))
 
 
 def _tints(instances: Sequence[InstanceLabel]) -> dict[int, tuple[int, int, int]]:
@@ -186,7 +226,7 @@ def _captioned(sample: Sample) -> Bytes:
     picture = sample_picture(sample)
     strip = Image.new("RGB", (picture.shape[1], CAPTION), PAPER)
     font = ImageFont.load_default(size=TEXT)
-    ImageDraw.Draw(strip).text((1, 2), caption(sample), fill=INK, font=font)
+    ImageDraw.Draw(strip).text((1, 2), sample_caption(sample), fill=INK, font=font)
     return np.vstack([np.asarray(strip), picture])
 
 
@@ -216,5 +256,5 @@ def _figure(sample: Sample) -> Html:
             width=picture.shape[1],
             height=picture.shape[0],
         ),
-        element("figcaption", caption(sample)),
+        element("figcaption", sample_caption(sample)),
     )

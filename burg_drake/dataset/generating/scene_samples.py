@@ -10,7 +10,12 @@ import numpy as np
 from burg_drake.cameras.noise import depth_noise, noisy_depth
 from burg_drake.cameras.optics import sensor
 from burg_drake.core import rng_from
-from burg_drake.dataset.appearance import Appearance, draw_appearance, read_appearance
+from burg_drake.dataset.appearance import (
+    Appearance,
+    distractor_boxes,
+    draw_appearance,
+    read_appearance,
+)
 from burg_drake.dataset.generating.recipe import DatasetRecipe
 from burg_drake.dataset.labels import (
     SceneGrasps,
@@ -71,6 +76,7 @@ class SceneSamples:
             recipe.viewpoints,
             intrinsics=intrinsics,
             depth_range=depth_range,
+            besides=() if self._appearance is None else distractor_boxes(self._appearance),
         )
         grasps = self._wanted_grasps() if self._grasps is None else self._grasps
         for number in range(recipe.views):

@@ -12,6 +12,7 @@ from burg_drake.core import Array, Booleans, Indices, check_pose, inverse, trans
 from burg_drake.dataset.labels.scene_grasps import instance_numbers
 from burg_drake.dataset.labels.tsdf import SIZE, VOXELS, Tsdf, grid_lengths, voxel_centers
 from burg_drake.scene.document import SceneLike, as_scene
+from burg_drake.station.document import Station, StationLike, as_station
 
 if TYPE_CHECKING:
     import trimesh
@@ -39,16 +40,19 @@ def exact_tsdf(
     X_SV: Array,
     *,
     table: bool = True,
+    station: StationLike | None = None,
     size: float = SIZE,
     voxels: int = VOXELS,
     truncation: float | None = None,
 ) -> Tsdf:
-    """Signed distances to the nearest surface of all instances, background included.
+    """Signed distances to the nearest surface of all instances, background included, and of a
+    station's obstacles: all that depth images show but for the arm and distractors.
 
     Args:
         scene: has the instances at their places.
         X_SV: (4, 4) lower corner of the cube in the scene frame.
-        table: whether all below the board, z < 0 of S, is filled.
+        table: whether all below the board, z < 0 of S, is filled, beyond the table's edges, too.
+        station: whose obstacles there are; none if None.
         size, voxels, truncation: as for `fuse_tsdf`.
 
     Returns:
@@ -57,7 +61,7 @@ def exact_tsdf(
 
     Raises:
         InvalidInputError: a number does not make sense, or `X_SV` is no pose.
-        UnknownNameError: a mesh file is missing.
+        UnknownNameError: a mesh file is missing, or there is no such station.
         MeshError: a mesh file is damaged.
     """
     scene = as_scene(scene)
@@ -68,10 +72,29 @@ def exact_tsdf(
         mesh = scene.library.surface(scene.instance(name).object)
         p_OQ = transform_points(inverse(scene.X_SO(name)), p_SQ)
         distance = np.minimum(distance, mesh_distance(mesh, p_OQ, truncation))
+    for corner, X_SB in () if station is None else _obstacles(as_station(station)):
+        p_BQ = transform_points(inverse(X_SB), p_SQ)
+        distance = np.minimum(distance, box_distance(corner, p_BQ))
     cut = np.clip(distance, -truncation, truncation).astype(np.float32)
     cube = (voxels, voxels, voxels)
     weight = np.ones(cube, np.float32)
     return Tsdf(np.array(X_SV, dtype=float), voxel, truncation, cut.reshape(cube), weight)
+
+
+def box_distance(corner: Array, points: Array) -> Array:
+    """(N,) signed distances of points (N, 3) from the box between a corner (3,) and its negative,
+    below 0 inside [m]."""
+    beyond = np.abs(points) - corner
+    outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
+    distance: Array = outside + np.minimum(beyond.max(axis=1), 0.0)
+    return distance
+
+
+def _obstacles(station: Station) -> list[tuple[Array, Array]]:
+    """Half the extents (3,) of each, and poses (4, 4) in the scene frame."""
+    X_SW = inverse(station.document.X_WS.matrix())
+    boxes = station.document.background.values()
+    return [(np.array(box.size) / 2, X_SW @ box.X_WB.matrix()) for box in boxes]
 
 
 def mesh_distance(mesh: trimesh.Trimesh, points: Array, reach: float) -> Array:

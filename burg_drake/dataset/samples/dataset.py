@@ -24,6 +24,7 @@ from burg_drake.dataset.samples.shard import SampleShard, ShardEntry, open_shard
 from burg_drake.dataset.samples.writer import scene_name
 from burg_drake.objects.library import ObjectLibrary, load_library
 from burg_drake.scene.document import Scene, load_scene
+from burg_drake.station.document import Station, load_station
 
 
 class Dataset(Sequence[Sample]):
@@ -121,6 +122,18 @@ class Dataset(Sequence[Sample]):
             UnknownNameError: it is not there any more.
         """
         return load_library(resolve(self.document.library, "models", self.folder))
+
+    @cached_property
+    def station(self) -> Station:
+        """What the scenes stand on.
+
+        Raises:
+            InvalidInputError: the data set names none.
+            UnknownNameError: it is not there any more.
+        """
+        if not self.document.station:
+            raise InvalidInputError(f"{self.folder} has no station: its document names none")
+        return load_station(resolve(self.document.station, "stations", self.folder))
 
     def index(self, value: Sample | str, start: int = 0, stop: int | None = None) -> int:
         """Index of a sample, by its key or itself.

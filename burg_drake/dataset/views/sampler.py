@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -18,7 +19,7 @@ from burg_drake.core import (
 )
 from burg_drake.dataset.views.places import draw_on_sphere, jittered
 from burg_drake.dataset.views.settings import SPHERE, WRIST, ViewpointSettings
-from burg_drake.dataset.views.surroundings import ViewedScene
+from burg_drake.dataset.views.surroundings import PlacedBox, ViewedScene
 from burg_drake.dataset.views.view import DEPTH_RANGE, View
 from burg_drake.dataset.views.wrist import WristCamera
 from burg_drake.scene.document import SceneLike, as_scene
@@ -40,6 +41,7 @@ class ViewSampler:
         *,
         intrinsics: Intrinsics | None = None,
         depth_range: tuple[float, float] | None = None,
+        besides: Sequence[PlacedBox] = (),
     ) -> None:
         """Checks that there are such cameras.
 
@@ -51,6 +53,8 @@ class ViewSampler:
                 sphere and wrist have them from the first camera of the station.
             depth_range: nearest and farthest depth [m]; that of the same camera, or `DEPTH_RANGE`
                 with given intrinsics, if None.
+            besides: boxes in the scene frame around what belongs to neither: cameras on sphere and
+                wrist are not in them, and see past them. Those of the station stand where they do.
 
         Raises:
             UnknownNameError: the station has no such camera.
@@ -61,6 +65,7 @@ class ViewSampler:
         self._scene, self._station = as_scene(scene), as_station(station)
         self._seen = ViewedScene(self._scene, self._station)
         self._given, self._depth_range = intrinsics, depth_range
+        self._besides = tuple(besides)
         self._fields: dict[Intrinsics, FieldOfView] = {}
         require_cameras(self.settings, self._station)
         known = self._station.document.cameras
@@ -111,12 +116,13 @@ class ViewSampler:
         """A view, or which rule it breaks."""
         known = self._station.document.cameras
         intrinsics, depth_range = self._optics(camera)
+        solids = self._seen.solids if camera in known else (*self._seen.solids, *self._besides)
         if camera in known:
             X_SW = inverse(self._station.document.X_WS.matrix())
             X_SC = jittered(X_SW @ known[camera].X_WC.matrix(), self.settings, rng)
         else:
             X_SC = draw_on_sphere(self.settings, self._seen.p_SO.mean(axis=0), rng)
-        broken = self._broken_rule(X_SC, intrinsics, depth_range)
+        broken = self._broken_rule(X_SC, intrinsics, depth_range, solids)
         if broken:
             return broken
         posture = self._wrist.posture(X_SC) if camera == WRIST else None
@@ -139,21 +145,31 @@ class ViewSampler:
         return of_camera(document), self._depth_range or document.depth_range
 
     def _broken_rule(
-        self, X_SC: Array, intrinsics: Intrinsics, depth_range: tuple[float, float]
+        self,
+        X_SC: Array,
+        intrinsics: Intrinsics,
+        depth_range: tuple[float, float],
+        solids: Sequence[PlacedBox],
     ) -> str:
         """Which rule of what is seen a camera breaks, in words; empty if none."""
         p_SC = X_SC[:3, 3]
-        for box in (*self._seen.solids, *self._seen.objects):
+        for box in (*solids, *self._seen.objects):
             if box.contains(p_SC):
                 return f"have the camera in {box.name!r}"
         wanted = max(1, int(np.ceil(self.settings.in_view * len(self._seen.p_SO) - 1e-9)))
-        if self._shown(X_SC, intrinsics, depth_range) < wanted:
+        if self._shown(X_SC, intrinsics, depth_range, solids) < wanted:
             return f"show fewer than {wanted} of {len(self._seen.p_SO)} objects"
         return ""
 
-    def _shown(self, X_SC: Array, intrinsics: Intrinsics, depth_range: tuple[float, float]) -> int:
-        """How many objects have their centres in the image and the range of depths, with neither
-        the table nor an obstacle before them."""
+    def _shown(
+        self,
+        X_SC: Array,
+        intrinsics: Intrinsics,
+        depth_range: tuple[float, float],
+        solids: Sequence[PlacedBox],
+    ) -> int:
+        """How many objects have their centres in the image and the range of depths, with none of
+        the solids before them."""
         p_SO = self._seen.p_SO
         p_CO = transform_points(inverse(X_SC), p_SO)
         near, far = depth_range
@@ -164,7 +180,7 @@ class ViewSampler:
         pixel[seen] = intrinsics.project(p_CO[seen])
         size = np.array((intrinsics.width, intrinsics.height))
         seen &= ((pixel >= -0.5) & (pixel <= size - 0.5)).all(axis=1)
-        for box in self._seen.solids:
+        for box in solids:
             seen &= ~box.hides(X_SC[:3, 3], p_SO)
         return int(seen.sum())
 

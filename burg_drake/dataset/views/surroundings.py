@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from burg_drake.core import Array, Booleans, inverse, transform_points
+from burg_drake.objects.library import ObjectEntry
 from burg_drake.scene.document import Scene
 from burg_drake.station.document import Station
 from burg_drake.station.world import obstacle_boxes, table_box
@@ -81,8 +82,12 @@ class ViewedScene:
         return np.array([box.X_SB[:3, 3] for box in seen]).reshape(-1, 3)
 
     def _around(self, name: str) -> PlacedBox:
-        entry = self.scene.entry(name)
-        lower, upper = np.array(entry.lower), np.array(entry.upper)
-        X_SB = self.scene.X_SO(name).copy()
-        X_SB[:3, 3] = transform_points(X_SB, 0.5 * (lower + upper)[None])[0]
-        return PlacedBox(name, X_SB, 0.5 * (upper - lower))
+        return box_around(name, self.scene.entry(name), self.scene.X_SO(name))
+
+
+def box_around(name: str, entry: ObjectEntry, X_SO: Array) -> PlacedBox:
+    """The box around an object of a library at a pose (4, 4), along its axes."""
+    lower, upper = np.array(entry.lower), np.array(entry.upper)
+    X_SB = X_SO.copy()
+    X_SB[:3, 3] = transform_points(X_SO, 0.5 * (lower + upper)[None])[0]
+    return PlacedBox(name, X_SB, 0.5 * (upper - lower))

@@ -7,6 +7,7 @@ from .flat_mesh import draw_flat as draw_flat
 from .gltf import (
     gltf_mesh as gltf_mesh,
     label_mesh as label_mesh,
+    picture_mesh as picture_mesh,
 )
 from .gripper_view import (
     GRIPPER_PATH as GRIPPER_PATH,

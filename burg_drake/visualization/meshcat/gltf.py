@@ -15,11 +15,12 @@ from typing import Any
 
 import numpy as np
 import trimesh
+from numpy.typing import ArrayLike
 from PIL import Image, ImageDraw, ImageFont
 from pydrake.common import MemoryFile
 from pydrake.geometry import InMemoryMesh, Mesh
 
-from burg_drake.core import MeshError
+from burg_drake.core import Array, Bytes, MeshError
 from burg_drake.visualization.style import linear_light
 
 ROUGHNESS = 0.65
@@ -92,12 +93,33 @@ def label_mesh(lines: tuple[str, ...], height: float, stretch: float = 1.0) -> t
     image = _text_image(lines)
     width = height * image.width / LABEL_PIXELS
     top = stretch * height * len(lines)
+    corners = np.array([[0, top, 0], [width, top, 0], [width, 0, 0], [0, 0, 0]], dtype=float)
+    return _picture(image, corners, "label"), width
+
+
+def picture_mesh(image: Bytes, corners: ArrayLike) -> Mesh:
+    """A picture in its own colours, whatever light falls on it; seen from both sides.
+
+    Args:
+        image: (H, W, 3) of sRGB bytes.
+        corners: (4, 3) of a flat quadrangle [m]: where the picture's upper left corner is, then
+            around it, clockwise as one sees the picture upright.
+
+    Returns:
+        Drake's shape.
+    """
+    return _picture(Image.fromarray(image), np.asarray(corners, dtype=float), "picture")
+
+
+def _picture(image: Image.Image, corners: Array, name: str) -> Mesh:
+    """A picture on a quadrangle (4, 3), without shading."""
     data = io.BytesIO()
     image.save(data, format="PNG", optimize=True)
-    corners = np.array([[0, 0, 0], [width, 0, 0], [width, top, 0], [0, top, 0]], dtype="<f4")
+    vertices = corners[[3, 2, 1, 0]].astype("<f4")
     uv = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], dtype="<f4")
     faces = np.array([0, 1, 2, 0, 2, 3], dtype="<u2")
-    buffers = [a.tobytes() for a in (corners, uv, faces)]
+    buffers = [a.tobytes() for a in (vertices, uv, faces)]
+    transparent = image.mode == "LA"
     document: dict[str, Any] = {
         "asset": {"version": "2.0"},
         "scene": 0,
@@ -116,8 +138,8 @@ def label_mesh(lines: tuple[str, ...], height: float, stretch: float = 1.0) -> t
                 "componentType": 5126,
                 "count": 4,
                 "type": "VEC3",
-                "min": corners.min(axis=0).tolist(),
-                "max": corners.max(axis=0).tolist(),
+                "min": vertices.min(axis=0).tolist(),
+                "max": vertices.max(axis=0).tolist(),
             },
             {"bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC2"},
             {"bufferView": 2, "componentType": 5123, "count": 6, "type": "SCALAR"},
@@ -128,14 +150,15 @@ def label_mesh(lines: tuple[str, ...], height: float, stretch: float = 1.0) -> t
         "materials": [
             {
                 "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}},
-                "alphaMode": "BLEND",
+                "alphaMode": "BLEND" if transparent else "OPAQUE",
+                "doubleSided": not transparent,
                 "extensions": {"KHR_materials_unlit": {}},
             }
         ],
         "textures": [{"source": 0}],
         "images": [{"uri": _data_uri("image/png", data.getvalue())}],
     }
-    return _shape(document, buffers, "label"), width
+    return _shape(document, buffers, name)
 
 
 def _shape(document: dict[str, Any], buffers: list[bytes], name: str) -> Mesh:

@@ -6,6 +6,7 @@ from .replay import (
 from .scene import (
     aim_camera as aim_camera,
     open_meshcat as open_meshcat,
+    scene_points as scene_points,
     show_scene as show_scene,
 )
 from .station import show_station as show_station

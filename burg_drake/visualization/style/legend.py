@@ -23,17 +23,24 @@ class LegendEntry:
         label: what the colour stands for.
         color: as CSS has it.
         paths: Meshcat paths that the entry shows and hides.
+        shown: whether they are shown when the page is opened; who draws them hides them if not.
     """
 
     label: str
     color: str
     paths: tuple[str, ...] = ()
+    shown: bool = True
 
     def html(self) -> Html:
         """The line."""
         return element(
             "label",
-            element("input", type="checkbox", checked="", data_paths=" ".join(self.paths)),
+            element(
+                "input",
+                type="checkbox",
+                checked="" if self.shown else None,
+                data_paths=" ".join(self.paths),
+            ),
             element("i", style=f"background:{self.color}"),
             self.label,
         )

@@ -1,0 +1,74 @@
+"""`burg-drake dataset show`: a sample in 3D, or samples from all over on a sheet."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from burg_drake.apps.options import Parser, add_verb, add_view, positive_int
+
+
+def add_to(group: Any) -> None:
+    """Adds the verb."""
+    add_verb(
+        group,
+        "show",
+        run_show,
+        "show a sample in Meshcat: scene, points, camera, grasps; or write a sheet of samples",
+        "burg-drake dataset show data",
+        "burg-drake dataset show data --sample 000012_003 --html sample.html",
+        "burg-drake dataset show data -o sheet.html",
+        "burg-drake dataset show data -o sheet.png --rows 6",
+        options=_add_options,
+    )
+
+
+def _add_options(parser: Parser) -> None:
+    parser.add_argument("data", metavar="DATA", help="folder of a data set")
+    parser.add_argument(
+        "--sample",
+        metavar="KEY",
+        help="sample to show (default: the first one; on a sheet, some from all over)",
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="FILE",
+        help="write a sheet with colour, depth and labels of samples (.png or .html)",
+    )
+    parser.add_argument(
+        "--rows", metavar="N", type=positive_int, default=4, help="of the sheet (default: 4)"
+    )
+    parser.add_argument(
+        "--columns", metavar="N", type=positive_int, default=1, help="of the sheet (default: 1)"
+    )
+    add_view(parser)
+
+
+def run_show(arguments: argparse.Namespace) -> int:
+    """Shows a sample in 3D, or writes a sheet."""
+    from burg_drake.apps.terminal import open_view, present, print_legend
+    from burg_drake.core import InvalidInputError
+    from burg_drake.dataset.exchange import contact_sheet, sample_caption, show_sample
+    from burg_drake.dataset.samples import load_dataset
+
+    dataset = load_dataset(arguments.data)
+    if not len(dataset):
+        raise InvalidInputError(f"{arguments.data} has no samples to show")
+    key = arguments.sample
+    chosen = None if key is None else dataset.index(key)
+    if arguments.output is not None:
+        samples = dataset if chosen is None else dataset[chosen : chosen + 1]
+        size = arguments.rows, arguments.columns
+        contact_sheet(samples, arguments.output, *size, title=dataset.name)
+        print(f"wrote {arguments.output}")
+        if arguments.html is None:
+            return 0
+    sample = dataset[chosen or 0]
+    scene, station = dataset.scene(sample.scene), dataset.station
+    meshcat = open_view(arguments)
+    legend = show_sample(sample, scene, station, meshcat)
+    print_legend(legend)
+    title = f"{dataset.name} {sample.key}"
+    present(meshcat, arguments, title=title, caption=[sample_caption(sample)], legend=legend)
+    return 0
