@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.client
 import json
 import socket
+import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -16,6 +17,7 @@ import numpy as np
 import pytest
 
 from burg_drake.apps.ar.server import PAGES, ViewServer
+from burg_drake.apps.web.server import MOST_REFUSALS
 from burg_drake.cameras.live.actions import ViewActions
 from burg_drake.cameras.live.event_log import EventLog
 from burg_drake.cameras.live.frame_processing import FrameProcessor
@@ -248,6 +250,47 @@ def test_malformed_requests_are_answered(
         assert connection.recv(100).startswith(f"HTTP/1.1 {code} ".encode())
     assert status(server)["source"]["state"] == "running"
     assert capfd.readouterr().err == ""
+
+
+def test_more_connections_than_are_served_are_told_why(server: ViewServer) -> None:
+    small = ViewServer(server.live, server.actions, port=0, connections=2)
+    small.start()
+    held = [http.client.HTTPConnection(*small.server_address[:2], timeout=TIMEOUT) for _ in "ab"]
+    try:
+        for connection in held:
+            connection.request("GET", "/status")
+            assert connection.getresponse().read()
+        for path in ("/", "/frame.jpg", "/status"):
+            code, _, body = request(small, "GET", path)
+            assert code == 503
+            assert json.loads(body)["error"].startswith("2 connections are open, the most that")
+        held[0].request("GET", "/status")  # those that were there first go on
+        assert held[0].getresponse().status == 200
+        held[0].close()
+        until(lambda: request(small, "GET", "/status")[0] == 200)
+    finally:
+        for connection in held:
+            connection.close()
+        small.close()
+
+
+def test_a_flood_of_connections_takes_no_threads(server: ViewServer) -> None:
+    """Beyond those that are served, and those that are told, connections are closed at once."""
+    small = ViewServer(server.live, server.actions, port=0, connections=1)
+    small.start()
+    before = threading.active_count()
+    flood = [
+        socket.create_connection(small.server_address[:2], timeout=TIMEOUT)
+        for _ in range(MOST_REFUSALS + 4)
+    ]
+    try:
+        assert flood[-1].recv(1) == b""
+        assert threading.active_count() <= before + 1 + MOST_REFUSALS
+    finally:
+        for connection in flood:
+            connection.close()
+        small.close()
+    until(lambda: threading.active_count() <= before)
 
 
 def test_clients_that_go_away_leave_no_trace(

@@ -12,6 +12,7 @@
 
 Other web sites that the browser has open can neither see nor do anything here: requests must name
 this machine as their host (which stops DNS rebinding), and what acts must come from this page.
+More connections than are served at a time are answered with 503 and the reason.
 """
 
 from __future__ import annotations
@@ -21,7 +22,13 @@ from http import HTTPStatus
 from typing import Any
 
 from burg_drake.apps.ar.session_status import status
-from burg_drake.apps.web import PageHandler, PageServer, address, picture_number
+from burg_drake.apps.web import (
+    MOST_CONNECTIONS,
+    PageHandler,
+    PageServer,
+    address,
+    picture_number,
+)
 from burg_drake.cameras.live import LiveSession, ViewActions
 from burg_drake.core import LOCALHOST, RequestError, require_local_host
 
@@ -46,6 +53,7 @@ class ViewServer(PageServer):
         actions: on it.
         host: address to listen on; only this machine can reach the default.
         port: to listen on; the first free one from `FIRST_PORT` on if None, any if 0.
+        connections: that are served at a time.
 
     Raises:
         InvalidInputError: the port is taken, or the address is not this machine's.
@@ -61,10 +69,11 @@ class ViewServer(PageServer):
         *,
         host: str = LOCALHOST,
         port: int | None = None,
+        connections: int = MOST_CONNECTIONS,
     ) -> None:
         self.live, self.actions = live, actions
         self.closing = threading.Event()
-        super().__init__(ViewHandler, host=host, port=port)
+        super().__init__(ViewHandler, host=host, port=port, connections=connections)
 
     def close(self) -> None:
         """Stops serving; requests that are being answered end soon."""

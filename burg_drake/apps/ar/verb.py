@@ -23,6 +23,7 @@ from burg_drake.apps.options import (
     settings_from,
 )
 from burg_drake.apps.terminal import interrupts_ignored, open_in_browser, terminated_as_interrupted
+from burg_drake.apps.web import MOST_CONNECTIONS
 
 if TYPE_CHECKING:
     from burg_drake.cameras.live import Event, LiveSession, ViewActions
@@ -71,6 +72,14 @@ def _add_view(parser: Any) -> None:
     view = parser.add_argument_group("view")
     add_options(view, OverlayStyle, "opacity", "tolerance", "angle_tolerance", unset=True)
     add_page(view, "all of the network can see and use it, such as a tablet beside the board")
+    view.add_argument(
+        "--connections",
+        type=positive_int,
+        metavar="N",
+        default=MOST_CONNECTIONS,
+        help="that the page serves at a time; a browser takes two to six, and more are told that"
+        " there are too many (default: %(default)s)",
+    )
     view.add_argument(
         "--no-browser",
         action="store_true",
@@ -168,7 +177,13 @@ def _serve(
     """Serves the page until all is closed."""
     from burg_drake.apps.ar.server import ViewServer
 
-    server = ViewServer(live, actions, host=arguments.host, port=arguments.port)
+    server = ViewServer(
+        live,
+        actions,
+        host=arguments.host,
+        port=arguments.port,
+        connections=arguments.connections,
+    )
     server.start()
     closing.callback(server.close)
     scene = live.processor.scene

@@ -3,6 +3,7 @@ from .requests import (
     picture_number as picture_number,
 )
 from .server import (
+    MOST_CONNECTIONS as MOST_CONNECTIONS,
     Handler as Handler,
     PageHandler as PageHandler,
     PageServer as PageServer,

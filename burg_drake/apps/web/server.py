@@ -32,6 +32,12 @@ PORTS = 50
 """How many ports are tried if none is given."""
 IDLE = 30.0
 """A connection without requests is closed after this [s]."""
+MOST_CONNECTIONS = 32
+"""At a time, each with a thread of its own, if not told otherwise; a browser takes two to six."""
+MOST_REFUSALS = 8
+"""Connections beyond those that are told so at a time; more are closed without a word."""
+REFUSED_WITHIN = 2.0
+"""How long a connection too many may take to ask for something [s]."""
 
 Handler = Callable[[Any], None]
 """Answers a request, with the body of a POST, or the query of a GET."""
@@ -44,6 +50,7 @@ class PageServer(ThreadingHTTPServer):
         handler: answers requests.
         host: address to listen on.
         port: to listen on; the first free one from `first_port` on if None, any if 0.
+        connections: that are served at a time; the next ones are told so, with status 503.
 
     Attributes:
         first_port: the first port that is tried.
@@ -62,9 +69,17 @@ class PageServer(ThreadingHTTPServer):
     poll = 0.5
 
     def __init__(
-        self, handler: type[BaseHTTPRequestHandler], *, host: str, port: int | None = None
+        self,
+        handler: type[BaseHTTPRequestHandler],
+        *,
+        host: str,
+        port: int | None = None,
+        connections: int = MOST_CONNECTIONS,
     ) -> None:
-        self.host = host
+        self.host, self.connections = host, connections
+        self._lock = threading.Lock()
+        self._served: set[socket.socket] = set()
+        self._refused: set[socket.socket] = set()
         if ":" in host:
             self.address_family = socket.AF_INET6
         first = self.first_port if port is None else port
@@ -99,6 +114,26 @@ class PageServer(ThreadingHTTPServer):
         self.shutdown()
         self.server_close()
 
+    def refuses(self, connection: socket.socket) -> bool:
+        """Whether a connection is one too many, and is to be told so."""
+        return connection in self._refused
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Answers a connection in a thread of its own, as long as there are not too many."""
+        with self._lock:
+            served = len(self._served) < self.connections
+            if not served and len(self._refused) >= MOST_REFUSALS:
+                self.shutdown_request(request)
+                return
+            (self._served if served else self._refused).add(request)
+        super().process_request(request, client_address)
+
+    def shutdown_request(self, request: Any) -> None:
+        """Closes a connection, which makes room for the next one."""
+        self._served.discard(request)
+        self._refused.discard(request)
+        super().shutdown_request(request)
+
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A browser that goes away in the middle of an answer is no error."""
         if not isinstance(sys.exception(), (ConnectionError, TimeoutError)):
@@ -109,6 +144,7 @@ class PageHandler(BaseHTTPRequestHandler):
     """Answers one connection's requests.
 
     Attributes:
+        server: whose connection it is.
         package: that has the files of the page.
         pages: file and type by path.
         policy: the Content-Security-Policy of every answer.
@@ -118,11 +154,18 @@ class PageHandler(BaseHTTPRequestHandler):
 
     protocol_version = "HTTP/1.1"
     timeout = IDLE
+    server: PageServer
     package: str
     pages: Mapping[str, tuple[str, str]]
     policy: str
     refused_code = HTTPStatus.CONFLICT
     new_cookie = ""
+
+    def setup(self) -> None:
+        """Waits less long for the request of a connection that is refused."""
+        super().setup()
+        if self.server.refuses(self.connection):
+            self.connection.settimeout(REFUSED_WITHIN)
 
     def admitted(self) -> tuple[str, dict[str, str]]:
         """Path and query of a request.
@@ -152,6 +195,13 @@ class PageHandler(BaseHTTPRequestHandler):
         """Answers a request by whoever is in charge of its path."""
         try:
             path, query = self.admitted()
+            if self.server.refuses(self.connection):
+                raise RequestError(
+                    HTTPStatus.SERVICE_UNAVAILABLE,
+                    f"{self.server.connections} connections are open, the most that this"
+                    f" {self.server.title} serves at a time; close it in another browser, or allow"
+                    " more when it is started",
+                )
             found = self.find(routes, path)
             found(json_body(self.headers, self.rfile) if self.command == "POST" else query)
         except RequestError as error:
