@@ -359,6 +359,20 @@ def test_verdicts() -> None:
     assert mark(placed(None, None), style, 0.0).verdict == "not_seen"
 
 
+def test_doubtful_results_have_a_question_mark_and_their_spread() -> None:
+    sure = replace(
+        placed((3e-3, 4e-3), math.radians(12.0)),
+        displacement_sd=(6e-4, 8e-4),
+        angle_sd=math.radians(2.0),
+    )
+    doubtful = replace(sure, status="uncertain", reason="two places fit alike")
+    assert mark(sure, OverlayStyle(), 0.0).text == "5.0 mm 12°"
+    note = mark(doubtful, OverlayStyle(), 0.0)
+    assert (note.verdict, note.text) == ("uncertain", "? 5.0±1.0 mm 12±2.0°")
+    nowhere = replace(placed(None, None), status="uncertain", reason="no outline")
+    assert mark(nowhere, OverlayStyle(), 0.0).verdict == "uncertain"
+
+
 def test_placement_shows_in_the_colour_of_outlines(scene: Scene) -> None:
     overlay = Overlay(scene, PINHOLE, PLAIN)
     check = PlacementCheck(
@@ -371,6 +385,15 @@ def test_placement_shows_in_the_colour_of_outlines(scene: Scene) -> None:
     drawn = overlay.draw(gray(), VIEWS[0], placement=check)
     for verdict in ("placed", "off"):
         assert (drawn == COLORS[verdict]).all(axis=2).sum() > 30
+    doubtful = replace(check.instances["mug"], status="uncertain", reason="badly fitting outline")
+    dashed = overlay.draw(gray(), VIEWS[0], placement=replace(check, instances={"mug": doubtful}))
+    arrows = replace(check, instances={"mug": replace(doubtful, displacement=(2e-4, 0.0))})
+    bare = overlay.draw(gray(), VIEWS[0], placement=arrows)
+    assert (dashed == COLORS["uncertain"]).all(axis=2).sum() > 30
+    whole = replace(check, instances={"mug": placed((2e-4, 0.0), None)})
+    green = (overlay.draw(gray(), VIEWS[0], placement=whole) == COLORS["placed"]).all(axis=2)
+    yellow = (bare == COLORS["uncertain"]).all(axis=2)
+    assert 0.4 * green.sum() < yellow.sum() < 0.75 * green.sum() and not (yellow & ~green).any()
     quiet = OverlayStyle(errors=False, names=False, footprints=False)
     np.testing.assert_array_equal(
         overlay.draw(gray(), VIEWS[0], placement=check, style=quiet),

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from burg_drake.cameras.live.actions import ViewActions
+from burg_drake.cameras.live.actions import ViewActions, placement_summary
 from burg_drake.cameras.live.event_log import EventLog
 from burg_drake.cameras.live.frame_processing import (
     FrameProcessor,
@@ -19,7 +19,14 @@ from burg_drake.cameras.live.recording import Recording
 from burg_drake.cameras.live.recording_table import read_poses
 from burg_drake.cameras.live.session import LiveSession
 from burg_drake.cameras.live.snapshot import load_snapshot
+from burg_drake.cameras.placement.document import (
+    CheckedImage,
+    CheckedScene,
+    Placement,
+    PlacementCheck,
+)
 from burg_drake.cameras.sources.frame import FrameSource
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.scene.document.scene import Scene, load_scene
 from tests.cameras.live_views import CAMERA, TIMEOUT, Pictures, camera_at, lines
@@ -153,3 +160,41 @@ def test_a_recording_that_fails_is_finished_and_the_view_goes_on(
     assert saved.startswith(f"recorded {take}, ")
     assert len(read_poses(tmp_path / "take.csv").times) == 2
     assert not list(tmp_path.glob(".*"))
+
+
+def test_a_still_photo_is_recorded_from_the_start_or_not_at_all(
+    live: Callable[..., LiveSession], image: np.ndarray, tmp_path: Path
+) -> None:
+    """Once its only frame has been looked at nothing comes that a video could have."""
+    log = EventLog()
+    running = live(Pictures(image), events=log)
+    actions = ViewActions(running, tmp_path)
+    take = actions.start_recording(tmp_path / "take.avi")
+    running.start()
+    running.wait(seconds=TIMEOUT)
+    assert actions.stop_recording() == take
+    assert len(read_poses(take.with_suffix(".csv")).times) == 1
+    before = sorted(tmp_path.iterdir())
+    with pytest.raises(InvalidInputError, match="pictures has no more frames that could be recor"):
+        actions.start_recording()
+    assert actions.recording is None and sorted(tmp_path.iterdir()) == before
+
+
+def test_the_words_for_a_check_count_what_was_measured_alone() -> None:
+    def check(*statuses: str, reason: str = "") -> PlacementCheck:
+        return PlacementCheck(
+            scene=CheckedScene(name="six", path="six.yaml", content="0"),
+            method="silhouette",
+            image=CheckedImage(content=""),
+            intrinsics=CAMERA,
+            reason=reason,
+            instances={
+                f"{k}": Placement(object="box", status=status, target=Pose())  # type: ignore[arg-type]
+                for k, status in enumerate(statuses)
+            },
+        )
+
+    assert placement_summary(check("measured", "measured")) == "2 of 2 objects measured"
+    said = placement_summary(check("uncertain", "measured", "not_seen", "uncertain"))
+    assert said == "1 of 4 objects measured, 2 uncertain, 1 not seen"
+    assert placement_summary(check(reason="no marker in sight")) == "no marker in sight"

@@ -9,6 +9,8 @@ let latest = null;  // the last status
 let lastEvent = 0;
 let online = true;
 
+class Refusal extends Error {}  // what the program answers in place of a status
+
 // --- What comes from the program
 
 async function showPictures() {
@@ -42,15 +44,16 @@ async function showStatus() {
     await seen();
     try {
       const answer = await fetch(`status?after=${lastEvent}`);
-      if (!answer.ok) throw new Error((await answer.json()).error);
+      if (!answer.ok) throw new Refusal((await answer.json()).error);
       latest = await answer.json();
       online = true;
       render(latest);
-    } catch {
+    } catch (error) {
+      const reason = error instanceof Refusal ? error.message : "";
       if (online) lastEvent = 0;
       online = false;
-      say("bad", "The program does not answer; has it ended?");
-      cover("The program does not answer");
+      say("bad", reason || "The program does not answer; has it ended?");
+      cover(reason || "The program does not answer");
     }
     await sleep(online ? 250 : 1000);
   }
@@ -111,9 +114,13 @@ function cover(text) {
   $("cover").textContent = text;
 }
 
-function renderControls({ settings, recording, checking, picture }) {
+function renderControls({ source, settings, recording, checking, picture }) {
+  const still = source.state === "ended" && !recording;
   $("record").setAttribute("aria-pressed", Boolean(recording));
   $("record").lastElementChild.textContent = recording ? "Stop" : "Record";
+  $("record").disabled = still;
+  $("record").title = still ? "Nothing moves any more; a snapshot (S) keeps this picture"
+    : "Record a video with poses (R)";
   $("recorded").hidden = !recording;
   if (recording) $("recorded").textContent = clock(recording.seconds);
   $("freeze").setAttribute("aria-pressed", settings.frozen);
@@ -142,8 +149,8 @@ function renderObjects({ scene, settings, placement, tolerance }) {
   }
   const limits = `${tolerance.mm.toFixed(1)} mm and ${tolerance.deg.toFixed(1)}°`;
   $("checked").textContent = !placement ? ""
-    : placement.reason || `✓ within ${limits}, by ${placement.method}, `
-      + `at ${new Date(placement.taken).toLocaleTimeString()}`;
+    : placement.reason || `${placement.summary} by ${placement.method} at `
+      + `${new Date(placement.taken).toLocaleTimeString()}. ✓ within ${limits}`;
 }
 
 function objectRow(name) {
@@ -167,6 +174,10 @@ function number() {
 function fill(row, placed) {
   const [, off, turn] = row.cells;
   const kind = placed.status === "measured" ? (placed.within ? "within" : "off") : "unsure";
+  row.classList.toggle("doubtful", placed.status === "uncertain");
+  let why = row.cells[0].querySelector("small");
+  if (!why) row.cells[0].append(why = document.createElement("small"));
+  why.textContent = placed.status === "uncertain" ? placed.reason : "";
   off.className = turn.className = `number ${kind}`;
   off.title = turn.title = placed.reason;
   if (placed.mm === null) {

@@ -66,9 +66,14 @@ def _words(row: dict[str, Any]) -> str:
     if row["mm"] is None:
         return ": ".join(filter(None, (row["status"].replace("_", " "), row["reason"])))
     x, y = row["xy_mm"]
-    words = f"{row['mm']:5.2f} mm off (x {x:+.2f}, y {y:+.2f})"
+    words = f"{row['mm']:5.2f} mm off (x {x:+.2f}, y {y:+.2f}{_spread(row['sd_mm'])})"
     if row["deg"] is not None:
-        words += f", rotated by {row['deg']:+.2f} deg"
+        words += f", rotated by {row['deg']:+.2f}{_spread(row['sd_deg'], '')} deg"
     if row["status"] != "measured":
         return f"{words}; {row['status']}: {row['reason']}"
     return f"{words}; {'placed' if row['within'] else 'off its target'}"
+
+
+def _spread(sd: float | None, before: str = ",") -> str:
+    """A standard deviation behind its value; nothing where it is not known."""
+    return "" if sd is None else f"{before} ± {sd:.2f}"

@@ -10,6 +10,7 @@ from burg_drake.cameras.live import (
     LiveSession,
     Picture,
     ViewActions,
+    placement_summary,
     placing_order,
     pose_line,
     position_sd,
@@ -81,6 +82,7 @@ def _picture(live: LiveSession, picture: Picture) -> dict[str, Any]:
 def _placement(check: PlacementCheck, style: OverlayStyle) -> dict[str, Any]:
     return {
         "reason": check.reason,
+        "summary": placement_summary(check),
         "method": check.method,
         "taken": check.taken,
         "objects": {name: placement_row(placed, style) for name, placed in check.instances.items()},

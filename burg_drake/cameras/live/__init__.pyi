@@ -1,4 +1,7 @@
-from .actions import ViewActions as ViewActions
+from .actions import (
+    ViewActions as ViewActions,
+    placement_summary as placement_summary,
+)
 from .event_log import (
     Event as Event,
     EventLog as EventLog,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections import Counter
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
@@ -19,6 +20,7 @@ from burg_drake.cameras.live.snapshot import (
     save_snapshot,
     scene_document,
 )
+from burg_drake.cameras.placement import PlacementCheck
 from burg_drake.core import BurgError, InvalidInputError
 
 DEFAULT_RATE = 30.0
@@ -99,12 +101,17 @@ class ViewActions:
             path: of the video; `SCENE_recording_001.mp4` and so on if not given.
 
         Raises:
-            InvalidInputError: it cannot be written, files of that name exist, or a recording is
-                being written already.
+            InvalidInputError: it cannot be written, files of that name exist, a recording is being
+                written already, or no frame comes any more.
         """
         with self._lock:
             if self.recording is not None:
                 raise InvalidInputError(f"{self.recording.path} is being recorded; stop that first")
+            if self.live.is_over:
+                raise InvalidInputError(
+                    f"{self.live.source.name} has no more frames that could be recorded; a snapshot"
+                    " keeps the picture that is shown"
+                )
             if path is None:
                 path = self._free_path("recording", ".mp4", taken=self._is_recorded)
             rate = self.live.source.fps or DEFAULT_RATE
@@ -133,7 +140,10 @@ class ViewActions:
                 return None
             path = recording.close()
         if path is None:
-            self.live.events.add(f"{recording.path}: nothing was recorded")
+            frozen = " while the picture was frozen" if self.live.settings.frozen else ""
+            self.live.events.add(
+                f"{recording.path}: nothing was recorded, as no frame came{frozen}", bad=True
+            )
         else:
             seconds = recording.frames / recording.frames_per_second
             self.live.events.add(f"recorded {path}, {seconds:.1f} s")
@@ -176,11 +186,7 @@ class ViewActions:
             self.live.events.add(f"placement check: {error}", bad=True)
         else:
             self.live.placement = check
-            measured = sum(placed.status != "not_seen" for placed in check.instances.values())
-            self.live.events.add(
-                f"placement of {measured} of {len(check.instances)} objects measured"
-                + (f"; {check.reason}" if check.reason else "")
-            )
+            self.live.events.add(f"placement: {placement_summary(check)}")
         finally:
             self.checking = False
 
@@ -211,6 +217,17 @@ class ViewActions:
         self, what: str, suffix: str = "", *, taken: Callable[[Path], bool] = Path.exists
     ) -> Path:
         return numbered(self.folder, f"{self.processor.scene.name}_{what}", suffix, taken=taken)
+
+
+def placement_summary(check: PlacementCheck) -> str:
+    """How many objects were measured, are doubtful and were not seen; or why none could be."""
+    if not check.instances:
+        return check.reason
+    counts = Counter(placed.status for placed in check.instances.values())
+    words = [f"{counts['measured']} of {len(check.instances)} objects measured"]
+    words += [f"{counts['uncertain']} uncertain"] if counts["uncertain"] else []
+    words += [f"{counts['not_seen']} not seen"] if counts["not_seen"] else []
+    return ", ".join(words) + (f"; {check.reason}" if check.reason else "")
 
 
 def _now() -> str:

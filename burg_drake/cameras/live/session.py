@@ -224,6 +224,11 @@ class LiveSession:
         if failure is not None:
             raise failure
 
+    @property
+    def is_over(self) -> bool:
+        """No frame will be looked at any more, such as after that of a photograph."""
+        return self._is_over(to_end=True)
+
     def _is_over(self, to_end: bool) -> bool:
         if self._closed or self._failure or self.reader.failure or self._enough:
             return True

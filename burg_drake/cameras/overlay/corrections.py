@@ -56,13 +56,16 @@ def mark(placement: Placement, style: OverlayStyle, height: float) -> Mark:
         height: at which arrows are drawn, z in S [m].
     """
     nothing = np.empty((0, 2, 3))
-    if placement.status == "not_seen" or placement.displacement is None:
-        return Mark("not_seen", "not seen", nothing)
+    uncertain = placement.status == "uncertain"
+    if placement.displacement is None:
+        return (
+            Mark("uncertain", "?", nothing) if uncertain else Mark("not_seen", "not seen", nothing)
+        )
     move = -np.array(placement.displacement)
     turn = -(placement.angle or 0.0)
     far, turned = math.hypot(*move) > style.tolerance, abs(turn) > style.angle_tolerance
     verdict: PlacementVerdict = "off" if far or turned else "placed"
-    if placement.status == "uncertain":
+    if uncertain:
         verdict = "uncertain"
     target = (placement.target.matrix() @ (*(placement.reference or (0.0, 0.0, 0.0)), 1.0))[:3]
     target[2] = height
@@ -71,16 +74,24 @@ def mark(placement: Placement, style: OverlayStyle, height: float) -> Mark:
         lines.append(_arrow(target, np.array([*move, 0.0])))
     if turned:
         lines.append(_turn(target, turn))
-    return Mark(verdict, _text(move, placement.angle), np.concatenate(lines))
+    return Mark(verdict, _text(placement, uncertain), np.concatenate(lines))
 
 
-def _text(move: Array, angle: float | None) -> str:
-    millimetres = 1e3 * math.hypot(*move)
-    text = f"{millimetres:.1f} mm" if millimetres < 9.95 else f"{millimetres:.0f} mm"
-    if angle is None:
-        return text
-    degrees = abs(math.degrees(angle))
-    return text + (f" {degrees:.1f}°" if degrees < 9.95 else f" {degrees:.0f}°")
+def _text(placement: Placement, uncertain: bool) -> str:
+    """Distance and turn, of an uncertain object with a question mark and standard deviations."""
+    far_sd = placement.displacement_sd if uncertain else None
+    turn_sd = placement.angle_sd if uncertain else None
+    far = 1e3 * math.hypot(*(placement.displacement or (0.0, 0.0)))
+    text = _number(far, None if far_sd is None else 1e3 * math.hypot(*far_sd)) + " mm"
+    if placement.angle is not None:
+        turn = abs(math.degrees(placement.angle))
+        text += f" {_number(turn, None if turn_sd is None else math.degrees(turn_sd))}°"
+    return f"? {text}" if uncertain else text
+
+
+def _number(value: float, sd: float | None) -> str:
+    text = f"{value:.1f}" if value < 9.95 else f"{value:.0f}"
+    return text if sd is None else f"{text}±{_number(sd, None)}"
 
 
 def _arrow(target: Array, move: Array) -> Array:

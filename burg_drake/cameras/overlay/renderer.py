@@ -43,6 +43,8 @@ BRIGHT = 0.4
 FOOTPRINT_WIDTH, ARROW_WIDTH = 1.2, 3.0
 """[pixels]."""
 FOOTPRINT_OPACITY = 0.7
+DASH = 7.0
+"""About half the distance of dashes along the outline of an uncertain object [pixels]."""
 LETTERS = 0.028
 """Height of the font, as a share of the image's."""
 SEEN = 12
@@ -232,7 +234,8 @@ def _marks(
 
 
 def _outlines(state: _DrawState, colors: Array, width: float) -> Ink:
-    """Outlines and inner lines; the former say by their colour how an object stands."""
+    """Outlines and inner lines; the former say by their colour how an object stands, and are dashed
+    where that is uncertain."""
     lines, rims = state.lines, np.array(colors)
     for number, name in enumerate(state.shape.names):
         if name in state.marks:
@@ -240,7 +243,21 @@ def _outlines(state: _DrawState, colors: Array, width: float) -> Ink:
     outer = lines.kind == OUTLINE
     chosen = np.where(outer[:, None], rims[lines.owner], colors[lines.owner])
     widths = width * np.where(outer, 1.0, INNER_WIDTH)
+    for number, name in enumerate(state.shape.names):
+        if name in state.marks and state.marks[name].verdict == "uncertain":
+            dashed = outer & (lines.owner == number)
+            widths[dashed] *= _dashes(lines.ends[dashed])
     return _ink(lines.ends, chosen, widths, 1.0, np.where(outer, RIM, INNER_RIM))
+
+
+def _dashes(ends: Array) -> NDArray[np.bool_]:
+    """(N,) which of the short lines (N, 2, 2) around an object [pixels] belong to a dash: those in
+    every other sector about its middle, as lines do not come in the order of the outline."""
+    arms = ends.mean(axis=1) - ends.mean(axis=(0, 1))
+    around = 2 * np.pi * np.linalg.norm(arms, axis=1).mean() if len(arms) else 0.0
+    dashes = max(round(around / (2 * DASH)), 4)
+    share = np.arctan2(arms[:, 1], arms[:, 0]) / (2 * np.pi) % 1.0
+    return np.asarray((share * dashes) % 1.0 < 0.6)
 
 
 def _ink(
