@@ -39,6 +39,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ViewServer]:
     server = ViewServer(live, ViewActions(live, tmp_path_factory.mktemp("shots")), port=0)
     live.start()
     server.start()
+    until(lambda: live.picture)
     yield server
     live.close()
     server.close()
