@@ -16,17 +16,17 @@ from burg_drake.core import MILLIMETRES, Array, InvalidInputError, setting
 from burg_drake.core.files import atomic_write
 from burg_drake.printout.board_edge import draw_edge, draw_origin
 from burg_drake.printout.drawings import Drawing, draw_arrows, draw_objects
+from burg_drake.printout.guide import BoardFacts, Guide, draw_guide, guide_steps
+from burg_drake.printout.losses import lacking_white, margin_losses, printer_losses
 from burg_drake.printout.page_frame import Caption, draw_page_frame
 from burg_drake.printout.paper import PAPERS, Paper, orientations
 from burg_drake.printout.pen import POINT, WHITE, Pen, rectangle
 from burg_drake.printout.sheet import Sheet, alignment_marks, draw_sheet, place_names
 from burg_drake.printout.tiling import Tile, Tiling, tile_board
-from burg_drake.scene.document import EDGE, MarkerLayout, Scene, SceneLike, as_scene, validate_scene
+from burg_drake.scene.document import MarkerLayout, Scene, SceneLike, as_scene, validate_scene
 
 MEASURED = (0.080, 0.125)
 """What a printed ruler of 100 mm can measure [m]; else it was read in another unit."""
-LOST = 0.5e-3
-"""An object that loses less than this to the page's margin is worth no word [m]."""
 FORM = "board"
 COVER = 2e-3
 """Width of the white around what a page shows [m]."""
@@ -44,7 +44,8 @@ class PrintSettings:
         measured: what the rulers of 100 mm along x and y of the page measured on paper [m]; all is
             drawn larger by as much as that is too little.
         height_map: draw the objects.
-        names: write their names beside them.
+        names: write their names beside them, on every page that shows a part of them.
+        instructions: begin with a page that shows how the board is printed, assembled and used.
     """
 
     page: str = setting(
@@ -59,6 +60,7 @@ class PrintSettings:
     measured: tuple[float, float] = (0.1, 0.1)
     height_map: bool = setting(True, "print the markers alone", name="no_height_map")
     names: bool = setting(True, "do not print the objects' names", name="no_names")
+    instructions: bool = False
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.margin <= 0.05:
@@ -80,22 +82,24 @@ class Printout:
         tiling: what of the board is where on which page.
         settings: how it was printed.
         warnings: what is not as the scene has it, a sentence each.
+        first: number of pages of instructions in the document, before those of the board.
     """
 
     pdf: bytes
     tiling: Tiling
     settings: PrintSettings
     warnings: tuple[str, ...]
+    first: int = 0
 
     def __repr__(self) -> str:
         pages, kib = len(self.tiling.tiles), len(self.pdf) / 1024
         return f"Printout({pages} pages of {self.settings.page}, {kib:.0f} KiB)"
 
     def p_PQ(self, page: int, p_SQ: Array) -> Array:
-        """Points of the board on a page of the document.
+        """Points of the board on a page of it.
 
         Args:
-            page: its number, from 1.
+            page: the number that is printed on it, from 1; instructions do not count.
             p_SQ: (..., 2 or 3) points in the scene frame [m].
 
         Returns:
@@ -143,12 +147,13 @@ def print_board(scene: SceneLike, settings: PrintSettings | None = None) -> Prin
     if settings.names:
         sheet, unplaced = place_names(sheet, tiling)
     warnings = [issue.message for issue in validate_scene(scene)] if settings.height_map else []
-    warnings += _lost_warnings(sheet, tiling)
+    losses = [*margin_losses(sheet, tiling), *printer_losses(sheet, tiling)]
+    warnings += losses
     warnings += _spread(size, layout, drawings, settings, tiling)
-    warnings += _without_white(size, layout)
-    warnings += [f"there is no room for the words {words!r}" for words in unplaced]
-    pdf = _document(scene, sheet, tiling, settings)
-    return Printout(pdf, tiling, settings, tuple(warnings))
+    warnings += lacking_white(size, layout)
+    warnings += [f"there is no room for the words {words}" for words in unplaced]
+    pdf, first = _document(scene, sheet, tiling, settings, losses)
+    return Printout(pdf, tiling, settings, tuple(warnings), first)
 
 
 def _tiling(
@@ -206,46 +211,15 @@ def _needed(
     return lower, upper
 
 
-def _lost_warnings(sheet: Sheet, tiling: Tiling) -> list[str]:
-    """What of the objects no page shows; of those beyond the board something else was said."""
-    first, last = tiling.tiles[0], tiling.tiles[-1]
-    lower = np.array([first.lower[0], last.lower[1]])
-    upper = np.array([last.upper[0], first.upper[1]])
-    warnings = []
-    beyond = {arrow.name for arrow in sheet.arrows}
-    for drawing in sheet.drawings:
-        if drawing.name in beyond or not drawing.outline:
-            continue
-        points = np.concatenate(drawing.outline)
-        lost = max((lower - points.min(axis=0)).max(), (points.max(axis=0) - upper).max())
-        if lost > LOST:
-            warnings.append(
-                f"the outermost {1e3 * lost:.1f} mm of {drawing.name!r} lie in the margin of the"
-                " page; larger pages have room"
-            )
-    return warnings
-
-
-def _without_white(size: tuple[float, float], layout: MarkerLayout) -> list[str]:
-    """Markers at the sheet's edge: detectors need white around them, about a cell wide."""
-    corners = layout.p_SQ[..., :2].reshape(-1, 2)
-    white = min(corners.min(), (np.array(size) - corners).min())
-    least = min(layout.side / layout.cells, EDGE)
-    if white > least - 1e-9:
-        return []
-    return [
-        f"markers are {1e3 * white:.1f} mm from the board's edge; cut out, on a dark table, they"
-        f" lack the white around them that detectors need: leave {1e3 * least:.1f} mm, by a larger"
-        " board or smaller markers"
-    ]
-
-
 def _scale_correction(settings: PrintSettings) -> Array:
     """How much larger all is drawn along x and y."""
     return 0.1 / np.array(settings.measured)
 
 
-def _document(scene: Scene, sheet: Sheet, tiling: Tiling, settings: PrintSettings) -> bytes:
+def _document(
+    scene: Scene, sheet: Sheet, tiling: Tiling, settings: PrintSettings, losses: list[str]
+) -> tuple[bytes, int]:
+    """The PDF, and how many pages of instructions it begins with."""
     print_scale, paper = _scale_correction(settings), tiling.paper
     stream = io.BytesIO()
     page_size = tuple((print_scale * [paper.width, paper.height] / POINT).tolist())
@@ -256,6 +230,10 @@ def _document(scene: Scene, sheet: Sheet, tiling: Tiling, settings: PrintSetting
     canvas.setAuthor("burg-drake")
     canvas.setViewerPreference("PrintScaling", "None")
     pen = Pen(canvas)
+    first = 0
+    if settings.instructions:
+        guide, (x, y) = _guide(scene, sheet, tiling, settings, losses), print_scale.tolist()
+        first = draw_guide(pen, tiling.paper, guide, scale_page=(x, y))
     canvas.beginForm(FORM, 0.0, 0.0, sheet.size[0] / POINT, sheet.size[1] / POINT)
     draw_sheet(pen, sheet)
     canvas.endForm()
@@ -273,7 +251,29 @@ def _document(scene: Scene, sheet: Sheet, tiling: Tiling, settings: PrintSetting
         )
         canvas.showPage()
     canvas.save()
-    return stream.getvalue()
+    return stream.getvalue(), first
+
+
+def _guide(
+    scene: Scene, sheet: Sheet, tiling: Tiling, settings: PrintSettings, losses: list[str]
+) -> Guide:
+    facts = BoardFacts(
+        size=sheet.size,
+        side=sheet.layout.side,
+        margin=settings.margin,
+        measured=settings.measured,
+        tiling=tiling,
+        objects=sheet.drawings,
+        losses=tuple(f"{loss[0].upper()}{loss[1:]}." for loss in losses),
+    )
+    pages, paper = len(tiling.tiles), tiling.paper.name
+    x, y = (f"{1e3 * s:g}" for s in sheet.size)
+    return Guide(
+        title="How to make this board",
+        subtitle=f"{scene.name}: {x} x {y} mm on {pages} page{'s' * (pages > 1)} {paper}, content"
+        f" {scene.content[:8]}",
+        steps=tuple(guide_steps(facts)),
+    )
 
 
 def _draw_board(pen: Pen, sheet: Sheet, tile: Tile) -> None:
@@ -316,9 +316,11 @@ def _caption(scene: Scene, settings: PrintSettings, pages: int, flap: float) -> 
     join = "Glue each page onto the strips of those before it, cross on cross."
     if not flap:
         join = "Join each page to those before it edge to edge, cross on cross."
-    steps = f"1 Check the rulers. 2 Cut along the lines that say CUT. 3 {join} "
+    steps = f" 1 Check the rulers. 2 Cut along the lines that say CUT. 3 {join}"
+    told = settings.instructions or pages == 1
     return Caption(
         title=scene.name,
         board=f"{1e3 * size[0]:g} x {1e3 * size[1]:g} mm, content {scene.content[:8]}",
-        lines=(f"{how} {markers}", (steps if pages > 1 else "") + origin),
+        facts=f"{markers} {origin}{'' if told else steps}",
+        how=how,
     )

@@ -41,10 +41,7 @@ class FreeSpace:
 
     def take_beyond(self, lower: Iterable[float], upper: Iterable[float]) -> None:
         """Takes all but a rectangle."""
-        rows, columns = self._cells(np.array([*lower]), np.array([*upper]))
-        inside = np.zeros_like(self.taken)
-        inside[rows, columns] = True
-        self.taken |= ~inside
+        self.taken |= ~self.within(lower, upper)
 
     def take_layer(self, layer: Layer, clear: float) -> NDArray[np.bool_]:
         """Takes what an instance covers and `clear` around it [m].
@@ -69,12 +66,25 @@ class FreeSpace:
         at[row, column] = True
         return at
 
-    def place(self, extent: tuple[float, float], beside: NDArray[np.bool_]) -> Array | None:
+    def within(self, lower: Iterable[float], upper: Iterable[float]) -> NDArray[np.bool_]:
+        """(H, W) the cells that a rectangle touches."""
+        inside = np.zeros_like(self.taken)
+        rows, columns = self._cells(np.array([*lower]), np.array([*upper]))
+        inside[rows, columns] = True
+        return inside
+
+    def place(
+        self,
+        extent: tuple[float, float],
+        beside: NDArray[np.bool_],
+        within: NDArray[np.bool_] | None = None,
+    ) -> Array | None:
         """Places a box on free cells as close to something as possible, and takes its place.
 
         Args:
             extent: of the box along x and y [m].
             beside: (H, W) cells of what it is to stand close to; not empty.
+            within: (H, W) cells that it may stand on; all if None.
 
         Returns:
             (2,) its lower left corner [m]; None if there is no room within `REACH`.
@@ -82,9 +92,10 @@ class FreeSpace:
         columns, rows = (max(1, int(np.ceil(e / STEP))) for e in extent)
         window = _around(beside, max(rows, columns) + round(REACH / STEP))
         taken, beside = self.taken[window], beside[window]
+        blocked = taken if within is None else taken | ~within[window]
         if rows > taken.shape[0] or columns > taken.shape[1]:
             return None
-        sums = cv2.integral(taken.astype(np.uint8))
+        sums = cv2.integral(blocked.astype(np.uint8))
         inside = sums[rows:, columns:] - sums[:-rows, columns:]
         inside += sums[:-rows, :-columns] - sums[rows:, :-columns]
         # Close by: the box's nearest cell, and among those alike its middle.

@@ -42,12 +42,14 @@ class Caption:
     Attributes:
         title: the scene's name.
         board: its size and content.
-        lines: how to print and join the pages, and what the board is; two.
+        facts: which markers there are and where, for those who look into it; small.
+        how: how to print, for everybody.
     """
 
     title: str
     board: str
-    lines: tuple[str, ...]
+    facts: str
+    how: str
 
 
 def draw_page_frame(
@@ -124,15 +126,15 @@ def _draw_caption(
 ) -> None:
     left, right = span
     page = f"page {tile.number} of {pages}"
-    pen.text(right, base + 9.0e-3, page, 8, align=1.0)
-    room = right - left - text_width(page, 8) - 3e-3
+    pen.text(right, base + 10.0e-3, page, 10, align=1.0)
+    room = right - left - text_width(page, 10) - 3e-3
     pen.text(
-        left, base + 9.0e-3, caption.title, _fitting(caption.title, room, 9.5, BOLD), font=BOLD
+        left, base + 10.0e-3, caption.title, _fitting(caption.title, room, 10, BOLD), font=BOLD
     )
-    pen.text(left, base + 5.9e-3, caption.board, _fitting(caption.board, right - left, 6.5))
+    pen.text(left, base + 6.8e-3, caption.board, _fitting(caption.board, right - left, 6.5))
     start = left - RULER - 8e-3  # below the ruler, too
-    for k, line in enumerate(caption.lines):
-        pen.text(start, base + 3.1e-3 - 2.6e-3 * k, line, _fitting(line, right - start, 6.5))
+    pen.text(start, base + 4.2e-3, caption.facts, _fitting(caption.facts, right - start, 6.5))
+    pen.text(start, base + 0.9e-3, caption.how, _fitting(caption.how, right - start, 10))
 
 
 def _fitting(text: str, room: float, size: float, font: str = "Helvetica") -> float:

@@ -16,7 +16,7 @@ from burg_drake.core import Array
 from burg_drake.core.terminal import Rgb
 from burg_drake.printout.board_edge import ORIGIN
 from burg_drake.printout.drawings import Arrow, Drawing
-from burg_drake.printout.labels import FreeSpace
+from burg_drake.printout.labels import STEP, FreeSpace
 from burg_drake.printout.outlines import cell_outlines
 from burg_drake.printout.pen import (
     BLACK,
@@ -42,7 +42,11 @@ NAME_SIZE = 8.5
 """Of names of objects [points]."""
 NAME_CLEAR = 1e-3
 """Least distance of a name from objects [m]; from markers it is at least the width of a frame."""
+LEAST_PART = 0.5e-4
+"""Of an object on another page that has its name, too [m^2]."""
 OUTLINE_WIDTH, FOOTPRINT_WIDTH = 0.2e-3, 0.4e-3
+EDGE_CLEAR = 1.0e-3
+"""Distance of the objects' lines from the edges of markers [m]."""
 HATCHING = 3e-3
 """Distance between the white lines over fixed objects [m]."""
 ALARM: Rgb = (0.80, 0.10, 0.10)
@@ -104,10 +108,11 @@ def alignment_marks(layout: MarkerLayout, tiling: Tiling) -> Array:
 
 
 def place_names(sheet: Sheet, tiling: Tiling) -> tuple[Sheet, list[str]]:
-    """Finds places for the names of objects and arrows: on paper, on no marker, on no object.
+    """Finds places for the names of objects and arrows: on paper, on no marker, on no object, and
+    on every page that shows a part of an object.
 
     Returns:
-        The sheet with names, and those words for which there was no room.
+        The sheet with names, and those words for which there was no room, quoted, with the page.
     """
     space, masks = FreeSpace(sheet.size), {}
     first, last = tiling.tiles[0], tiling.tiles[-1]
@@ -140,11 +145,31 @@ def place_names(sheet: Sheet, tiling: Tiling) -> tuple[Sheet, list[str]]:
         extent = text_width(words, NAME_SIZE, BOLD) + 2 * NAME_CLEAR, NAME_SIZE * POINT
         corner = space.place(extent, beside)
         if corner is None:
-            homeless.append(words)
-        else:  # a line's letters reach a fifth of its height below the baseline
-            position = corner[0] + NAME_CLEAR, corner[1] + 0.22 * extent[1]
-            names.append(Name(words, position, color))
+            homeless.append(repr(words))
+            continue
+        # a line's letters reach a fifth of its height below the baseline
+        shift = np.array([NAME_CLEAR, 0.22 * extent[1]])
+        corners = [corner]
+        for tile in tiling.tiles if len(tiling.tiles) > 1 else ():
+            page = space.within(*tile.core)
+            part = beside & page
+            if part.sum() * STEP**2 < LEAST_PART or page[_cell_at(space, corner)]:
+                continue
+            again = space.place(extent, part, page)
+            if again is None:
+                homeless.append(f"{words!r} on page {tile.number}")
+            else:
+                corners.append(again)
+        for at in corners:
+            x, y = (at + shift).tolist()
+            names.append(Name(words, (x, y), color))
     return dataclasses.replace(sheet, names=tuple(names)), homeless
+
+
+def _cell_at(space: FreeSpace, point: Array) -> tuple[int, int]:
+    """Row and column of the cell at a point."""
+    column, row = np.rint(space.grid.pixels(point + STEP)).astype(int)
+    return int(row), int(column)
 
 
 def draw_sheet(pen: Pen, sheet: Sheet) -> None:
@@ -194,40 +219,45 @@ def _draw_markers(pen: Pen, layout: MarkerLayout) -> None:
     square edge, which a detector can take for that of the marker.
     """
     gap, frame = _gap(layout), _frame(layout)
-    frames, cells = [], []
-    for corners, black in zip(layout.p_SQ[:, :, :2], layout.black, strict=True):
+    frames = []
+    for corners in layout.p_SQ[:, :, :2]:
         lower, upper = corners.min(axis=0), corners.max(axis=0)
         frames += [rectangle(lower - frame, upper + frame), rectangle(lower, upper)]
         outer = rectangle(lower - 0.9 * frame, upper + 0.9 * frame)
         meeting = rectangle(lower - gap / 2, upper + gap / 2)
         for start, end in zip(outer.tolist(), meeting.tolist(), strict=True):
             pen.line(start, end, width=SEAM, color=WHITE)
-        for loop in cell_outlines(black):
-            shift = loop * np.array([1.0, -1.0]) * layout.side / layout.cells
-            cells.append(corners[0] + shift)
     pen.area(frames, WHITE)
-    pen.area(cells, BLACK, holes=False)
+    pen.area(_black_cells(layout), BLACK, holes=False)
 
 
 def _draw_outlines(pen: Pen, sheet: Sheet) -> None:
-    """The objects' lines, dark between markers and lighter on them, where they are too thin to turn
-    a cell; interrupted along the edge of a marker, which detectors follow all around it."""
+    """The objects' lines across everything, dark on white and light on black cells, but along the
+    edges of markers, which detectors follow all around."""
     corners = sheet.layout.p_SQ[:, :, :2]
     lower, upper = corners.min(axis=1), corners.max(axis=1)
-    frame = _frame(sheet.layout)
-    inset = 0.5 * sheet.layout.side / sheet.layout.cells
-    on_markers = [rectangle(*c) for c in zip(lower + inset, upper - inset, strict=True)]
-    beside = [rectangle(*c) for c in zip(lower - frame, upper + frame, strict=True)]
-    for on_black, areas in (
-        (False, [rectangle((0.0, 0.0), sheet.size), *beside]),
-        (True, on_markers),
-    ):
+    board = rectangle((0.0, 0.0), sheet.size)
+    cells = _black_cells(sheet.layout)
+    outer = [rectangle(*c) for c in zip(lower - EDGE_CLEAR, upper + EDGE_CLEAR, strict=True)]
+    inner = [rectangle(*c) for c in zip(lower + EDGE_CLEAR, upper - EDGE_CLEAR, strict=True)]
+    for on_black in (False, True):
         pen.canvas.saveState()
-        pen.clip(areas)
+        pen.clip([board, *outer, *inner])
+        pen.clip(cells if on_black else [board, *cells])
         for d in sheet.drawings:
             pen.outline(d.outline, OUTLINE_WIDTH, d.on_black if on_black else d.outline_color)
             pen.outline(d.footprint, FOOTPRINT_WIDTH, d.on_black if on_black else d.footprint_color)
         pen.canvas.restoreState()
+
+
+def _black_cells(layout: MarkerLayout) -> list[Array]:
+    """Outlines of the black cells of all markers (N, 2) [m]; holes run the other way round."""
+    flip = np.array([1.0, -1.0]) * layout.side / layout.cells
+    return [
+        corners[0] + loop * flip
+        for corners, black in zip(layout.p_SQ[:, :, :2], layout.black, strict=True)
+        for loop in cell_outlines(black)
+    ]
 
 
 def _frame(layout: MarkerLayout) -> float:

@@ -50,6 +50,20 @@ class Tile:
     upper: tuple[float, float]
     p_PS: tuple[float, float]
 
+    @property
+    def core(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Corners of the part that is seen once all is glued, lower left and upper right [m]; on
+        sides without a cut that is where the page ends."""
+        left, bottom = (
+            edge if cut is None else cut
+            for cut, edge in zip((self.cut_left, self.cut_bottom), self.lower, strict=True)
+        )
+        right, top = (
+            edge if cut is None else cut
+            for cut, edge in zip((self.cut_right, self.cut_top), self.upper, strict=True)
+        )
+        return (left, bottom), (right, top)
+
 
 @dataclass(frozen=True)
 class Tiling:

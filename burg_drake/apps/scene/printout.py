@@ -47,6 +47,11 @@ def _add_options(parser: Parser) -> None:
         " scaled to compensate",
     )
     add_options(parser, PrintSettings, "height_map", "names")
+    parser.add_argument(
+        "--no-instructions",
+        action="store_true",
+        help="leave out the first page, which shows how the board is printed, assembled and used",
+    )
 
 
 def require_pdf(path: str) -> None:
@@ -65,7 +70,12 @@ def run_printout(arguments: argparse.Namespace) -> int:
 
     require_pdf(arguments.output)
     x, y = arguments.measured_mm
-    settings = settings_from(arguments, PrintSettings, measured=(x * 1e-3, y * 1e-3))
+    settings = settings_from(
+        arguments,
+        PrintSettings,
+        measured=(x * 1e-3, y * 1e-3),
+        instructions=not arguments.no_instructions,
+    )
     scene = load_scene(arguments.scene)
     require_writable(arguments.output)
     printout = print_board(scene, settings)
@@ -78,5 +88,6 @@ def run_printout(arguments: argparse.Namespace) -> int:
     if tiling.paper.name not in PAPERS:
         across = ""
     pages = f"{columns} x {rows} pages" if columns * rows > 1 else "1 page"
-    print(f"wrote {arguments.output}: {pages} {tiling.paper.name}{across}")
+    told = "instructions and " if printout.first else ""
+    print(f"wrote {arguments.output}: {told}{pages} {tiling.paper.name}{across}")
     return 0

@@ -53,7 +53,7 @@ def _printouts(runs: TriedRuns, page: Path) -> dict[int, str]:
     """Writes the board of each scene; returns the files' names by block."""
     from burg_drake.core import BurgError
     from burg_drake.experiment.pages import in_blocks
-    from burg_drake.printout import print_board
+    from burg_drake.printout import PrintSettings, print_board
 
     names: dict[int, str] = {}
     written: dict[str, str] = {}
@@ -63,7 +63,7 @@ def _printouts(runs: TriedRuns, page: Path) -> dict[int, str]:
             taken = f"_{block}" if f"{page.stem}_{scene.name}.pdf" in written.values() else ""
             name = f"{page.stem}_{scene.name}{taken}.pdf"
             try:
-                print_board(scene).save(page.with_name(name))
+                print_board(scene, PrintSettings(instructions=True)).save(page.with_name(name))
             except BurgError as error:
                 message = f"burg-drake: warning: no printed board of {scene.name}: {error}"
                 print(message, file=sys.stderr)

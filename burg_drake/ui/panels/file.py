@@ -113,7 +113,7 @@ class FilePanel:
     def print_out(self, client: Client) -> None:
         """Sends the printout of the board to a page."""
         session = self._actions.session
-        printout = session.printout(PrintSettings(page=self._page.value))
+        printout = session.printout(PrintSettings(page=self._page.value, instructions=True))
         for warning in printout.warnings:
             self._actions.show_warning(client, warning, "On the printout")
         if client is not None:
