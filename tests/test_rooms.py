@@ -34,7 +34,7 @@ ROOMS = {
     "formats": "common grasps collections",
     "objects": "library meshes physics collision",
     "scene": "document arrangement",
-    "printout": "",
+    "printout": "guide",
     "station": "document world control diagram checks",
     "export": "",
     "cameras": "optics sources calibration pose rectification projection placement overlay noise"

@@ -14,9 +14,10 @@ Capture = pytest.CaptureFixture[str]
 def test_it_writes_the_board(tmp_path: Path, capsys: Capture) -> None:
     output = tmp_path / "new" / "board.pdf"
     assert main(["printout", "tabletop_six", "--no-height-map", "-o", str(output)]) == 0
-    assert capsys.readouterr().out == f"wrote {output}: 3 x 2 pages A4 landscape\n"
-    options = ["--page", "a2", "--measured-mm", "99.5,100", "--margin-mm", "4", "--no-names"]
-    assert main(["printout", "tabletop_six", "--no-height-map", *options, "-o", str(output)]) == 0
+    assert capsys.readouterr().out == f"wrote {output}: instructions and 3 x 2 pages A4 landscape\n"
+    options = ["--page", "a2", "--measured-mm", "99.5,100", "--margin-mm", "4.5", "--no-names"]
+    options += ["--no-height-map", "--no-instructions"]
+    assert main(["printout", "tabletop_six", *options, "-o", str(output)]) == 0
     assert capsys.readouterr().out == f"wrote {output}: 1 page A2 landscape\n"
     assert output.read_bytes().startswith(b"%PDF-")
 

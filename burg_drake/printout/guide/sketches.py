@@ -30,7 +30,7 @@ LABEL = 10.0
 """Of words in sketches [points]."""
 THICK = 0.5e-3
 
-Point = tuple[float, float]
+Spot = tuple[float, float]
 
 
 def draw_scale(pen: Pen) -> None:
@@ -202,22 +202,22 @@ def draw_placing(pen: Pen) -> None:
     pen.area([shape], (0.72, 0.82, 0.90))
     pen.outline([shape], 0.3e-3, (0.25, 0.45, 0.60))
     pen.outline([_disc((40e-3, 8.5e-3), 6e-3, 0.42)], 0.6e-3, (0.10, 0.28, 0.42))
-    base, top = 16.5e-3, 25e-3
+    base, top = 15.5e-3, 22.5e-3
     pen.area([rectangle((34e-3, base), (46e-3, top))], SOFT)
     pen.area([_disc((40e-3, base), 6e-3, 0.25)], SOFT)
     pen.area([_disc((40e-3, top), 6e-3, 0.25)], WHITE)
     pen.outline([_disc((40e-3, top), 6e-3, 0.25)], 0.25e-3, INK)
     pen.line((34e-3, top), (34e-3, base), width=0.25e-3)
     pen.line((46e-3, top), (46e-3, base), width=0.25e-3)
-    _arrow(pen, (52e-3, 22e-3), (52e-3, 13e-3), GOOD)
+    _arrow(pen, (52e-3, 21e-3), (52e-3, 12e-3), GOOD)
 
 
-def _sheet(pen: Pen, lower: Point, upper: Point) -> None:
+def _sheet(pen: Pen, lower: Spot, upper: Spot) -> None:
     pen.area([rectangle(lower, upper)], PAPER)
     pen.outline([rectangle(lower, upper)], 0.25e-3, INK)
 
 
-def _verdict(pen: Pen, at: Point, *, good: bool) -> None:
+def _verdict(pen: Pen, at: Spot, *, good: bool) -> None:
     """A tick or a cross, 5 mm wide, with its lower left corner at a point."""
     x, y = at
     if good:
@@ -227,7 +227,7 @@ def _verdict(pen: Pen, at: Point, *, good: bool) -> None:
         pen.line((x, y + 4.5e-3), (x + 4.5e-3, y), width=1e-3, color=BAD)
 
 
-def _arrow(pen: Pen, start: Point, tip: Point, color: Rgb) -> None:
+def _arrow(pen: Pen, start: Spot, tip: Spot, color: Rgb) -> None:
     begin, end = np.array(start), np.array(tip)
     along = (end - begin) / np.linalg.norm(end - begin)
     across = np.array([-along[1], along[0]])
@@ -236,7 +236,7 @@ def _arrow(pen: Pen, start: Point, tip: Point, color: Rgb) -> None:
     pen.area([np.array([end, neck + 1.1e-3 * across, neck - 1.1e-3 * across])], color)
 
 
-def _scissors(pen: Pen, at: Point) -> None:
+def _scissors(pen: Pen, at: Spot) -> None:
     """Open scissors whose blades meet left of a point."""
     x, y = at
     for side in (1.0, -1.0):
@@ -244,7 +244,7 @@ def _scissors(pen: Pen, at: Point) -> None:
         pen.circle(x + 6.8e-3, y - side * 2.2e-3, 1.8e-3, INK, THICK)
 
 
-def _disc(middle: Point, radius: float, flat: float = 1.0) -> Array:
+def _disc(middle: Spot, radius: float, flat: float = 1.0) -> Array:
     """(40, 2) a circle's outline, or an ellipse's whose height is a share of its width."""
     around = np.linspace(0.0, 2 * math.pi, 40, endpoint=False)
     return np.array(middle) + radius * np.column_stack([np.cos(around), flat * np.sin(around)])
