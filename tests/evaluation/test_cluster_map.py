@@ -45,6 +45,8 @@ def nodes() -> Iterator[LocalNodes]:
 def executor(nodes: LocalNodes, monkeypatch: pytest.MonkeyPatch) -> Iterator[DaskExecutor]:
     monkeypatch.setattr("burg_drake.evaluation.cluster.cluster_map.LOOK", 0.2)
     client = distributed.Client(nodes.address, set_as_default=False, timeout=30)
+    nodes.restart_workers()  # those that another test has killed
+    wait_for(lambda: len(threads_by_address(client)) == 2)
     yield DaskExecutor(client, maintain=nodes.restart_workers)
     client.close(timeout=2)
 
