@@ -58,7 +58,7 @@ def nodes() -> Iterator[LocalNodes]:
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """All of a data set but its page."""
+    """Contents of all files of a data set, by name."""
     paths = sorted(path for path in folder.rglob("*") if path.is_file())
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
 

@@ -14,7 +14,7 @@ from burg_drake.dataset.generating.sent_scene import MadeScene, SentScene, make_
 from burg_drake.dataset.generating.work import SceneWork, given_scene, make_scene
 from burg_drake.dataset.labels import grasps_of_run
 from burg_drake.dataset.samples import ShardEntry, write_made_scene
-from burg_drake.evaluation.cluster import DaskExecutor, connect_cluster
+from burg_drake.evaluation.cluster import DaskExecutor, connect_cluster, map_on_cluster
 from burg_drake.evaluation.cluster.bundles import make_bundle
 from burg_drake.evaluation.store import open_results
 from burg_drake.objects.library import ObjectLibrary
@@ -87,7 +87,7 @@ def _make_on_cluster(
         document, path = (scene.document, scene.path) if scene else (None, one.inputs.folder)
         return SentScene(replace(world, data=b""), sent, one.number, document, path, grasps)
 
-    with closing(executor.map_unordered(make_sent_scene, able, world, pack)) as answers:
+    with closing(map_on_cluster(executor, make_sent_scene, able, world, pack)) as answers:
         for one, made in answers:
             yield one, made if isinstance(made, BaseException) else _kept(one, library, made)
 
