@@ -80,6 +80,18 @@ def apply_appearance(built: StationDiagram, appearance: Appearance) -> str:
         raise MissingDependencyError(
             f"rendering needs the system libraries {', '.join(missing)}; run: {apt_command()}"
         )
+    furnish(built, appearance)
+    engine = MakeRenderEngineVtk(render_parameters(appearance))
+    built.scene_graph.AddRenderer(RENDERER, engine)
+    return RENDERER
+
+
+def furnish(built: StationDiagram, appearance: Appearance) -> None:
+    """All of `apply_appearance` but the renderer: what there is to be seen, with any renderer.
+
+    Raises:
+        UnknownNameError: there is no such library of distractors, or no such object in it.
+    """
     if appearance.table is not None:
         _cover_table(built, appearance)
     if not appearance.board:
@@ -87,9 +99,6 @@ def apply_appearance(built: StationDiagram, appearance: Appearance) -> str:
     _add_distractors(built, appearance)
     if any(light.shadows for light in appearance.lights):
         _add_speck(built)
-    engine = MakeRenderEngineVtk(render_parameters(appearance))
-    built.scene_graph.AddRenderer(RENDERER, engine)
-    return RENDERER
 
 
 def render_parameters(appearance: Appearance) -> RenderEngineVtkParams:

@@ -9,13 +9,23 @@ from typing import Literal
 import numpy as np
 from pydrake.multibody.tree import BodyIndex
 
-from burg_drake.core import Array, InvalidInputError, inverse, nearest, transform_points
+from burg_drake.core import (
+    Array,
+    InvalidInputError,
+    UnknownNameError,
+    inverse,
+    nearest,
+    transform_points,
+)
 from burg_drake.dataset.appearance import (
     Appearance,
     apply_appearance,
+    furnish,
     photometric,
     with_background,
 )
+from burg_drake.dataset.blender import RENDERERS, RendererName, blender_scene
+from burg_drake.dataset.rendering.blender_colors import BlenderColors
 from burg_drake.dataset.rendering.colors import DrakeColors
 from burg_drake.dataset.rendering.images import SURROUNDINGS, Images
 from burg_drake.dataset.rendering.ray_scene import RayScene, label_numbers
@@ -32,7 +42,8 @@ KINDS: tuple[ImageKind, ...] = ("color", "depth", "labels", "normals")
 class SceneRenderer:
     """Renders one scene on one station from many places.
 
-    Depth, labels and normals come from rays and are exact; colours come from Drake's renderer.
+    Depth, labels and normals come from rays and are exact, and the same with any renderer; colours
+    come from Drake's renderer or Blender.
 
     Attributes:
         scene, station: what is rendered.
@@ -47,6 +58,7 @@ class SceneRenderer:
         appearance: Appearance | None = None,
         arm: bool = False,
         colors: bool = True,
+        renderer: RendererName = "drake",
     ) -> None:
         """Builds the scene.
 
@@ -57,22 +69,31 @@ class SceneRenderer:
             arm: whether the station's arm is there.
             colors: whether colours will be asked for; without them, and without an appearance, no
                 system libraries are needed.
+            renderer: of colours, `drake` or `blender`, which needs no system libraries.
 
         Raises:
-            MissingDependencyError: a system library of the renderer is missing.
+            MissingDependencyError: a system library of Drake's renderer is missing.
+            UnknownNameError: there is no such renderer.
             InvalidInputError: the station has no arm; and as `build_station_diagram`.
         """
+        if renderer not in RENDERERS:
+            raise UnknownNameError(
+                f"no renderer {renderer!r}; {nearest(renderer, RENDERERS)}"
+            ).about("renderer")
         self.scene, self.station = as_scene(scene), as_station(station)
         self.numbers = label_numbers((*self.scene.instances, *self.scene.background))
-        self._appearance = appearance
+        self._appearance, self._in_blender = appearance, renderer == "blender"
+        seen = colors or appearance is not None
         self._built = build_station_diagram(
             self.scene,
             self.station,
             robot="arm" if arm else "none",
-            cameras=colors or appearance is not None,
+            cameras=() if seen and self._in_blender else seen,
         )
         self._renderer = RENDERER if colors else None
-        if appearance is not None:
+        if appearance is not None and self._in_blender:
+            furnish(self._built, appearance)
+        elif appearance is not None:
             self._renderer = apply_appearance(self._built, appearance)
         self._surfaces = visible_surfaces(self._built.plant, self._built.scene_graph)
         self._context = self._built.diagram.CreateDefaultContext()
@@ -126,9 +147,12 @@ class SceneRenderer:
         return self._ray_scene
 
     @cached_property
-    def _colors(self) -> DrakeColors:
+    def _colors(self) -> DrakeColors | BlenderColors:
         if self._renderer is None:
             raise InvalidInputError("this scene was built without colours")
+        if self._in_blender:
+            scene = blender_scene(self._built, self._appearance)
+            return BlenderColors(scene, self._poses, self._appearance)
         scene_graph = self._built.scene_graph
         context = scene_graph.GetMyContextFromRoot(self._context)
         query = scene_graph.get_query_output_port().Eval(context)
@@ -172,6 +196,10 @@ class SceneRenderer:
                 ]
             )
         return self._rays
+
+    def _poses(self) -> dict[str, Array]:
+        bodies = {one.body for one in self._surfaces}
+        return {str(int(body)): self._X_WB(body) for body in bodies}
 
     def _X_WB(self, body: BodyIndex) -> Array:
         plant = self._built.plant

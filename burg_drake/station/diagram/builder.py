@@ -99,7 +99,7 @@ def build_station_diagram(
             the ports above. Needs an arm.
         cameras: add the station's cameras, all or the named ones; needs the renderer's system
             libraries. The board's markers are drawn with cameras or `meshcat` only; it is plain
-            where nobody looks.
+            where nobody looks. `()` draws them for a renderer of one's own.
         weld_objects: for a plant of the robot alone that is not simulated: what would be free
             stands where it is placed, and can be lifted off by a joint `RISE` of its model along
             world z, and moved sideways with its frame `PLACE`; rigid meshes are replaced by pieces
@@ -134,7 +134,7 @@ def build_station_diagram(
     _set_engine(plant, engine)
 
     table = add_table(plant, station)
-    add_board(plant, scene.board, station, markers=bool(cameras) or meshcat is not None)
+    add_board(plant, scene.board, station, markers=cameras is not False or meshcat is not None)
     add = partial(add_instance, builder, scene, station.packages, by_pieces=weld_objects)
     alone = for_trials if isinstance(for_trials, str) else None
     if alone is not None and alone not in scene.instances:
