@@ -108,7 +108,7 @@ def _add_generate_options(parser: Parser) -> None:
         nargs="+",
         help="sphere (around the scene), wrist, or cameras of the station (default: sphere)",
     )
-    add_options(parser, DatasetRecipe, "views", "sensor", "normals", "seed", unset=True)
+    add_options(parser, DatasetRecipe, "views", "sensor", "renderer", "normals", "seed", unset=True)
     parser.add_argument(
         "--plain",
         action="store_true",

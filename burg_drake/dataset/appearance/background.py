@@ -72,9 +72,7 @@ def over_background(
     return found
 
 
-def _behind(
-    where: Booleans, X_WC: Array, intrinsics: Intrinsics, look: Appearance | None
-) -> Bytes:
+def _behind(where: Booleans, X_WC: Array, intrinsics: Intrinsics, look: Appearance | None) -> Bytes:
     """(H, W, 3) what is behind everything, in pixels of the mask `where`."""
     behind = np.empty((*where.shape, 3), np.uint8)
     behind[:] = SKY if look is None else GREY

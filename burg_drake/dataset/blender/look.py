@@ -39,9 +39,7 @@ def _usual_lights() -> list[DirectedLight]:
     for light in LIGHTS:
         x, y, z = np.asarray(light.direction, float).tolist()
         intensity = float(light.intensity)
-        found.append(
-            DirectedLight(direction=(x, y, z), frame=light.frame, irradiance=intensity)
-        )
+        found.append(DirectedLight(direction=(x, y, z), frame=light.frame, irradiance=intensity))
     return found
 
 

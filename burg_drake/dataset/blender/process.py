@@ -90,7 +90,9 @@ class Blender:
             stderr=self._log,
             env={name: value for name, value in os.environ.items() if name not in foreign},
         )
-        self._lock, self._shown = RLock(), None
+        self._lock = RLock()
+        self._shown: BlenderScene | None = None
+        self._program = command[0]
         self.version = str(self._answer("started")["version"])
 
     @property
@@ -174,8 +176,9 @@ class Blender:
         found: dict[str, Any] = json.loads(line)
         if "missing" in found:
             self.close()
-            program = self._process.args[0]  # type: ignore[index]
-            raise MissingDependencyError(f"{program} has no Blender ({found['missing']}): {REMEDY}")
+            raise MissingDependencyError(
+                f"{self._program} has no Blender ({found['missing']}): {REMEDY}"
+            )
         return found
 
     def _last_words(self) -> str:

@@ -15,7 +15,7 @@ from burg_drake.core import Array
 from burg_drake.core.documents import Vector3
 from burg_drake.dataset.blender.surfaces import PaintedSurface
 
-SAMPLES = 64
+SAMPLES = 16
 """Paths of light a pixel, whose noise is then removed by Open Image Denoise."""
 
 

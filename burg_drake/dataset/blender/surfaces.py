@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -153,12 +153,12 @@ def _physical(found: Any) -> Material:
     """The material of a glTF file, whose numbers are linear and default to 1."""
     color = (255,) * 4 if found.baseColorFactor is None else found.baseColorFactor
     r, g, b, a = (np.asarray(color, float) / 255.0).tolist()
-    emission = BLACK if found.emissiveFactor is None else tuple(map(float, found.emissiveFactor))
+    red, green, blue = BLACK if found.emissiveFactor is None else map(float, found.emissiveFactor)
     return Material(
         color=(r, g, b, a),
         metallic=1.0 if found.metallicFactor is None else float(found.metallicFactor),
         roughness=1.0 if found.roughnessFactor is None else float(found.roughnessFactor),
-        emission=emission,
+        emission=(red, green, blue),
         texture=_png(found.baseColorTexture),
     )
 

@@ -22,6 +22,8 @@ from typing import Any
 
 SENSOR = 36.0
 """Width of Blender's sensor [mm]; only its ratio to the focal length matters."""
+BOUNCES = 4
+"""Of a path of light; more do not show on a table."""
 SHARP = math.radians(30.0)
 """Edges of a mesh without normals are seen from this angle on [rad]."""
 
@@ -96,8 +98,11 @@ class Scene:
         cycles.use_adaptive_sampling = False
         cycles.pixel_filter_type = "BOX"  # a pixel collects what falls on it
         cycles.filter_width = 1.0
+        cycles.max_bounces = BOUNCES
+        cycles.caustics_reflective = cycles.caustics_refractive = False
+        cycles.use_light_tree = False  # which pays with many lights
         cycles.use_denoising = samples > 1
-        cycles.denoiser = "OPENIMAGEDENOISE"
+        cycles.denoiser, cycles.denoising_prefilter = "OPENIMAGEDENOISE", "FAST"
         cycles.denoising_use_gpu = False
 
     def _add(self, name: str, data: Any) -> Any:

@@ -9,6 +9,7 @@ from pathlib import Path
 from burg_drake.core import BurgError, InvalidInputError, content_hash, one_line, software_versions
 from burg_drake.core.paths import name_from, portable_reference
 from burg_drake.core.workers import map_unordered
+from burg_drake.dataset.blender import blender
 from burg_drake.dataset.exchange import write_card
 from burg_drake.dataset.generating.recipe import DatasetRecipe
 from burg_drake.dataset.generating.work import DatasetInputs, SceneWork, make_scene
@@ -77,6 +78,7 @@ def generate_dataset(
         InvalidInputError: the folder holds another data set or is being written, a scene has no
             file, the scenes are of several libraries, or there is no such run.
         UnknownNameError: the station has no such camera.
+        MissingDependencyError: the recipe asks for Blender, and there is none.
     """
     station, recipe = as_station(station), recipe or DatasetRecipe()
     paths: Sequence[Path | None]
@@ -113,6 +115,8 @@ def generate_dataset(
 
 def _require_possible(recipe: DatasetRecipe, station: Station) -> None:
     """Refuses what no scene can have samples with, before a folder is made."""
+    if recipe.renderer == "blender":
+        blender()
     require_cameras(recipe.viewpoints, station)
     if recipe.run:
         open_results(recipe.run)
@@ -144,6 +148,9 @@ def _document(
     folder: Path, library: ObjectLibrary, station: Station, recipe: DatasetRecipe
 ) -> DatasetDocument:
     name = name_from(folder.resolve().name)
+    versions = software_versions(PACKAGES)
+    if recipe.renderer == "blender":
+        versions["blender"] = blender().version
     return DatasetDocument(
         name=name,
         objects=tuple(library.objects),
@@ -151,7 +158,7 @@ def _document(
         station=portable_reference(station.path, folder),
         library_content=content_hash(library.content)[:HASH_DIGITS],
         station_content=station.content[:HASH_DIGITS],
-        versions=software_versions(PACKAGES),
+        versions=versions,
         recipe=recipe.plain(),
     )
 

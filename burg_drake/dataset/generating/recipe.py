@@ -9,9 +9,10 @@ from typing import Any, ClassVar
 
 from burg_drake.cameras.noise import depth_noise
 from burg_drake.cameras.optics import sensor
-from burg_drake.core import LARGEST_SEED, FieldError, setting
+from burg_drake.core import LARGEST_SEED, FieldError, nearest, setting
 from burg_drake.core.documents import parse_document, plain_data, require_ranges
 from burg_drake.dataset.appearance import AppearanceSettings
+from burg_drake.dataset.blender import RENDERERS, RendererName
 from burg_drake.dataset.views import ViewpointSettings
 from burg_drake.scene.document import SceneRecipe
 
@@ -37,6 +38,7 @@ class DatasetRecipe:
         size: width and height of the sensor's images [pixels].
         looks: how the looks of scenes vary, drawn once a scene; as simulated cameras always see
             them if None.
+        renderer: of colours: `drake`, or `blender`, see `dataset.blender`; all else is the same.
         normals: whether there are images of normals.
         grasps_per_object: grasps that are sampled on each object and screened by the open hand.
         run: folder of a run whose grasps and outcomes are taken; none if empty.
@@ -55,6 +57,9 @@ class DatasetRecipe:
     )
     size: tuple[int, int] = (640, 480)
     looks: AppearanceSettings | None = AppearanceSettings()
+    renderer: RendererName = setting(
+        "drake", "of colours; blender is photorealistic, and slow", choices=RENDERERS
+    )
     normals: bool = setting(False, "write images of normals, too")
     grasps_per_object: int = 0
     run: str = ""
@@ -66,6 +71,10 @@ class DatasetRecipe:
         if self.sensor:
             sensor(self.sensor).depth_camera(self.size)
             depth_noise(self.sensor)
+        if self.renderer not in RENDERERS:
+            raise FieldError(
+                f"no renderer {self.renderer!r}; {nearest(self.renderer, RENDERERS)}", "renderer"
+            )
         if self.run and self.grasps_per_object:
             raise FieldError("grasps are sampled or taken from a run, not both", "run")
 

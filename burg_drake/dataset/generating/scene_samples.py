@@ -108,7 +108,11 @@ class SceneSamples:
     def _renderer(self, arm: bool) -> SceneRenderer:
         if arm not in self._renderers:
             self._renderers[arm] = SceneRenderer(
-                self._scene, self._station, appearance=self._appearance, arm=arm
+                self._scene,
+                self._station,
+                appearance=self._appearance,
+                arm=arm,
+                renderer=self._recipe.renderer,
             )
         return self._renderers[arm]
 
