@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -22,7 +23,11 @@ from burg_drake.core import (
     UnknownNameError,
     make_pose,
 )
-from burg_drake.dataset.appearance import Appearance, DirectedLight, TableSurface
+from burg_drake.dataset.appearance import (
+    Appearance,
+    DirectedLight,
+    TableSurface,
+)
 from burg_drake.dataset.appearance.background import GREY, SKY, over_background
 from burg_drake.dataset.blender import (
     Blender,
@@ -37,6 +42,7 @@ from burg_drake.dataset.blender.process import VARIABLE, blender_command
 from burg_drake.dataset.rendering import RayScene, SceneRenderer, station_view
 from burg_drake.dataset.views import View
 from burg_drake.station.diagram import visible_surfaces
+from tests.dataset.shapes_scene import looking_at
 
 CAMERA = Intrinsics(width=160, height=120, focal=(210.0, 170.0), center=(61.3, 70.8))
 """With pixels that are not square, and an axis that is not in the middle."""
@@ -173,7 +179,7 @@ def test_labels_need_no_blender(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(VARIABLE, "no_such_blender")
     kinds = ("depth", "labels")
     ours = burg.render("tabletop_six", "panda_tabletop", "board", kinds, renderer="blender")
-    drakes = burg.render("tabletop_six", "panda_tabletop", "board", (*kinds, "color"))
+    drakes = burg.render("tabletop_six", "panda_tabletop", "board", kinds)
     assert np.array_equal(ours.depth, drakes.depth) and np.array_equal(ours.labels, drakes.labels)
 
 
@@ -234,36 +240,30 @@ def test_half_an_image_is_none() -> None:
 
 
 def test_pixels_are_where_rays_have_them(rendering: Blender) -> None:
-    """Shares of pixels that shining things take: their middles, and edges, as rays have them."""
+    """Shares of pixels that things take, each alone: their middles, and their edges. Those of a
+    camera that is half a pixel aside would be, and of one with another focal length or axis."""
     ball = trimesh.creation.icosphere(4, 0.05)
     ball.apply_translation((0.06, -0.02, 0.05))
     box = trimesh.creation.box((0.06, 0.04, 0.05))
     box.apply_transform(trimesh.transformations.rotation_matrix(0.4, (0.2, 0.3, 1.0)))
     box.apply_translation((-0.07, 0.05, 0.03))
-    black = {"color": (0.0, 0.0, 0.0, 1.0), "roughness": 1.0}
-    shining = (
-        surface(ball, Material(emission=(1.0, 0.0, 0.0), **black)),
-        surface(box, Material(emission=(0.0, 1.0, 0.0), **black)),
-    )
-    camera = Intrinsics(width=320, height=240, focal=(420.0, 340.0), center=(122.3, 141.8))
-    tilted = DOWN @ make_pose(cv2.Rodrigues(np.array([0.1, 0.15, 0.3]))[0])
-    X_WC = make_pose(tilted[:3, :3], (0.05, 0.02, 0.6))
-    image = image_of(rendering, BlenderScene(shining, (), samples=256), X_WC, camera)
-    rays = RayScene.joined([(k, one.vertices, one.faces) for k, one in enumerate(shining, 1)])
-    labels = rays.images(View(camera="tilted", intrinsics=camera, X_SC=X_WC)).labels
-    assert labels is not None and np.unique(labels).tolist() == [0, 1, 2]
-    for k, channel in ((1, 0), (2, 1)):
-        mask = labels == k
-        alone = image[..., 3] / 255.0 * (image[..., channel] > image[..., 1 - channel])
-        apart = (alone > 0.5) != mask
-        inner = cv2.erode(mask.astype(np.uint8), np.ones((3, 3))).astype(bool)
-        outer = cv2.dilate(mask.astype(np.uint8), np.ones((3, 3))).astype(bool)
-        assert mask.sum() > 1000 and not apart[inner | ~outer].any()
-        assert apart.sum() < 0.01 * mask.sum()
-        for share, axis in zip(np.nonzero(mask), range(2), strict=True):
-            along = np.arange(image.shape[axis])
-            ours = (alone.sum(axis=1 - axis) * along).sum() / alone.sum()
-            assert ours == pytest.approx(share.mean(), abs=0.05)
+    camera = Intrinsics(width=480, height=360, focal=(840.0, 680.0), center=(190.3, 206.8))
+    X_WC = looking_at((0.1, -0.25, 0.5), (0.0, 0.0, 0.03))
+    view = View(camera="tilted", intrinsics=camera, X_SC=X_WC)
+    for mesh in (ball, box):
+        part = surface(mesh, Material())
+        share = image_of(rendering, BlenderScene((part,), (), samples=32), X_WC, camera)[..., 3]
+        labels = RayScene.joined([(1, part.vertices, part.faces)]).images(view).labels
+        assert labels is not None
+        mask = labels == 1
+        inner = cv2.erode(labels, np.ones((3, 3))) == 1
+        beyond = cv2.dilate(labels, np.ones((3, 3))) == 0
+        assert mask.sum() > 5000 and (share[inner] == 255).all() and not share[beyond].any()
+        assert np.count_nonzero((share > 127) != mask) < 0.005 * mask.sum()
+        rows, columns = np.mgrid[:360, :480]
+        for along in (rows, columns):
+            middle = (share * along).sum() / share.sum(dtype=float)
+            assert middle == pytest.approx(along[mask].mean(), abs=0.03)
 
 
 def test_light_is_as_bright_as_in_drakes_renderer(rendering: Blender) -> None:
@@ -357,12 +357,10 @@ def test_it_looks_like_drakes(rendering: Blender, small: View) -> None:
 
 
 def test_a_lens_bends_the_picture_as_the_labels(rendering: Blender, small: View) -> None:
-    from dataclasses import replace
-
     bent = replace(small.intrinsics, distortion=(-0.28, 0.09, 0.001, -0.0005))
     renderer = SceneRenderer("tabletop_six", "panda_tabletop", renderer="blender")
     straight, lens = renderer.images(small), renderer.images(replace(small, intrinsics=bent))
-    assert np.count_nonzero(straight.labels != lens.labels) > 100
+    assert np.count_nonzero(straight.labels != lens.labels) > 50
     yellow = [one.color[one.labels == 6].astype(float).mean(axis=0) for one in (straight, lens)]
     assert np.allclose(*yellow, atol=8.0)
 

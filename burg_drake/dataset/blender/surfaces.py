@@ -14,7 +14,6 @@ from pydrake.geometry import GeometryProperties, GeometrySet, Mesh, Rgba, Role, 
 from pydrake.multibody.plant import MultibodyPlant
 
 from burg_drake.core import Array, Indices, transform_points
-from burg_drake.core.documents import Vector3
 from burg_drake.dataset.appearance import linear_from_srgb
 from burg_drake.station.diagram import shape_triangles
 
@@ -23,7 +22,6 @@ UNPAINTED = (0.9, 0.7, 0.2, 1.0)
 ROUGHNESS = 0.5
 """Of surfaces that do not say: a plastic between mat and shiny."""
 Color = tuple[float, float, float, float]
-BLACK: Vector3 = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,14 +32,12 @@ class Material:
         color: red, green, blue, linear, and opacity; multiplies the texture.
         metallic: 0 for a dielectric, 1 for a metal.
         roughness: 0 for a mirror, 1 for chalk.
-        emission: red, green, blue that it shines with, linear.
         texture: PNG in sRGB; none if empty.
     """
 
     color: Color = UNPAINTED
     metallic: float = 0.0
     roughness: float = ROUGHNESS
-    emission: Vector3 = BLACK
     texture: bytes = b""
 
 
@@ -153,12 +149,10 @@ def _physical(found: Any) -> Material:
     """The material of a glTF file, whose numbers are linear and default to 1."""
     color = (255,) * 4 if found.baseColorFactor is None else found.baseColorFactor
     r, g, b, a = (np.asarray(color, float) / 255.0).tolist()
-    red, green, blue = BLACK if found.emissiveFactor is None else map(float, found.emissiveFactor)
     return Material(
         color=(r, g, b, a),
         metallic=1.0 if found.metallicFactor is None else float(found.metallicFactor),
         roughness=1.0 if found.roughnessFactor is None else float(found.roughnessFactor),
-        emission=(red, green, blue),
         texture=_png(found.baseColorTexture),
     )
 

@@ -135,8 +135,6 @@ class Scene:
         shader["Alpha"].default_value = opacity
         shader["Metallic"].default_value = described["metallic"]
         shader["Roughness"].default_value = described["roughness"]
-        shader["Emission Color"].default_value = (*described["emission"], 1.0)
-        shader["Emission Strength"].default_value = 1.0
         if described["texture"]:
             image = nodes.new("ShaderNodeTexImage")
             image.image = self._image(folder / described["texture"])
