@@ -223,6 +223,18 @@ def test_an_end_and_a_refusal() -> None:
     failing.close()
 
 
+def test_nobody_gets_the_answer_to_an_interrupted_question() -> None:
+    """The process ends with the question."""
+    waiting = Blender(
+        program("import signal; sys.stdin.readline(); os.kill(os.getppid(), signal.SIGINT)\n"
+                "sys.stdin.read()")
+    )  # fmt: skip
+    with pytest.raises(KeyboardInterrupt):
+        image_of(waiting, EMPTY)
+    waiting.close()
+    assert not waiting.alive
+
+
 def test_half_an_image_is_none() -> None:
     half = Blender(
         program(
@@ -264,6 +276,23 @@ def test_pixels_are_where_rays_have_them(rendering: Blender) -> None:
         for along in (rows, columns):
             middle = (share * along).sum() / share.sum(dtype=float)
             assert middle == pytest.approx(along[mask].mean(), abs=0.03)
+
+
+def test_a_program_that_calls_itself_blender(
+    rendering: Blender, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """It is told to run the worker as Blender is, and may greet before."""
+    stand_in = tmp_path / "blender"
+    run = " ".join(blender_command()[:-1])
+    stand_in.write_text(
+        "#!/bin/sh\necho 'Blender 4.5.0'\n[ $1 = --version ] && exit\n"
+        f'[ "$1 $2" = "--background --factory-startup" ] || exit 9\nexec {run} "$6"\n'
+    )
+    stand_in.chmod(0o755)
+    monkeypatch.setenv(VARIABLE, str(stand_in))
+    started = Blender(blender_command())
+    assert started.version == rendering.version
+    started.close()
 
 
 def test_light_is_as_bright_as_in_drakes_renderer(rendering: Blender) -> None:

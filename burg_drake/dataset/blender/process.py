@@ -59,7 +59,8 @@ def blender_command() -> list[str]:
         raise MissingDependencyError(f"{VARIABLE} is {given!r}, which is no program: {REMEDY}")
     told = subprocess.run([found, "--version"], capture_output=True, text=True, check=False)
     if told.stdout.startswith("Blender"):
-        return [found, "--background", "--factory-startup", "--python", str(WORKER)]
+        quiet = ["--background", "--factory-startup", "--python-exit-code", "1"]
+        return [found, *quiet, "--python", str(WORKER)]
     return [found, "-P", str(WORKER)]
 
 
@@ -162,13 +163,19 @@ class Blender:
             self._process.stdin.flush()
         except BrokenPipeError:
             pass  # it has ended, which the answer tells
-        error = self._answer(when).get("error")
+        try:
+            error = self._answer(when).get("error")
+        except BaseException:
+            self._process.kill()  # an answer that nobody waits for must not be taken for the next
+            raise
         if error is not None:
             raise SimulationError(f"Blender failed when {when}: {error}")
 
     def _answer(self, when: str) -> dict[str, Any]:
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
+        while line.endswith(b"\n") and not line.startswith(b"{"):  # what Blender says of itself
+            line = self._process.stdout.readline()
         if not line.endswith(b"\n"):
             code = self._process.wait()
             how = f"by {signal.Signals(-code).name}" if code < 0 else f"with code {code}"
