@@ -29,16 +29,10 @@ from burg_drake.dataset.appearance import (
     TableSurface,
 )
 from burg_drake.dataset.appearance.background import GREY, SKY, over_background
-from burg_drake.dataset.blender import (
-    Blender,
-    BlenderScene,
-    Lamp,
-    Material,
-    PaintedSurface,
-    blender_scene,
-    painted_surfaces,
-)
-from burg_drake.dataset.blender.process import VARIABLE, blender_command
+from burg_drake.dataset.blender import BlenderScene, blender_scene
+from burg_drake.dataset.blender.process import VARIABLE, Blender, blender_command
+from burg_drake.dataset.blender.scene import Lamp
+from burg_drake.dataset.blender.surfaces import Material, PaintedSurface, painted_surfaces
 from burg_drake.dataset.rendering import RayScene, SceneRenderer, station_view
 from burg_drake.dataset.views import View
 from burg_drake.station.diagram import visible_surfaces

@@ -28,7 +28,7 @@ SHARP = math.radians(30.0)
 """Edges of a mesh without normals are seen from this angle on [rad]."""
 
 
-class Scene:
+class LoadedScene:
     """Blender's scene, and what moves in it.
 
     Args:
@@ -58,12 +58,11 @@ class Scene:
 
     def render(self, task: dict[str, Any]) -> None:
         """Writes one image."""
-        from mathutils import Matrix
-
         for body, pose in task["poses"].items():
             for placed in self._bodies.get(body, ()):
-                placed.matrix_world = Matrix(pose)
-        self._camera.matrix_world = Matrix(task["X_WC"]) @ Matrix.Diagonal((1.0, -1.0, -1.0, 1.0))
+                placed.matrix_world = columns(pose)
+        looking = [[x, -y, -z, p] for x, y, z, p in task["X_WC"]]  # along -z, with y up
+        self._camera.matrix_world = columns(looking)
         self._set_lens(task)
         self._scene.render.filepath = task["output"]
         self._bpy.ops.render.render(write_still=True)
@@ -146,17 +145,16 @@ class Scene:
         return material
 
     def _lamp(self, described: dict[str, Any]) -> None:
-        from mathutils import Matrix, Vector
-
         lamp = self._bpy.data.lights.new("lamp", "SUN")
         lamp.energy, lamp.color = described["irradiance"], described["color"]
         lamp.angle, lamp.use_shadow = described["angle"], described["shadows"]
         placed = self._add("lamp", lamp)
-        along = Vector(described["direction"])
+        x, y, z = described["direction"]
         if described["frame"] == "camera":
             placed.parent = self._camera
-            along = Matrix.Diagonal((1.0, -1.0, -1.0)) @ along
-        placed.rotation_euler = along.to_track_quat("-Z", "Y").to_euler()
+            y, z = -y, -z
+        # It shines along its own -z, which is turned down from the zenith and then around it.
+        placed.rotation_euler = (0.0, math.atan2(math.hypot(x, y), -z), math.atan2(-y, -x))
 
     def _world(self, file: str, folder: Path) -> None:
         world = self._bpy.data.worlds.new("world")
@@ -176,6 +174,11 @@ class Scene:
         if not image.packed_file:
             image.pack()
         return image
+
+
+def columns(rows: list[list[float]]) -> list[tuple[float, ...]]:
+    """A matrix as Blender takes one from lists."""
+    return list(zip(*rows, strict=True))
 
 
 def main() -> None:
@@ -199,7 +202,7 @@ def main() -> None:
         try:
             if task["do"] == "load":
                 scene = None
-                scene = Scene(bpy, Path(task["folder"]))
+                scene = LoadedScene(bpy, Path(task["folder"]))
             elif scene is not None:
                 scene.render(task)
             answer()
