@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from burg_drake.core.documents import Vector3
 from burg_drake.dataset.appearance import Appearance, DirectedLight, environment_file
 from burg_drake.dataset.blender.scene import BlenderScene, Lamp
 from burg_drake.dataset.blender.surfaces import painted_surfaces
@@ -18,8 +17,9 @@ LAMP_ANGLE = np.deg2rad(4.0)
 def blender_scene(built: StationDiagram, appearance: Appearance | None = None) -> BlenderScene:
     """A diagram as it is for Blender.
 
-    Lights of the world always cast shadows, as those of the world do. One that goes with the camera
-    stands for what walls scatter, and casts them only if it is asked to.
+    Lights that stand in the world cast shadows whether or not they are asked to: without them
+    things seem to float. One that goes with the camera stands for what walls scatter, and casts
+    them only if it is asked to.
 
     Args:
         built: with the markers of its board, and the things of the appearance.
@@ -44,12 +44,11 @@ def _usual_lights() -> list[DirectedLight]:
 
 
 def _lamp(light: DirectedLight) -> Lamp:
-    color: Vector3 = light.color
     return Lamp(
         direction=light.direction,
         frame=light.frame,
         irradiance=light.irradiance * np.pi,  # a white surface reflects the pi-th part
-        color=color,
+        color=light.color,
         shadows=light.shadows or light.frame == "world",
         angle=float(LAMP_ANGLE),
     )

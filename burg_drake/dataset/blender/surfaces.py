@@ -72,9 +72,6 @@ def painted_surfaces(
         scene_graph: has the shapes.
         linear: whether colours of shapes and OBJ files are linear, as Drake's physically based
             shading takes them, or sRGB, as its simple shading does.
-
-    Raises:
-        InvalidInputError: a mesh file cannot be read.
     """
     inspector = scene_graph.model_inspector()
     seen = inspector.GetGeometryIds(GeometrySet(inspector.GetAllGeometryIds()), Role.kPerception)
