@@ -42,7 +42,7 @@ def with_possible_colors(recipe: DatasetRecipe, folder: Path) -> DatasetRecipe:
     from burg_drake.system_libraries import describe_missing, missing_render_libraries
 
     missing = missing_render_libraries()
-    if not recipe.colors or not missing:
+    if not recipe.colors or recipe.renderer != "drake" or not missing:
         return recipe
     if _has_colors(folder):
         raise MissingDependencyError(

@@ -104,7 +104,7 @@ def _add_generate_options(parser: Parser) -> None:
         nargs="+",
         help="sphere (around the scene), wrist, or cameras of the station (default: sphere)",
     )
-    known = ("views", "sensor", "normals", "colors", "seed")
+    known = ("views", "sensor", "renderer", "normals", "colors", "seed")
     add_options(parser, DatasetRecipe, *known, unset=True)
     parser.add_argument(
         "--plain",

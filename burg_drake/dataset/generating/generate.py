@@ -16,6 +16,7 @@ from burg_drake.core import (
     software_versions,
 )
 from burg_drake.core.paths import name_from, portable_reference
+from burg_drake.dataset.blender import blender
 from burg_drake.dataset.exchange import write_card
 from burg_drake.dataset.generating.makers import scene_maker
 from burg_drake.dataset.generating.recipe import DatasetRecipe
@@ -89,8 +90,8 @@ def generate_dataset(
         InvalidInputError: the folder holds another data set, is being written or is full, a scene
             has no file, the scenes are of several libraries, or there is no such run.
         UnknownNameError: the station has no such camera.
-        MissingDependencyError: the recipe has colours, and a system library of the renderer is
-            missing; or Dask is asked for, and not installed.
+        MissingDependencyError: the recipe has colours, and what renders them is missing; or Dask is
+            asked for, and not installed.
         ClusterError: no scheduler is reached, or it is lost; a worker has other versions; scenes
             that are there stay, and the same call continues.
     """
@@ -139,8 +140,11 @@ def _require_possible(recipe: DatasetRecipe, station: Station) -> None:
     require_cameras(recipe.viewpoints, station)
     if recipe.run:
         open_results(recipe.run)
-    missing = missing_render_libraries() if recipe.colors else []
-    if missing:
+    if not recipe.colors:
+        return
+    if recipe.renderer == "blender":
+        blender()
+    elif missing := missing_render_libraries():
         raise MissingDependencyError(
             f"the recipe has colours (colors=False leaves them out): {describe_missing(missing)}"
         )
@@ -172,6 +176,9 @@ def _document(
     folder: Path, library: ObjectLibrary, station: Station, recipe: DatasetRecipe
 ) -> DatasetDocument:
     name = name_from(folder.resolve().name)
+    versions = software_versions(PACKAGES)
+    if recipe.renderer == "blender":
+        versions["blender"] = blender().version
     return DatasetDocument(
         name=name,
         objects=tuple(library.objects),
@@ -179,7 +186,7 @@ def _document(
         station=portable_reference(station.path, folder),
         library_content=content_hash(library.content)[:HASH_DIGITS],
         station_content=station.content[:HASH_DIGITS],
-        versions=software_versions(PACKAGES),
+        versions=versions,
         recipe=recipe.plain(),
     )
 

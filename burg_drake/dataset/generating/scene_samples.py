@@ -119,7 +119,12 @@ class SceneSamples:
         arm = view.posture is not None
         if (arm, colors) not in self._renderers:
             self._renderers[arm, colors] = SceneRenderer(
-                self._scene, self._station, appearance=self._appearance, arm=arm, colors=colors
+                self._scene,
+                self._station,
+                appearance=self._appearance,
+                arm=arm,
+                colors=colors,
+                renderer=self._recipe.renderer,
             )
         return self._renderers[arm, colors]
 
