@@ -33,7 +33,9 @@ from burg_drake.dataset.blender import BlenderScene, blender_scene
 from burg_drake.dataset.blender.process import VARIABLE, Blender, blender_command
 from burg_drake.dataset.blender.scene import Lamp
 from burg_drake.dataset.blender.surfaces import Material, PaintedSurface, painted_surfaces
-from burg_drake.dataset.rendering import RayScene, SceneRenderer, station_view
+from burg_drake.dataset.rendering import SceneRenderer, station_view
+from burg_drake.dataset.rendering.ray_scene import RayScene
+from burg_drake.dataset.rendering.ray_surface import RaySurface
 from burg_drake.dataset.views import View
 from burg_drake.station.diagram import visible_surfaces
 from tests.dataset.shapes_scene import looking_at
@@ -259,7 +261,7 @@ def test_pixels_are_where_rays_have_them(rendering: Blender) -> None:
     for mesh in (ball, box):
         part = surface(mesh, Material())
         share = image_of(rendering, BlenderScene((part,), (), samples=32), X_WC, camera)[..., 3]
-        labels = RayScene.joined([(1, part.vertices, part.faces)]).images(view).labels
+        labels = RayScene([RaySurface(1, part.vertices, part.faces)]).images(view).labels
         assert labels is not None
         mask = labels == 1
         inner = cv2.erode(labels, np.ones((3, 3))) == 1
