@@ -220,6 +220,10 @@ def test_the_arm_stands_as_it_is_told(station: Station, scene: Scene) -> None:
     drawn = renderer.images(home).color.astype(int)
     moved = np.abs(drawn - renderer.images(turned).color).max(axis=2) > 60
     assert moved[(first != second)].mean() > 0.5
+    bare = View(camera="overview", intrinsics=home.intrinsics, X_SC=home.X_SC)
+    for one in (renderer, SceneRenderer(scene, station, arm=True, colors=False)):
+        with pytest.raises(InvalidInputError, match=r"a view without the arm in it, of a scene"):
+            one.images(bare, ("depth",))
     with pytest.raises(InvalidInputError, match=r"posture of 2 joints; the arm has 7"):
         renderer.images(
             View(camera="x", intrinsics=home.intrinsics, X_SC=home.X_SC, posture=(0.0, 1.0))

@@ -91,8 +91,7 @@ def _add_generate_options(parser: Parser) -> None:
         metavar="N",
         dest="objects",
         type=positive_int,
-        default=SceneRecipe.count,
-        help="objects in a sampled scene (default: %(default)d)",
+        help=f"objects in a sampled scene (default: {SceneRecipe.count})",
     )
     add_station(parser)
     parser.add_argument(
@@ -134,7 +133,7 @@ def run_generate(arguments: argparse.Namespace) -> int:
     recipe = _recipe(arguments)
     scenes: list[Scene] | ObjectLibrary
     if arguments.sample is not None:
-        scenes, count, sampled = _sampling(arguments, station)
+        scenes, count, sampled = _sampling(arguments, recipe, station)
         recipe = _replaced(recipe, sampled=sampled)
     else:
         scenes = _given_scenes(arguments.scenes)
@@ -148,7 +147,7 @@ def run_generate(arguments: argparse.Namespace) -> int:
             station,
             arguments.output,
             recipe,
-            count=count,
+            count=None if arguments.sample is None else count,
             workers=arguments.workers,
             cluster=arguments.cluster,
             progress=lambda number, error: pace.step(),
@@ -218,8 +217,10 @@ def _given_scenes(references: list[str]) -> list[Scene]:
 
 
 def _sampling(
-    arguments: argparse.Namespace, station: Station
+    arguments: argparse.Namespace, asked: DatasetRecipe, station: Station
 ) -> tuple[ObjectLibrary, int, SceneRecipe]:
+    from dataclasses import replace
+
     from burg_drake.apps.scene import library_reference, station_reference
     from burg_drake.core import InvalidInputError
     from burg_drake.objects.library import load_library
@@ -233,13 +234,16 @@ def _sampling(
         )
     library = load_library(name)
     folder = Path(arguments.output) / "scenes"
-    recipe = SceneRecipe(
-        library=library_reference(name, library, folder),
-        count=arguments.objects,
-        seed=arguments.seed or 0,
+    reference = library_reference(name, library, folder)
+    sampled = asked.sampled or SceneRecipe(library=reference, seed=asked.seed)
+    sampled = replace(
+        sampled,
+        library=reference,
+        count=sampled.count if arguments.objects is None else arguments.objects,
+        seed=sampled.seed if arguments.seed is None else arguments.seed,
         station=station_reference(arguments.station, station, folder),
     )
-    return library, int(count), recipe
+    return library, int(count), sampled
 
 
 def run_check(arguments: argparse.Namespace) -> int:

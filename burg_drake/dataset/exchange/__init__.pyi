@@ -1,5 +1,8 @@
 from .bop import write_bop as write_bop
-from .card import write_card as write_card
+from .card import (
+    CARD as CARD,
+    write_card as write_card,
+)
 from .coco import write_coco as write_coco
 from .graspnet import (
     write_graspnet as write_graspnet,

@@ -161,15 +161,15 @@ class SceneRenderer:
         return DrakeColors(query, scene_graph.world_frame_id(), self._renderer, fill)
 
     def _place_arm(self, view: View) -> None:
-        if view.posture == self._posture:
-            return
         joints = self._built.arm_joints
-        if not joints or view.posture is None:
+        if bool(joints) != (view.posture is not None):
             have = "no arm" if not joints else "its arm"
             raise InvalidInputError(
                 f"a view {'without' if view.posture is None else 'with'} the arm in it, of a scene"
                 f" with {have}"
             )
+        if view.posture is None or view.posture == self._posture:
+            return
         if len(view.posture) != len(joints):
             raise InvalidInputError(
                 f"posture of {len(view.posture)} joints; the arm has {len(joints)}"
