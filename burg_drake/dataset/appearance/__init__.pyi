@@ -10,10 +10,7 @@ from .background import (
     over_background as over_background,
     with_background as with_background,
 )
-from .distractors import (
-    distractor_boxes as distractor_boxes,
-    distractor_library as distractor_library,
-)
+from .distractors import distractor_boxes as distractor_boxes
 from .drawing import draw_appearance as draw_appearance
 from .photometry import (
     linear_from_srgb as linear_from_srgb,

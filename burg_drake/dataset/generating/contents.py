@@ -8,7 +8,6 @@ from pathlib import Path
 
 from burg_drake.core import InvalidInputError, content_hash
 from burg_drake.core.paths import PACKAGE_URI, portable_reference, resolve
-from burg_drake.dataset.appearance import distractor_library
 from burg_drake.dataset.generating.recipe import DatasetRecipe
 from burg_drake.dataset.samples import DatasetDocument
 from burg_drake.objects.library import ObjectLibrary, load_library
@@ -63,7 +62,7 @@ def distractors_content(recipe: DatasetRecipe, folder: Path) -> str:
     if recipe.looks is None or not recipe.looks.distractors[1]:
         return ""
     root = placed_library(recipe.looks.distractor_library, folder)
-    return library_content(distractor_library(root))
+    return library_content(load_library(root))
 
 
 def require_same_contents(
