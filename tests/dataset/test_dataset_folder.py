@@ -202,7 +202,6 @@ def test_one_process_writes_at_a_time(tmp_path: Path) -> None:
     ("change", "message"),
     [
         ({"objects": ("mug",)}, "objects is ['mug', 'bottle', 'box', 'screwdriver', 'bowl', "),
-        ({"name": "other"}, "name is drawn there, other here"),
         ({"library_content": "ab"}, "the content of the library is none there, ab here"),
         ({"versions": {"drake": "3", "burg_drake": "1"}}, "(drake is 2 there, 3 here)"),
         ({"recipe": None}, "recipe.views.count is 3 there, none here; "),

@@ -103,8 +103,10 @@ def _add_generate_options(parser: Parser) -> None:
         nargs="+",
         help="sphere (around the scene), wrist, or cameras of the station (default: sphere)",
     )
-    known = ("views", "sensor", "renderer", "normals", "colors", "seed")
-    add_options(parser, DatasetRecipe, *known, unset=True)
+    for name in ("views", "sensor", "renderer", "normals", "colors", "seed"):
+        default = getattr(DatasetRecipe(), name)
+        shown = None if isinstance(default, bool) or default == "" else default
+        add_options(parser, DatasetRecipe, name, unset=True, shown_default=shown)
     parser.add_argument(
         "--plain",
         action="store_true",
@@ -124,6 +126,7 @@ def _add_generate_options(parser: Parser) -> None:
 
 def run_generate(arguments: argparse.Namespace) -> int:
     """Writes a data set; 1 if some scenes have no samples."""
+    from burg_drake.core import InvalidInputError
     from burg_drake.core.terminal import Progress, ProgressMeter, Reporter
     from burg_drake.dataset.generating import generate_dataset
     from burg_drake.dataset.samples import load_dataset
@@ -135,6 +138,10 @@ def run_generate(arguments: argparse.Namespace) -> int:
     if arguments.sample is not None:
         scenes, count, sampled = _sampling(arguments, recipe, station)
         recipe = _replaced(recipe, sampled=sampled)
+    elif arguments.objects is not None:
+        raise InvalidInputError(
+            f"-n {arguments.objects}: how many objects stand in given scenes is in their documents"
+        )
     else:
         scenes = _given_scenes(arguments.scenes)
         count = len(scenes)

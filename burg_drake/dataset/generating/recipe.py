@@ -57,7 +57,9 @@ class DatasetRecipe:
     views: int = setting(20, "views of each scene", metavar="K", low=1)
     viewpoints: ViewpointSettings = ViewpointSettings()
     sensor: str = setting(
-        "", "depth camera with its intrinsics and noise: d435, d455, azure_kinect, ..."
+        "",
+        "depth camera with its intrinsics and noise: d435, d455, azure_kinect, zivid_two, kinect",
+        metavar="NAME",
     )
     size: tuple[int, int] | None = None
     looks: AppearanceSettings | None = AppearanceSettings()

@@ -53,7 +53,8 @@ class DatasetDocument:
 
     def differences(self, other: DatasetDocument) -> list[str]:
         """What two differ in, in words; `other` is here, this is there. Of a library or a station
-        its content counts, not where it is, and of the versions those in `DECIDING_VERSIONS`."""
+        its content counts, not where it is, and of the versions those in `DECIDING_VERSIONS`; the
+        name does not count."""
         mine, theirs = _compared(self), _compared(other)
         found = [
             f"{name} is {_shown(mine.get(name))} there, {_shown(theirs.get(name))} here"
@@ -99,7 +100,6 @@ def save_dataset_document(document: DatasetDocument, path: str | Path) -> None:
 def _compared(document: DatasetDocument) -> dict[str, Any]:
     """Values that decide about samples, by their name for messages."""
     values: dict[str, Any] = {
-        "name": document.name,
         "objects": list(document.objects),
         "the content of the library": document.library_content,
         "the content of the station": document.station_content,
