@@ -8,6 +8,7 @@ from .appearance import (
     draw_appearance as draw_appearance,
 )
 from .exchange import (
+    ReadableSamples as ReadableSamples,
     Samples as Samples,
     contact_sheet as contact_sheet,
     write_bop as write_bop,

@@ -25,6 +25,7 @@ from burg_drake.dataset.exchange.image_files import color_file, depth_numbers, p
 from burg_drake.dataset.exchange.source import (
     Samples,
     depth_of,
+    lost_depth,
     object_index,
     require_images,
     require_pinhole,
@@ -73,7 +74,9 @@ def write_bop(
         MeshError: a mesh of the library is damaged.
     """
     if not depth_unit > 0.0:
-        raise InvalidInputError(f"unit of depth is {depth_unit:g} m; it must be above 0")
+        raise InvalidInputError(f"unit of depth is {depth_unit:g} m; it must be above 0").about(
+            "depth_unit"
+        )
     suffix = ".jpg" if split.endswith("_pbr") else ".png"
     lost: set[str] = set()
     targets: list[dict[str, int]] = []
@@ -85,7 +88,7 @@ def write_bop(
                 if not (fresh / "camera.json").exists():
                     _write_json(fresh / "camera.json", _camera(sample, depth_unit))
                 scene.add(sample, depth_of(sample, "BOP", sensor=sensor_depth))
-                lost |= set(_losses(sample))
+                lost |= {*_losses(sample), *lost_depth(sample, "BOP", sensor=sensor_depth)}
             scene.finish()
             targets += scene.targets(number)
         if split.startswith("test"):

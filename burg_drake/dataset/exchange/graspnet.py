@@ -39,6 +39,7 @@ from burg_drake.dataset.exchange.model_file import visual_model, write_ply
 from burg_drake.dataset.exchange.source import (
     Samples,
     depth_of,
+    lost_depth,
     object_index,
     require_images,
     require_pinhole,
@@ -134,6 +135,7 @@ def write_graspnet(
                 if name not in cameras:
                     cameras[name] = _Camera(samples.objects, scene, name, opening)
                 cameras[name].add(sample, depth_of(sample, "GraspNet", sensor=sensor_depth))
+                lost |= lost_depth(sample, "GraspNet", sensor=sensor_depth)
             for one in cameras.values():
                 one.finish()
     return tuple(sorted(lost))

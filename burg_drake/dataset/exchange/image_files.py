@@ -51,7 +51,7 @@ def depth_numbers(depth: Single, unit: float, key: str) -> NDArray[np.uint16]:
         raise InvalidInputError(
             f"depth of sample {key} is up to {depth.max():.3g} m; images of 16 bits end at"
             f" {DEEPEST * unit:.3g} m if 1 stands for {1e3 * unit:g} mm: take a larger unit"
-        )
+        ).about("depth_unit")
     return np.asarray(numbers, dtype=np.uint16)
 
 
