@@ -8,7 +8,6 @@ from .appearance import (
     draw_appearance as draw_appearance,
 )
 from .exchange import (
-    ReadableSamples as ReadableSamples,
     Samples as Samples,
     contact_sheet as contact_sheet,
     write_bop as write_bop,
@@ -53,6 +52,7 @@ from .samples import (
     Dataset as Dataset,
     DatasetDocument as DatasetDocument,
     DatasetFinding as DatasetFinding,
+    ReadableSamples as ReadableSamples,
     Sample as Sample,
     ShardEntry as ShardEntry,
 )

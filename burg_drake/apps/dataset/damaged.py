@@ -6,7 +6,7 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from burg_drake.dataset.exchange import ReadableSamples
+    from burg_drake.dataset.samples import ReadableSamples
 
 
 def warn_of_damage(samples: ReadableSamples) -> bool:

@@ -59,13 +59,12 @@ def run_export(arguments: argparse.Namespace) -> int:
     samples are damaged, and left out."""
     from burg_drake.core import InvalidInputError
     from burg_drake.dataset.exchange import (
-        ReadableSamples,
         write_bop,
         write_coco,
         write_graspnet,
         write_webdataset,
     )
-    from burg_drake.dataset.samples import load_dataset
+    from burg_drake.dataset.samples import ReadableSamples, load_dataset
 
     writers: dict[str, Any] = {
         "bop": write_bop,

@@ -51,13 +51,12 @@ def run_show(arguments: argparse.Namespace) -> int:
     from burg_drake.apps.terminal import open_view, present, print_legend
     from burg_drake.core import InvalidInputError
     from burg_drake.dataset.exchange import (
-        ReadableSamples,
         contact_sheet,
         sample_caption,
         show_sample,
         spread,
     )
-    from burg_drake.dataset.samples import load_dataset
+    from burg_drake.dataset.samples import ReadableSamples, load_dataset
 
     dataset = load_dataset(arguments.data)
     if not len(dataset):

@@ -4,7 +4,6 @@ from .coco import write_coco as write_coco
 from .graspnet import (
     write_graspnet as write_graspnet,
 )
-from .readable import ReadableSamples as ReadableSamples
 from .sample_view import show_sample as show_sample
 from .sheet import (
     contact_sheet as contact_sheet,

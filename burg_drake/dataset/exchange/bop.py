@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from burg_drake.core import Array, InvalidInputError, inverse
 from burg_drake.dataset.exchange.bop_models import write_models
 from burg_drake.dataset.exchange.folder import new_folder
-from burg_drake.dataset.exchange.image_files import color_file, depth_numbers, png
+from burg_drake.dataset.exchange.image_files import color_file, depth_numbers
 from burg_drake.dataset.exchange.source import (
     Samples,
     depth_of,
@@ -32,7 +32,7 @@ from burg_drake.dataset.exchange.source import (
     scenes_of,
 )
 from burg_drake.dataset.labels import Box, InstanceLabel
-from burg_drake.dataset.samples import Sample
+from burg_drake.dataset.samples import Sample, encode_png
 
 DEPTH_UNIT = 1e-4
 """What 1 stands for in a depth image [m], as in BOP's own rendered images: up to 6.5 m."""
@@ -120,7 +120,7 @@ class _Scene:
         view, name = str(sample.number), f"{sample.number:06d}"
         numbers = depth_numbers(depth, self._unit, sample.key)
         self._write("rgb", f"{name}{self._suffix}", color_file(color, self._suffix))
-        self._write("depth", f"{name}.png", png(numbers))
+        self._write("depth", f"{name}.png", encode_png(numbers))
         self._cameras[view] = _scene_camera(sample, self._unit)
         self._poses[view], self._infos[view] = [], []
         for k, label in enumerate(sample.instances):
@@ -194,7 +194,7 @@ def _box(box: Box | None) -> list[int]:
 
 
 def _mask(mask: NDArray[np.bool_]) -> bytes:
-    return png(np.where(mask, np.uint8(255), np.uint8(0)))
+    return encode_png(np.where(mask, np.uint8(255), np.uint8(0)))
 
 
 def _losses(sample: Sample) -> Iterator[str]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from burg_drake.core import InvalidInputError
-from burg_drake.dataset.samples import Dataset, Sample
+from burg_drake.dataset.samples.dataset import Dataset
+from burg_drake.dataset.samples.sample import Sample
 from burg_drake.objects.library import ObjectLibrary
 
 
