@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
+import cv2
 import numpy as np
 import pytest
+import trimesh
 from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
@@ -50,6 +53,30 @@ def test_graspnet_has_poses_labels_and_depth(graspnet: Path, single: InMemory) -
             X = np.column_stack([R, translation])
             np.testing.assert_allclose(X, meta["poses"][:, :, j], atol=1e-8)
             np.testing.assert_allclose(X, instance.X_CO[:3], atol=1e-8)
+
+
+def test_graspnet_has_models_where_its_images_show_them(graspnet: Path) -> None:
+    """Corners of the models, read by trimesh and moved by the poses of its annotations, are around
+    the pixels of their labels, and their depths around those of the image."""
+    K, root = np.load(graspnet / "camK.npy"), graspnet.parents[2]
+    seen = Counter[str]()
+    for k in range(2):
+        label = image(graspnet / f"label/{k:04d}.png")
+        depth = image(graspnet / f"depth/{k:04d}.png") / 1000.0
+        for entry in ElementTree.parse(graspnet / f"annotations/{k:04d}.xml").getroot():
+            text = {child.tag: child.text or "" for child in entry}
+            mesh = trimesh.load(root / text["obj_path"] / "nontextured.ply", process=False)
+            R = Rotation.from_quat(np.array(text["ori_in_world"].split(), float)[[1, 2, 3, 0]])
+            points = R.apply(mesh.vertices) + np.array(text["pos_in_world"].split(), float)
+            pixels = (points / points[:, 2:] @ K.T)[:, :2]
+            outline = cv2.convexHull(pixels.astype(np.float32))
+            shown = label == int(text["obj_id"]) + 1
+            seen[text["obj_name"]] += int(shown.sum())
+            for v, u in np.argwhere(shown):
+                assert cv2.pointPolygonTest(outline, (float(u), float(v)), True) > -0.01
+            assert points[:, 2].min() - 1e-3 < depth[shown].min()
+            assert depth[shown].max() < points[:, 2].max() + 1e-3
+    assert seen.keys() == {"box", "gem"} and min(seen.values()) > 150
 
 
 def test_graspnet_has_grasps_with_scores(graspnet: Path) -> None:

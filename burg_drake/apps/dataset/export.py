@@ -78,7 +78,8 @@ def run_export(arguments: argparse.Namespace) -> int:
         if name not in FORMATS[arguments.to]:
             known = [one for one, taken in FORMATS.items() if name in taken]
             raise InvalidInputError(
-                f"{arguments.to} has no choice of it; {' and '.join(known)} have"
+                f"{arguments.to} takes no {name.replace('_', ' ')}, which"
+                f" {' and '.join(known)} take"
             ).about(name)
     samples = ReadableSamples(load_dataset(arguments.data))
     for remark in writers[arguments.to](samples, arguments.output, **options):

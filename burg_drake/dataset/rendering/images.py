@@ -18,6 +18,9 @@ SURROUNDINGS = 0
 class Images:
     """Images of one view; those that were not asked for are None.
 
+    Labels and normals are those of the nearest surface, whether its depth is in the depth range of
+    the view or not: a pixel can have both and no depth.
+
     Attributes:
         color: (H, W, 3) red, green, blue.
         depth: (H, W) distance along the optical axis [m]; 0 where nothing is in the depth range.
