@@ -1,9 +1,7 @@
-"""What Blender is given, and what it makes of it: against rays and formulas, where there is one."""
+"""What Blender makes of a scene: against rays and formulas, where there is one."""
 
 from __future__ import annotations
 
-import json
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,37 +12,18 @@ import pytest
 import trimesh
 
 import burg_drake as burg
-from burg_drake.apps.cli import main
 from burg_drake.cameras.optics import Intrinsics
-from burg_drake.core import (
-    FieldError,
-    MissingDependencyError,
-    SimulationError,
-    UnknownNameError,
-    make_pose,
-)
-from burg_drake.dataset.appearance import (
-    Appearance,
-    DirectedLight,
-    TableSurface,
-)
-from burg_drake.dataset.appearance.background import GREY, SKY, over_background
-from burg_drake.dataset.blender import BlenderScene, blender_scene
+from burg_drake.core import MissingDependencyError, make_pose
+from burg_drake.dataset.appearance.background import SKY
+from burg_drake.dataset.blender import BlenderScene
 from burg_drake.dataset.blender.process import VARIABLE, Blender, blender_command
-from burg_drake.dataset.blender.scene import Lamp
-from burg_drake.dataset.blender.surfaces import Material, PaintedSurface, painted_surfaces
+from burg_drake.dataset.blender.surfaces import Material
 from burg_drake.dataset.rendering import SceneRenderer, station_view
 from burg_drake.dataset.rendering.ray_scene import RayScene
 from burg_drake.dataset.rendering.ray_surface import RaySurface
 from burg_drake.dataset.views import View
-from burg_drake.station.diagram import visible_surfaces
+from tests.dataset.blender_parts import DOWN, WHITE_CHALK, image_of, lamp, surface
 from tests.dataset.shapes_scene import looking_at
-
-CAMERA = Intrinsics(width=160, height=120, focal=(210.0, 170.0), center=(61.3, 70.8))
-"""With pixels that are not square, and an axis that is not in the middle."""
-DOWN = make_pose(np.diag([1.0, -1.0, -1.0]), (0.0, 0.0, 0.6))
-"""A camera above the origin that looks down."""
-WHITE_CHALK = Material(color=(1.0, 1.0, 1.0, 1.0), roughness=1.0)
 
 
 @pytest.fixture(scope="module")
@@ -55,196 +34,6 @@ def rendering() -> Iterator[Blender]:
         pytest.skip(str(error))
     yield process
     process.close()
-
-
-def surface(mesh: trimesh.Trimesh, material: Material) -> PaintedSurface:
-    return PaintedSurface("0", np.asarray(mesh.vertices), np.asarray(mesh.faces), material)
-
-
-def lamp(direction: tuple[float, float, float], **options: object) -> Lamp:
-    settings = {"frame": "world", "irradiance": np.pi, "color": (1.0, 1.0, 1.0)}
-    return Lamp(**({"direction": direction, "shadows": True, "angle": 0.0} | settings | options))
-
-
-def image_of(
-    process: Blender, scene: BlenderScene, X_WC: np.ndarray = DOWN, camera: Intrinsics = CAMERA
-) -> np.ndarray:
-    return process.image(scene, {"0": np.eye(4)}, camera, X_WC, (0.01, 10.0))
-
-
-# --- what it is given -----------------------------------------------------------------------------
-
-
-def test_surfaces_are_those_that_rays_meet() -> None:
-    """The same triangles in the same places; of all that a station has, with its arm."""
-    rendered = SceneRenderer("tabletop_six", "panda_tabletop", arm=True, renderer="blender")
-    built = rendered._built
-    corners: dict[str, list[np.ndarray]] = {}
-    for one in painted_surfaces(built.plant, built.scene_graph, linear=False):
-        corners.setdefault(one.body, []).append(one.vertices[one.faces])
-        assert one.normals is None or one.normals.shape == one.vertices.shape
-    rays: dict[str, list[np.ndarray]] = {}
-    for seen in visible_surfaces(built.plant, built.scene_graph):
-        rays.setdefault(str(int(seen.body)), []).append(seen.vertices[seen.faces])
-    assert corners.keys() == rays.keys() and len(rays) > 15
-    for body, triangles in rays.items():
-        ours, theirs = (
-            np.sort(np.concatenate(some).mean(axis=1).round(7), axis=0)
-            for some in (corners[body], triangles)
-        )
-        assert np.allclose(ours, theirs, atol=2e-7)
-
-
-def test_files_of_a_scene(tmp_path: Path) -> None:
-    look = Appearance(
-        lights=(DirectedLight(direction=(0.0, 0.0, -1.0), irradiance=0.5),),
-        room=3,
-        room_light=0.4,
-        table=TableSurface(pattern="wood", seed=1),
-    )
-    rendered = SceneRenderer("tabletop_six", "panda_tabletop", appearance=look, renderer="blender")
-    scene = blender_scene(rendered._built, look)
-    scene.write(tmp_path, threads=2)
-    described = json.loads((tmp_path / "scene.json").read_text())
-    arrays = np.load(tmp_path / "meshes.npz")
-    assert sorted(path.name for path in tmp_path.iterdir()) == [
-        "environment.hdr", "meshes.npz", "scene.json", "texture_0.png",
-    ]  # fmt: skip
-    assert cv2.imread(str(tmp_path / "environment.hdr"), cv2.IMREAD_UNCHANGED).dtype == np.float32
-    (textured,) = (k for k, one in enumerate(described["parts"]) if one["material"]["texture"])
-    assert arrays[f"part_{textured}.uv"].shape == (len(arrays[f"part_{textured}.vertices"]), 2)
-    assert described["lamps"][0]["irradiance"] == pytest.approx(0.5 * np.pi)
-    assert all(len(arrays[f"part_{k}.faces"]) for k in range(len(described["parts"])))
-
-
-def test_colors_are_linear_where_drakes_shading_is(tmp_path: Path) -> None:
-    built = SceneRenderer("tabletop_six", "panda_tabletop", renderer="blender")._built
-    first = {
-        linear: painted_surfaces(built.plant, built.scene_graph, linear=linear)[0].material.color
-        for linear in (True, False)
-    }
-    assert first[True] == (0.82, 0.79, 0.74, 1.0)
-    assert first[False] == pytest.approx((0.638, 0.587, 0.507, 1.0), abs=1e-3)
-
-
-def test_what_is_behind_is_mixed_in_linear_light() -> None:
-    color = np.zeros((1, 3, 4), np.uint8)
-    color[0, :, 3] = (255, 0, 128)
-    camera = Intrinsics(width=3, height=1, focal=(3.0, 3.0), center=(1.0, 0.0))
-    found = over_background(color, np.eye(4), camera, None)
-    assert found[0, 0].tolist() == [0, 0, 0] and found[0, 1].tolist() == list(SKY)
-    half = 255.0 * ((SKY[0] / 255.0 + 0.055) / 1.055 * 0.498 ** (1 / 2.4) * 1.055 - 0.055)
-    assert found[0, 2, 0] == pytest.approx(half, abs=1.0)
-    assert over_background(color, np.eye(4), camera, Appearance())[0, 1].tolist() == [GREY] * 3
-
-
-# --- no Blender, and one that fails ---------------------------------------------------------------
-
-
-def test_no_blender(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv(VARIABLE, "no_such_blender")
-    with pytest.raises(
-        MissingDependencyError, match=r"'no_such_blender', which is no program: pip install 'burg"
-    ):
-        burg.render("tabletop_six", "panda_tabletop", renderer="blender")
-    recipe = burg.dataset.DatasetRecipe(renderer="blender", views=1)
-    with pytest.raises(MissingDependencyError, match=r"no_such_blender"):
-        burg.generate_dataset(["tabletop_six"], "panda_tabletop", tmp_path / "data", recipe)
-    assert not (tmp_path / "data").exists()
-
-
-def test_a_python_without_bpy(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    bare = tmp_path / "python"
-    bare.write_text(f'#!/bin/sh\nexec {sys.executable} -S "$@"\n')
-    bare.chmod(0o755)
-    monkeypatch.setenv(VARIABLE, str(bare))
-    with pytest.raises(MissingDependencyError, match=r"has no Blender \(No module named 'bpy'\)"):
-        Blender(blender_command())
-
-
-def test_the_command_line_says_what_to_install(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv(VARIABLE, "no_such_blender")
-    out = tmp_path / "view.png"
-    assert main(["render", "tabletop_six", "--renderer", "blender", "-o", str(out)]) != 0
-    assert "pip install 'burg-drake[blender]'" in capsys.readouterr().err and not out.exists()
-
-
-def test_labels_need_no_blender(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(VARIABLE, "no_such_blender")
-    kinds = ("depth", "labels")
-    ours = burg.render("tabletop_six", "panda_tabletop", "board", kinds, renderer="blender")
-    drakes = burg.render("tabletop_six", "panda_tabletop", "board", kinds)
-    assert np.array_equal(ours.depth, drakes.depth) and np.array_equal(ours.labels, drakes.labels)
-
-
-def test_no_such_renderer() -> None:
-    with pytest.raises(UnknownNameError, match=r"no renderer 'blendr'; did you mean 'blender'\?"):
-        burg.render("tabletop_six", "panda_tabletop", renderer="blendr")  # type: ignore[arg-type]
-    with pytest.raises(FieldError, match=r"no renderer 'blendr'; did you mean 'blender'\?"):
-        burg.dataset.DatasetRecipe(renderer="blendr")  # type: ignore[arg-type]
-
-
-def program(after: str) -> list[str]:
-    """A process that says that it is a Blender, and does something when it is asked."""
-    code = f'import os, sys, json; print(\'{{"version": "0"}}\', flush=True)\n{after}'
-    return [sys.executable, "-c", code]
-
-
-EMPTY = BlenderScene((), ())
-
-
-def test_a_crash_is_told_with_the_last_lines() -> None:
-    dying = Blender(
-        program("sys.stdin.readline(); os.write(2, b'first\\n\\nout of memory\\n'); os.abort()")
-    )
-    with pytest.raises(
-        SimulationError,
-        match=r"^Blender ended by SIGABRT when it was given a scene; its last lines: first \| out"
-        r" of memory$",
-    ):
-        image_of(dying, EMPTY)
-    assert not dying.alive
-    with pytest.raises(SimulationError, match=r"^Blender ended by SIGABRT"):
-        image_of(dying, EMPTY)
-
-
-def test_an_end_and_a_refusal() -> None:
-    with pytest.raises(SimulationError, match=r"^Blender ended with code 3 when it was given a"):
-        image_of(Blender(program("sys.stdin.readline(); sys.exit(3)")), EMPTY)
-    failing = Blender(program('for line in sys.stdin: print(\'{"error": "no"}\', flush=True)'))
-    with pytest.raises(SimulationError, match=r"^Blender failed when it was given a scene: no$"):
-        image_of(failing, EMPTY)
-    failing.close()
-
-
-def test_nobody_gets_the_answer_to_an_interrupted_question() -> None:
-    """The process ends with the question."""
-    waiting = Blender(
-        program("import signal; sys.stdin.readline(); os.kill(os.getppid(), signal.SIGINT)\n"
-                "sys.stdin.read()")
-    )  # fmt: skip
-    with pytest.raises(KeyboardInterrupt):
-        image_of(waiting, EMPTY)
-    waiting.close()
-    assert not waiting.alive
-
-
-def test_half_an_image_is_none() -> None:
-    half = Blender(
-        program(
-            "for line in sys.stdin:\n"
-            "    if 'output' in line: open(json.loads(line)['output'], 'wb').write(b'\\x89PNG')\n"
-            "    print('{}', flush=True)"
-        )
-    )
-    with pytest.raises(SimulationError, match=r"^Blender wrote no image; it has said nothing$"):
-        image_of(half, EMPTY)
-    half.close()
-
-
-# --- what it makes of it --------------------------------------------------------------------------
 
 
 def test_pixels_are_where_rays_have_them(rendering: Blender) -> None:

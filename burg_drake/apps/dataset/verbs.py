@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.dataset import show
+from burg_drake.apps.dataset import export, show
 from burg_drake.apps.dataset.colors import with_possible_colors
 from burg_drake.apps.options import (
     Parser,
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from burg_drake.objects.library import ObjectLibrary
     from burg_drake.scene.document import Scene, SceneRecipe
     from burg_drake.station.document import Station
-
-FORMATS = ("bop", "coco", "graspnet", "webdataset")
 
 
 def add_to(verbs: Any) -> None:
@@ -61,14 +59,7 @@ def add_to(verbs: Any) -> None:
         options=_add_data,
     )
     show.add_to(group)
-    add_verb(
-        group,
-        "export",
-        run_export,
-        "write a data set in another project's format",
-        "burg-drake dataset export data --to bop -o data_bop",
-        options=_add_export_options,
-    )
+    export.add_to(group)
 
 
 def _add_data(parser: Parser) -> None:
@@ -264,35 +255,4 @@ def run_check(arguments: argparse.Namespace) -> int:
     if found:
         return 1
     print(f"{arguments.data}: {len(load_dataset(arguments.data))} samples, nothing is wrong")
-    return 0
-
-
-def _add_export_options(parser: Parser) -> None:
-    _add_data(parser)
-    parser.add_argument("--to", required=True, choices=FORMATS, help="format")
-    parser.add_argument(
-        "-o", "--output", metavar="FOLDER", required=True, help="folder to write, new or empty"
-    )
-
-
-def run_export(arguments: argparse.Namespace) -> int:
-    """Writes a data set in another format; what that cannot carry goes to stderr."""
-    from burg_drake.dataset.exchange import (
-        write_bop,
-        write_coco,
-        write_graspnet,
-        write_webdataset,
-    )
-    from burg_drake.dataset.samples import load_dataset
-
-    dataset = load_dataset(arguments.data)
-    writers: dict[str, Any] = {
-        "bop": write_bop,
-        "coco": write_coco,
-        "graspnet": write_graspnet,
-        "webdataset": write_webdataset,
-    }
-    for remark in writers[arguments.to](dataset, arguments.output):
-        print(f"burg-drake: warning: {remark}", file=sys.stderr)
-    print(f"wrote {arguments.output}: {len(dataset)} samples")
     return 0

@@ -11,6 +11,7 @@ from .sample_view import show_sample as show_sample
 from .sheet import (
     contact_sheet as contact_sheet,
     sample_caption as sample_caption,
+    spread as spread,
 )
 from .source import (
     Samples as Samples,

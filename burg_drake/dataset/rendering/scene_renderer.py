@@ -20,8 +20,8 @@ from burg_drake.dataset.appearance import (
 from burg_drake.dataset.blender import RENDERERS, RendererName, blender_scene
 from burg_drake.dataset.rendering.blender_colors import BlenderColors
 from burg_drake.dataset.rendering.colors import DrakeColors
-from burg_drake.dataset.rendering.images import SURROUNDINGS, Images
-from burg_drake.dataset.rendering.ray_scene import RayScene, Silhouette, label_numbers
+from burg_drake.dataset.rendering.images import SURROUNDINGS, Images, instance_numbers
+from burg_drake.dataset.rendering.ray_scene import RayScene, Silhouette
 from burg_drake.dataset.rendering.ray_surface import RaySurface, surfaces_of_body
 from burg_drake.dataset.views import View
 from burg_drake.scene.document import SceneLike, as_scene
@@ -75,7 +75,7 @@ class SceneRenderer:
                 f"no renderer {renderer!r}; {nearest(renderer, RENDERERS)}"
             ).about("renderer")
         self.scene, self.station = as_scene(scene), as_station(station)
-        self.numbers = label_numbers((*self.scene.instances, *self.scene.background))
+        self.numbers = instance_numbers(self.scene)
         self._appearance, self._in_blender = appearance, renderer == "blender"
         self._built = build_station_diagram(
             self.scene,
