@@ -158,7 +158,7 @@ def test_a_damaged_shard_is_named_and_made_anew(
     message = str(refused.value)
     assert str(shard) in message and said in message
     assert message.endswith("run the command that made the data set once more, which makes the"
-                            " shard anew; if it does not, delete the shard before")  # fmt: skip
+                            " shard anew; if it does not, delete the shard first")  # fmt: skip
     assert main(["dataset", "check", str(folder)]) == 1
     assert f"{SHARD}: it" in capsys.readouterr().out
     assert dataset[1].key == "000001_000" and dataset.index("000001_000") == 1

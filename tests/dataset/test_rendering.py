@@ -136,6 +136,12 @@ def test_balls_by_formula() -> None:
     assert np.count_nonzero(silhouette != masks[1]) <= 0.01 * np.count_nonzero(masks[1])
     at = tuple(np.argwhere(images.labels == 1).mean(axis=0).astype(int))
     assert images.depth[at] == pytest.approx(0.6 - 0.13, abs=5e-4)
+    short = rays.images(replace(view, depth_range=(0.1, 0.5)), normals=True)
+    beyond = images.depth > 0.5
+    assert beyond[images.labels == 2].all() and not beyond[images.labels == 1].all()
+    assert np.array_equal(short.depth, np.where(beyond, 0.0, images.depth))
+    assert np.array_equal(short.labels, images.labels)  # these stay where depth is cut
+    assert np.array_equal(short.normals, images.normals)
     normal = images.normals[images.labels > 0]
     assert np.allclose(np.linalg.norm(normal, axis=1), 1.0, atol=1e-5)
     assert (normal[:, 2] < 0.2).all() and images.normals[images.labels == 0].max() == 0.0

@@ -58,12 +58,7 @@ def run_export(arguments: argparse.Namespace) -> int:
     """Writes a data set in another format; what that cannot carry goes to stderr. 1 if some
     samples are damaged, and left out."""
     from burg_drake.core import InvalidInputError
-    from burg_drake.dataset.exchange import (
-        write_bop,
-        write_coco,
-        write_graspnet,
-        write_webdataset,
-    )
+    from burg_drake.dataset.exchange import write_bop, write_coco, write_graspnet, write_webdataset
     from burg_drake.dataset.samples import ReadableSamples, load_dataset
 
     writers: dict[str, Any] = {

@@ -50,12 +50,7 @@ def run_show(arguments: argparse.Namespace) -> int:
     """Shows a sample in 3D, or writes a sheet; those that are damaged are left out, and named."""
     from burg_drake.apps.terminal import open_view, present, print_legend
     from burg_drake.core import InvalidInputError
-    from burg_drake.dataset.exchange import (
-        contact_sheet,
-        sample_caption,
-        show_sample,
-        spread,
-    )
+    from burg_drake.dataset.exchange import contact_sheet, sample_caption, show_sample, spread
     from burg_drake.dataset.samples import ReadableSamples, load_dataset
 
     dataset = load_dataset(arguments.data)
@@ -69,9 +64,9 @@ def run_show(arguments: argparse.Namespace) -> int:
         shown = [chosen] if chosen is not None else list(samples.read(indices))
         contact_sheet(shown, arguments.output, rows, columns, title=dataset.name)
         print(f"wrote {arguments.output}")
-    if arguments.output is not None and arguments.html is None:
-        warn_of_damage(samples)
-        return 0
+        if arguments.html is None:
+            warn_of_damage(samples)
+            return 0
     sample = chosen if chosen is not None else next(iter(samples))
     warn_of_damage(samples)
     scene, station = dataset.scene(sample.scene), dataset.station

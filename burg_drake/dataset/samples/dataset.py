@@ -28,7 +28,7 @@ from burg_drake.station.document import Station, load_station
 
 ANEW = (
     "run the command that made the data set once more, which makes the shard anew; if it does not,"
-    " delete the shard before"
+    " delete the shard first"
 )
 """What mends a data set with a damaged shard."""
 
@@ -155,14 +155,13 @@ class Dataset(Sequence[Sample]):
             InvalidInputError: the shard of its scene is missing or damaged.
         """
         key = value if isinstance(value, str) else value.key
-        scene = key.partition("_")[0]
-        number = int(scene) if scene.isdecimal() else -1
-        if number not in self.scenes:
-            known = [f"{one:06d}" for one in self.scenes]
+        scene, known = key.partition("_")[0], {f"{one:06d}": one for one in self.scenes}
+        if scene not in known:
             raise UnknownNameError(
                 f"{self.folder} has no sample {key!r}, whose scene would be {scene!r}; its scenes"
-                f" are {listing(known)}"
+                f" are {listing(list(known))}"
             )
+        number = known[scene]
         indices, keys = self.indices(number), self._shard(self._scene_place(number)).keys
         if key not in keys or indices[keys.index(key)] not in range(len(self))[start:stop]:
             raise UnknownNameError(f"{self.folder} has no sample {key!r}; {nearest(key, keys)}")
