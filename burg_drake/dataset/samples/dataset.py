@@ -68,28 +68,37 @@ class Dataset(Sequence[Sample]):
             return [self.read(i) for i in range(*index.indices(len(self)))]
         return self.read(index)
 
-    def read(self, index: int, images: Iterable[str] = PARTS) -> Sample:
+    def read(self, index: int | str, images: Iterable[str] = PARTS) -> Sample:
         """A sample, with those of its images that are asked for.
 
         Args:
-            index: from 0; negative ones count from the end.
+            index: from 0, negative ones count from the end; or the key of the sample.
             images: of `color`, `depth`, `labels`, `normals` and `sensor_depth`, and `grasps`; no
                 others are decoded. What the sample does not have is None.
 
         Raises:
             IndexError: there is no such sample.
-            UnknownNameError: there are no such images.
+            UnknownNameError: there is no sample of that key, or no such images.
             InvalidInputError: the shard is missing or damaged, or a file of the sample is; the
                 message names both.
         """
         asked = asked_parts(images)
-        shard, key = self._place(index)
+        shard, key = self._place(self.index(index) if isinstance(index, str) else index)
         try:
             return shard.sample(shard.record(key), asked)
         except DocumentError:  # of another version, or not as samples are: not mended so
             raise
         except InvalidInputError as error:
             raise InvalidInputError(f"{error}; {ANEW}") from error
+
+    def parts(self, index: int) -> tuple[str, ...]:
+        """What a sample has of `read`'s images, and `grasps`; none is decoded.
+
+        Raises:
+            IndexError, InvalidInputError: as `read`.
+        """
+        shard, key = self._place(index)
+        return shard.record(key).files
 
     @cached_property
     def keys(self) -> tuple[str, ...]:
