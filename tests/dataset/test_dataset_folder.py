@@ -84,6 +84,10 @@ def test_only_what_is_asked_for_is_read(tmp_path: Path) -> None:
     assert sample.images.depth is not None and sample.images.color is None
     assert sample.sensor_depth is None and sample.grasps is None
     assert dataset.read(0, ["grasps"]).grasps is not None
+    assert dataset.read("000012_001", ()).key == "000012_001"
+    assert {"color", "depth", "grasps"} <= {*dataset.parts(0)}
+    with pytest.raises(UnknownNameError, match="has no sample '000012_1'"):
+        dataset.read("000012_1")
     assert [one.key for one in dataset[1:3]] == ["000012_001", "000013_000"]
     with pytest.raises(IndexError, match="has no sample 4; it has 4"):
         dataset[4]
