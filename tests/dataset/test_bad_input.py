@@ -15,7 +15,7 @@ import pytest
 
 import burg_drake as burg
 from burg_drake.apps.cli import main
-from burg_drake.core import FieldError, InvalidInputError
+from burg_drake.core import InvalidInputError
 from burg_drake.core.documents import Pose, load_document
 from burg_drake.dataset.generating import DatasetRecipe, check_generated
 from burg_drake.dataset.rendering import render, station_view
@@ -219,10 +219,12 @@ def test_intrinsics_that_do_not_fit_the_image(tmp_path: Path) -> None:
         InvalidInputError, match=r"principal point 959\.5, 539\.5 is outside of the"
     ):
         render("tabletop_six", station, replace(view, intrinsics=other), ["color"])
-    with pytest.raises(
-        FieldError, match=r"center 959\.5, 539\.5 is outside of the image, which has"
-    ):
-        replace(station.document.cameras["board"], center=(959.5, 539.5))
+    wrong = replace(station.document.cameras["board"], center=(959.5, 539.5))
+    document = replace(station.document, cameras={"board": wrong})
+    with pytest.raises(InvalidInputError, match=r"959\.5, 539\.5 .*is outside of the image"):
+        burg.build_station_diagram(
+            "tabletop_six", replace(station, document=document), robot="none", cameras=True
+        )
     edge = replace(view.intrinsics, center=(-0.49, 479.49))
     images = render("tabletop_six", station, replace(view, intrinsics=edge), ["depth"])
     assert images.depth is not None and np.isfinite(images.depth).all()

@@ -121,7 +121,8 @@ def test_a_node_needs_no_file_of_the_user(tmp_path: Path) -> None:
     shutil.rmtree(user)
     folder = unpack(bundle.data, tmp_path / "node", bundle.name)
     world = replace(bundle, data=b"")
-    made = make_sent_scene(SentScene(world, recipe, 0, scene.document, scene.path, None), folder)
+    sent = portable_recipe(recipe, tmp_path / "set")
+    made = make_sent_scene(SentScene(world, sent, 0, scene.document, scene.path, None), folder)
     assert made.shard == (tmp_path / "set/shards/000000.tar").read_bytes()
     assert made.entry.filesize == len(made.shard)
     assert [path.name for path in folder.parent.iterdir()] == [bundle.name]

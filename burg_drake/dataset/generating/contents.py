@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from burg_drake.core import InvalidInputError, content_hash
-from burg_drake.core.paths import PACKAGE_URI, portable_reference, resolve
+from burg_drake.core.paths import PACKAGE_URI, builtin_names, portable_reference, resolve
 from burg_drake.dataset.generating.recipe import DatasetRecipe
 from burg_drake.dataset.samples import DatasetDocument
 from burg_drake.objects.library import ObjectLibrary, load_library
@@ -46,15 +46,19 @@ def placed_library(reference: str, folder: Path) -> str:
     Raises:
         UnknownNameError: it is not there.
     """
-    if reference.startswith(PACKAGE_URI):
-        return str(resolve(reference))
-    # The folder itself may not be there yet.
-    return str(resolve(os.path.normpath(folder.absolute() / reference)))
+    if reference.startswith(PACKAGE_URI) or reference in builtin_names("models"):
+        return str(resolve(reference, "models"))
+    return str(resolve(_from(folder, reference)))
 
 
 def run_folder(recipe: DatasetRecipe, folder: Path) -> Path:
     """The folder of the run that a data set takes grasps from."""
-    return folder / recipe.run
+    return _from(folder, recipe.run)
+
+
+def _from(folder: Path, reference: str) -> Path:
+    """A path from the folder of a data set, which may not be there yet."""
+    return Path(os.path.normpath(folder.absolute() / reference))
 
 
 def distractors_content(recipe: DatasetRecipe, folder: Path) -> str:
