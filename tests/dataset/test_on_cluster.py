@@ -19,6 +19,7 @@ from burg_drake.core.errors import ClusterError, InvalidInputError
 from burg_drake.core.paths.resources import data_root
 from burg_drake.dataset.appearance import AppearanceSettings
 from burg_drake.dataset.generating import DatasetRecipe
+from burg_drake.dataset.generating.contents import portable_recipe
 from burg_drake.dataset.generating.makers import catalogue, scene_maker
 from burg_drake.dataset.generating.sent_scene import SentScene, make_sent_scene
 from burg_drake.evaluation.cascade import evaluate
