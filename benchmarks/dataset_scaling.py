@@ -5,8 +5,9 @@
 Runs come in pairs, one worker and two, first the one and then the other; ratios are of each pair,
 and medians are over the pairs. `whole command` is the time of `burg-drake dataset generate` from
 its start to its end, with all imports, starts of processes and the card; a single worker is the
-command itself. `warm workers` is that of the scenes alone, by processes that have each made one
-scene before, also with a single worker. The machine should do nothing else.
+command itself, whose renderer has one thread, as workers have. `warm workers` is that of the scenes
+alone, by processes that have each made one scene before, also with a single worker. The machine
+should do nothing else.
 """
 
 from __future__ import annotations
@@ -85,6 +86,7 @@ def whole(workers: int, asked: argparse.Namespace) -> float:
             [sys.executable, "-c", PROGRAM, *command, *where, "--workers", str(workers)],
             check=True,
             stdout=subprocess.DEVNULL,
+            env={**os.environ, "LP_NUM_THREADS": "0"},
         )
         return time.perf_counter() - start
 

@@ -11,6 +11,7 @@ in the same process, and says on how many pixels the two differ. Published for t
 from __future__ import annotations
 
 import argparse
+import os
 import time
 from collections.abc import Callable
 from typing import Any
@@ -27,6 +28,7 @@ from burg_drake.dataset.views import View
 from burg_drake.station.diagram import build_station_diagram
 from burg_drake.station.world.camera_sensors import render_cameras
 
+os.environ["LP_NUM_THREADS"] = "0"  # one thread in Mesa's renderer, as in workers
 PEER = 0.080
 """The peer's time for colour, depth and labels [s]."""
 

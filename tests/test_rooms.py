@@ -48,7 +48,7 @@ ROOMS = {
     "evaluation": "candidates stages workers cluster records store results grasp_sets robustness"
     " report run merge",
     "generation": "",
-    "dataset": "views appearance rendering labels samples exchange generating",
+    "dataset": "views appearance blender rendering labels samples exchange generating",
     "experiment": "trials planning statistics pairing comparison gap pages",
     "compose": "document commands storage background editing",
     "ui": "server widgets view pointing panels",

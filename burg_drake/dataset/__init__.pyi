@@ -52,6 +52,7 @@ from .samples import (
     Dataset as Dataset,
     DatasetDocument as DatasetDocument,
     DatasetFinding as DatasetFinding,
+    ReadableSamples as ReadableSamples,
     Sample as Sample,
     ShardEntry as ShardEntry,
 )

@@ -6,7 +6,7 @@ the faces that it passes inward, and leaves it at the first that it passes outwa
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -205,6 +205,12 @@ def scene_of(number: int, *, twice: bool = False, **more: object) -> list[Sample
         camera_at((0.35, 0.0, 0.35), (0.0, 0.07, 0.0)),
     ]
     return [draw(number, k, X_SC, bodies, **more) for k, X_SC in enumerate(views)]
+
+
+def zoomed(data: InMemory) -> InMemory:
+    """With other intrinsics in the second view."""
+    view = replace(data[1].view, intrinsics=replace(CAMERA, focal=(80.0, 80.0)))
+    return replace(data, samples=(data[0], replace(data[1], view=view)))
 
 
 def some_grasps() -> LabelledGrasps:

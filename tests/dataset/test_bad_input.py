@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import resource
 import shutil
+import tarfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 import burg_drake as burg
 from burg_drake.apps.cli import main
-from burg_drake.core import FieldError, InvalidInputError
+from burg_drake.core import InvalidInputError
 from burg_drake.core.documents import Pose, load_document
 from burg_drake.dataset.generating import DatasetRecipe, check_generated
 from burg_drake.dataset.rendering import render, station_view
@@ -131,9 +133,10 @@ def flipped(near: bytes) -> Callable[[bytes], bytes]:
 @pytest.mark.parametrize(
     ("damage", "said"),
     [
-        (lambda data: data[: len(data) // 2], "it is cut off or changed; delete it, and run the"),
-        (lambda data: b"", "it is cut off or changed; delete it, and run the command that made"),
-        (lambda data: bytes(len(data)), "has 0 samples, the index 1; run the command that made"),
+        (lambda data: data[: len(data) // 2], "is cut off within 000000_000."),
+        (lambda data: b"", "is cut off behind its beginning"),
+        (lambda data: data + bytes(512), "bytes, the index "),
+        (lambda data: bytes(len(data)), "has 0 samples, the index 1"),
         (lambda data: b"1" + data[1:], "is damaged: the check sum of a header is wrong"),
         (flipped(b"IDAT"), "000000_000.depth.png is damaged: a check sum is wrong"),
     ],
@@ -149,18 +152,43 @@ def test_a_damaged_shard_is_named_and_made_anew(
     folder = shutil.copytree(whole, tmp_path / "set")
     shard, sound = folder / SHARD, (whole / SHARD).read_bytes()
     shard.write_bytes(damage(sound))
+    dataset = burg.load_dataset(folder)
     with pytest.raises(InvalidInputError) as refused:
-        burg.load_dataset(folder).read(0)
-    assert str(shard) in str(refused.value) and said in str(refused.value)
+        dataset.read(0)
+    message = str(refused.value)
+    assert str(shard) in message and said in message
+    assert message.endswith("run the command that made the data set once more, which makes the"
+                            " shard anew; if it does not, delete the shard first")  # fmt: skip
     assert main(["dataset", "check", str(folder)]) == 1
     assert f"{SHARD}: it" in capsys.readouterr().out
-    for verb in (["show"], ["export", "--to", "webdataset"]):
-        out = tmp_path / "out.png"
-        assert main(["dataset", *verb, str(folder), "-o", str(out)]) == 2
-        assert capsys.readouterr().err == f"burg-drake: error: {refused.value}\n"
-        assert not out.exists()
+    assert dataset[1].key == "000001_000" and dataset.index("000001_000") == 1
+    warning = f"burg-drake: warning: 1 sample is left out: {message}\n"
+    for verb, code in ((["show"], 0), (["export", "--to", "webdataset"], 1)):
+        out = tmp_path / f"{verb[0]}.png"
+        assert main(["dataset", *verb, str(folder), "-o", str(out)]) == code
+        assert capsys.readouterr().err == warning
+    with tarfile.open(tmp_path / "export.png/shard-000000.tar") as tar:
+        assert {name.partition(".")[0] for name in tar.getnames()} == {"000001_000"}
+    sheet = cv2.imread(str(tmp_path / "show.png"))
+    assert main(["dataset", "show", str(whole), "-o", str(tmp_path / "whole.png")]) == 0
+    assert cv2.imread(str(tmp_path / "whole.png")).shape[0] > 1.8 * sheet.shape[0]
     again = burg.generate_dataset(scenes, STATION, folder, RECIPE)
     assert (again.known, again.new) == ((1,), (0,)) and shard.read_bytes() == sound
+
+
+def test_nothing_is_exported_of_what_is_all_damaged(
+    whole: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, out = shutil.copytree(whole, tmp_path / "set"), tmp_path / "out"
+    for shard in (folder / "shards").iterdir():
+        shard.unlink()
+    for verb in (["show"], ["export", "--to", "webdataset"]):
+        assert main(["dataset", *verb, str(folder), "-o", f"{out}.png"]) == 2
+        assert capsys.readouterr().err.startswith(
+            f"burg-drake: error: no sample of {folder} can be read; the first: cannot read shard"
+            f" {folder / SHARD}: No such file or directory; run the command"
+        )
+    assert [path.name for path in tmp_path.iterdir()] == ["set"]
 
 
 def test_a_data_set_of_another_version(
@@ -191,10 +219,12 @@ def test_intrinsics_that_do_not_fit_the_image(tmp_path: Path) -> None:
         InvalidInputError, match=r"principal point 959\.5, 539\.5 is outside of the"
     ):
         render("tabletop_six", station, replace(view, intrinsics=other), ["color"])
-    with pytest.raises(
-        FieldError, match=r"center 959\.5, 539\.5 is outside of the image, which has"
-    ):
-        replace(station.document.cameras["board"], center=(959.5, 539.5))
+    wrong = replace(station.document.cameras["board"], center=(959.5, 539.5))
+    document = replace(station.document, cameras={"board": wrong})
+    with pytest.raises(InvalidInputError, match=r"959\.5, 539\.5 .*is outside of the image"):
+        burg.build_station_diagram(
+            "tabletop_six", replace(station, document=document), robot="none", cameras=True
+        )
     edge = replace(view.intrinsics, center=(-0.49, 479.49))
     images = render("tabletop_six", station, replace(view, intrinsics=edge), ["depth"])
     assert images.depth is not None and np.isfinite(images.depth).all()

@@ -84,6 +84,10 @@ def test_only_what_is_asked_for_is_read(tmp_path: Path) -> None:
     assert sample.images.depth is not None and sample.images.color is None
     assert sample.sensor_depth is None and sample.grasps is None
     assert dataset.read(0, ["grasps"]).grasps is not None
+    assert dataset.read("000012_001", ()).key == "000012_001"
+    assert {"color", "depth", "grasps"} <= {*dataset.parts(0)}
+    with pytest.raises(UnknownNameError, match="has no sample '000012_1'"):
+        dataset.read("000012_1")
     assert [one.key for one in dataset[1:3]] == ["000012_001", "000013_000"]
     with pytest.raises(IndexError, match="has no sample 4; it has 4"):
         dataset[4]
@@ -202,7 +206,6 @@ def test_one_process_writes_at_a_time(tmp_path: Path) -> None:
     ("change", "message"),
     [
         ({"objects": ("mug",)}, "objects is ['mug', 'bottle', 'box', 'screwdriver', 'bowl', "),
-        ({"name": "other"}, "name is drawn there, other here"),
         ({"library_content": "ab"}, "the content of the library is none there, ab here"),
         ({"versions": {"drake": "3", "burg_drake": "1"}}, "(drake is 2 there, 3 here)"),
         ({"recipe": None}, "recipe.views.count is 3 there, none here; "),
@@ -278,10 +281,27 @@ def test_a_lost_shard_and_a_wrong_count_are_named(tmp_path: Path) -> None:
     with pytest.raises(DocumentError, match=r"000012\.tar has 2 samples, the index 3"):
         load_dataset(tmp_path)[0]
     (tmp_path / "shards/000013.tar").unlink()
-    with pytest.raises(
-        InvalidInputError, match=r"shard .*000013\.tar cannot be read: No such file"
-    ):
-        load_dataset(tmp_path)
+    with pytest.raises(InvalidInputError, match=r"read shard .*000013\.tar: No such file"):
+        load_dataset(tmp_path)[3]
+
+
+def test_samples_are_found_by_their_keys(tmp_path: Path) -> None:
+    dataset = load_dataset(drawn.write(tmp_path))
+    assert "000013_000" in dataset and dataset.index("000013_000") == 2
+    assert drawn.sample(1, 12) in dataset and dataset.index(dataset[1]) == 1
+    assert "000013_002" not in dataset and "mug" not in dataset and 2 not in dataset
+    assert (dataset.count("000013_000"), dataset.count("000014_000")) == (1, 0)
+    assert [one.key for one in reversed(dataset)] == list(reversed(dataset.keys))
+    with pytest.raises(UnknownNameError, match=r"no sample '000013_2'; did you mean '000013_00"):
+        dataset.index("000013_2")
+    with pytest.raises(UnknownNameError, match=r"'000014_000'.* its scenes are 000012, 000013"):
+        dataset.index("000014_000")
+    with pytest.raises(UnknownNameError, match="no sample '000012_001'"):
+        dataset.index("000012_001", 2)
+    (tmp_path / "shards/000012.tar").unlink()
+    assert "000013_000" in dataset  # reads no other shard
+    with pytest.raises(InvalidInputError, match=r"000012\.tar"):
+        assert "000012_000" in dataset
 
 
 def test_pixels_of_a_sample_are_its_own(tmp_path: Path) -> None:

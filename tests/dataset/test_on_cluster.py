@@ -19,6 +19,7 @@ from burg_drake.core.errors import ClusterError, InvalidInputError
 from burg_drake.core.paths.resources import data_root
 from burg_drake.dataset.appearance import AppearanceSettings
 from burg_drake.dataset.generating import DatasetRecipe
+from burg_drake.dataset.generating.contents import portable_recipe
 from burg_drake.dataset.generating.makers import catalogue, scene_maker
 from burg_drake.dataset.generating.sent_scene import SentScene, make_sent_scene
 from burg_drake.evaluation.cascade import evaluate
@@ -58,7 +59,7 @@ def nodes() -> Iterator[LocalNodes]:
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """All of a data set but its page."""
+    """Contents of all files of a data set, by name."""
     paths = sorted(path for path in folder.rglob("*") if path.is_file())
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
 
@@ -121,7 +122,8 @@ def test_a_node_needs_no_file_of_the_user(tmp_path: Path) -> None:
     shutil.rmtree(user)
     folder = unpack(bundle.data, tmp_path / "node", bundle.name)
     world = replace(bundle, data=b"")
-    made = make_sent_scene(SentScene(world, recipe, 0, scene.document, scene.path, None), folder)
+    sent = portable_recipe(recipe, tmp_path / "set")
+    made = make_sent_scene(SentScene(world, sent, 0, scene.document, scene.path, None), folder)
     assert made.shard == (tmp_path / "set/shards/000000.tar").read_bytes()
     assert made.entry.filesize == len(made.shard)
     assert [path.name for path in folder.parent.iterdir()] == [bundle.name]

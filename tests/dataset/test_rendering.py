@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 import burg_drake as burg
@@ -11,7 +14,6 @@ from burg_drake.cameras.optics import Intrinsics
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import inverse, make_pose
 from burg_drake.dataset.labels import label_instances
-from burg_drake.dataset.labels.instances import box_around
 from burg_drake.dataset.rendering import SceneRenderer, render, station_view
 from burg_drake.dataset.rendering.ray_scene import RayScene
 from burg_drake.dataset.rendering.ray_surface import RaySurface
@@ -84,6 +86,13 @@ def test_the_table_is_flat_to_a_hundredth_of_a_millimetre(scene: Scene, station:
     assert np.minimum(np.abs(height), np.abs(height + 1e-4))[on_top].max() < 1e-5
 
 
+def pixels_and_box(mask: NDArray[np.bool_]) -> tuple[int, tuple[int, ...]]:
+    """How many pixels are on, and left column, top row, width and height around them."""
+    rows, columns = np.nonzero(mask)
+    left, top = columns.min(), rows.min()
+    return len(rows), (left, top, columns.max() - left + 1, rows.max() - top + 1)
+
+
 def ball(radius: float, p_SB: tuple[float, float, float], label: int) -> RaySurface:
     import trimesh
 
@@ -127,6 +136,12 @@ def test_balls_by_formula() -> None:
     assert np.count_nonzero(silhouette != masks[1]) <= 0.01 * np.count_nonzero(masks[1])
     at = tuple(np.argwhere(images.labels == 1).mean(axis=0).astype(int))
     assert images.depth[at] == pytest.approx(0.6 - 0.13, abs=5e-4)
+    short = rays.images(replace(view, depth_range=(0.1, 0.5)), normals=True)
+    beyond = images.depth > 0.5
+    assert beyond[images.labels == 2].all() and not beyond[images.labels == 1].all()
+    assert np.array_equal(short.depth, np.where(beyond, 0.0, images.depth))
+    assert np.array_equal(short.labels, images.labels)  # these stay where depth is cut
+    assert np.array_equal(short.normals, images.normals)
     normal = images.normals[images.labels > 0]
     assert np.allclose(np.linalg.norm(normal, axis=1), 1.0, atol=1e-5)
     assert (normal[:, 2] < 0.2).all() and images.normals[images.labels == 0].max() == 0.0
@@ -142,7 +157,7 @@ def test_a_silhouette_goes_on_beyond_the_image() -> None:
     whole = pixels_of_ball(view, X_CS[:3, :3] @ place + X_CS[:3, 3], 0.06, reach=150)
     assert 0 < np.count_nonzero(inside) < 0.9 * np.count_nonzero(silhouette.mask)
     assert np.count_nonzero(silhouette.mask) == pytest.approx(np.count_nonzero(whole), rel=0.01)
-    left, top, width, height = box_around(whole)
+    _, (left, top, width, height) = pixels_and_box(whole)
     assert silhouette.left == pytest.approx(left - 150, abs=1)
     assert silhouette.top == pytest.approx(top - 150, abs=1)
     assert silhouette.mask.shape == pytest.approx((height, width), abs=2)
@@ -176,36 +191,37 @@ def test_a_lens_moves_depth_and_labels_as_opencv_says(renderer: SceneRenderer) -
     )
 
 
-def test_labels_of_instances(renderer: SceneRenderer) -> None:
-    view = station_view(renderer.station, "board")
+@pytest.mark.parametrize("camera", ["board", "overview"])
+def test_labels_of_instances(
+    scene: Scene, station: Station, renderer: SceneRenderer, camera: str
+) -> None:
+    """Counted in Drake's label images of the whole scene and of each object alone. An edge may take
+    or leave a pixel."""
+    view = station_view(station, camera)
     images = renderer.images(view, ("depth", "labels"))
     found = {label.name: label for label in label_instances(renderer, view, images)}
-    assert list(found) == list(renderer.scene.instances)
-    for label in found.values():
-        mask = images.labels == label.number
-        assert label.visible_pixels == np.count_nonzero(mask) and label.visible_box == box_around(
-            mask
-        )
-        assert not (mask & ~label.amodal).any()
-        assert label.visibility == label.visible_pixels / label.silhouette_pixels
-        X_SO = view.X_SC @ label.X_CO
-        assert np.allclose(X_SO, renderer.scene.X_SO(label.name), atol=1e-12)
-    assert found["box"].visibility == 1.0 and 0.2 < found["bottle"].visibility < 0.3
-
-
-@pytest.mark.parametrize("name", ["mug", "bottle", "screwdriver"])
-def test_a_silhouette_is_the_object_alone(scene: Scene, station: Station, name: str) -> None:
-    """As Drake renders a scene without the others."""
-    from dataclasses import replace
-
-    only = tuple(one for n, one in scene.instances.items() if n == name)
-    alone = Scene(replace(scene.document, instances=only), scene.library, scene.path)
-    built = build_station_diagram(alone, station, robot="none", cameras=["board"])
-    _, labels = drake_images(built, "board")
-    rendered = SceneRenderer(scene, station, colors=False)
-    view = station_view(station, "board")
-    label = {one.name: one for one in label_instances(rendered, view)}[name]
-    assert np.count_nonzero(label.amodal != (labels == int(built.free[name]))) <= 1
+    assert list(found) == list(scene.instances)
+    built = build_station_diagram(scene, station, robot="none", cameras=[camera])
+    _, labels = drake_images(built, camera)
+    hidden = 0
+    for number, (name, instance) in enumerate(scene.instances.items(), start=1):
+        only = Scene(replace(scene.document, instances=(instance,)), scene.library, scene.path)
+        alone = build_station_diagram(only, station, robot="none", cameras=[camera])
+        whole = drake_images(alone, camera)[1] == int(alone.free[name])
+        visible = labels == int(built.free[name])
+        pixels, box = pixels_and_box(visible)
+        all_pixels, amodal_box = pixels_and_box(whole)
+        label = found[name]
+        assert label.number == number
+        assert label.visible_pixels == pytest.approx(pixels, abs=2)
+        assert label.silhouette_pixels == pytest.approx(all_pixels, abs=2)
+        assert label.visibility == pytest.approx(pixels / all_pixels, abs=4 / all_pixels)
+        assert label.visible_box == box
+        assert label.amodal_box == amodal_box
+        assert np.count_nonzero(label.amodal != whole) <= 1
+        assert np.allclose(view.X_SC @ label.X_CO, scene.X_SO(name), atol=1e-12)
+        hidden += box != amodal_box
+    assert hidden
 
 
 def test_the_arm_stands_as_it_is_told(station: Station, scene: Scene) -> None:
@@ -220,6 +236,10 @@ def test_the_arm_stands_as_it_is_told(station: Station, scene: Scene) -> None:
     drawn = renderer.images(home).color.astype(int)
     moved = np.abs(drawn - renderer.images(turned).color).max(axis=2) > 60
     assert moved[(first != second)].mean() > 0.5
+    bare = View(camera="overview", intrinsics=home.intrinsics, X_SC=home.X_SC)
+    for one in (renderer, SceneRenderer(scene, station, arm=True, colors=False)):
+        with pytest.raises(InvalidInputError, match=r"a view without the arm in it, of a scene"):
+            one.images(bare, ("depth",))
     with pytest.raises(InvalidInputError, match=r"posture of 2 joints; the arm has 7"):
         renderer.images(
             View(camera="x", intrinsics=home.intrinsics, X_SC=home.X_SC, posture=(0.0, 1.0))

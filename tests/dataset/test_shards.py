@@ -310,14 +310,10 @@ def test_damaged_archives_are_refused(
     tmp_path: Path, damage: Callable[[bytes], bytes], message: str
 ) -> None:
     shard = drawn.write(tmp_path, [12]) / "shards/000012.tar"
-    dataset, size = load_dataset(tmp_path), shard.stat().st_size
     shard.write_bytes(damage(shard.read_bytes()))
     with pytest.raises(InvalidInputError) as refused:
-        dataset.read(0)
+        load_dataset(tmp_path).read(0)
     assert str(shard) in str(refused.value) and message in str(refused.value)
-    if shard.stat().st_size != size:
-        with pytest.raises(InvalidInputError, match=r"000012\.tar has \d+ bytes, the index"):
-            load_dataset(tmp_path)
 
 
 def linked() -> bytes:

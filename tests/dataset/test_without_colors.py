@@ -125,8 +125,8 @@ def test_colours_are_never_mixed(
     command = [*COMMAND, recipe_file(tmp_path), "--quiet", "-o", str(colored)]
     assert main(command) == 2
     assert capsys.readouterr().err == (
-        f"burg-drake: error: {colored} has samples with colours, and is continued with colours"
-        f" alone: {MISSING}\n"
+        f"burg-drake: error: the samples of {colored} have colours, and so must all that are added:"
+        f" {MISSING}\n"
     )
     assert main([*command, "--no-colors"]) == 2
     assert "recipe.colors is True there, False here" in capsys.readouterr().err

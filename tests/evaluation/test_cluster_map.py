@@ -18,12 +18,16 @@ import burg_drake
 from burg_drake.core.errors import BurgError, ClusterError, InvalidInputError
 from burg_drake.core.workers.processes import start_worker
 from burg_drake.evaluation.cluster.bundles.bundle import Bundle
+from burg_drake.evaluation.cluster.dask_executor import (
+    DaskExecutor,
+    connect_cluster,
+    map_on_cluster,
+)
 
 distributed = pytest.importorskip("distributed", reason="the cluster needs burg-drake[dask]")
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
 
 from burg_drake.evaluation.cluster.calls import ClusterCall, make_call  # noqa: E402
-from burg_drake.evaluation.cluster.dask_executor import DaskExecutor, connect_cluster  # noqa: E402
 from burg_drake.evaluation.cluster.delivery import send_bundle  # noqa: E402
 from burg_drake.evaluation.cluster.local_nodes import LocalNodes  # noqa: E402
 from burg_drake.evaluation.cluster.members import threads_by_address  # noqa: E402
@@ -41,6 +45,8 @@ def nodes() -> Iterator[LocalNodes]:
 def executor(nodes: LocalNodes, monkeypatch: pytest.MonkeyPatch) -> Iterator[DaskExecutor]:
     monkeypatch.setattr("burg_drake.evaluation.cluster.cluster_map.LOOK", 0.2)
     client = distributed.Client(nodes.address, set_as_default=False, timeout=30)
+    nodes.restart_workers()  # those that another test has killed
+    wait_for(lambda: len(threads_by_address(client)) == 2)
     yield DaskExecutor(client, maintain=nodes.restart_workers)
     client.close(timeout=2)
 
@@ -59,7 +65,7 @@ def same(work: Known) -> Known:
 def squares(executor: DaskExecutor, work: list[Known], **changes: Any) -> dict[int, Any]:
     """Outcomes by the work's number, each of which comes once."""
     how = {"bundle": bundle(), "pack": same, **changes}
-    found = list(executor.map_unordered(square, work, **how))
+    found = list(map_on_cluster(executor, square, work, **how))
     assert len({one.number for one, _ in found}) == len(found)
     return {one.number: str(made) if isinstance(made, BurgError) else made for one, made in found}
 
@@ -117,7 +123,7 @@ def test_work_at_which_several_workers_are_lost_is_given_up(
 def test_leaving_early_ends_the_children(executor: DaskExecutor, tmp_path: Path) -> None:
     log = tmp_path / "log"
     work = [Known(0, log=log), Known(1, pause=60.0, log=log)]
-    made = executor.map_unordered(square, work, bundle(), same)
+    made = map_on_cluster(executor, square, work, bundle(), same)
     assert next(made) == (work[0], (0, "known"))
     wait_for(lambda: len(log.read_text().splitlines()) == 2)
     made.close()
@@ -192,7 +198,7 @@ def test_a_scheduler_that_dies_is_said_in_one_line() -> None:
             pytest.raises(ClusterError, match=lost),
         ):
             work = [Known(k, pause=0.2) for k in range(50)]
-            for _ in executor.map_unordered(square, work, bundle(), same):
+            for _ in map_on_cluster(executor, square, work, bundle(), same):
                 nodes.scheduler.kill()
                 nodes.scheduler.wait()
     finally:

@@ -92,7 +92,7 @@ def test_half_of_the_board() -> None:
     plate = Obstacle(X_WB=Pose((0.5, 0.0, 0.5)), size=(1.0, 1.0, 0.01))
     hidden = replace(station, document=replace(station.document, background={"plate": plate}))
     assert seen_share(camera, hidden, Board()) == pytest.approx(0.5, abs=0.02)
-    half = replace(camera, center=(639.5, 239.5))
+    half = replace(camera, center=(639.4, 239.5))
     assert seen_share(half, station, Board()) == pytest.approx(0.5, abs=0.02)
     away = replace(camera, X_WC=Pose((0.0, 0.0, 1.0)))
     assert seen_share(away, station, Board()) == 0.0

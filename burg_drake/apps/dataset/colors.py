@@ -42,11 +42,11 @@ def with_possible_colors(recipe: DatasetRecipe, folder: Path) -> DatasetRecipe:
     from burg_drake.system_libraries import describe_missing, missing_render_libraries
 
     missing = missing_render_libraries()
-    if not recipe.colors or not missing:
+    if not recipe.colors or recipe.renderer != "drake" or not missing:
         return recipe
     if _has_colors(folder):
         raise MissingDependencyError(
-            f"{folder} has samples with colours, and is continued with colours alone:"
+            f"the samples of {folder} have colours, and so must all that are added:"
             f" {describe_missing(missing)}"
         )
     dark = ", and its sensor depth no holes at dark surfaces" if recipe.sensor else ""

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.dataset.colors import warn_without_colors
-from burg_drake.apps.options import Parser, add_scene, add_station, add_verb
+from burg_drake.apps.options import Parser, add_options, add_scene, add_station, add_verb
 
 if TYPE_CHECKING:
     from burg_drake.dataset.rendering import Images
@@ -22,6 +22,7 @@ def add_to(verbs: Any) -> None:
         "render what a camera of the station sees of a scene",
         "burg-drake render tabletop_six --camera board -o view.png",
         "burg-drake render tabletop_six --camera overview --arm -o view.png --depth --labels",
+        "burg-drake render tabletop_six --renderer blender -o view.png",
         "",
         "Depth, labels and normals go beside it: view.depth.png (16 bit, tenths of a millimetre,",
         "0 is none), view.labels.png (numbers of the scene's instances from 1; 0 is all else) and",
@@ -31,6 +32,8 @@ def add_to(verbs: Any) -> None:
 
 
 def _add_options(parser: Parser) -> None:
+    from burg_drake.dataset.generating import DatasetRecipe
+
     add_scene(parser)
     add_station(parser)
     parser.add_argument(
@@ -43,6 +46,7 @@ def _add_options(parser: Parser) -> None:
         "-o", "--output", metavar="FILE", required=True, help="file to write (.png)"
     )
     parser.add_argument("--arm", action="store_true", help="with the arm, in its home posture")
+    add_options(parser, DatasetRecipe, "renderer")
     for kind in ("depth", "labels", "normals"):
         parser.add_argument(f"--{kind}", action="store_true", help=f"write an image of {kind}, too")
 
@@ -60,7 +64,8 @@ def run_render(arguments: argparse.Namespace) -> int:
     if output.suffix.lower() != ".png":
         raise InvalidInputError(f"{output}: only PNG is written; end the name with .png")
     kinds: list[ImageKind] = []
-    if not warn_without_colors(f"{output} is not written, as it has colours"):
+    by_drake = arguments.renderer == "drake"
+    if not (by_drake and warn_without_colors(f"{output} is not written, as it has colours")):
         kinds.append("color")
     if arguments.depth:
         kinds.append("depth")
@@ -73,7 +78,7 @@ def run_render(arguments: argparse.Namespace) -> int:
     scene, station = load_scene(arguments.scene), load_station(arguments.station)
     view = station_view(station, arguments.camera, arm=arguments.arm)
     require_writable(output)
-    images = render(scene, station, view, kinds)
+    images = render(scene, station, view, kinds, renderer=arguments.renderer)
     for kind in kinds:
         path = output if kind == "color" else output.with_suffix(f".{kind}.png")
         image = getattr(images, kind)

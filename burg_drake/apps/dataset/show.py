@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from burg_drake.apps.dataset.damaged import warn_of_damage
 from burg_drake.apps.options import Parser, add_verb, add_view, positive_int
 
 
@@ -46,25 +47,28 @@ def _add_options(parser: Parser) -> None:
 
 
 def run_show(arguments: argparse.Namespace) -> int:
-    """Shows a sample in 3D, or writes a sheet."""
+    """Shows a sample in 3D, or writes a sheet; those that are damaged are left out, and named."""
     from burg_drake.apps.terminal import open_view, present, print_legend
     from burg_drake.core import InvalidInputError
-    from burg_drake.dataset.exchange import contact_sheet, sample_caption, show_sample
-    from burg_drake.dataset.samples import load_dataset
+    from burg_drake.dataset.exchange import contact_sheet, sample_caption, show_sample, spread
+    from burg_drake.dataset.samples import ReadableSamples, load_dataset
 
     dataset = load_dataset(arguments.data)
     if not len(dataset):
         raise InvalidInputError(f"{arguments.data} has no samples to show")
-    key = arguments.sample
-    chosen = None if key is None else dataset.index(key)
+    samples, key = ReadableSamples(dataset), arguments.sample
+    chosen = None if key is None else dataset[dataset.index(key)]
+    rows, columns = arguments.rows, arguments.columns
     if arguments.output is not None:
-        samples = dataset if chosen is None else dataset[chosen : chosen + 1]
-        size = arguments.rows, arguments.columns
-        contact_sheet(samples, arguments.output, *size, title=dataset.name)
+        indices = spread(len(dataset), rows * columns)
+        shown = [chosen] if chosen is not None else list(samples.read(indices))
+        contact_sheet(shown, arguments.output, rows, columns, title=dataset.name)
         print(f"wrote {arguments.output}")
         if arguments.html is None:
+            warn_of_damage(samples)
             return 0
-    sample = dataset[chosen or 0]
+    sample = chosen if chosen is not None else next(iter(samples))
+    warn_of_damage(samples)
     scene, station = dataset.scene(sample.scene), dataset.station
     meshcat = open_view(arguments)
     legend = show_sample(sample, scene, station, meshcat)

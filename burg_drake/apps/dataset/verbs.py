@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.dataset import show
+from burg_drake.apps.dataset import export, show
 from burg_drake.apps.dataset.colors import with_possible_colors
 from burg_drake.apps.options import (
     Parser,
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from burg_drake.objects.library import ObjectLibrary
     from burg_drake.scene.document import Scene, SceneRecipe
     from burg_drake.station.document import Station
-
-FORMATS = ("bop", "coco", "graspnet", "webdataset")
 
 
 def add_to(verbs: Any) -> None:
@@ -61,14 +59,7 @@ def add_to(verbs: Any) -> None:
         options=_add_data,
     )
     show.add_to(group)
-    add_verb(
-        group,
-        "export",
-        run_export,
-        "write a data set in another project's format",
-        "burg-drake dataset export data --to bop -o data_bop",
-        options=_add_export_options,
-    )
+    export.add_to(group)
 
 
 def _add_data(parser: Parser) -> None:
@@ -91,8 +82,7 @@ def _add_generate_options(parser: Parser) -> None:
         metavar="N",
         dest="objects",
         type=positive_int,
-        default=SceneRecipe.count,
-        help="objects in a sampled scene (default: %(default)d)",
+        help=f"objects in a sampled scene (default: {SceneRecipe.count})",
     )
     add_station(parser)
     parser.add_argument(
@@ -104,8 +94,10 @@ def _add_generate_options(parser: Parser) -> None:
         nargs="+",
         help="sphere (around the scene), wrist, or cameras of the station (default: sphere)",
     )
-    known = ("views", "sensor", "normals", "colors", "seed")
-    add_options(parser, DatasetRecipe, *known, unset=True)
+    for name in ("views", "sensor", "renderer", "normals", "colors", "seed"):
+        default = getattr(DatasetRecipe(), name)
+        shown = None if isinstance(default, bool) or default == "" else default
+        add_options(parser, DatasetRecipe, name, unset=True, shown_default=shown)
     parser.add_argument(
         "--plain",
         action="store_true",
@@ -125,6 +117,7 @@ def _add_generate_options(parser: Parser) -> None:
 
 def run_generate(arguments: argparse.Namespace) -> int:
     """Writes a data set; 1 if some scenes have no samples."""
+    from burg_drake.core import InvalidInputError
     from burg_drake.core.terminal import Progress, ProgressMeter, Reporter
     from burg_drake.dataset.generating import generate_dataset
     from burg_drake.dataset.samples import load_dataset
@@ -134,8 +127,12 @@ def run_generate(arguments: argparse.Namespace) -> int:
     recipe = _recipe(arguments)
     scenes: list[Scene] | ObjectLibrary
     if arguments.sample is not None:
-        scenes, count, sampled = _sampling(arguments, station)
+        scenes, count, sampled = _sampling(arguments, recipe, station)
         recipe = _replaced(recipe, sampled=sampled)
+    elif arguments.objects is not None:
+        raise InvalidInputError(
+            f"-n {arguments.objects}: how many objects stand in given scenes is in their documents"
+        )
     else:
         scenes = _given_scenes(arguments.scenes)
         count = len(scenes)
@@ -148,7 +145,7 @@ def run_generate(arguments: argparse.Namespace) -> int:
             station,
             arguments.output,
             recipe,
-            count=count,
+            count=None if arguments.sample is None else count,
             workers=arguments.workers,
             cluster=arguments.cluster,
             progress=lambda number, error: pace.step(),
@@ -218,8 +215,10 @@ def _given_scenes(references: list[str]) -> list[Scene]:
 
 
 def _sampling(
-    arguments: argparse.Namespace, station: Station
+    arguments: argparse.Namespace, asked: DatasetRecipe, station: Station
 ) -> tuple[ObjectLibrary, int, SceneRecipe]:
+    from dataclasses import replace
+
     from burg_drake.apps.scene import library_reference, station_reference
     from burg_drake.core import InvalidInputError
     from burg_drake.objects.library import load_library
@@ -233,13 +232,16 @@ def _sampling(
         )
     library = load_library(name)
     folder = Path(arguments.output) / "scenes"
-    recipe = SceneRecipe(
-        library=library_reference(name, library, folder),
-        count=arguments.objects,
-        seed=arguments.seed or 0,
+    reference = library_reference(name, library, folder)
+    sampled = asked.sampled or SceneRecipe(library=reference, seed=asked.seed)
+    sampled = replace(
+        sampled,
+        library=reference,
+        count=sampled.count if arguments.objects is None else arguments.objects,
+        seed=sampled.seed if arguments.seed is None else arguments.seed,
         station=station_reference(arguments.station, station, folder),
     )
-    return library, int(count), recipe
+    return library, int(count), sampled
 
 
 def run_check(arguments: argparse.Namespace) -> int:
@@ -253,35 +255,4 @@ def run_check(arguments: argparse.Namespace) -> int:
     if found:
         return 1
     print(f"{arguments.data}: {len(load_dataset(arguments.data))} samples, nothing is wrong")
-    return 0
-
-
-def _add_export_options(parser: Parser) -> None:
-    _add_data(parser)
-    parser.add_argument("--to", required=True, choices=FORMATS, help="format")
-    parser.add_argument(
-        "-o", "--output", metavar="FOLDER", required=True, help="folder to write, new or empty"
-    )
-
-
-def run_export(arguments: argparse.Namespace) -> int:
-    """Writes a data set in another format; what that cannot carry goes to stderr."""
-    from burg_drake.dataset.exchange import (
-        write_bop,
-        write_coco,
-        write_graspnet,
-        write_webdataset,
-    )
-    from burg_drake.dataset.samples import load_dataset
-
-    dataset = load_dataset(arguments.data)
-    writers: dict[str, Any] = {
-        "bop": write_bop,
-        "coco": write_coco,
-        "graspnet": write_graspnet,
-        "webdataset": write_webdataset,
-    }
-    for remark in writers[arguments.to](dataset, arguments.output):
-        print(f"burg-drake: warning: {remark}", file=sys.stderr)
-    print(f"wrote {arguments.output}: {len(dataset)} samples")
     return 0

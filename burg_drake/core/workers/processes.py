@@ -24,8 +24,9 @@ LOOK = 1.0
 """Between two looks of a worker whether its parent is there [s]."""
 ONE_THREAD = {
     f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM")
-}
-"""Environment of a worker: parallelism is in the processes, and sums keep their order."""
+} | {"LP_NUM_THREADS": "0"}
+"""Environment of a worker: parallelism is in the processes, and sums keep their order. The last is
+of Mesa's renderer without a GPU: 0 are threads besides the one that calls it."""
 
 
 def default_workers() -> int:

@@ -23,7 +23,7 @@ class DirectedLight:
         frame: of the direction: the world, or that of the camera, with which the light goes.
         irradiance: of a surface that faces it: with 1, a white one is white in the image.
         color: red, green, blue, linear.
-        shadows: whether it casts them.
+        shadows: whether it casts them with Drake's renderer; with Blender those of the world do.
     """
 
     direction: Vector3

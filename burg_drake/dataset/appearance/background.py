@@ -10,12 +10,15 @@ import numpy as np
 from burg_drake.cameras.optics import FieldOfView, Intrinsics
 from burg_drake.core import Array, Booleans, Bytes
 from burg_drake.dataset.appearance.appearance import Appearance
+from burg_drake.dataset.appearance.photometry import linear_from_srgb, srgb_from_linear
 from burg_drake.dataset.appearance.room import environment_map, pixels_of
 
 NOWHERE = (255, 0, 254)
 """What the renderer of an appearance puts where nothing is: a colour that nothing else has."""
 GREY = 150
 """Where no room is."""
+SKY = (204, 229, 255)
+"""Where no appearance is, as behind simulated cameras' images."""
 KEPT = 4
 """Cameras that are kept for the next image."""
 
@@ -37,13 +40,46 @@ def with_background(color: Bytes, X_WC: Array, intrinsics: Intrinsics, look: App
         return color
     edge = cv2.dilate(nothing.astype(np.uint8), np.ones((3, 3), np.uint8)).astype(bool) & ~nothing
     seen_behind = nothing | edge
-    behind = np.full(color.shape, GREY, np.uint8)
-    if look.room is not None:
-        d_W = _rays(intrinsics)[seen_behind] @ X_WC[:3, :3].T
-        behind[seen_behind] = _looked_up(environment_map(look.room), pixels_of(d_W))
+    behind = _behind(seen_behind, X_WC, intrinsics, look)
     filled = np.where(nothing[..., None], behind, color)
     filled[edge] = _unmixed(color, nothing, edge, behind)
     return filled
+
+
+def over_background(
+    color: Bytes, X_WC: Array, intrinsics: Intrinsics, look: Appearance | None
+) -> Bytes:
+    """An image with the room where the renderer has found nothing, mixed in linear light.
+
+    Args:
+        color: (H, W, 4) sRGB, and the share of each pixel that anything is in, which colours are
+            not multiplied by.
+        X_WC: (4, 4) the camera's optical frame in the world.
+        intrinsics: of the camera.
+        look: has the room; None for the sky of simulated cameras.
+
+    Returns:
+        (H, W, 3) sRGB.
+    """
+    found, share = color[..., :3].copy(), color[..., 3]
+    mixed = share < 255
+    if mixed.any():
+        behind = _behind(mixed, X_WC, intrinsics, look)[mixed]
+        part = share[mixed, None] / 255.0
+        before = linear_from_srgb(found[mixed] / 255.0)
+        light = part * before + (1.0 - part) * linear_from_srgb(behind / 255.0)
+        found[mixed] = srgb_from_linear(light) * 255.0 + 0.5
+    return found
+
+
+def _behind(where: Booleans, X_WC: Array, intrinsics: Intrinsics, look: Appearance | None) -> Bytes:
+    """(H, W, 3) what is behind everything, in pixels of the mask `where`."""
+    behind = np.empty((*where.shape, 3), np.uint8)
+    behind[:] = SKY if look is None else GREY
+    if look is not None and look.room is not None:
+        d_W = _rays(intrinsics)[where] @ X_WC[:3, :3].T
+        behind[where] = _looked_up(environment_map(look.room), pixels_of(d_W))
+    return behind
 
 
 def _unmixed(color: Bytes, nothing: Booleans, edge: Booleans, behind: Bytes) -> Bytes:

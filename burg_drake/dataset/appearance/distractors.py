@@ -74,7 +74,8 @@ def place_distractors(
     settings: AppearanceSettings, scene: Scene, station: Station, rng: np.random.Generator
 ) -> tuple[Distractor, ...]:
     """Draws things and their places: on the table in a stable pose, their bounding circles clear of
-    those of the scene's objects, of obstacles, the arm's base and, unless allowed, the board.
+    those of the scene's objects, of obstacles, the arm's base and, unless allowed, the board. What
+    the scene itself has of the library is none.
 
     Raises:
         UnknownNameError: there is no such library.
@@ -85,10 +86,14 @@ def place_distractors(
     if not count:
         return ()
     library = distractor_library(settings.distractor_library)
-    usable = sorted(name for name, e in library.objects.items() if e.stable_poses)
+    labelled = {one.object for one in (*scene.instances.values(), *scene.background.values())}
+    if library.root.resolve() != scene.library.root.resolve():
+        labelled = set()
+    usable = sorted(n for n, e in library.objects.items() if e.stable_poses and n not in labelled)
     if not usable:
         raise InvalidInputError(
-            f"library {library.root} has no object with a stable pose that could be a distractor"
+            f"library {library.root} has no object with a stable pose that could be a distractor,"
+            " other than those that the scene has"
         )
     table = free_table(scene, station, settings.distractors_on_board)
     found = []

@@ -1,5 +1,8 @@
 from .bop import write_bop as write_bop
-from .card import write_card as write_card
+from .card import (
+    CARD as CARD,
+    write_card as write_card,
+)
 from .coco import write_coco as write_coco
 from .graspnet import (
     write_graspnet as write_graspnet,
@@ -8,6 +11,7 @@ from .sample_view import show_sample as show_sample
 from .sheet import (
     contact_sheet as contact_sheet,
     sample_caption as sample_caption,
+    spread as spread,
 )
 from .source import (
     Samples as Samples,

@@ -21,17 +21,18 @@ from numpy.typing import NDArray
 from burg_drake.core import Array, InvalidInputError, inverse
 from burg_drake.dataset.exchange.bop_models import write_models
 from burg_drake.dataset.exchange.folder import new_folder
-from burg_drake.dataset.exchange.image_files import color_file, depth_numbers, png
+from burg_drake.dataset.exchange.image_files import color_file, depth_numbers
 from burg_drake.dataset.exchange.source import (
     Samples,
     depth_of,
+    lost_depth,
     object_index,
     require_images,
     require_pinhole,
     scenes_of,
 )
 from burg_drake.dataset.labels import Box, InstanceLabel
-from burg_drake.dataset.samples import Sample
+from burg_drake.dataset.samples import Sample, encode_png
 
 DEPTH_UNIT = 1e-4
 """What 1 stands for in a depth image [m], as in BOP's own rendered images: up to 6.5 m."""
@@ -73,7 +74,9 @@ def write_bop(
         MeshError: a mesh of the library is damaged.
     """
     if not depth_unit > 0.0:
-        raise InvalidInputError(f"unit of depth is {depth_unit:g} m; it must be above 0")
+        raise InvalidInputError(f"unit of depth is {depth_unit:g} m; it must be above 0").about(
+            "depth_unit"
+        )
     suffix = ".jpg" if split.endswith("_pbr") else ".png"
     lost: set[str] = set()
     targets: list[dict[str, int]] = []
@@ -85,7 +88,7 @@ def write_bop(
                 if not (fresh / "camera.json").exists():
                     _write_json(fresh / "camera.json", _camera(sample, depth_unit))
                 scene.add(sample, depth_of(sample, "BOP", sensor=sensor_depth))
-                lost |= set(_losses(sample))
+                lost |= {*_losses(sample), *lost_depth(sample, "BOP", sensor=sensor_depth)}
             scene.finish()
             targets += scene.targets(number)
         if split.startswith("test"):
@@ -117,7 +120,7 @@ class _Scene:
         view, name = str(sample.number), f"{sample.number:06d}"
         numbers = depth_numbers(depth, self._unit, sample.key)
         self._write("rgb", f"{name}{self._suffix}", color_file(color, self._suffix))
-        self._write("depth", f"{name}.png", png(numbers))
+        self._write("depth", f"{name}.png", encode_png(numbers))
         self._cameras[view] = _scene_camera(sample, self._unit)
         self._poses[view], self._infos[view] = [], []
         for k, label in enumerate(sample.instances):
@@ -191,7 +194,7 @@ def _box(box: Box | None) -> list[int]:
 
 
 def _mask(mask: NDArray[np.bool_]) -> bytes:
-    return png(np.where(mask, np.uint8(255), np.uint8(0)))
+    return encode_png(np.where(mask, np.uint8(255), np.uint8(0)))
 
 
 def _losses(sample: Sample) -> Iterator[str]:

@@ -141,7 +141,7 @@ def _objects(samples: Samples, counted: Tally, licences: Mapping[str, str]) -> s
 
 
 def _counts(name: str, counts: Counter[str]) -> str:
-    rows = [(key or "not judged", f"{n:,}") for key, n in counts.most_common()]
+    rows = [(key or "clear, or not judged", f"{n:,}") for key, n in counts.most_common()]
     return _table((name, "number"), rows)
 
 

@@ -34,18 +34,19 @@ from scipy.io import savemat
 from burg_drake.core import Array, Booleans, InvalidInputError, inverse, quaternion_from_rotation
 from burg_drake.core.grasps import GraspSet, Outcome
 from burg_drake.dataset.exchange.folder import new_folder
-from burg_drake.dataset.exchange.image_files import depth_numbers, png
+from burg_drake.dataset.exchange.image_files import depth_numbers
 from burg_drake.dataset.exchange.model_file import visual_model, write_ply
 from burg_drake.dataset.exchange.source import (
     Samples,
     depth_of,
+    lost_depth,
     object_index,
     require_images,
     require_pinhole,
     scenes_of,
 )
 from burg_drake.dataset.labels import LabelledGrasps, grasp_rectangles
-from burg_drake.dataset.samples import Sample
+from burg_drake.dataset.samples import Sample, encode_png
 from burg_drake.formats import write_grasp_file
 
 DEPTH_UNIT = 1e-3
@@ -134,6 +135,7 @@ def write_graspnet(
                 if name not in cameras:
                     cameras[name] = _Camera(samples.objects, scene, name, opening)
                 cameras[name].add(sample, depth_of(sample, "GraspNet", sensor=sensor_depth))
+                lost |= lost_depth(sample, "GraspNet", sensor=sensor_depth)
             for one in cameras.values():
                 one.finish()
     return tuple(sorted(lost))
@@ -169,10 +171,10 @@ class _Camera:
         name = f"{len(self._X_SC):04d}"
         self._X_SC.append(sample.view.X_SC)
         assert sample.images.color is not None and sample.images.labels is not None
-        self._write("rgb", f"{name}.png", png(sample.images.color))
+        self._write("rgb", f"{name}.png", encode_png(sample.images.color))
         numbers = depth_numbers(depth, DEPTH_UNIT, sample.key)
-        self._write("depth", f"{name}.png", png(numbers))
-        self._write("label", f"{name}.png", png(self._labels(sample, ids)))
+        self._write("depth", f"{name}.png", encode_png(numbers))
+        self._write("label", f"{name}.png", encode_png(self._labels(sample, ids)))
         self._write("meta", f"{name}.mat", _meta(sample, ids))
         self._write("annotations", f"{name}.xml", _annotations(sample, ids))
         if sample.grasps is not None:

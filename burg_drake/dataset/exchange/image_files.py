@@ -1,14 +1,13 @@
-"""Images as the bytes of files: PNG without loss, JPEG for colours, depth as whole numbers."""
+"""Images as files of other formats have them: colours, and depth as whole numbers."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import Bytes, InvalidInputError, Single
+from burg_drake.dataset.samples import encode_png
 
 QUALITY = 95
 """Of JPEG, 0 to 100; OpenCV's own default."""
@@ -16,23 +15,12 @@ DEEPEST = np.iinfo(np.uint16).max
 """Largest number of a pixel in a depth image."""
 
 
-def png(image: NDArray[Any]) -> bytes:
-    """An image as PNG, without loss.
-
-    Args:
-        image: (H, W) of uint8 or uint16, or RGB (H, W, 3) of uint8.
-    """
-    return _encoded(".png", image, [])
-
-
-def jpg(image: Bytes) -> bytes:
-    """Colours (H, W, 3) as JPEG."""
-    return _encoded(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
-
-
 def color_file(image: Bytes, suffix: str) -> bytes:
     """Colours (H, W, 3) as `.jpg` or `.png`."""
-    return jpg(image) if suffix == ".jpg" else png(image)
+    if suffix == ".png":
+        return encode_png(image)
+    _, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    return bytes(data)
 
 
 def depth_numbers(depth: Single, unit: float, key: str) -> NDArray[np.uint16]:
@@ -51,11 +39,5 @@ def depth_numbers(depth: Single, unit: float, key: str) -> NDArray[np.uint16]:
         raise InvalidInputError(
             f"depth of sample {key} is up to {depth.max():.3g} m; images of 16 bits end at"
             f" {DEEPEST * unit:.3g} m if 1 stands for {1e3 * unit:g} mm: take a larger unit"
-        )
+        ).about("depth_unit")
     return np.asarray(numbers, dtype=np.uint16)
-
-
-def _encoded(suffix: str, image: NDArray[Any], options: list[int]) -> bytes:
-    shown = image[..., ::-1] if image.ndim == 3 else image
-    _, data = cv2.imencode(suffix, np.ascontiguousarray(shown), options)
-    return bytes(data)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from itertools import groupby
 from typing import Protocol
 
 from burg_drake.core import InvalidInputError, Single, UnknownNameError, nearest
 from burg_drake.dataset.labels import InstanceLabel
-from burg_drake.dataset.samples import Dataset, Sample
-from burg_drake.objects.library import ObjectLibrary, load_library
+from burg_drake.dataset.samples import Sample
+from burg_drake.objects.library import ObjectLibrary
 
 
 class Samples(Protocol):
@@ -34,46 +32,6 @@ class Samples(Protocol):
     def __getitem__(self, index: int, /) -> Sample: ...
 
     def __iter__(self) -> Iterator[Sample]: ...
-
-
-@dataclass(frozen=True)
-class StoredSamples:
-    """Those of a data set on disk, read when they are asked for.
-
-    Attributes:
-        dataset: where they are.
-    """
-
-    dataset: Dataset
-
-    @property
-    def name(self) -> str:
-        """Of the data set."""
-        return self.dataset.document.name
-
-    @property
-    def objects(self) -> tuple[str, ...]:
-        """Names of the library's objects, in the order of their ids."""
-        return self.dataset.document.objects
-
-    @cached_property
-    def library(self) -> ObjectLibrary:
-        """Where these objects are.
-
-        Raises:
-            UnknownNameError: there is no such library.
-            DocumentError: its document does not fit the schema.
-        """
-        return load_library(self.dataset.document.library, self.dataset.folder)
-
-    def __len__(self) -> int:
-        return len(self.dataset)
-
-    def __getitem__(self, index: int, /) -> Sample:
-        return self.dataset[index]
-
-    def __iter__(self) -> Iterator[Sample]:
-        return iter(self.dataset)
 
 
 def scenes_of(samples: Iterable[Sample]) -> Iterator[tuple[int, Iterator[Sample]]]:
@@ -144,6 +102,19 @@ def depth_of(sample: Sample, format: str, *, sensor: bool) -> Single:
             " generate the data set with a sensor"
         )
     return depth
+
+
+def lost_depth(sample: Sample, format: str, *, sensor: bool) -> set[str]:
+    """What is lost of the depth by a format that has one depth image of a view, in a sentence.
+
+    Args:
+        sample, format, sensor: as for `depth_of`.
+    """
+    if sensor and sample.images.depth is not None:
+        return {f"{format} has one depth image of a view: the exact depth is left out."}
+    if not sensor and sample.sensor_depth is not None:
+        return {f"{format} has one depth image of a view: the depth of the sensor is left out."}
+    return set()
 
 
 def object_index(objects: Sequence[str], sample: Sample, label: InstanceLabel) -> int:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from burg_drake.core import Array
-from burg_drake.dataset.samples import Sample
+from burg_drake.dataset.exchange.source import Samples
+from burg_drake.dataset.samples import Dataset, Sample
 
 
 @dataclass(eq=False)
@@ -47,15 +48,15 @@ class Tally:
         """Number of samples."""
         return self.views.total()
 
-    def add(self, sample: Sample) -> None:
-        """Counts a sample."""
-        view, images = sample.view, sample.images
+    def add(self, sample: Sample, parts: Collection[str]) -> None:
+        """Counts a sample that has such images, read or not."""
+        view = sample.view
         self.scenes.add(sample.scene)
         self.views[view.camera] += 1
         self.sizes[view.intrinsics.width, view.intrinsics.height] += 1
         for name in ("color", "depth", "labels", "normals"):
-            self.images[name] += getattr(images, name) is not None
-        self.images["depth of a sensor"] += sample.sensor_depth is not None
+            self.images[name] += name in parts
+        self.images["depth of a sensor"] += "sensor_depth" in parts
         self.elevations.append(elevation(view.X_SC))
         seen = [label for label in sample.instances if label.visible_pixels]
         self.objects.append(len(seen))
@@ -67,11 +68,18 @@ class Tally:
             self.outcomes.update(str(outcome) for outcome in sample.grasps.outcome)
 
 
-def tally(samples: Iterable[Sample]) -> Tally:
-    """Counts all samples."""
+def tally(samples: Samples) -> Tally:
+    """Counts all samples; images of a data set on disk are not decoded for that."""
     counted = Tally()
+    if isinstance(samples, Dataset):
+        for index in range(len(samples)):
+            counted.add(samples.read(index, ("grasps",)), samples.parts(index))
+        return counted
     for sample in samples:
-        counted.add(sample)
+        there = {name for name, image in vars(sample.images).items() if image is not None}
+        if sample.sensor_depth is not None:
+            there.add("sensor_depth")
+        counted.add(sample, there)
     return counted
 
 

@@ -7,9 +7,7 @@ and when.
 
 from __future__ import annotations
 
-import io
 import json
-import tarfile
 from collections.abc import Iterator
 from itertools import groupby
 from pathlib import Path
@@ -19,10 +17,10 @@ import numpy as np
 
 from burg_drake.core import InvalidInputError
 from burg_drake.dataset.exchange.folder import new_folder
-from burg_drake.dataset.exchange.image_files import color_file, depth_numbers, png
+from burg_drake.dataset.exchange.image_files import color_file, depth_numbers
 from burg_drake.dataset.exchange.source import Samples, object_index
 from burg_drake.dataset.labels import InstanceLabel, LabelledGrasps, encode_mask
-from burg_drake.dataset.samples import Sample
+from burg_drake.dataset.samples import TAR_END, Sample, encode_png, tar_member
 
 DEPTH_UNIT = 1e-4
 """What 1 stands for in a depth image [m]."""
@@ -66,21 +64,14 @@ def write_webdataset(
     with new_folder(folder) as fresh:
         for shard, part in groupby(enumerate(samples), key=lambda one: one[0] // shard_size):
             path = fresh / f"shard-{shard:06d}.tar"
-            with tarfile.open(path, "w", format=tarfile.USTAR_FORMAT) as tar:
+            with path.open("wb") as stream:
                 for _, sample in part:
                     for name, content in _files(samples.objects, sample, images, depth_unit):
-                        _add(tar, f"{sample.key}.{name}", content)
+                        stream.write(tar_member(f"{sample.key}.{name}", content))
                     if sample.images.normals is not None:
                         lost.add("Images of normals are left out.")
+                stream.write(TAR_END)
     return tuple(sorted(lost))
-
-
-def _add(tar: tarfile.TarFile, name: str, content: bytes) -> None:
-    """Adds a file that is of nobody and of no time."""
-    member = tarfile.TarInfo(name)
-    member.size = len(content)
-    member.mode = 0o644
-    tar.addfile(member, io.BytesIO(content))
 
 
 def _files(
@@ -91,11 +82,11 @@ def _files(
     if seen.color is not None:
         yield images, color_file(seen.color, f".{images}")
     if seen.depth is not None:
-        yield "depth.png", png(depth_numbers(seen.depth, depth_unit, sample.key))
+        yield "depth.png", encode_png(depth_numbers(seen.depth, depth_unit, sample.key))
     if seen.labels is not None:
-        yield "seg.png", png(seen.labels.astype(np.uint16))
+        yield "seg.png", encode_png(seen.labels.astype(np.uint16))
     if sample.sensor_depth is not None:
-        yield "sensor.png", png(depth_numbers(sample.sensor_depth, depth_unit, sample.key))
+        yield "sensor.png", encode_png(depth_numbers(sample.sensor_depth, depth_unit, sample.key))
     content = _description(objects, sample, depth_unit)
     yield "json", json.dumps(content, sort_keys=True, allow_nan=False).encode()
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from burg_drake.core import InvalidInputError
-from burg_drake.core.paths import resolve
+from burg_drake.core import BurgError, InvalidInputError
+from burg_drake.dataset.generating.contents import require_same_contents
 from burg_drake.dataset.generating.recipe import DatasetRecipe, read_recipe
 from burg_drake.dataset.generating.scene_samples import SceneSamples, appearance_of
 from burg_drake.dataset.rendering import Images
@@ -19,7 +19,7 @@ from burg_drake.dataset.samples import (
     load_dataset_document,
 )
 from burg_drake.scene.document import Scene
-from burg_drake.station.document import Station, load_station
+from burg_drake.station.document import Station
 
 
 def sample_again(dataset: Dataset, key: str) -> Sample:
@@ -34,12 +34,14 @@ def sample_again(dataset: Dataset, key: str) -> Sample:
 
     Raises:
         UnknownNameError: no such sample.
-        InvalidInputError: nobody generated the data set.
+        InvalidInputError: nobody generated the data set, or its library or station is another now.
     """
     stored = dataset.read(dataset.index(key), images=())
     recipe, station = _made_with(dataset.document, dataset.folder)
     scene = dataset.scene(stored.scene)
-    samples = SceneSamples(scene, stored.scene, station, recipe, appearance_of(stored))
+    samples = SceneSamples(
+        scene, stored.scene, station, recipe, dataset.folder, appearance_of(stored)
+    )
     return samples.sample(stored.number, stored.view)
 
 
@@ -57,7 +59,10 @@ def check_generated(folder: str | Path) -> list[DatasetFinding]:
     document = load_dataset_document(folder / FILE)
     if document.recipe is None:
         return check_dataset(folder)
-    recipe, station = _made_with(document, folder)
+    try:
+        recipe, station = _made_with(document, folder)
+    except BurgError as error:
+        return [DatasetFinding("", FILE, str(error)), *check_dataset(folder)]
 
     last: list[tuple[tuple[int, str], SceneSamples]] = []
 
@@ -65,7 +70,8 @@ def check_generated(folder: str | Path) -> list[DatasetFinding]:
         key = sample.scene, repr(sample.appearance)
         if not last or last[0][0] != key:
             appearance = appearance_of(sample)
-            last[:] = [(key, SceneSamples(scene, sample.scene, station, recipe, appearance))]
+            samples = SceneSamples(scene, sample.scene, station, recipe, folder, appearance)
+            last[:] = [(key, samples)]
         return last[0][1].redrawn(sample.view)
 
     return check_dataset(folder, redraw)
@@ -74,5 +80,5 @@ def check_generated(folder: str | Path) -> list[DatasetFinding]:
 def _made_with(document: DatasetDocument, folder: Path) -> tuple[DatasetRecipe, Station]:
     if document.recipe is None:
         raise InvalidInputError(f"{folder} was not generated: its document has no recipe")
-    station = load_station(resolve(document.station, "stations", folder))
-    return read_recipe(document.recipe, f"recipe of {folder}"), station
+    recipe = read_recipe(document.recipe, f"recipe of {folder}")
+    return recipe, require_same_contents(document, recipe, folder)

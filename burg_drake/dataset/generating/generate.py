@@ -11,12 +11,19 @@ from burg_drake.core import (
     BurgError,
     InvalidInputError,
     MissingDependencyError,
-    content_hash,
     one_line,
     software_versions,
 )
 from burg_drake.core.paths import name_from, portable_reference
-from burg_drake.dataset.exchange import write_card
+from burg_drake.core.workers import worker_count
+from burg_drake.dataset.blender import blender
+from burg_drake.dataset.exchange import CARD, write_card
+from burg_drake.dataset.generating.contents import (
+    HASH_DIGITS,
+    distractors_content,
+    library_content,
+    portable_recipe,
+)
 from burg_drake.dataset.generating.makers import scene_maker
 from burg_drake.dataset.generating.recipe import DatasetRecipe
 from burg_drake.dataset.generating.work import DatasetInputs, SceneWork
@@ -36,7 +43,6 @@ PACKAGES = {
     "opencv": "opencv-python-headless",
 }
 """What decides about samples, as it is called in `dataset.yaml` and installed."""
-HASH_DIGITS = 16
 
 
 @dataclass(frozen=True)
@@ -76,7 +82,7 @@ def generate_dataset(
         station: what they stand on.
         folder: of the data set; new, or one that this function has begun.
         recipe: how samples are made.
-        count: of sampled scenes; all given ones if None.
+        count: of sampled scenes.
         workers: number of processes; with one this process does it.
         cluster: in their place, workers of Dask, which need none of this machine's files: as
             `burg.runs.connect_cluster` takes it, such as `local:4` or the path of a cluster file.
@@ -87,23 +93,27 @@ def generate_dataset(
 
     Raises:
         InvalidInputError: the folder holds another data set, is being written or is full, a scene
-            has no file, the scenes are of several libraries, or there is no such run.
-        UnknownNameError: the station has no such camera.
-        MissingDependencyError: the recipe has colours, and a system library of the renderer is
-            missing; or Dask is asked for, and not installed.
+            has no file, the scenes are of several libraries, or there is no such run; a number is
+            below 1.
+        UnknownNameError: the station has no such camera, or there is no library of distractors.
+        MissingDependencyError: the recipe has colours, and what renders them is missing; or Dask is
+            asked for, and not installed.
         ClusterError: no scheduler is reached, or it is lost; a worker has other versions; scenes
             that are there stay, and the same call continues.
     """
     station, recipe = as_station(station), recipe or DatasetRecipe()
     paths: Sequence[Path | None]
+    workers, folder = worker_count(workers), Path(folder)
     if isinstance(scenes, ObjectLibrary):
-        if recipe.sampled is None or count is None:
-            raise InvalidInputError("sampled scenes need a recipe and their count")
+        if recipe.sampled is None or count is None or count < 1:
+            raise InvalidInputError("sampled scenes need a recipe and their count, 1 or more")
         library, paths = scenes, [None] * count
+    elif count is not None:
+        raise InvalidInputError("count is of sampled scenes; of given ones all are taken")
     else:
         library, recipe, paths = _given(scenes, recipe)
     _require_possible(recipe, station)
-    folder = Path(folder)
+    recipe = portable_recipe(recipe, folder)
     document = _document(folder, library, station, recipe)
     with (
         scene_maker(cluster, workers, recipe, library, station) as make,
@@ -128,7 +138,8 @@ def generate_dataset(
                 if progress is not None:
                     progress(one.number, failed.get(one.number, ""))
         writer.finish()
-        _write_card(folder, recipe)
+        if len(failed) < len(missing) or not (folder / CARD).exists():
+            _write_card(folder, recipe)
     new = tuple(number for number in missing if number not in failed)
     known = tuple(number for number in range(len(paths)) if number not in missing)
     return GeneratedDataset(folder, new, known, dict(sorted(failed.items())))
@@ -139,8 +150,11 @@ def _require_possible(recipe: DatasetRecipe, station: Station) -> None:
     require_cameras(recipe.viewpoints, station)
     if recipe.run:
         open_results(recipe.run)
-    missing = missing_render_libraries() if recipe.colors else []
-    if missing:
+    if not recipe.colors:
+        return
+    if recipe.renderer == "blender":
+        blender()
+    elif missing := missing_render_libraries():
         raise MissingDependencyError(
             f"the recipe has colours (colors=False leaves them out): {describe_missing(missing)}"
         )
@@ -172,14 +186,18 @@ def _document(
     folder: Path, library: ObjectLibrary, station: Station, recipe: DatasetRecipe
 ) -> DatasetDocument:
     name = name_from(folder.resolve().name)
+    versions = software_versions(PACKAGES)
+    if recipe.renderer == "blender":
+        versions["blender"] = blender().version
     return DatasetDocument(
         name=name,
         objects=tuple(library.objects),
         library=portable_reference(library.root, folder),
         station=portable_reference(station.path, folder),
-        library_content=content_hash(library.content)[:HASH_DIGITS],
+        library_content=library_content(library),
         station_content=station.content[:HASH_DIGITS],
-        versions=software_versions(PACKAGES),
+        distractors_content=distractors_content(recipe, folder),
+        versions=versions,
         recipe=recipe.plain(),
     )
 

@@ -8,13 +8,16 @@ from dataclasses import replace
 from functools import partial
 
 from burg_drake.core import BurgError, InvalidInputError
+from burg_drake.core.paths import PACKAGE_URI
 from burg_drake.core.workers import map_unordered
+from burg_drake.dataset.blender import blender
+from burg_drake.dataset.generating.contents import run_folder
 from burg_drake.dataset.generating.recipe import DatasetRecipe
 from burg_drake.dataset.generating.sent_scene import MadeScene, SentScene, make_sent_scene
 from burg_drake.dataset.generating.work import SceneWork, given_scene, make_scene
 from burg_drake.dataset.labels import grasps_of_run
 from burg_drake.dataset.samples import ShardEntry, write_made_scene
-from burg_drake.evaluation.cluster import DaskExecutor, connect_cluster
+from burg_drake.evaluation.cluster import DaskExecutor, connect_cluster, map_on_cluster
 from burg_drake.evaluation.cluster.bundles import make_bundle
 from burg_drake.evaluation.store import open_results
 from burg_drake.objects.library import ObjectLibrary
@@ -54,6 +57,11 @@ def scene_maker(
             "a cluster takes the grasps of a run for given scenes, which they travel with; sample"
             " the scenes first, or give no cluster"
         )
+    if recipe.looks is not None and not recipe.looks.distractor_library.startswith(PACKAGE_URI):
+        raise InvalidInputError(
+            f"a cluster takes distractors of a built-in library, not of"
+            f" {recipe.looks.distractor_library}, which its machines do not have"
+        )
     with connect_cluster(cluster) as executor:
         yield partial(_make_on_cluster, executor, recipe, library, station)
 
@@ -77,7 +85,8 @@ def _make_on_cluster(
     if not able:
         return
     world = make_bundle(catalogue(library, scenes.values()), station, looks=True)
-    run = open_results(recipe.run) if recipe.run else None
+    run = open_results(run_folder(recipe, able[0].inputs.folder)) if recipe.run else None
+    version = blender().version if recipe.colors and recipe.renderer == "blender" else ""
     sent = replace(recipe, given=(), run="")
 
     def pack(one: SceneWork) -> SentScene:
@@ -85,9 +94,11 @@ def _make_on_cluster(
         if scene is not None and run is not None:
             grasps = grasps_of_run(run, scene)
         document, path = (scene.document, scene.path) if scene else (None, one.inputs.folder)
-        return SentScene(replace(world, data=b""), sent, one.number, document, path, grasps)
+        return SentScene(
+            replace(world, data=b""), sent, one.number, document, path, grasps, version
+        )
 
-    with closing(executor.map_unordered(make_sent_scene, able, world, pack)) as answers:
+    with closing(map_on_cluster(executor, make_sent_scene, able, world, pack)) as answers:
         for one, made in answers:
             yield one, made if isinstance(made, BaseException) else _kept(one, library, made)
 

@@ -9,9 +9,10 @@ from typing import Any, ClassVar
 
 from burg_drake.cameras.noise import depth_noise
 from burg_drake.cameras.optics import sensor
-from burg_drake.core import LARGEST_SEED, FieldError, InvalidInputError, setting
+from burg_drake.core import LARGEST_SEED, FieldError, InvalidInputError, nearest, setting
 from burg_drake.core.documents import parse_document, plain_data, require_ranges
 from burg_drake.dataset.appearance import AppearanceSettings
+from burg_drake.dataset.blender import RENDERERS, RendererName
 from burg_drake.dataset.views import ViewpointSettings
 from burg_drake.scene.document import SceneRecipe
 from burg_drake.station.document import MAX_SIDE
@@ -38,9 +39,10 @@ class DatasetRecipe:
         size: width and height of the sensor's images [pixels]; its usual ones if None.
         looks: how the looks of scenes vary, drawn once a scene; as simulated cameras always see
             them if None.
-        colors: whether there are images of colours, which need Drake's renderer and its system
-            libraries. All other images are the same without them, but for `sensor_depth`, whose
-            noise is drawn anew and has no holes at dark surfaces.
+        colors: whether there are images of colours, which need a renderer. All other images are
+            the same without them, but for `sensor_depth`, whose noise is drawn anew and has no
+            holes at dark surfaces.
+        renderer: of colours: `drake`, or `blender`, see `dataset.blender`; all else is the same.
         normals: whether there are images of normals.
         grasps_per_object: grasps that are sampled on each object and screened by the open hand.
         run: folder of a run whose grasps and outcomes are taken; none if empty.
@@ -55,12 +57,17 @@ class DatasetRecipe:
     views: int = setting(20, "views of each scene", metavar="K", low=1)
     viewpoints: ViewpointSettings = ViewpointSettings()
     sensor: str = setting(
-        "", "depth camera with its intrinsics and noise: d435, d455, azure_kinect, ..."
+        "",
+        "depth camera with its intrinsics and noise: d435, d455, azure_kinect, zivid_two, kinect",
+        metavar="NAME",
     )
     size: tuple[int, int] | None = None
     looks: AppearanceSettings | None = AppearanceSettings()
     colors: bool = setting(
-        True, "write no images of colours, which alone need Drake's renderer", name="no_colors"
+        True, "write no images of colours, which alone need a renderer", name="no_colors"
+    )
+    renderer: RendererName = setting(
+        "drake", "of colours; blender is photorealistic, and slow", choices=RENDERERS
     )
     normals: bool = setting(False, "write images of normals, too")
     grasps_per_object: int = 0
@@ -73,6 +80,10 @@ class DatasetRecipe:
         if self.sensor:
             self._require_size()
             depth_noise(self.sensor)
+        if self.renderer not in RENDERERS:
+            raise FieldError(
+                f"no renderer {self.renderer!r}; {nearest(self.renderer, RENDERERS)}", "renderer"
+            )
         if self.run and self.grasps_per_object:
             raise FieldError("grasps are sampled or taken from a run, not both", "run")
 

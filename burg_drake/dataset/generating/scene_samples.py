@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from burg_drake.dataset.appearance import (
     draw_appearance,
     read_appearance,
 )
+from burg_drake.dataset.generating.contents import placed_library, run_folder
 from burg_drake.dataset.generating.recipe import DatasetRecipe
 from burg_drake.dataset.labels import (
     SceneGrasps,
@@ -39,6 +41,7 @@ class SceneSamples:
         number: of it in the data set.
         station: what it stands on.
         recipe: how samples are made.
+        folder: of the data set, which the recipe's references start from.
         appearance: how it looks; drawn by the recipe if None.
         grasps: on its objects; those that the recipe asks for if None.
     """
@@ -49,14 +52,23 @@ class SceneSamples:
         number: int,
         station: Station,
         recipe: DatasetRecipe,
+        folder: Path,
         appearance: Appearance | None = None,
         grasps: SceneGrasps | None = None,
     ) -> None:
-        self._scene, self._number = scene, number
+        self._scene, self._number, self._folder = scene, number, folder
         self._station, self._recipe, self._grasps = station, recipe, grasps
-        if appearance is None and recipe.looks is not None:
+        looks = recipe.looks
+        if appearance is None and looks is not None:
             rng = rng_from("dataset looks", recipe.seed, number)
-            appearance = draw_appearance(recipe.looks, scene, station, rng)
+            library = placed_library(looks.distractor_library, folder)
+            settings = replace(looks, distractor_library=library)
+            drawn = draw_appearance(settings, scene, station, rng)
+            appearance = replace(drawn, library=looks.distractor_library)
+        self._stored = appearance
+        if appearance is not None:
+            library = placed_library(appearance.library, folder)
+            appearance = replace(appearance, library=library)
         self._appearance = appearance
         self._renderers: dict[tuple[bool, bool], SceneRenderer] = {}
 
@@ -108,7 +120,7 @@ class SceneSamples:
             sensor_depth=self._measured(view, images, rng) if recipe.sensor else None,
             instances=label_instances(renderer, view, images),
             grasps=None if grasps is None else label_grasps(grasps, self._scene, view.X_SC),
-            appearance={} if self._appearance is None else self._appearance.plain(),
+            appearance={} if self._stored is None else self._stored.plain(),
         )
 
     def redrawn(self, view: View) -> Images:
@@ -119,7 +131,12 @@ class SceneSamples:
         arm = view.posture is not None
         if (arm, colors) not in self._renderers:
             self._renderers[arm, colors] = SceneRenderer(
-                self._scene, self._station, appearance=self._appearance, arm=arm, colors=colors
+                self._scene,
+                self._station,
+                appearance=self._appearance,
+                arm=arm,
+                colors=colors,
+                renderer=self._recipe.renderer,
             )
         return self._renderers[arm, colors]
 
@@ -137,7 +154,7 @@ class SceneSamples:
     def _wanted_grasps(self) -> SceneGrasps | None:
         recipe = self._recipe
         if recipe.run:
-            return grasps_of_run(recipe.run, self._scene)
+            return grasps_of_run(run_folder(recipe, self._folder), self._scene)
         if recipe.grasps_per_object:
             return sampled_grasps(self._scene, self._station, recipe.grasps_per_object, recipe.seed)
         return None

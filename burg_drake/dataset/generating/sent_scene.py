@@ -8,6 +8,8 @@ from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from burg_drake.core import InvalidInputError
+from burg_drake.dataset.blender import blender
 from burg_drake.dataset.generating.recipe import DatasetRecipe
 from burg_drake.dataset.generating.scene_samples import SceneSamples
 from burg_drake.dataset.generating.work import accepted_scene, drake_errors
@@ -32,6 +34,7 @@ class SentScene:
         path: of the document on the machine of the data set; of the data set for a sampled scene.
             Only messages have it.
         grasps: on its objects; those that the recipe asks for if None.
+        blender: version of Blender, if that renders.
     """
 
     world: Bundle
@@ -40,6 +43,7 @@ class SentScene:
     document: SceneDocument | None
     path: Path
     grasps: SceneGrasps | None
+    blender: str = ""
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,10 @@ def make_sent_scene(sent: SentScene, folder: Path) -> MadeScene:
     Raises:
         Exception: as `work.make_scene`; or the world is not the one that was sent.
     """
+    if sent.blender and (version := blender().version) != sent.blender:
+        raise InvalidInputError(
+            f"the worker has Blender {version}, the data set is made with {sent.blender}"
+        )
     with drake_errors():
         library, station = _world(sent.world, folder)
         if sent.document is not None:
@@ -75,7 +83,7 @@ def make_sent_scene(sent: SentScene, folder: Path) -> MadeScene:
             assert sent.recipe.sampled is not None
             sampler = _sampler(sent.recipe.sampled, sent.world, folder)
             scene = accepted_scene(sampler, sent.number, sent.path)
-        samples = SceneSamples(scene, sent.number, station, sent.recipe, grasps=sent.grasps)
+        samples = SceneSamples(scene, sent.number, station, sent.recipe, folder, grasps=sent.grasps)
         # beside the bundle, as that is where this machine has room, and old folders are removed
         with TemporaryDirectory(dir=folder.parent, prefix=".samples.") as place:
             path = Path(place) / shard_name(sent.number)

@@ -64,7 +64,7 @@ def make_scene(work: SceneWork) -> ShardEntry:
             scene = given_scene(work)
         else:
             scene = accepted_scene(_sampler(inputs), work.number, inputs.folder)
-        samples = SceneSamples(scene, work.number, station, inputs.recipe)
+        samples = SceneSamples(scene, work.number, station, inputs.recipe, inputs.folder)
         return write_scene(inputs.folder, work.number, scene, samples)
 
 

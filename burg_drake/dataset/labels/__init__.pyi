@@ -17,6 +17,7 @@ from .grasps import (
 from .instance_label import (
     Box as Box,
     InstanceLabel as InstanceLabel,
+    box_of_mask as box_of_mask,
 )
 from .instances import (
     label_instances as label_instances,

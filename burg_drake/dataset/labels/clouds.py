@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from burg_drake.cameras.optics import FieldOfView, Intrinsics
 from burg_drake.core import Array, Bytes, InvalidInputError, Single, transform_points
-from burg_drake.dataset.labels.scene_grasps import instance_numbers
+from burg_drake.dataset.rendering import instance_numbers
 from burg_drake.scene.document import SceneLike, as_scene
 
 CAMERAS = 4

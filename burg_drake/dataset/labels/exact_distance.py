@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from burg_drake.core import Array, Booleans, Indices, check_pose, inverse, transform_points
-from burg_drake.dataset.labels.scene_grasps import instance_numbers
 from burg_drake.dataset.labels.tsdf import SIZE, VOXELS, Tsdf, grid_lengths, voxel_centers
+from burg_drake.dataset.rendering import instance_numbers
 from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.station.document import Station, StationLike, as_station
 

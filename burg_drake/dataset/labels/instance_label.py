@@ -43,3 +43,12 @@ class InstanceLabel:
     visible_box: Box | None
     amodal_box: Box | None
     amodal: NDArray[np.bool_]
+
+
+def box_of_mask(mask: NDArray[np.bool_]) -> Box | None:
+    """The smallest box around the pixels of a mask (H, W) that are on; None if there are none."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if not len(rows):
+        return None
+    left, top = int(columns[0]), int(rows[0])
+    return left, top, int(columns[-1]) - left + 1, int(rows[-1]) - top + 1

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from burg_drake.core import inverse
-from burg_drake.dataset.labels.instance_label import Box, InstanceLabel
+from burg_drake.dataset.labels.instance_label import InstanceLabel, box_of_mask
 from burg_drake.dataset.rendering import Images, SceneRenderer
 from burg_drake.dataset.views import View
 
@@ -43,18 +42,9 @@ def label_instances(
                 visible_pixels=visible,
                 silhouette_pixels=size,
                 visibility=visible / size if size else 0.0,
-                visible_box=box_around(labels == number) if visible else None,
+                visible_box=box_of_mask(labels == number) if visible else None,
                 amodal_box=(silhouette.left, silhouette.top, columns, rows) if rows else None,
                 amodal=amodal,
             )
         )
     return tuple(found)
-
-
-def box_around(mask: NDArray[np.bool_]) -> Box | None:
-    """The smallest rectangle of pixels that holds a mask (H, W); None if it is empty."""
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    if not len(rows):
-        return None
-    left, top = int(columns[0]), int(rows[0])
-    return left, top, int(columns[-1]) - left + 1, int(rows[-1]) - top + 1

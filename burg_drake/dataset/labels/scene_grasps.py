@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from burg_drake.core import Array, InvalidInputError, check_pose, inverse
 from burg_drake.dataset.labels.labelled_grasps import LabelledGrasps
-from burg_drake.scene.document import Scene, SceneLike, as_scene
+from burg_drake.dataset.rendering import instance_numbers
+from burg_drake.scene.document import SceneLike, as_scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,9 +71,3 @@ def label_grasps(grasps: SceneGrasps, scene: SceneLike, X_SC: Array) -> Labelled
         X_CG[mine] = X_CS @ scene.X_SO(name) @ grasps.X_OG[mine]
         number[mine] = numbers[name]
     return LabelledGrasps(X_CG, grasps.width, number, grasps.outcome, dict(grasps.margins))
-
-
-def instance_numbers(scene: Scene) -> dict[str, int]:
-    """Numbers of instances in label images by name: from 1, free ones before background."""
-    names = (*scene.instances, *scene.background)
-    return {name: place + 1 for place, name in enumerate(names)}

@@ -1,5 +1,6 @@
 from .images import (
     Images as Images,
+    instance_numbers as instance_numbers,
 )
 from .one_view import (
     render as render,

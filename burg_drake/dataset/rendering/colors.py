@@ -56,7 +56,7 @@ class DrakeColors:
         """
         if intrinsics.is_pinhole:
             return self._pinhole(intrinsics, X_WC, depth_range)
-        wide, at = _covering(intrinsics)
+        wide, at = covering(intrinsics)
         image = self._pinhole(wide, X_WC, depth_range)
         return np.asarray(cv2.remap(image, at, None, cv2.INTER_LINEAR), np.uint8)
 
@@ -101,7 +101,7 @@ def _covering_of(key: tuple[Any, ...]) -> tuple[Intrinsics, Single]:
     return wide, (flat * focal - start).astype(np.float32)
 
 
-def _covering(intrinsics: Intrinsics) -> tuple[Intrinsics, Single]:
+def covering(intrinsics: Intrinsics) -> tuple[Intrinsics, Single]:
     """A pinhole camera that sees all that one with distortion sees, and (H, W, 2) where the pixels
     of that one are in its image."""
     one = intrinsics

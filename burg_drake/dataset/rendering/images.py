@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import Bytes, Single
+from burg_drake.scene.document import Scene
 
 SURROUNDINGS = 0
 """Label of what is no object of the scene: table, board, obstacles, robot, distractors, sky."""
@@ -16,6 +17,9 @@ SURROUNDINGS = 0
 @dataclass(frozen=True, eq=False)
 class Images:
     """Images of one view; those that were not asked for are None.
+
+    Labels and normals are those of the nearest surface, whether its depth is in the depth range of
+    the view or not: a pixel can have both and no depth.
 
     Attributes:
         color: (H, W, 3) red, green, blue.
@@ -30,3 +34,9 @@ class Images:
     depth: Single | None = None
     labels: NDArray[np.uint16] | None = None
     normals: Single | None = None
+
+
+def instance_numbers(scene: Scene) -> dict[str, int]:
+    """Numbers of instances in label images by name: from 1, free ones before background."""
+    names = (*scene.instances, *scene.background)
+    return {name: number for number, name in enumerate(names, SURROUNDINGS + 1)}

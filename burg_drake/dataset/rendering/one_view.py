@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from burg_drake.cameras.optics import of_camera
 from burg_drake.core import InvalidInputError, inverse
+from burg_drake.dataset.blender import RendererName
 from burg_drake.dataset.rendering.images import Images
 from burg_drake.dataset.rendering.scene_renderer import ImageKind, SceneRenderer
 from burg_drake.dataset.views import View
@@ -20,6 +21,7 @@ def render(
     kinds: Iterable[ImageKind] = ("color", "depth", "labels"),
     *,
     arm: bool = False,
+    renderer: RendererName = "drake",
 ) -> Images:
     """What a camera sees of a scene on a station.
 
@@ -29,20 +31,29 @@ def render(
         camera: its name in the station, or any view.
         kinds: of images: `color`, `depth`, `labels`, `normals`.
         arm: whether the station's arm is there, in its home posture if the camera is a name.
+        renderer: of colours, `drake` or `blender`; all else is the same with both.
 
     Returns:
         Images whose pixels are the same ones; those that were not asked for are None.
 
     Raises:
-        UnknownNameError: there is no such camera, scene or station.
-        MissingDependencyError: colours were asked for, and the renderer lacks a system library.
+        UnknownNameError: there is no such camera, scene, station or renderer.
+        MissingDependencyError: colours were asked for, and the renderer is not installed or lacks a
+            system library.
+        SimulationError: Blender failed.
         InvalidInputError: there is no such kind of image, or the station has no arm.
     """
     scene, station = as_scene(scene), as_station(station)
     kinds = tuple(kinds)
     view = camera if isinstance(camera, View) else station_view(station, camera, arm=arm)
-    renderer = SceneRenderer(scene, station, arm=view.posture is not None, colors="color" in kinds)
-    return renderer.images(view, kinds)
+    rendered = SceneRenderer(
+        scene,
+        station,
+        arm=view.posture is not None,
+        colors="color" in kinds,
+        renderer=renderer,
+    )
+    return rendered.images(view, kinds)
 
 
 def station_view(station: Station, camera: str, *, arm: bool = False) -> View:

@@ -7,7 +7,7 @@ silhouettes are there as well.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -128,8 +128,3 @@ class RayScene:
                 return known
         surface, X_SB = self._of_label[number]
         return surface.met(view.intrinsics, inverse(view.X_SC) @ X_SB, beyond=True)
-
-
-def label_numbers(names: Sequence[str]) -> Mapping[str, int]:
-    """Labels of instances, in the scene's order."""
-    return {name: number for number, name in enumerate(names, SURROUNDINGS + 1)}

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from pydrake.multibody.tree import BodyIndex
 
-from burg_drake.core import Array, InvalidInputError, inverse, nearest
+from burg_drake.core import Array, InvalidInputError, UnknownNameError, inverse, nearest
 from burg_drake.dataset.appearance import (
     Appearance,
     apply_appearance,
@@ -17,9 +17,11 @@ from burg_drake.dataset.appearance import (
     place_appearance,
     with_background,
 )
+from burg_drake.dataset.blender import RENDERERS, RendererName, blender_scene
+from burg_drake.dataset.rendering.blender_colors import BlenderColors
 from burg_drake.dataset.rendering.colors import DrakeColors
-from burg_drake.dataset.rendering.images import SURROUNDINGS, Images
-from burg_drake.dataset.rendering.ray_scene import RayScene, Silhouette, label_numbers
+from burg_drake.dataset.rendering.images import SURROUNDINGS, Images, instance_numbers
+from burg_drake.dataset.rendering.ray_scene import RayScene, Silhouette
 from burg_drake.dataset.rendering.ray_surface import RaySurface, surfaces_of_body
 from burg_drake.dataset.views import View
 from burg_drake.scene.document import SceneLike, as_scene
@@ -34,7 +36,8 @@ KINDS: tuple[ImageKind, ...] = ("color", "depth", "labels", "normals")
 class SceneRenderer:
     """Renders one scene on one station from many places.
 
-    Depth, labels and normals come from rays and are exact; colours come from Drake's renderer.
+    Depth, labels and normals come from rays and are exact, and the same with any renderer; colours
+    come from Drake's renderer or Blender.
 
     Attributes:
         scene, station: what is rendered.
@@ -49,6 +52,7 @@ class SceneRenderer:
         appearance: Appearance | None = None,
         arm: bool = False,
         colors: bool = True,
+        renderer: RendererName = "drake",
     ) -> None:
         """Builds the scene.
 
@@ -59,22 +63,29 @@ class SceneRenderer:
             arm: whether the station's arm is there.
             colors: whether colours will be asked for; without them no system libraries are needed,
                 and all other images are the same.
+            renderer: of colours, `drake` or `blender`, which needs no system libraries.
 
         Raises:
-            MissingDependencyError: a system library of the renderer is missing.
+            MissingDependencyError: a system library of Drake's renderer is missing.
+            UnknownNameError: there is no such renderer.
             InvalidInputError: the station has no arm; and as `build_station_diagram`.
         """
+        if renderer not in RENDERERS:
+            raise UnknownNameError(
+                f"no renderer {renderer!r}; {nearest(renderer, RENDERERS)}"
+            ).about("renderer")
         self.scene, self.station = as_scene(scene), as_station(station)
-        self.numbers = label_numbers((*self.scene.instances, *self.scene.background))
-        self._appearance = appearance
+        self.numbers = instance_numbers(self.scene)
+        self._appearance, self._in_blender = appearance, renderer == "blender"
         self._built = build_station_diagram(
             self.scene,
             self.station,
             robot="arm" if arm else "none",
-            cameras=colors or (),  # the board has markers in any case
+            # The board has markers in any case.
+            cameras=() if self._in_blender else colors or (),
         )
         self._renderer = RENDERER if colors else None
-        if appearance is not None and colors:
+        if appearance is not None and colors and not self._in_blender:
             self._renderer = apply_appearance(self._built, appearance)
         elif appearance is not None:
             place_appearance(self._built, appearance)
@@ -135,9 +146,12 @@ class SceneRenderer:
         return self._ray_scene.silhouette(number, view)
 
     @cached_property
-    def _colors(self) -> DrakeColors:
+    def _colors(self) -> DrakeColors | BlenderColors:
         if self._renderer is None:
             raise InvalidInputError("this scene was built without colours")
+        if self._in_blender:
+            scene = blender_scene(self._built, self._appearance)
+            return BlenderColors(scene, self._poses, self._appearance)
         scene_graph = self._built.scene_graph
         context = scene_graph.GetMyContextFromRoot(self._context)
         query = scene_graph.get_query_output_port().Eval(context)
@@ -147,15 +161,15 @@ class SceneRenderer:
         return DrakeColors(query, scene_graph.world_frame_id(), self._renderer, fill)
 
     def _place_arm(self, view: View) -> None:
-        if view.posture == self._posture:
-            return
         joints = self._built.arm_joints
-        if not joints or view.posture is None:
+        if bool(joints) != (view.posture is not None):
             have = "no arm" if not joints else "its arm"
             raise InvalidInputError(
                 f"a view {'without' if view.posture is None else 'with'} the arm in it, of a scene"
                 f" with {have}"
             )
+        if view.posture is None or view.posture == self._posture:
+            return
         if len(view.posture) != len(joints):
             raise InvalidInputError(
                 f"posture of {len(view.posture)} joints; the arm has {len(joints)}"
@@ -184,6 +198,9 @@ class SceneRenderer:
             poses = [X_SW @ self._X_WB(body) for body, _ in self._seen]
             self._rays = RayScene([surface for _, surface in self._seen], poses)
         return self._rays
+
+    def _poses(self) -> dict[str, Array]:
+        return {str(int(body)): self._X_WB(body) for body, _ in self._seen}
 
     def _X_WB(self, body: BodyIndex) -> Array:
         plant = self._built.plant

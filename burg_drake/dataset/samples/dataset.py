@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import overload
 
-from burg_drake.core import DocumentError, InvalidInputError, UnknownNameError, nearest
+from burg_drake.core import DocumentError, InvalidInputError, UnknownNameError, listing, nearest
 from burg_drake.core.paths import resolve
 from burg_drake.dataset.samples.document import (
     FILE as DOCUMENT_FILE,
@@ -26,12 +26,19 @@ from burg_drake.objects.library import ObjectLibrary, load_library
 from burg_drake.scene.document import Scene, load_scene
 from burg_drake.station.document import Station, load_station
 
+ANEW = (
+    "run the command that made the data set once more, which makes the shard anew; if it does not,"
+    " delete the shard first"
+)
+"""What mends a data set with a damaged shard."""
+
 
 class Dataset(Sequence[Sample]):
     """The samples of a data set, in the order of their scenes.
 
     It keeps no open files and no pixels, so that it can be pickled, and be read by several
-    processes and threads at once.
+    processes and threads at once. Samples are told apart by their keys: `"000012_003" in dataset`
+    and `dataset.index("000012_003")` read no images, and the shard of that scene alone.
 
     Attributes:
         folder: of the data set.
@@ -61,23 +68,37 @@ class Dataset(Sequence[Sample]):
             return [self.read(i) for i in range(*index.indices(len(self)))]
         return self.read(index)
 
-    def read(self, index: int, images: Iterable[str] = PARTS) -> Sample:
+    def read(self, index: int | str, images: Iterable[str] = PARTS) -> Sample:
         """A sample, with those of its images that are asked for.
 
         Args:
-            index: from 0; negative ones count from the end.
+            index: from 0, negative ones count from the end; or the key of the sample.
             images: of `color`, `depth`, `labels`, `normals` and `sensor_depth`, and `grasps`; no
                 others are decoded. What the sample does not have is None.
 
         Raises:
             IndexError: there is no such sample.
-            UnknownNameError: there are no such images.
+            UnknownNameError: there is no sample of that key, or no such images.
             InvalidInputError: the shard is missing or damaged, or a file of the sample is; the
                 message names both.
         """
         asked = asked_parts(images)
+        shard, key = self._place(self.index(index) if isinstance(index, str) else index)
+        try:
+            return shard.sample(shard.record(key), asked)
+        except DocumentError:  # of another version, or not as samples are: not mended so
+            raise
+        except InvalidInputError as error:
+            raise InvalidInputError(f"{error}; {ANEW}") from error
+
+    def parts(self, index: int) -> tuple[str, ...]:
+        """What a sample has of `read`'s images, and `grasps`; none is decoded.
+
+        Raises:
+            IndexError, InvalidInputError: as `read`.
+        """
         shard, key = self._place(index)
-        return shard.sample(shard.record(key), asked)
+        return shard.record(key).files
 
     @cached_property
     def keys(self) -> tuple[str, ...]:
@@ -139,14 +160,39 @@ class Dataset(Sequence[Sample]):
         """Index of a sample, by its key or itself.
 
         Raises:
-            UnknownNameError: no such sample.
+            UnknownNameError: no such sample, or not from `start` on and before `stop`.
+            InvalidInputError: the shard of its scene is missing or damaged.
         """
         key = value if isinstance(value, str) else value.key
-        if key not in self.keys[start:stop]:
+        scene, known = key.partition("_")[0], {f"{one:06d}": one for one in self.scenes}
+        if scene not in known:
             raise UnknownNameError(
-                f"{self.folder} has no sample {key!r}; {nearest(key, self.keys)}"
+                f"{self.folder} has no sample {key!r}, whose scene would be {scene!r}; its scenes"
+                f" are {listing(list(known))}"
             )
-        return self.keys.index(key, start)
+        number = known[scene]
+        indices, keys = self.indices(number), self._shard(self._scene_place(number)).keys
+        if key not in keys or indices[keys.index(key)] not in range(len(self))[start:stop]:
+            raise UnknownNameError(f"{self.folder} has no sample {key!r}; {nearest(key, keys)}")
+        return indices[keys.index(key)]
+
+    def __contains__(self, value: object) -> bool:
+        """Whether there is a sample of this key, or of the key of this sample.
+
+        Raises:
+            InvalidInputError: the shard of its scene is missing or damaged.
+        """
+        if not isinstance(value, Sample | str):
+            return False
+        try:
+            self.index(value)
+        except UnknownNameError:
+            return False
+        return True
+
+    def count(self, value: Sample | str) -> int:
+        """1 if it is there, 0 if not: no key is there twice."""
+        return int(value in self)
 
     def scene(self, number: int) -> Scene:
         """A scene, with its library.
@@ -173,44 +219,42 @@ class Dataset(Sequence[Sample]):
         return shard, shard.keys[index - self._ends[number] + self._entries[number].nsamples]
 
     def _shard(self, number: int) -> SampleShard:
+        """The shard of a line of the index.
+
+        Raises:
+            InvalidInputError: it is missing, or not what the index says.
+        """
         entry = self._entries[number]
-        shard = open_shard(self.folder / entry.url)
+        path = self.folder / entry.url
+        try:
+            shard = open_shard(path)
+        except InvalidInputError as error:
+            raise InvalidInputError(f"{error}; {ANEW}") from error
+        size = os.stat(path).st_size
+        if size != entry.filesize:
+            raise InvalidInputError(
+                f"shard {path} has {size} bytes, the index {entry.filesize}: it was changed; {ANEW}"
+            )
         if len(shard.keys) != entry.nsamples:
             raise DocumentError(
-                f"{shard.path} has {len(shard.keys)} samples, the index {entry.nsamples}; run the"
-                " command that made the data set once more, and it is made again"
+                f"{path} has {len(shard.keys)} samples, the index {entry.nsamples}; {ANEW}"
             )
         return shard
 
 
 def load_dataset(folder: str | Path) -> Dataset:
-    """Opens a data set for reading; no sample is read yet.
+    """Opens a data set for reading. No shard is looked at yet: one that is damaged is named when a
+    sample of it is read, and all others can be.
 
     Args:
         folder: of the data set.
 
     Raises:
-        InvalidInputError: it is not finished, or a shard is missing or of another size than in the
-            index; the message names it.
+        InvalidInputError: it is not finished.
         DocumentError: it is of another version, or damaged.
     """
     folder = Path(folder)
     if not (folder / DOCUMENT_FILE).is_file():
         raise InvalidInputError(f"{folder} is no data set: {DOCUMENT_FILE} is missing")
     document = load_dataset_document(folder / DOCUMENT_FILE)
-    entries = read_index(folder)
-    for entry in entries:
-        path = folder / entry.url
-        try:
-            size = os.stat(path).st_size
-        except OSError as error:
-            raise InvalidInputError(
-                f"shard {path} cannot be read: {error.strerror or error}; run the command that made"
-                " the data set once more, and it is made again"
-            ) from error
-        if size != entry.filesize:
-            raise InvalidInputError(
-                f"shard {path} has {size} bytes, the index {entry.filesize}: it is cut off or"
-                " changed; delete it, and run the command that made the data set once more"
-            )
-    return Dataset(folder, document, entries)
+    return Dataset(folder, document, read_index(folder))

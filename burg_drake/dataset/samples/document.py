@@ -17,7 +17,7 @@ from burg_drake.core.paths import require_name
 FILE = "dataset.yaml"
 RECIPE = "recipe"
 HEADER = "What the samples of this data set are of, and what they were made with."
-DECIDING_VERSIONS = ("burg_drake", "drake", "numpy", "scipy", "embreex", "opencv")
+DECIDING_VERSIONS = ("burg_drake", "drake", "numpy", "scipy", "embreex", "opencv", "blender")
 """Software whose versions decide about samples."""
 SHOWN_DIFFERENCES = 6
 
@@ -32,6 +32,7 @@ class DatasetDocument:
         library: folder of the object library, relative to the data set, or a built-in name.
         station: its file, relative to the data set, or a built-in name; empty without one.
         library_content, station_content: hashes of what is in them.
+        distractors_content: the same of the library that distractors are from; empty without one.
         versions: of the software that made it.
         recipe: of who generated it, as plain data; None if nobody did.
     """
@@ -43,6 +44,7 @@ class DatasetDocument:
     station: str = ""
     library_content: str = ""
     station_content: str = ""
+    distractors_content: str = ""
     versions: dict[str, str] = field(default_factory=dict)
     recipe: Mapping[str, Any] | None = None
 
@@ -51,7 +53,8 @@ class DatasetDocument:
 
     def differences(self, other: DatasetDocument) -> list[str]:
         """What two differ in, in words; `other` is here, this is there. Of a library or a station
-        its content counts, not where it is, and of the versions those in `DECIDING_VERSIONS`."""
+        its content counts, not where it is, and of the versions those in `DECIDING_VERSIONS`; the
+        name does not count."""
         mine, theirs = _compared(self), _compared(other)
         found = [
             f"{name} is {_shown(mine.get(name))} there, {_shown(theirs.get(name))} here"
@@ -97,10 +100,10 @@ def save_dataset_document(document: DatasetDocument, path: str | Path) -> None:
 def _compared(document: DatasetDocument) -> dict[str, Any]:
     """Values that decide about samples, by their name for messages."""
     values: dict[str, Any] = {
-        "name": document.name,
         "objects": list(document.objects),
         "the content of the library": document.library_content,
         "the content of the station": document.station_content,
+        "the content of the library of distractors": document.distractors_content,
     }
     values |= {name: document.versions.get(name, "unknown") for name in DECIDING_VERSIONS}
     return values | _flat(plain_data(document.recipe), RECIPE)

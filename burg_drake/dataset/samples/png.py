@@ -8,6 +8,7 @@ Depth is kept in whole units, which follow from the depth range of the view; 0 i
 from __future__ import annotations
 
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -90,13 +91,23 @@ def encode_image(name: str, image: NDArray[Any], depth_unit: float) -> bytes:
         image = _whole_normals(image)
     elif name == "labels":
         image = image.astype(np.uint8 if image.max(initial=0) <= 255 else np.uint16)
-    if kind.channels == 3:
-        image = cv2.cvtColor(image, cv2.COLOR_RGB2BGR)
     options = (
         *(cv2.IMWRITE_PNG_COMPRESSION, 1),
         *(cv2.IMWRITE_PNG_STRATEGY, kind.strategy),
         *(cv2.IMWRITE_PNG_FILTER, kind.filter),
     )
+    return encode_png(image, options)
+
+
+def encode_png(image: NDArray[Any], options: Sequence[int] = ()) -> bytes:
+    """Numbers as PNG, without loss.
+
+    Args:
+        image: (H, W) of uint8 or uint16, or RGB (H, W, 3).
+        options: OpenCV's, in pairs.
+    """
+    if image.ndim == 3:
+        image = cv2.cvtColor(image, cv2.COLOR_RGB2BGR)
     return bytes(cv2.imencode(".png", np.ascontiguousarray(image), options)[1].tobytes())
 
 

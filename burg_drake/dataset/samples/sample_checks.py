@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from burg_drake.core import Array, Booleans, InvalidInputError, inverse, quoted, rotation_angle
 from burg_drake.core.grasps import Outcome
-from burg_drake.dataset.labels import Box, InstanceLabel
+from burg_drake.dataset.labels import Box, InstanceLabel, box_of_mask
 from burg_drake.dataset.rendering import Images
 from burg_drake.dataset.samples.sample import Sample
 from burg_drake.dataset.samples.sample_files import GRASPS, RECORD
@@ -46,7 +46,7 @@ def label_faults(sample: Sample) -> Iterator[Fault]:
                 f"{one.name!r} has {count} pixels; its record says {one.visible_pixels}",
             )
         visible = labels == one.number
-        box = box_around(visible)
+        box = box_of_mask(visible)
         if box != one.visible_box:
             yield RECORD, f"visible_box of {one.name!r} is {one.visible_box}; its labels have {box}"
         outside = int(np.count_nonzero(visible & ~one.amodal))
@@ -74,7 +74,7 @@ def _contradictions(one: InstanceLabel) -> Iterator[str]:
     share = one.visible_pixels / pixels if pixels else 0.0
     if abs(share - one.visibility) > VISIBILITY_TOLERANCE:
         yield f"visibility {one.visibility:g} is not {share:g}, as its pixels have it"
-    box = box_around(one.amodal)
+    box = box_of_mask(one.amodal)
     if (one.amodal_box is None) != (pixels == 0):
         yield f"amodal_box {one.amodal_box} does not fit silhouette_pixels {pixels}"
     elif box is not None and one.amodal_box is not None and not _contains(one.amodal_box, box):
@@ -163,15 +163,6 @@ def _different(kind: str, image: NDArray[np.generic], differs: Booleans) -> Iter
             kind,
             f"{count} pixels differ from freshly drawn ones, the first in column {x} of row {y}",
         )
-
-
-def box_around(mask: Booleans) -> Box | None:
-    """The smallest box around the pixels of a mask that are on."""
-    columns, rows = (np.flatnonzero(mask.any(axis=axis)) for axis in (0, 1))
-    if not len(columns):
-        return None
-    left, top = int(columns[0]), int(rows[0])
-    return left, top, int(columns[-1]) + 1 - left, int(rows[-1]) + 1 - top
 
 
 def _contains(outer: Box, inner: Box) -> bool:

@@ -23,7 +23,13 @@ from burg_drake.dataset.samples.sample_files import (
     read_parts,
     read_record,
 )
-from burg_drake.dataset.samples.tar import END, MemberPlace, read_member, tar_member, tar_members
+from burg_drake.dataset.samples.tar import (
+    TAR_END,
+    MemberPlace,
+    read_member,
+    tar_member,
+    tar_members,
+)
 
 FOLDER = "shards"
 AT_ONCE = 1 << 20
@@ -92,7 +98,7 @@ def write_shard(path: str | Path, samples: Iterable[Sample]) -> ShardEntry:
             seen.add(sample.key)
             for name, data in encoded(sample):
                 write(tar_member(name, data))
-        write(END)
+        write(TAR_END)
     return ShardEntry(f"{FOLDER}/{path.name}", len(seen), size, digest.hexdigest())
 
 

@@ -16,7 +16,7 @@ from burg_drake.core import InvalidInputError, shown
 from burg_drake.core.files import open_regular
 
 BLOCK = 512
-END = bytes(2 * BLOCK)
+TAR_END = bytes(2 * BLOCK)
 NAME, SIZE, SUM, KIND, PREFIX = (
     *(slice(0, 100), slice(124, 136), slice(148, 156), slice(156, 157), slice(345, 500)),
 )

@@ -54,7 +54,7 @@ class SentCall:
 
 
 class ClusterMap:
-    """Calls under way on a cluster; see `DaskExecutor.map_unordered`."""
+    """Calls under way on a cluster; see `dask_executor.map_on_cluster`."""
 
     def __init__(
         self,

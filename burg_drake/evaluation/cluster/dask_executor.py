@@ -32,6 +32,7 @@ class DaskExecutor:
     Attributes:
         client: of `distributed`.
         limits: what the workers' children may take.
+        maintain: called from time to time while they work.
     """
 
     def __init__(
@@ -59,7 +60,7 @@ class DaskExecutor:
             require_safe(client.scheduler_info()["address"], "the scheduler listens at ")
         self.client = client
         self.limits = limits or WorkerLimits()
-        self._maintain = maintain
+        self.maintain = maintain
 
     @property
     def workers(self) -> int:
@@ -78,34 +79,36 @@ class DaskExecutor:
         """
         from burg_drake.evaluation.cluster.dispatch import Dispatch
 
-        yield from Dispatch(self.client, self.limits, self._maintain).run(jobs, on_failure)
+        yield from Dispatch(self.client, self.limits, self.maintain).run(jobs, on_failure)
 
-    def map_unordered(
-        self,
-        function: Callable[[Any, Path], Result],
-        work: Sequence[Work],
-        bundle: Bundle,
-        pack: Callable[[Work], Any],
-    ) -> Generator[tuple[Work, Result | BaseException], None, None]:
-        """Results of a function as they come, as `core.workers.map_unordered` gives them.
 
-        Args:
-            function: importable; called in a child process of a worker with what `pack` gives and
-                the folder of the bundle.
-            work: what is to be done, begun in this order.
-            bundle: which all calls need; each machine gets it once.
-            pack: makes of work what is sent; called when a worker is free.
+def map_on_cluster(
+    executor: DaskExecutor,
+    function: Callable[[Any, Path], Result],
+    work: Sequence[Work],
+    bundle: Bundle,
+    pack: Callable[[Work], Any],
+) -> Generator[tuple[Work, Result | BaseException], None, None]:
+    """Results of a function as they come, as `core.workers.map_unordered` gives them.
 
-        Yields:
-            The work, and the result or the error: of the function, of `pack`, or because workers
-            were lost at it one after the other. Closing the iterator ends the children.
+    Args:
+        executor: the cluster.
+        function: importable; called in a child process of a worker with what `pack` gives and the
+            folder of the bundle.
+        work: what is to be done, begun in this order.
+        bundle: which all calls need; each machine gets it once.
+        pack: makes of work what is sent; called when a worker is free.
 
-        Raises:
-            ClusterError: a worker has other versions of what decides, or the scheduler is lost.
-        """
-        from burg_drake.evaluation.cluster.cluster_map import ClusterMap
+    Yields:
+        The work, and the result or the error: of the function, of `pack`, or because workers were
+        lost at it one after the other. Closing the iterator ends the children.
 
-        yield from ClusterMap(self.client, function, bundle, pack).run(work, self._maintain)
+    Raises:
+        ClusterError: a worker has other versions of what decides, or the scheduler is lost.
+    """
+    from burg_drake.evaluation.cluster.cluster_map import ClusterMap
+
+    yield from ClusterMap(executor.client, function, bundle, pack).run(work, executor.maintain)
 
 
 @contextlib.contextmanager

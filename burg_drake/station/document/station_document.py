@@ -121,13 +121,6 @@ class Camera:
                 f"image of {self.width} x {self.height} pixels; a side has at most {MAX_SIDE:,}",
                 "width" if self.width > MAX_SIDE else "height",
             )
-        across, down = self.principal_point
-        if not 0 < across + HALF_PIXEL < self.width or not 0 < down + HALF_PIXEL < self.height:
-            raise FieldError(
-                f"center {across:g}, {down:g} is outside of the image, which has {self.width} x"
-                f" {self.height} pixels; give center, focal, width and height of the same images",
-                "center",
-            )
         if not 0.0 < self.depth_range[0] < self.depth_range[1]:
             raise InvalidInputError("camera depth_range must rise from above 0 [m]")
         if not 1 <= self.samples <= MAX_SAMPLES:

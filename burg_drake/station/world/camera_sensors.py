@@ -41,8 +41,17 @@ Without shadows, which cost three times the rendering."""
 
 
 def render_cameras(camera: Camera) -> tuple[ColorRenderCamera, DepthRenderCamera]:
-    """Drake's render cameras of a station camera."""
+    """Drake's render cameras of a station camera.
+
+    Raises:
+        InvalidInputError: its principal point lies outside of the image, which Drake does not take.
+    """
     (fx, fy), (cx, cy) = camera.focal, camera.principal_point
+    if not 0 < cx + HALF_PIXEL < camera.width or not 0 < cy + HALF_PIXEL < camera.height:
+        raise InvalidInputError(
+            f"center {cx:g}, {cy:g} of a camera is outside of the image, which has {camera.width} x"
+            f" {camera.height} pixels; give center, focal, width and height of the same images"
+        )
     info = CameraInfo(camera.width, camera.height, fx, fy, cx + HALF_PIXEL, cy + HALF_PIXEL)
     near, far = camera.depth_range
     core = RenderCameraCore(RENDERER, info, ClippingRange(near / 2, far * 2), RigidTransform())
