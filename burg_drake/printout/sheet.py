@@ -46,7 +46,8 @@ LEAST_PART = 0.5e-4
 """Of an object on another page that has its name, too [m^2]."""
 OUTLINE_WIDTH, FOOTPRINT_WIDTH = 0.2e-3, 0.4e-3
 EDGE_CLEAR = 1.0e-3
-"""Distance of the objects' lines from the edges of markers [m]."""
+"""Distance of the objects' lines from the edges of markers [m], where gaps and cells are wide
+enough."""
 HATCHING = 3e-3
 """Distance between the white lines over fixed objects [m]."""
 ALARM: Rgb = (0.80, 0.10, 0.10)
@@ -234,12 +235,14 @@ def _draw_markers(pen: Pen, layout: MarkerLayout) -> None:
 def _draw_outlines(pen: Pen, sheet: Sheet) -> None:
     """The objects' lines across everything, dark on white and light on black cells, but along the
     edges of markers, which detectors follow all around."""
-    corners = sheet.layout.p_SQ[:, :, :2]
+    layout = sheet.layout
+    corners = layout.p_SQ[:, :, :2]
     lower, upper = corners.min(axis=1), corners.max(axis=1)
     board = rectangle((0.0, 0.0), sheet.size)
-    cells = _black_cells(sheet.layout)
-    outer = [rectangle(*c) for c in zip(lower - EDGE_CLEAR, upper + EDGE_CLEAR, strict=True)]
-    inner = [rectangle(*c) for c in zip(lower + EDGE_CLEAR, upper - EDGE_CLEAR, strict=True)]
+    cells = _black_cells(layout)
+    clear = min(EDGE_CLEAR, 0.4 * _gap(layout), 0.5 * layout.side / layout.cells)
+    outer = [rectangle(*c) for c in zip(lower - clear, upper + clear, strict=True)]
+    inner = [rectangle(*c) for c in zip(lower + clear, upper - clear, strict=True)]
     for on_black in (False, True):
         pen.canvas.saveState()
         pen.clip([board, *outer, *inner])
