@@ -98,7 +98,9 @@ def ours(image: NDArray[np.uint8], camera: Camera, truth: Array) -> Answer:
     estimate = estimator.estimate(image)
     spent = 1e3 * (time.process_time() - start)
     if not estimate.valid:
-        return Answer(False, " ".join(map(_figureless, estimate.reason.split())), milliseconds=spent)
+        return Answer(
+            False, " ".join(map(_figureless, estimate.reason.split())), milliseconds=spent
+        )
     return _answer(estimate.X_SC, truth, estimate.covariance, spent)
 
 

@@ -51,7 +51,10 @@ def hand(light: Light, size: tuple[float, float], rng: np.random.Generator) -> C
     def at(forward: float, left: float) -> Array:
         return middle + forward * along + thumb * left * aside
 
-    capsules = [(at(-0.32, 0.0), at(-0.04, 0.0), 0.030), (at(-0.02, 0.012), at(0.035, 0.012), 0.028)]
+    capsules = [
+        (at(-0.32, 0.0), at(-0.04, 0.0), 0.030),
+        (at(-0.02, 0.012), at(0.035, 0.012), 0.028),
+    ]
     capsules += [(at(-0.02, -0.012), at(0.03, -0.012), 0.028)]
     for k, length in enumerate((0.065, 0.075, 0.070, 0.055)):
         root = 0.033 - 0.022 * k
@@ -62,13 +65,16 @@ def hand(light: Light, size: tuple[float, float], rng: np.random.Generator) -> C
     capsules.append((at(0.0, 0.03), at(0.035, 0.075), 0.011))
     alpha = np.zeros(grid(size).shape[:2], np.uint8)
     for start, end, radius in capsules:
-        ends = [tuple(((p + AROUND) / GRID * 2**FRACTION).astype(int).tolist()) for p in (start, end)]
+        ends = [
+            tuple(((p + AROUND) / GRID * 2**FRACTION).astype(int).tolist()) for p in (start, end)
+        ]
         cv2.line(alpha, *ends, 255, round(2 * radius / GRID), cv2.LINE_AA, FRACTION)
     alpha = cv2.GaussianBlur(alpha, None, SOFT / GRID)
     round_shade = cv2.blur(cv2.blur(alpha, (25, 25)), (25, 25)) / 255.0
     skin = np.array(SKIN[rng.integers(len(SKIN))])
-    radiance = (0.55 + 0.45 * round_shade)[..., None] * skin
-    return Cover(_lit(radiance, alpha, light, size), HAND_HEIGHT)
+    color = (alpha * (0.55 + 0.45 * round_shade))[..., None] * skin
+    drawn = np.dstack([np.round(color).astype(np.uint8), alpha])
+    return Cover(_lit(drawn, light, size), HAND_HEIGHT)
 
 
 def things(
@@ -94,7 +100,7 @@ def things(
     p = p.reshape(-1, 2)
     hidden = np.zeros(len(p), bool)
     shape = grid(board.size).shape[:2]
-    alpha, radiance = np.zeros(shape, np.uint8), np.zeros((*shape, 3))
+    drawn = np.zeros((*shape, 4), np.uint8)
     size = 0.5
     while abs(hidden.mean() - share) > 0.03:
         middle = p[rng.choice(np.flatnonzero(~hidden))]
@@ -108,14 +114,10 @@ def things(
         hidden |= below
         signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
         outline = middle + (signs * half) @ axes
-        drawn = np.zeros(shape, np.uint8)
         cells = np.round((outline + AROUND) / GRID * 2**FRACTION).astype(np.int32)
-        cv2.fillConvexPoly(drawn, cells, 255, cv2.LINE_AA, FRACTION)
-        color = rng.uniform(0.02, 0.9) * rng.uniform(0.3, 1.0, 3)
-        above = (drawn / 255.0)[..., None]
-        radiance = radiance * (1 - above) + color * above
-        alpha = np.maximum(alpha, drawn)
-    return Cover(_lit(radiance, alpha, light, board.size), THING_HEIGHT), float(hidden.mean())
+        color = 255.0 * rng.uniform(0.02, 0.9) * rng.uniform(0.3, 1.0, 3)
+        cv2.fillConvexPoly(drawn, cells, (*color.tolist(), 255.0), cv2.LINE_AA, FRACTION)
+    return Cover(_lit(drawn, light, board.size), THING_HEIGHT), float(hidden.mean())
 
 
 def shadow_below(cover: Cover, light: Light) -> Array:
@@ -129,7 +131,8 @@ def shadow_below(cover: Cover, light: Light) -> Array:
     return cv2.GaussianBlur(shadow, None, soft) / 255.0
 
 
-def _lit(radiance: Array, alpha: Image, light: Light, size: tuple[float, float]) -> Image:
-    lamp = lamp_light(light, size, grid(size))[..., None]
-    color = np.clip(255.0 * radiance * lamp, 0, 255) * (alpha / 255.0)[..., None]
-    return np.dstack([np.round(color).astype(np.uint8), alpha])
+def _lit(reflectance: Image, light: Light, size: tuple[float, float]) -> Image:
+    """(R, C, 4) radiance of a layer of that reflectance, both times cover [1/255]."""
+    lamp = lamp_light(light, size, grid(size)).astype(np.float32)
+    lit = [cv2.multiply(reflectance[..., k], lamp, dtype=cv2.CV_8U) for k in range(3)]
+    return np.dstack([*lit, reflectance[..., 3]])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .covers import Cover
 from .lens import Camera, corner_directions
 from .light import AROUND, GRID, Map
-from .paper import Array
+from .paper import Array, Image
 from .sheet import Relief, Texture
 
 sys.path.append(str(Path(__file__).parents[1]))
@@ -26,6 +26,11 @@ PAPER, INK = 0.82, 0.035
 """Linear reflectance of white paper and of toner."""
 SIDE = 4
 """Samples along a pixel's side."""
+ABOVE = 0.3
+"""Radiance of the room above the table's horizon."""
+
+Three = tuple[float, float, float]
+Four = tuple[float, float, float, float]
 
 
 class Ground(NamedTuple):
@@ -104,135 +109,149 @@ def _bilinear(values: NDArray[np.float32], row: float, column: float) -> float:
 
 
 @compiled
-def _printed(texture: Texture, level: int, x: float, y: float, out: Array) -> None:
-    """Reflectance times cover, and cover, at a point of the sheet."""
-    width, height = texture.width[level], texture.height[level]
-    scale = texture.per_metre / 2.0**level
-    column = (x - texture.left) * scale - 0.5
-    row = (texture.top - y) * scale - 0.5
+def _mixed(texels: Image, start: int, width: int, height: int, row: float, column: float) -> Four:
+    """The four values of texels, bilinear; 0 beyond them."""
     i, j = int(np.floor(row)), int(np.floor(column))
-    out[:] = 0.0
-    if i < -1 or j < -1 or i >= height or j >= width:
-        return
+    if i < 0 or j < 0 or i + 1 >= height or j + 1 >= width:
+        return 0.0, 0.0, 0.0, 0.0
     s, t = row - i, column - j
-    for down in range(2):
-        for right in range(2):
-            if 0 <= i + down < height and 0 <= j + right < width:
-                weight = (s if down else 1 - s) * (t if right else 1 - t) / 255.0
-                at = texture.start[level] + (i + down) * width + j + right
-                for k in range(4):
-                    out[k] += weight * texture.texels[at, k]
-
-
-@compiled
-def _covering(cover: Cover, x: float, y: float, out: Array) -> None:
-    """Radiance times cover, and cover, of what is above a point of its plane."""
-    column, row = (x + AROUND) / GRID, (y + AROUND) / GRID
-    i, j = int(np.floor(row)), int(np.floor(column))
-    out[:] = 0.0
-    if i < 0 or j < 0 or i + 1 >= cover.radiance.shape[0] or j + 1 >= cover.radiance.shape[1]:
-        return
-    s, t = row - i, column - j
-    for down in range(2):
-        for right in range(2):
-            weight = (s if down else 1 - s) * (t if right else 1 - t) / 255.0
-            for k in range(4):
-                out[k] += weight * cover.radiance[i + down, j + right, k]
-
-
-@compiled
-def _toward(pose: Array, direction: Array, out: Array) -> None:
-    for k in range(3):
-        out[k] = pose[k, 0] * direction[0] + pose[k, 1] * direction[1] + pose[k, 2]
-
-
-@compiled
-def _level(directions: Array, pose: Array, v: int, u: int, spacing: float, finest: float) -> int:
-    """The level whose texels are as large as the distance of samples on the sheet, or smaller."""
-    p = np.empty((3, 2))
-    ray = np.empty(3)
-    for k in range(3):
-        _toward(pose, directions[v + k // 2, u + k % 2], ray)
-        if ray[2] > -1e-6:
-            return 0
-        t = -pose[2, 3] / ray[2]
-        p[k, 0], p[k, 1] = pose[0, 3] + t * ray[0], pose[1, 3] + t * ray[1]
-    a, b = p[1] - p[0], p[2] - p[0]
-    area = abs(a[0] * b[1] - a[1] * b[0])
-    return int(max(np.floor(np.log2(max(np.sqrt(area) * spacing * finest, 1.0))), 0.0))
-
-
-@compiled
-def _reflected(surface: Surface, level: int, C: Array, ray: Array, out: Array, layer: Array) -> None:
-    """Radiance that a ray from a camera at C meets."""
-    if ray[2] > -1e-6:
-        out[:3] = 0.3
-        return
-    z = 0.0
-    x, y = 0.0, 0.0
-    relief = surface.relief
-    for _ in range(3):
-        t = (z - C[2]) / ray[2]
-        x, y = C[0] + t * ray[0], C[1] + t * ray[1]
-        z = _bilinear(relief.z, (y - relief.bottom) / relief.step, (x - relief.left) / relief.step)
-    _printed(surface.texture, level, x, y, layer)
-    ground = surface.ground
-    cells = ground.reflectance.shape[0]
-    i, j = int(np.floor(y * ground.per_metre)) % cells, int(np.floor(x * ground.per_metre)) % cells
-    light = surface.light
-    lit = _bilinear(
-        light.values, (y - light.bottom) * light.per_metre, (x - light.left) * light.per_metre
+    at = start + i * width + j
+    a, b = (1 - s) * (1 - t) / 255.0, (1 - s) * t / 255.0
+    c, d = s * (1 - t) / 255.0, s * t / 255.0
+    p, q, u, v = at, at + 1, at + width, at + width + 1
+    return (
+        a * texels[p, 0] + b * texels[q, 0] + c * texels[u, 0] + d * texels[v, 0],
+        a * texels[p, 1] + b * texels[q, 1] + c * texels[u, 1] + d * texels[v, 1],
+        a * texels[p, 2] + b * texels[q, 2] + c * texels[u, 2] + d * texels[v, 2],
+        a * texels[p, 3] + b * texels[q, 3] + c * texels[u, 3] + d * texels[v, 3],
     )
-    shine = 0.0
-    if surface.gloss.strength > 0.0:
-        shine = PAPER * layer[3] * _shine(surface.gloss, x, y, C)
-    for k in range(3):
-        paper = INK * layer[3] + (PAPER - INK) * layer[k]
-        out[k] = lit * (paper + (1 - layer[3]) * ground.reflectance[i, j, k]) + shine
-    if surface.cover.height > 0.0:
-        t = (surface.cover.height - C[2]) / ray[2]
-        _covering(surface.cover, C[0] + t * ray[0], C[1] + t * ray[1], layer)
-        for k in range(3):
-            out[k] = (1 - layer[3]) * out[k] + layer[k]
 
 
 @compiled
-def _shine(gloss: Gloss, x: float, y: float, C: Array) -> float:
-    a = np.array([gloss.lamp[0] - x, gloss.lamp[1] - y, gloss.lamp[2]])
-    b = np.array([C[0] - x, C[1] - y, C[2]])
-    half = a / np.sqrt((a * a).sum()) + b / np.sqrt((b * b).sum())
-    return gloss.strength * (half[2] / np.sqrt((half * half).sum())) ** gloss.power
+def _level(x: Three, y: Three, per_metre: float, most: int) -> int:
+    """The level whose texels are as large as the distance of samples on the sheet, or smaller.
+
+    Args:
+        x, y: of three points of the sheet, a sample apart along the rows and columns.
+        per_metre: texels of level 0.
+        most: the coarsest level.
+    """
+    area = abs((x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]))
+    texels = max(np.sqrt(area) * per_metre, 1.0)
+    return int(min(np.floor(np.log2(texels)), most))
+
+
+@compiled
+def _shine(strength: float, power: float, toward: Array, x: float, y: float, C: Three) -> float:
+    """Gloss at a point of the sheet for a lamp and a camera at C."""
+    a0, a1, a2 = toward[0] - x, toward[1] - y, toward[2]
+    b0, b1, b2 = C[0] - x, C[1] - y, C[2]
+    a = 1.0 / np.sqrt(a0 * a0 + a1 * a1 + a2 * a2)
+    b = 1.0 / np.sqrt(b0 * b0 + b1 * b1 + b2 * b2)
+    h0, h1, h2 = a * a0 + b * b0, a * a1 + b * b1, a * a2 + b * b2
+    return strength * (h2 / np.sqrt(h0 * h0 + h1 * h1 + h2 * h2)) ** power
+
+
+@compiled
+def _on_plane(X: Array, x: float, y: float, z: float) -> Three:
+    """Where the ray of a direction meets the plane of height z, and its slope; far away for rays
+    that do not."""
+    down = X[2, 0] * x + X[2, 1] * y + X[2, 2]
+    t = (z - X[2, 3]) / min(down, -1e-6)
+    return (
+        X[0, 3] + t * (X[0, 0] * x + X[0, 1] * y + X[0, 2]),
+        X[1, 3] + t * (X[1, 0] * x + X[1, 1] * y + X[1, 2]),
+        down,
+    )
 
 
 @compiled
 def _integrate(directions: Array, poses: Array, surface: Surface, side: int, found: Array) -> None:
     moments, rows = poses.shape[:2]
-    direction, ray, light, layer = np.empty(2), np.empty(3), np.empty(4), np.empty(4)
-    texture = surface.texture
-    spacing = 1.0 / side if moments == 1 else 0.5 / side
+    texels, start, widths, heights, left, top, per_metre = surface.texture
+    relief, relief_left, relief_bottom, step = surface.relief
+    ground, ground_per_metre = surface.ground
+    lights, light_left, light_bottom, light_per_metre = surface.light
+    cover, cover_height = surface.cover
+    strength, power, lamp = surface.gloss
+    over = cover.reshape(-1, 4)
+    rough = relief.min() != 0.0 or relief.max() != 0.0
+    cells = ground.shape[0]
+    apart = 1.0 / side if moments == 1 else 0.5 / side
     share = 1.0 / (moments * side * side)
     for v in range(found.shape[0]):
         row = min(v, rows - 1)
         for u in range(found.shape[1]):
-            level = _level(directions, poses[0, row], v, u, spacing, texture.per_metre)
-            level = min(level, len(texture.start) - 1)
-            corners = directions[v : v + 2, u : u + 2]
+            x0, y0 = directions[v, u, 0], directions[v, u, 1]
+            ax, ay = directions[v, u + 1, 0] - x0, directions[v, u + 1, 1] - y0
+            bx, by = directions[v + 1, u, 0] - x0, directions[v + 1, u, 1] - y0
+            cx = directions[v + 1, u + 1, 0] - x0 - ax - bx
+            cy = directions[v + 1, u + 1, 1] - y0 - ay - by
+            P = _on_plane(poses[0, row], x0, y0, 0.0)
+            Q = _on_plane(poses[0, row], x0 + apart * ax, y0 + apart * ay, 0.0)
+            R = _on_plane(poses[0, row], x0 + apart * bx, y0 + apart * by, 0.0)
+            level = _level((P[0], Q[0], R[0]), (P[1], Q[1], R[1]), per_metre, len(start) - 1)
+            first, width, height = start[level], widths[level], heights[level]
+            scale = per_metre / 2.0**level
+            red, green, blue = 0.0, 0.0, 0.0
             for k in range(moments):
-                pose = poses[k, row]
-                stagger_u = 0.0 if moments == 1 else (k % 2 - 0.5) / (2 * side)
-                stagger_v = 0.0 if moments == 1 else (k // 2 % 2 - 0.5) / (2 * side)
-                for i in range(side):
-                    b = (i + 0.5) / side + stagger_v
-                    for j in range(side):
-                        a = (j + 0.5) / side + stagger_u
-                        for c in range(2):
-                            above = (1 - a) * corners[0, 0, c] + a * corners[0, 1, c]
-                            below = (1 - a) * corners[1, 0, c] + a * corners[1, 1, c]
-                            direction[c] = (1 - b) * above + b * below
-                        _toward(pose, direction, ray)
-                        _reflected(surface, level, pose[:, 3], ray, light, layer)
-                        for c in range(3):
-                            found[v, u, c] += share * light[c]
+                X = poses[k, row]
+                C = X[0, 3], X[1, 3], X[2, 3]
+                stagger_u, stagger_v = 0.0, 0.0
+                if moments > 1:  # the same forwards and backwards, so as not to add to the motion
+                    turn = min(k, moments - 1 - k)
+                    stagger_u = (turn % 2 - 0.5) / (2 * side)
+                    stagger_v = (turn // 2 % 2 - 0.5) / (2 * side)
+                for i in range(side * side):
+                    a = (i % side + 0.5) / side + stagger_u
+                    b = (i // side + 0.5) / side + stagger_v
+                    dx = x0 + a * ax + b * bx + a * b * cx
+                    dy = y0 + a * ay + b * by + a * b * cy
+                    x, y, down = _on_plane(X, dx, dy, 0.0)
+                    if down > -1e-6:
+                        red, green, blue = red + ABOVE, green + ABOVE, blue + ABOVE
+                        continue
+                    if rough:
+                        for _ in range(3):
+                            z = _bilinear(
+                                relief, (y - relief_bottom) / step, (x - relief_left) / step
+                            )
+                            x, y, down = _on_plane(X, dx, dy, z)
+                    r, g, m, paper = _mixed(
+                        texels, first, width, height, (top - y) * scale - 0.5,
+                        (x - left) * scale - 0.5,
+                    )  # fmt: skip
+                    r = INK * paper + (PAPER - INK) * r
+                    g = INK * paper + (PAPER - INK) * g
+                    m = INK * paper + (PAPER - INK) * m
+                    if paper < 1.0:
+                        i_cell = int(np.floor(y * ground_per_metre)) % cells
+                        j_cell = int(np.floor(x * ground_per_metre)) % cells
+                        r += (1 - paper) * ground[i_cell, j_cell, 0]
+                        g += (1 - paper) * ground[i_cell, j_cell, 1]
+                        m += (1 - paper) * ground[i_cell, j_cell, 2]
+                    lit = _bilinear(
+                        lights,
+                        (y - light_bottom) * light_per_metre,
+                        (x - light_left) * light_per_metre,
+                    )
+                    r, g, m = lit * r, lit * g, lit * m
+                    if strength > 0.0:
+                        shine = PAPER * paper * _shine(strength, power, lamp, x, y, C)
+                        r, g, m = r + shine, g + shine, m + shine
+                    if cover_height > 0.0:
+                        x, y, down = _on_plane(X, dx, dy, cover_height)
+                        o = _mixed(
+                            over, 0, cover.shape[1], cover.shape[0], (y + AROUND) / GRID,
+                            (x + AROUND) / GRID,
+                        )  # fmt: skip
+                        r = (1 - o[3]) * r + o[0]
+                        g = (1 - o[3]) * g + o[1]
+                        m = (1 - o[3]) * m + o[2]
+                    red, green, blue = red + r, green + g, blue + m
+            found[v, u, 0] = share * red
+            found[v, u, 1] = share * green
+            found[v, u, 2] = share * blue
 
 
 def table(rng: np.random.Generator) -> Ground:
@@ -250,5 +269,3 @@ def table(rng: np.random.Generator) -> Ground:
 def no_gloss() -> Gloss:
     """Of matt paper."""
     return Gloss(0.0, 1.0, np.zeros(3))
-
-

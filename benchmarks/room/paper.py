@@ -6,7 +6,6 @@ drawing of the whole board is a form that each page places, and dashed lines say
 
 from __future__ import annotations
 
-import itertools
 import subprocess
 import sys
 import tempfile
@@ -148,18 +147,14 @@ def linear(image: Image) -> Image:
     """
     levels = np.arange(256) / 255.0
     decoded = np.where(levels <= 0.04045, levels / 12.92, ((levels + 0.055) / 1.055) ** 2.4)
-    decoded = np.round(255.0 * decoded).astype(np.float32)
-    found = np.empty_like(image)
-    for k, first in itertools.product(range(3), range(0, len(image), 1024)):
-        rows = slice(max(first - 1, 0), first + 1025)
-        part = np.ascontiguousarray(image[rows, :, k])
-        around = np.ones((3, 3), np.uint8)
-        low, high = cv2.erode(part, around), cv2.dilate(part, around)
-        share = (part - low) / np.maximum(high - low, 1).astype(np.float32)
-        dark = decoded[low]
-        mixed = dark + share * (decoded[high] - dark)
-        start = first - rows.start
-        found[first : first + 1024, :, k] = np.round(mixed[start : start + 1024])
+    decoded *= 255.0
+    found = cv2.LUT(image, np.round(decoded).astype(np.uint8))
+    around = np.ones((3, 3), np.uint8)
+    low, high = cv2.erode(image, around), cv2.dilate(image, around)
+    edge = (image > low) & (image < high)
+    value, dark, light = (each[edge].astype(int) for each in (image, low, high))
+    share = (value - dark) / (light - dark)
+    found[edge] = np.round(decoded[dark] + share * (decoded[light] - decoded[dark]))
     return found
 
 

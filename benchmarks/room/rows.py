@@ -154,9 +154,7 @@ def _light(row: Row, size: tuple[float, float], rng: np.random.Generator) -> Lig
     return replace(light, ambient=0.35, shadows=(plate,))
 
 
-def _poses(
-    row: Row, camera: Camera, X_SC: Array, p_S: Array, rng: np.random.Generator
-) -> Array:
+def _poses(row: Row, camera: Camera, X_SC: Array, p_S: Array, rng: np.random.Generator) -> Array:
     """(N, R, 4, 4) of moments and rows."""
     pixels = row.motion or row.rolling
     if not pixels:

@@ -104,15 +104,12 @@ class Sheet:
     p_SQ: Array
 
 
-def glue(
-    board: Board, pages: tuple[Page, ...], faults: Faults, rng: np.random.Generator
-) -> Sheet:
+def glue(board: Board, pages: tuple[Page, ...], faults: Faults, rng: np.random.Generator) -> Sheet:
     """Glues the pages of a board, each a little off, on a table that makes them bulge."""
     turns = np.radians(faults.turn) * rng.uniform(-1, 1, len(pages))
     offsets = faults.offset * rng.uniform(-1, 1, (len(pages), 2))
     places = [
-        _place(page, faults.scale, *each)
-        for page, *each in zip(pages, turns, offsets, strict=True)
+        _place(page, faults.scale, *each) for page, *each in zip(pages, turns, offsets, strict=True)
     ]
     corners = board.p_SQ
     home = [_page_of(pages, p) for p in corners.mean(axis=1)]
@@ -121,9 +118,39 @@ def glue(
     )
     best = _rigid_fit(printed.reshape(-1, 2), corners.reshape(-1, 2))
     printed = _moved(best, printed)
-    texture = _assembled(board, pages, [best @ place for place in places])
+    texture = assembled(board.size, pages, [best @ place for place in places])
     relief = _bulging(board.size, faults.bulge, rng, printed)
     return Sheet(board, texture, relief, np.dstack([printed, relief.at(printed)]))
+
+
+def assembled(size: tuple[float, float], pages: tuple[Page, ...], places: list[Array]) -> Texture:
+    """Lays page over page, as they are glued.
+
+    Args:
+        size: of the board [m].
+        pages: in the order in which they are laid.
+        places: (3, 3) of each, from its lower left corner to S [m].
+    """
+    width, height = (int(np.ceil((s + 2 * RIM) * TEXELS / 32)) * 32 for s in size)
+    left, top = -RIM, height / TEXELS - RIM
+    canvas = np.zeros((height, width, 4), np.uint8)
+    to_canvas = np.array(
+        [[TEXELS, 0, -0.5 - left * TEXELS], [0, -TEXELS, top * TEXELS - 0.5], [0, 0, 1]]
+    )
+    for page, place in zip(pages, places, strict=True):
+        rows, columns = page.reflectance.shape[:2]
+        x, y = columns / page.size[0], rows / page.size[1]
+        to_page = np.array([[1 / x, 0, 0.5 / x], [0, -1 / y, page.size[1] - 0.5 / y], [0, 0, 1]])
+        cut = np.full((rows, columns, 4), 255, np.uint8)
+        cut[..., :3] = page.reflectance
+        if page.cut_left is not None:
+            cut[:, : round(page.cut_left * x)] = 0
+        if page.cut_top is not None:
+            cut[: round((page.size[1] - page.cut_top) * y)] = 0
+        shown = cv2.warpAffine(cut, (to_canvas @ place @ to_page)[:2], (width, height))
+        below = 255 - shown[..., 3:]
+        canvas = shown + cv2.multiply(canvas, np.broadcast_to(below, canvas.shape), scale=1 / 255)
+    return texture_of(canvas, left, top, TEXELS)
 
 
 def flat(size: tuple[float, float]) -> Relief:
@@ -141,9 +168,7 @@ def texture_of(canvas: Image, left: float, top: float, per_metre: float) -> Text
     sizes = np.array([level.shape[:2] for level in levels], dtype=np.int64)
     start = np.r_[0, np.cumsum(sizes.prod(axis=1))[:-1]]
     texels = np.concatenate([level.reshape(-1, 4) for level in levels])
-    return Texture(
-        texels, start, sizes[:, 1].copy(), sizes[:, 0].copy(), left, top, per_metre
-    )
+    return Texture(texels, start, sizes[:, 1].copy(), sizes[:, 0].copy(), left, top, per_metre)
 
 
 def _place(page: Page, scale: tuple[float, float], turn: float, offset: Array) -> Array:
@@ -179,28 +204,6 @@ def _rigid_fit(p: Array, to: Array) -> Array:
     fit[:2, :2] = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
     fit[:2, 2] = to.mean(axis=0) - fit[:2, :2] @ p.mean(axis=0)
     return fit
-
-
-def _assembled(board: Board, pages: tuple[Page, ...], places: list[Array]) -> Texture:
-    """Lays page over page, as they are glued."""
-    width, height = (int(np.ceil((s + 2 * RIM) * TEXELS / 32)) * 32 for s in board.size)
-    left, top = -RIM, height / TEXELS - RIM
-    canvas = np.zeros((height, width, 4), np.uint8)
-    to_canvas = np.array([[TEXELS, 0, -0.5 - left * TEXELS], [0, -TEXELS, top * TEXELS - 0.5], [0, 0, 1]])
-    for page, place in zip(pages, places, strict=True):
-        rows, columns = page.reflectance.shape[:2]
-        x, y = columns / page.size[0], rows / page.size[1]
-        to_page = np.array([[1 / x, 0, 0.5 / x], [0, -1 / y, page.size[1] - 0.5 / y], [0, 0, 1]])
-        cut = np.full((rows, columns, 4), 255, np.uint8)
-        cut[..., :3] = page.reflectance
-        if page.cut_left is not None:
-            cut[:, : round(page.cut_left * x)] = 0
-        if page.cut_top is not None:
-            cut[: round((page.size[1] - page.cut_top) * y)] = 0
-        shown = cv2.warpAffine(cut, (to_canvas @ place @ to_page)[:2], (width, height))
-        below = 255 - shown[..., 3:]
-        canvas = shown + cv2.multiply(canvas, np.broadcast_to(below, canvas.shape), scale=1 / 255)
-    return texture_of(canvas, left, top, TEXELS)
 
 
 def _bulging(
