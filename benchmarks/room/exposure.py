@@ -20,7 +20,7 @@ from .paper import Array, Image
 from .sheet import Relief, Texture
 
 sys.path.append(str(Path(__file__).parents[1]))
-from oracle.compiled import compiled  # noqa: E402
+from oracle.compiled import compiled
 
 PAPER, INK = 0.82, 0.035
 """Linear reflectance of white paper and of toner."""
@@ -73,7 +73,13 @@ class Surface(NamedTuple):
     gloss: Gloss
 
 
-def radiance(camera: Camera, X_SC: Array, surface: Surface, side: int = SIDE) -> Array:
+def radiance(
+    camera: Camera,
+    X_SC: Array,
+    surface: Surface,
+    side: int = SIDE,
+    hidden: NDArray[np.uint16] | None = None,
+) -> Array:
     """What the pixels receive.
 
     Args:
@@ -83,6 +89,8 @@ def radiance(camera: Camera, X_SC: Array, surface: Surface, side: int = SIDE) ->
         surface: what is in sight.
         side: samples along a pixel's side at each moment; those of four moments that follow each
             other are staggered.
+        hidden: (H, W) samples of each pixel that something else hides, and that are black: a bit
+            each, row by row; of one moment and 16 samples at most.
 
     Returns:
         (H, W, 3) radiance; 1 is that of a white surface in the middle of the board.
@@ -91,9 +99,11 @@ def radiance(camera: Camera, X_SC: Array, surface: Surface, side: int = SIDE) ->
     height, width = directions.shape[0] - 1, directions.shape[1] - 1
     if X_SC.shape[1] not in (1, height):
         raise ValueError(f"poses of {X_SC.shape[1]} rows, the image has {height}; give 1 or all")
+    if hidden is None:
+        hidden = np.zeros((height, width), np.uint16)
     found = np.zeros((height, width, 3))
     poses = np.ascontiguousarray(X_SC[:, :, :3], dtype=float)
-    _integrate(directions, poses, surface, side, found)
+    _integrate(directions, poses, surface, side, hidden, found)
     return found
 
 
@@ -166,7 +176,14 @@ def _on_plane(X: Array, x: float, y: float, z: float) -> Three:
 
 
 @compiled
-def _integrate(directions: Array, poses: Array, surface: Surface, side: int, found: Array) -> None:
+def _integrate(
+    directions: Array,
+    poses: Array,
+    surface: Surface,
+    side: int,
+    hidden: NDArray[np.uint16],
+    found: Array,
+) -> None:
     moments, rows = poses.shape[:2]
     texels, start, widths, heights, left, top, per_metre = surface.texture
     relief, relief_left, relief_bottom, step = surface.relief
@@ -203,6 +220,8 @@ def _integrate(directions: Array, poses: Array, surface: Surface, side: int, fou
                     stagger_u = (turn % 2 - 0.5) / (2 * side)
                     stagger_v = (turn // 2 % 2 - 0.5) / (2 * side)
                 for i in range(side * side):
+                    if (hidden[v, u] >> min(i, 15)) & 1:
+                        continue
                     a = (i % side + 0.5) / side + stagger_u
                     b = (i // side + 0.5) / side + stagger_v
                     dx = x0 + a * ax + b * bx + a * b * cx

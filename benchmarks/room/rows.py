@@ -14,7 +14,7 @@ from .lens import Camera
 from .light import Light, Shadow, irradiance, map_of
 from .paper import Array, Board, Image, printed
 from .sensor import Sensor, image_of
-from .sheet import Faults, Sheet, glue
+from .sheet import AS_MEANT, Faults, Sheet, glue
 from .views import moved, random_view, seen_at, shaken
 
 WEBCAM = Sensor(blur=0.6, vignetting=0.25, electrons=3000.0, quality=90)
@@ -47,7 +47,7 @@ class Row:
 
     sensor: Sensor = WEBCAM
     page: str = "A2"
-    faults: Faults = Faults()
+    faults: Faults = AS_MEANT
     motion: float = 0.0
     rolling: float = 0.0
     shadow: float | None = None
@@ -126,7 +126,7 @@ def picture(row: Row, camera: Camera, seed: tuple[int, ...], board: Board = BOAR
 @lru_cache(maxsize=2 * SHEETS)
 def sheet(board: Board, page: str, faults: Faults, number: int) -> Sheet:
     """One of the sheets that are glued with such faults."""
-    if faults == Faults():
+    if faults == AS_MEANT:
         number = 0
     return _glued(board, page, faults, number)
 

@@ -84,6 +84,10 @@ class Faults:
     scale: tuple[float, float] = (1.0, 1.0)
 
 
+AS_MEANT = Faults()
+"""Of a sheet that is printed as it should be, and flat."""
+
+
 @dataclass(frozen=True, eq=False)
 class Sheet:
     """A board as it lies on the table.
