@@ -14,9 +14,10 @@ import cv2
 import numpy as np
 import trimesh
 import yaml
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
-from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from .exposure import PAPER, SIDE, Surface, radiance
 from .lens import Camera, corner_directions
@@ -28,7 +29,7 @@ LAMP_RAYS = 48
 """From a point of the table to a lamp that is not a point."""
 SKY_RAYS = 64
 COARSE, FINE, HARD = 4e-3, 1e-3, 0.5e-3
-"""Distances of the points on the table: of light from everywhere, of soft and of hard shadows [m]."""
+"""Distances of the points on the table for light from everywhere, for soft and hard shadows [m]."""
 OFF = 1e-5
 """Where rays start above a surface [m]."""
 SMOOTH = 0.9
@@ -99,7 +100,8 @@ class Objects:
         self.count = len(things)
         self._normals = np.concatenate([m.vertex_normals for m in moved])
         self._colors = np.concatenate([_reflectance(thing) for thing in things])
-        self._scene = RayMeshIntersector(self.mesh)._scene
+        self._scene = EmbreeScene(robust=True)
+        TriangleMesh(self._scene, np.float32(self.mesh.triangles))
 
     def first(self, start: Array, along: Array) -> tuple[NDArray[np.int64], Array, Array]:
         """The faces (N,) that rays meet first, -1 for none, distances (N,), and weights (N, 3) of
@@ -129,6 +131,7 @@ def photographed(
     surface: Surface,
     light: Light,
     objects: Objects,
+    size: tuple[float, float],
     rng: np.random.Generator,
 ) -> Seen:
     """What a camera receives of objects on a board.
@@ -139,9 +142,9 @@ def photographed(
         surface: the board; its light is replaced by that which the objects leave.
         light: of the room; its own shadows do not count.
         objects: on the board.
+        size: of the board [m].
         rng: of the directions that light comes from.
     """
-    size = tuple(np.array(surface.light.values.shape[::-1]) / surface.light.per_metre - 2 * AROUND)
     surface = surface._replace(light=light_left(light, objects, size, rng))
     width, height = camera.size
     pixels = _near_objects(camera, X_SC, objects)
@@ -163,18 +166,18 @@ def photographed(
 
 
 def light_left(
-    light: Light, objects: Objects, size: tuple[float, ...], rng: np.random.Generator
+    light: Light, objects: Objects, size: tuple[float, float], rng: np.random.Generator
 ) -> Map:
     """The light that objects leave the table."""
     spacing = HARD if light.radius == 0.0 else FINE
     p = _points(size, spacing)
     sky = cv2.resize(_open_sky(objects, _points(size, COARSE), rng), p.shape[1::-1])
-    full = lamp_light(light, (size[0], size[1]), p) - light.ambient
+    full = lamp_light(light, size, p) - light.ambient
     lit = light.ambient * sky + full * _lamp_seen(objects, light, p)
     return Map(lit.astype(np.float32), -AROUND, -AROUND, 1 / spacing)
 
 
-def _points(size: tuple[float, ...], spacing: float) -> Array:
+def _points(size: tuple[float, float], spacing: float) -> Array:
     """(R, C, 2)"""
     x, y = (np.arange(-AROUND, s + AROUND, spacing) for s in size)
     return np.stack(np.meshgrid(x, y), axis=-1)
@@ -239,7 +242,7 @@ def _near_objects(camera: Camera, X_SC: Array, objects: Objects) -> NDArray[np.i
 
 
 def _rays(camera: Camera, X_SC: Array, pixels: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Starts and directions (N * SIDE², 3) of the samples of pixels (N,), as `exposure` has them."""
+    """Starts and directions (N * SIDE², 3) of the samples of pixels (N,): those of `exposure`."""
     directions = corner_directions(camera)
     v, u = np.divmod(pixels, camera.size[0])
     inner = (np.arange(SIDE) + 0.5) / SIDE
@@ -254,7 +257,7 @@ def _rays(camera: Camera, X_SC: Array, pixels: NDArray[np.int64]) -> tuple[Array
 def _shaded(
     objects: Objects,
     light: Light,
-    size: tuple[float, ...],
+    size: tuple[float, float],
     met: tuple[Array, Array, NDArray[np.int64], Array],
     rng: np.random.Generator,
 ) -> Array:
@@ -294,7 +297,9 @@ def _on_sphere(rng: np.random.Generator, count: int) -> Array:
 
 def _reflectance(thing: Thing) -> Array:
     """(V, 3) linear reflectance of a mesh's vertices."""
-    srgb = np.asarray(thing.mesh.visual.to_color().vertex_colors)[:, :3] / 255.0
+    visual = thing.mesh.visual
+    colors = visual.to_color() if visual.kind == "texture" else visual
+    srgb = np.asarray(colors.vertex_colors)[:, :3] / 255.0
     linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
     p = np.asarray(thing.mesh.vertices)
     waves = np.sin(p @ [170.0, 90.0, 210.0]) * np.sin(p @ [-60.0, 240.0, 110.0])
