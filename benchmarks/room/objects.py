@@ -171,14 +171,16 @@ def light_left(
     """The light that objects leave the table."""
     spacing = HARD if light.radius == 0.0 else FINE
     p = _points(size, spacing)
-    sky = cv2.resize(_open_sky(objects, _points(size, COARSE), rng), p.shape[1::-1])
+    sky = _open_sky(objects, _points(size, COARSE), rng)
+    row, column = np.float32(np.indices(p.shape[:2]) * spacing / COARSE)
+    sky = cv2.remap(sky, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     full = lamp_light(light, size, p) - light.ambient
     lit = light.ambient * sky + full * _lamp_seen(objects, light, p)
     return Map(lit.astype(np.float32), -AROUND, -AROUND, 1 / spacing)
 
 
 def _points(size: tuple[float, float], spacing: float) -> Array:
-    """(R, C, 2)"""
+    """(R, C, 2) points of the table."""
     x, y = (np.arange(-AROUND, s + AROUND, spacing) for s in size)
     return np.stack(np.meshgrid(x, y), axis=-1)
 
@@ -275,9 +277,7 @@ def _shaded(
     toward = np.where((flat * along).sum(axis=1, keepdims=True) > 0, -1.0, 1.0)
     flat, normal = flat * toward, normal * toward
     start = p + OFF * flat
-    ball = rng.normal(size=p.shape)
-    ball /= np.linalg.norm(ball, axis=1, keepdims=True)
-    to_lamp = np.array(light.lamp) + light.radius * ball - start
+    to_lamp = np.array(light.lamp) + light.radius * _on_sphere(rng, len(p)) - start
     distance = np.linalg.norm(to_lamp, axis=1)
     slant = np.maximum((normal * to_lamp).sum(axis=1) / distance, 0.0)
     slant *= (flat * to_lamp).sum(axis=1) > 0
@@ -291,8 +291,14 @@ def _shaded(
 
 
 def _on_sphere(rng: np.random.Generator, count: int) -> Array:
-    p = rng.normal(size=(count, 3))
-    return p / np.linalg.norm(p, axis=1, keepdims=True)
+    """(N, 3) points of the unit sphere; those that follow each other, as the samples of a pixel do,
+    are spread evenly (Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018)."""
+    first, second = (
+        (rng.uniform() + step * np.arange(count)) % 1.0 for step in (0.7548776662, 0.5698402910)
+    )
+    z, angle = 2.0 * first - 1.0, 2.0 * np.pi * second
+    flat = np.sqrt(1.0 - z * z)
+    return np.stack([flat * np.cos(angle), flat * np.sin(angle), z], axis=-1)
 
 
 def _reflectance(thing: Thing) -> Array:
