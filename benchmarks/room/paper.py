@@ -114,6 +114,7 @@ def printed(board: Board, page: str = "A2") -> tuple[Page, ...]:
             document.write_text(scene)
             scene = str(document)
         command = [sys.executable, "-m", "burg_drake.apps.cli", "printout", scene]
+        command.append("--no-instructions")
         subprocess.run([*command, "--page", page, "-o", pdf], check=True, capture_output=True)
         return read_pages(pdf.read_bytes(), board)
 

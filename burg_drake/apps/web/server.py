@@ -18,6 +18,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib.resources import files
 from typing import Any
 
+from burg_drake.apps.web.limits import MOST_CONNECTIONS
 from burg_drake.apps.web.requests import json_body
 from burg_drake.core import (
     HEADERS as ACCESS_HEADERS,
@@ -32,8 +33,6 @@ PORTS = 50
 """How many ports are tried if none is given."""
 IDLE = 30.0
 """A connection without requests is closed after this [s]."""
-MOST_CONNECTIONS = 32
-"""At a time, each with a thread of its own, if not told otherwise; a browser takes two to six."""
 MOST_REFUSALS = 8
 """Connections beyond those that are told so at a time; more are closed without a word."""
 REFUSED_WITHIN = 2.0
