@@ -17,6 +17,7 @@ from burg_drake.cameras.pose.coarse import CoarsePose, coarse_pose
 from burg_drake.cameras.pose.detection import Detection, MarkerDetector, other_markers
 from burg_drake.cameras.pose.edges import marker_edges
 from burg_drake.cameras.pose.estimate import BoardEstimate
+from burg_drake.cameras.pose.linear_light import linear_light
 from burg_drake.cameras.pose.print_size import (
     LEAST_DEVIATION,
     deformation,
@@ -114,19 +115,20 @@ class BoardPose:
         if wrong:
             return BoardEstimate(reason=wrong)
         found = seen.index[coarse.inliers]
-        refined, wrong = self._refine(grey, coarse.X_SC, found)
+        light = linear_light(grey)
+        refined, wrong = self._refine(light, coarse.X_SC, found)
         if refined is None:
             return BoardEstimate(reason=wrong)
         printed = deformation(refined)
         if printed.marker_scale_error:
             return BoardEstimate(reason=self._other_size_reason(1.0 + printed.marker_scale_error))
-        return self._estimate(grey, refined, printed.aspect_error, depth, X_SC_known)
+        return self._estimate(grey, light, refined, printed.aspect_error, depth, X_SC_known)
 
     def _refine(
-        self, grey: NDArray[np.uint8], poses: list[Array], found: NDArray[np.intp]
+        self, light: NDArray[np.float32], poses: list[Array], found: NDArray[np.intp]
     ) -> tuple[RefinedPose | None, str]:
         """The pose that fits the edges best, or why there is none."""
-        attempts = [self._refinement.refine(grey, X_SC, found) for X_SC in poses]
+        attempts = [self._refinement.refine(light, X_SC, found) for X_SC in poses]
         refined = sorted((r for r in attempts if r is not None), key=_misfit)
         if not refined:
             return (
@@ -149,14 +151,14 @@ class BoardPose:
     def _estimate(
         self,
         grey: NDArray[np.uint8],
+        light: NDArray[np.float32],
         refined: RefinedPose,
         aspect_error: float,
         depth: NDArray[np.floating[Any]] | None,
         X_SC_known: Array | None,
     ) -> BoardEstimate:
         """What to tell about a pose."""
-        contrast = float(np.median(refined.fits.contrast[refined.weight > 0.0]))
-        wrong = self._other_board.beyond(grey, refined.X_SC, contrast)
+        wrong = self._other_board.beyond(grey, light, refined.X_SC)
         if wrong:
             return BoardEstimate(reason=wrong)
         used, corners, error = self._seen_corners(refined)
@@ -168,7 +170,7 @@ class BoardPose:
             scale = scale_by_height(refined.X_SC, X_SC_known)
         if abs(scale - 1.0) > LEAST_DEVIATION:
             return BoardEstimate(reason=_scale_warning(scale), scale=scale)
-        blank = self._other_board.blank(grey, refined.X_SC, contrast, used) if len(used) else ""
+        blank = self._other_board.blank(light, refined.X_SC, used) if len(used) else ""
         return BoardEstimate(
             X_SC=refined.X_SC,
             valid=True,

@@ -48,23 +48,23 @@ def deformation(refined: RefinedPose) -> Deformation:
     """Fits a deformation together with the pose, to the edges of the last round."""
     views = refined.views
     weight = np.sqrt(refined.weight) / refined.sd
-    J = np.column_stack([views.motion, views.print]) * weight[:, None]
+    J = np.column_stack([views.motion, views.print, views.bloom]) * weight[:, None]
     e = refined.fits.offset * weight
     try:
         inverse = np.linalg.inv(J.T @ J)
     except np.linalg.LinAlgError:
         return Deformation()
     x = inverse @ (J.T @ e)
-    variance = ((e - J @ x) ** 2).sum() / max(refined.weight.sum() - 8.0, 1.0)
-    variance *= variance_factor_of_blur(refined.blur)
-    value = x[6:] * [2.0, 1.0]  # a stretch makes y longer and x shorter by the same share
-    spread = np.diag(inverse)[6:] * variance
+    variance = ((e - J @ x) ** 2).sum() / max(refined.weight.sum() - 9.0, 1.0)
+    variance *= variance_factor_of_blur(refined.spread.blur)
+    value = x[6:8] * [2.0, 1.0]  # a stretch makes y longer and x shorter by the same share
+    spread = np.diag(inverse)[6:8] * variance
     if not (spread > 0.0).all():  # singular but for rounding
         return Deformation()
     sd = np.sqrt(spread) * [2.0, 1.0]
     least = [
         LEAST_ASPECT_ERROR,
-        LEAST_MARKER_SCALE_ERROR * np.sqrt(variance_factor_of_blur(refined.blur)),
+        LEAST_MARKER_SCALE_ERROR * np.sqrt(variance_factor_of_blur(refined.spread.blur)),
     ]
     significant = np.abs(value) > np.maximum(SIGNIFICANT * sd, least)
     return Deformation(*(float(v) for v in np.where(significant, value, 0.0)))

@@ -28,9 +28,21 @@ from burg_drake.core import Array
 
 FIRST, LATER, LAST = 160, 320, 800
 """Edges that the rounds look at: the pose is coarse at first, and a few suffice."""
-BLURS = (0.1, 0.5, 2.5)
-"""Variances of lens and pixel together to begin with [pixels^2]; a pixel alone has 1/12."""
-LEAST_BLUR, MOST_BLUR = 0.08, 9.0
+BLURS = np.array(
+    [variance * np.eye(2) for variance in (0.1, 0.5, 2.5)]
+    + [[[0.4 + 4.0 * c * c, 4.0 * c * s], [4.0 * c * s, 0.4 + 4.0 * s * s]]
+       for c, s in ((1.0, 0.0), (0.7071, 0.7071), (0.0, 1.0), (0.7071, -0.7071))]
+)  # fmt: skip
+"""Covariances of lens, motion and pixel together to begin with [pixels^2]: without motion, and with
+one of 7 pixels; a pixel alone has 1/12."""
+LEAST_BLUR, MOST_BLUR = 0.08, 16.0
+"""Variances in any direction [pixels^2]."""
+BLOOM_SD = 1.0
+"""White that is too large on all sides by so much is not unlikely [pixels]."""
+STILL = 0.02
+"""Edges that a round moves by less are where they belong, root mean square [pixels]."""
+MORE = 3
+"""Rounds with all edges, at most."""
 LONG = 0.3
 """A first step that moves an edge by more is followed by another of its kind: edges are fitted best
 where they are expected [pixels]."""
@@ -64,6 +76,25 @@ LEAST_EDGES = 24
 
 
 @dataclass(frozen=True, eq=False)
+class Spread:
+    """How light spreads in an image.
+
+    Attributes:
+        blur: (2, 2) covariance of lens, motion and pixel together [pixels^2].
+        bloom: by which white is larger on all sides than the print has it: overexposure, another
+            encoding of the levels than sRGB, ink that is short [pixels].
+    """
+
+    blur: Array
+    bloom: float = 0.0
+
+    @property
+    def variance(self) -> float:
+        """Mean of both directions [pixels^2]."""
+        return float(np.trace(self.blur)) / 2.0
+
+
+@dataclass(frozen=True, eq=False)
 class RefinedPose:
     """A pose by edges.
 
@@ -74,7 +105,8 @@ class RefinedPose:
         weight: (N,) of each edge, 0 to 1; 0 for what does not belong.
         residual: (N,) of each edge [pixels].
         sd: (N,) expected standard deviation of each edge's offset [pixels].
-        blur: variance of lens and pixel together [pixels^2].
+        spread: of the light.
+        moved: edges by the last round, root mean square [pixels].
     """
 
     X_SC: Array
@@ -84,7 +116,8 @@ class RefinedPose:
     weight: Array
     residual: Array
     sd: Array
-    blur: float
+    spread: Spread
+    moved: float
 
 
 class EdgeRefinement:
@@ -97,12 +130,12 @@ class EdgeRefinement:
         self._intrinsics = intrinsics
 
     def refine(
-        self, grey: NDArray[np.uint8], X_SC: Array, markers: NDArray[np.intp]
+        self, light: NDArray[np.float32], X_SC: Array, markers: NDArray[np.intp]
     ) -> RefinedPose | None:
         """Refines a pose.
 
         Args:
-            grey: (H, W) image.
+            light: (H, W) image in linear light.
             X_SC: (4, 4) pose that puts the edges of `markers` within about a pixel.
             markers: those that were found, as indices of the layout's.
 
@@ -112,27 +145,33 @@ class EdgeRefinement:
         read = np.zeros(len(self._corners), dtype=bool)
         read[markers] = True
         found = np.flatnonzero(read[self._edges.marker])
-        blur = self._first_blur(grey, X_SC, found[:FIRST])
-        result = self._iterate(grey, X_SC, found[:FIRST], blur)
+        spread = self._first_spread(light, X_SC, found[:FIRST])
+        result = self._iterate(light, X_SC, found[:FIRST], spread)
         if result and np.abs(result.fits.offset - result.residual).max() > LONG:
-            result = self._iterate(grey, result.X_SC, found[:FIRST], result.blur)
+            result = self._iterate(light, result.X_SC, found[:FIRST], result.spread)
         others = self._missed_markers(result, read) if result else read
         if result and others.sum() > FEW * read.sum():
             unread = np.flatnonzero(others[self._edges.marker])
             which = np.concatenate([found[:FIRST], unread[:LATER]])
-            result = self._iterate(grey, result.X_SC, which, result.blur)
+            result = self._iterate(light, result.X_SC, which, result.spread)
             found = found if result is None else self._seen(result, found)
-        return result and self._iterate(grey, result.X_SC, found[:LAST], result.blur)
+        for _ in range(MORE):
+            result = result and self._iterate(light, result.X_SC, found[:LAST], result.spread)
+            if result is None or result.moved < STILL:
+                break
+        return result
 
-    def _first_blur(self, grey: NDArray[np.uint8], X_SC: Array, which: NDArray[np.intp]) -> float:
+    def _first_spread(
+        self, light: NDArray[np.float32], X_SC: Array, which: NDArray[np.intp]
+    ) -> Spread:
         """The blur with which edges are most like what they should be."""
         tried = np.tile(which[: FIRST // len(BLURS)], len(BLURS))
         views = view_edges(self._edges, tried, self._intrinsics, X_SC)
         if len(views.which) == 0:
-            return BLURS[0]
-        blurs = np.repeat(BLURS, len(views.which) // len(BLURS))
-        unlike = fit_edges(grey, self._edges, views, blurs).noise.reshape(len(BLURS), -1)
-        return BLURS[int(np.argmin(np.median(unlike, axis=1)))]
+            return Spread(BLURS[0])
+        blurs = np.repeat(BLURS, len(views.which) // len(BLURS), axis=0)
+        unlike = fit_edges(light, self._edges, views, blurs).noise.reshape(len(BLURS), -1)
+        return Spread(BLURS[int(np.argmin(np.median(unlike, axis=1)))])
 
     def _missed_markers(self, result: RefinedPose, read: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(N,) other markers that the image may show, whose place the pose tells well enough."""
@@ -154,37 +193,31 @@ class EdgeRefinement:
         return np.flatnonzero(seen[self._edges.marker])
 
     def _iterate(
-        self, grey: NDArray[np.uint8], X_SC: Array, which: NDArray[np.intp], blur: float
+        self, light: NDArray[np.float32], X_SC: Array, which: NDArray[np.intp], spread: Spread
     ) -> RefinedPose | None:
-        views = view_edges(self._edges, which, self._intrinsics, X_SC)
+        views = view_edges(self._edges, which, self._intrinsics, X_SC, spread.bloom)
         if len(views.which) < LEAST_EDGES:
             return None
-        fits = fit_edges(grey, self._edges, views, blur)
+        fits = fit_edges(light, self._edges, views, spread.blur)
         good = _has_expected_profile(fits)
         if good.sum() < LEAST_EDGES:
             return None
-        noise = np.median(fits.noise[good])
-        safe = np.maximum(np.abs(fits.contrast), 1.0) ** 2 * np.maximum(fits.information, 1e-6)
-        sd = np.sqrt(noise**2 / safe + MODEL_SD**2)
-        step, weight = _robust_step(views.motion, fits.offset, sd, good)
-        residual = fits.offset - views.motion @ step
-        change, total = fits.widening[weight > 0.5].sum(axis=0)
-        blur = float(
-            np.clip(
-                blur + np.clip(change / max(total, 1e-9), -0.3 * blur, 0.5 * blur),
-                LEAST_BLUR,
-                MOST_BLUR,
-            )
-        )
+        sd = np.sqrt(_offset_variance(fits, good) + MODEL_SD**2)
+        J = np.column_stack([views.motion, views.bloom])
+        step, weight = _robust_step(J, fits.offset, sd, good)
+        residual = fits.offset - J @ step
+        blur = _better_blur(spread.blur, views, fits.widening, weight > 0.5)
+        spread = Spread(blur, spread.bloom + float(step[6]))
         return RefinedPose(
-            perturbed_pose(X_SC, step, self._edges.p_SE[views.which].mean(axis=0)),
+            perturbed_pose(X_SC, step[:6], self._edges.p_SE[views.which].mean(axis=0)),
             self._covariance(views, residual, sd, weight) * variance_factor_of_blur(blur),
             views,
             fits,
             weight,
             residual,
             sd,
-            blur,
+            spread,
+            float(np.sqrt(np.average((J @ step) ** 2, weights=weight))),
         )
 
     def _covariance(self, views: EdgeViews, residual: Array, sd: Array, weight: Array) -> Array:
@@ -195,20 +228,55 @@ class EdgeRefinement:
         """
         total = weight.sum()
         markers = np.count_nonzero(np.bincount(self._edges.marker[views.which[weight > 0.0]]))
-        scale = (weight * (residual / sd) ** 2).sum() / max(total - 6.0, 1.0)
+        scale = (weight * (residual / sd) ** 2).sum() / max(total - 7.0, 1.0)
         alike = max(total / max(markers, 1) - 1.0, 0.0) * ALIKE_SD**2
-        J = views.motion * np.sqrt(weight / (scale * sd**2 + alike))[:, None]
-        return np.linalg.inv(J.T @ J)
+        J = np.column_stack([views.motion, views.bloom])
+        J *= np.sqrt(weight / (scale * sd**2 + alike))[:, None]
+        return np.linalg.inv(J.T @ J + _bloom_prior())[:6, :6]
 
 
-def variance_factor_of_blur(blur: float) -> float:
+def _bloom_prior() -> Array:
+    """(7, 7) information about a step that is known before."""
+    prior = np.zeros((7, 7))
+    prior[6, 6] = 1.0 / BLOOM_SD**2
+    return prior
+
+
+def _offset_variance(fits: EdgeFits, good: NDArray[np.bool_]) -> Array:
+    """(N,) variance of offsets by the image's noise [pixels^2]: light is noisy by its root."""
+    contrast = np.maximum(np.abs(fits.contrast), 1e-3)
+    noise = np.median(fits.noise[good] / np.sqrt(contrast[good]))
+    return np.asarray(noise**2 / (contrast * np.maximum(fits.information, 1e-6)))
+
+
+def _better_blur(
+    blur: Array, views: EdgeViews, widening: Array, good: NDArray[np.bool_]
+) -> Array:
+    """(2, 2) the blur with which edges fit better; of a change that no edge tells, none."""
+    n = views.across[good]
+    n = n / np.sqrt((n**2).sum(axis=1, keepdims=True))
+    across, information = widening[good].T
+    A = np.column_stack([n[:, 0] ** 2, 2.0 * n[:, 0] * n[:, 1], n[:, 1] ** 2])
+    normal = (A * information[:, None]).T @ A
+    normal += 1e-3 * max(np.trace(normal), 1e-9) * np.eye(3)
+    x = np.linalg.solve(normal, A.T @ across)
+    root = np.linalg.cholesky(blur)
+    inverse = np.linalg.inv(root)
+    relative = inverse @ np.array([[x[0], x[1]], [x[1], x[2]]]) @ inverse.T
+    share, axes = np.linalg.eigh(relative)
+    better = blur + root @ (axes * np.clip(share, -0.3, 0.5)) @ axes.T @ root.T
+    variance, axes = np.linalg.eigh(better)
+    return np.asarray((axes * np.clip(variance, LEAST_BLUR, MOST_BLUR)) @ axes.T)
+
+
+def variance_factor_of_blur(blur: Array) -> float:
     """By how much blur increases the variance of a pose: what is within its width is fitted with
     each of several edges, so that their errors are alike.
 
     Normalised errors of 24 views each with blurs of standard deviations of 1, 1.5, 2 and 2.5 pixels
     are 1.1, 1.5, 2.1 and 2.4 without it: the variance of the blur in pixels^2 is the factor.
     """
-    return max(1.0, blur)
+    return max(1.0, float(np.trace(blur)) / 2.0)
 
 
 def predicted_places(
@@ -266,7 +334,7 @@ def _has_expected_profile(fits: EdgeFits) -> NDArray[np.bool_]:
 def _robust_step(
     motion: Array, offset: Array, sd: Array, good: NDArray[np.bool_]
 ) -> tuple[Array, Array]:
-    """Least squares with Tukey's weights: step (6,), and weights (N,)."""
+    """Least squares with Tukey's weights: step (7,), pose and bloom, and weights (N,)."""
     J, e = motion / sd[:, None], offset / sd
     weight = good.astype(float)
     step = _weighted_step(J, e, weight)
@@ -280,4 +348,4 @@ def _robust_step(
 
 def _weighted_step(J: Array, e: Array, weight: Array) -> Array:
     weighted = J * weight[:, None]
-    return np.asarray(np.linalg.solve(weighted.T @ J, weighted.T @ e))
+    return np.asarray(np.linalg.solve(weighted.T @ J + _bloom_prior(), weighted.T @ e))
