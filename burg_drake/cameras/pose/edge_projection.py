@@ -91,6 +91,17 @@ def view_edges(
     )
 
 
+def motion_of_points(intrinsics: Intrinsics, X_SC: Array, p_S: Array) -> tuple[Array, Array]:
+    """Image points (N, 2) of points (N, 3), and (N, 2, 6) how they move with a small rotation and
+    translation of the camera, as in `BoardEstimate.covariance`. Points behind it are anywhere."""
+    q_S = p_S - X_SC[:3, 3]
+    p_C = q_S @ X_SC[:3, :3]
+    ahead = p_C[:, 2:] > NEAREST
+    at, by_C = image_points(intrinsics, np.where(ahead, p_C, [0.0, 0.0, 1.0]))
+    by_S = by_C @ X_SC[:3, :3].T
+    return at, np.concatenate([cross(by_S, q_S[:, None]), -by_S], axis=2)
+
+
 def image_points(intrinsics: Intrinsics, p_CQ: Array) -> tuple[Array, Array]:
     """Image points (N, 2) and their derivatives (N, 2, 3) by the points in the camera's frame."""
     x = p_CQ[:, :2] / p_CQ[:, 2:]

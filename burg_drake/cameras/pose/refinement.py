@@ -8,19 +8,19 @@ part of them, take part as soon as the pose tells well enough where their edges 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from burg_drake.cameras.optics import Intrinsics
+from burg_drake.cameras.pose.disturbance import Disturbance, DisturbanceFit, SheetModes
 from burg_drake.cameras.pose.edge_fit import EdgeFits, fit_edges
 from burg_drake.cameras.pose.edge_projection import (
     NEAREST,
     EdgeViews,
-    cross,
-    image_points,
+    motion_of_points,
     view_edges,
 )
 from burg_drake.cameras.pose.edges import MarkerEdges
@@ -107,6 +107,7 @@ class RefinedPose:
         sd: (N,) expected standard deviation of each edge's offset [pixels].
         spread: of the light.
         moved: edges by the last round, root mean square [pixels].
+        disturbance: what else moves the markers.
     """
 
     X_SC: Array
@@ -118,6 +119,7 @@ class RefinedPose:
     sd: Array
     spread: Spread
     moved: float
+    disturbance: Disturbance | None = None
 
 
 class EdgeRefinement:
@@ -128,6 +130,7 @@ class EdgeRefinement:
         self._edges = edges
         self._corners = p_SQ
         self._intrinsics = intrinsics
+        self._modes = SheetModes(p_SQ.mean(axis=1))
 
     def refine(
         self, light: NDArray[np.float32], X_SC: Array, markers: NDArray[np.intp]
@@ -159,7 +162,24 @@ class EdgeRefinement:
             result = result and self._iterate(light, result.X_SC, found[:LAST], result.spread)
             if result is None or result.moved < STILL:
                 break
-        return result
+        return result and self._with_disturbance(result)
+
+    def _with_disturbance(self, result: RefinedPose) -> RefinedPose:
+        """The pose if markers may be shifted."""
+        views = result.views
+        _, motion = motion_of_points(self._intrinsics, result.X_SC, self._corners.mean(axis=1))
+        found = DisturbanceFit(
+            views,
+            result.residual,
+            result.weight / result.sd**2,
+            self._edges.marker[views.which],
+            motion,
+            self._modes,
+            self._intrinsics.height,
+        ).fit(_bloom_prior())
+        covariance = found.covariance * variance_factor_of_blur(result.spread.blur)
+        X_SC = perturbed_pose(result.X_SC, found.step)
+        return replace(result, X_SC=X_SC, covariance=covariance, disturbance=found)
 
     def _first_spread(
         self, light: NDArray[np.float32], X_SC: Array, which: NDArray[np.intp]
@@ -284,12 +304,9 @@ def predicted_places(
 ) -> tuple[Array, Array]:
     """Places (..., 2) in the image of points (..., 3) [pixels], and their variance (...) along the
     larger axis [pixels^2]: infinite for points behind the camera."""
-    q_S = p_SQ.reshape(-1, 3) - X_SC[:3, 3]
-    p_C = q_S @ X_SC[:3, :3]
-    ahead = p_C[:, 2] > NEAREST
-    at, by_C = image_points(intrinsics, np.where(ahead[:, None], p_C, [0.0, 0.0, 1.0]))
-    by_S = by_C @ X_SC[:3, :3].T
-    motion = np.concatenate([cross(by_S, q_S[:, None]), -by_S], axis=2)
+    p_S = p_SQ.reshape(-1, 3)
+    ahead = (p_S - X_SC[:3, 3]) @ X_SC[:3, 2] > NEAREST
+    at, motion = motion_of_points(intrinsics, X_SC, p_S)
     spread = motion @ covariance @ motion.transpose(0, 2, 1)
     variance = np.where(ahead, np.linalg.eigvalsh(spread)[:, -1], np.inf)
     return at.reshape(*p_SQ.shape[:-1], 2), variance.reshape(p_SQ.shape[:-1])
