@@ -27,6 +27,9 @@ OUT_OF_PLANE = 4e-4, 1.5e-3
 """Of the height of a sheet that does not lie flat [m]."""
 ROWS = 0.8
 """By what the camera does from the first row of an image to the last one [pixels]."""
+SIZE = 0.01
+"""Of the markers for their distances: light spreads further from the white around a marker than
+from that within [-]."""
 ASPECT = 0.01
 """Of a print's length along y for that along x [-]."""
 PAGE, BEND = 0.15, 0.12
@@ -39,6 +42,7 @@ FAINT = 1e-3
 KINDS: dict[str, tuple[float, ...]] = {
     "rows": (ROWS,),
     "aspect": (ASPECT,),
+    "size": (SIZE,),
     "in_plane": IN_PLANE,
     "out_of_plane": OUT_OF_PLANE,
 }
@@ -65,6 +69,7 @@ class Shifts:
         out_of_plane: of the sheet's height [m].
         rows: while the rows of the image are exposed [pixels].
         aspect: of the print's length along y for that along x [-].
+        size: of the markers for their distances [-].
     """
 
     alone: float = ALONE[0]
@@ -72,6 +77,7 @@ class Shifts:
     out_of_plane: float = 0.0
     rows: float = 0.0
     aspect: float = 0.0
+    size: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +92,7 @@ class Disturbance:
         out_of_plane: largest height of one [m].
         rows: what the camera did from the first row to the last one [pixels].
         aspect: how much longer the print is along y than along x [-].
+        size: by how much the markers are larger for their distances [-].
     """
 
     step: Array
@@ -95,6 +102,7 @@ class Disturbance:
     out_of_plane: float
     rows: float
     aspect: float
+    size: float
 
 
 class SheetModes:
@@ -119,9 +127,7 @@ class SheetModes:
         moved = np.stack([[one, zero], [zero, one], [-y, x]], axis=-1)  # (2, n, 3)
         modes = _modes(alike, moved.transpose(1, 0, 2).reshape(2 * n, 3))
         self.in_plane = modes.reshape(n, 2, -1)
-        self.out_of_plane = _modes(
-            np.exp(-apart / (2.0 * BEND**2)), np.stack([one, x, y], axis=-1)
-        )
+        self.out_of_plane = _modes(np.exp(-apart / (2.0 * BEND**2)), np.stack([one, x, y], axis=-1))
 
 
 def _modes(covariance: Array, whole: Array) -> Array:
@@ -186,21 +192,22 @@ class DisturbanceFit:
         self._sums /= self._spread_within_markers(belongs)
         self._modes = modes.in_plane[used], modes.out_of_plane[used]
         P = motion[used][:, :, 3:]
-        J, row = views.motion[kept], views.at[kept, 1] / height - 0.5
+        J = views.motion[kept]
+        row = views.at[kept, 1:] / height - 0.5
         strength = np.sqrt((J**2).mean(axis=0)) + 1e-9
         shifted = [P[:, :, :2] @ self._modes[0], P[:, :, 2:] * self._modes[1][:, None]]
         parts = {
             "pose": np.column_stack([J, views.bloom[kept]]),
-            "rows": row[:, None] * J / strength / np.sqrt(6.0),
+            "rows": row * J / strength / np.sqrt(6.0),
             "aspect": 0.5 * views.print[kept, :1],
+            "size": views.print[kept, 1:],
             "in_plane": (self._normal[:, None] @ shifted[0][belongs])[:, 0],
             "out_of_plane": (self._normal[:, None] @ shifted[1][belongs])[:, 0],
         }
         ends = np.cumsum([0, *(part.shape[1] for part in parts.values())])
-        self._columns = {
-            kind: np.arange(*ends[k : k + 2]) for k, kind in enumerate(parts)
-        }
+        self._columns = {kind: np.arange(*ends[k : k + 2]) for k, kind in enumerate(parts)}
         self._J = np.column_stack(list(parts.values()))
+        self._add_up()
         self._equations = {alone: self._normal_equations(alone) for alone in ALONE}
 
     def fit(self, prior: Array) -> Disturbance:
@@ -236,43 +243,48 @@ class DisturbanceFit:
             return 1.0
         return max(float((self._sums @ rest**2).sum()) / freedom, LEAST_SPREAD)
 
+    def _add_up(self) -> None:
+        """Sums over all edges, and those by marker, of the columns and of what is seen."""
+        G, g = self._by_marker()
+        both = self._sums @ (self._normal[:, :, None] * self._J[:, None]).reshape(len(self._J), -1)
+        both = np.concatenate([both.reshape(*g.shape, -1), g[..., None]], axis=2)
+        self._G, self._shares = G, both  # (n, 2, 2), (n, 2, K + 1)
+        weight = self._sums.sum(axis=0)
+        seen = np.column_stack([self._J, self._offset])
+        self._squares = (seen * weight[:, None]).T @ seen
+
     def _normal_equations(self, alone: float) -> tuple[Array, Array, float]:
         """(K, K) and (K,) normal equations of all columns if single markers are shifted as well,
         and what that leaves of the logarithm of the probability."""
-        G, g = self._by_marker()
-        inner = G + np.eye(2) / alone**2
-        both = self._sums @ (self._normal[:, :, None] * self._J[:, None]).reshape(len(self._J), -1)
-        both = np.concatenate([both.reshape(*g.shape, -1), g[..., None]], axis=2)  # (n, 2, K + 1)
-        columns = both.reshape(-1, both.shape[2])
-        taken = columns.T @ np.linalg.solve(inner, both).reshape(columns.shape)
-        weight = self._sums.sum(axis=0)
-        weighted = self._J * weight[:, None]
-        A = weighted.T @ self._J - taken[:-1, :-1]
-        b = weighted.T @ self._offset - taken[:-1, -1]
-        square = float(weight @ self._offset**2 - taken[-1, -1])
-        volume = float(np.linalg.slogdet(inner * alone**2)[1].sum())
-        return A, b, -0.5 * (square + volume)
+        inner = self._G + np.eye(2) / alone**2
+        a, b, c = inner[:, 0, 0], inner[:, 0, 1], inner[:, 1, 1]
+        det = a * c - b * b
+        inverse = np.stack([c, -b, -b, a], axis=-1).reshape(-1, 2, 2) / det[:, None, None]
+        shares = self._shares.reshape(-1, self._shares.shape[2])
+        left = self._squares - shares.T @ (inverse @ self._shares).reshape(shares.shape)
+        volume = float(np.log(det * alone**4).sum())
+        return left[:-1, :-1], left[:-1, -1], -0.5 * (float(left[-1, -1]) + volume)
 
     def _solve(self, shifts: Shifts, prior: Array) -> _Solution:
         pose = self._columns["pose"]
-        kinds = [(self._columns[kind], sd) for kind, sd in vars(shifts).items() if kind in self._columns]
-        columns = np.concatenate([pose, *(which for which, sd in kinds if sd)])
-        sds = np.concatenate([np.full(len(which), sd) for which, sd in kinds if sd] or [[]])
+        sds = {kind: getattr(shifts, kind) for kind in KINDS if getattr(shifts, kind)}
+        columns = np.concatenate([pose, *(self._columns[kind] for kind in sds)])
+        known = np.repeat(np.array(list(sds.values())), [len(self._columns[kind]) for kind in sds])
         A, b, logarithm = self._equations[shifts.alone]
         A, b = A[np.ix_(columns, columns)], b[columns]
         A[: len(pose), : len(pose)] += prior
-        A[range(len(pose), len(A)), range(len(pose), len(A))] += sds**-2.0
+        A[range(len(pose), len(A)), range(len(pose), len(A))] += known**-2.0
         covariance = np.linalg.inv(A)
         x = covariance @ b
         logarithm += 0.5 * float(b @ x) - 0.5 * float(np.linalg.slogdet(A)[1])
-        logarithm -= float(np.log(sds).sum())
+        logarithm -= float(np.log(known).sum())
         return _Solution(logarithm, shifts, x, covariance, columns)
 
     def _disturbance(self, best: _Solution, solved: list[_Solution]) -> Disturbance:
         """What the best solution says, its step and covariance those of all, by probability."""
         x = np.zeros(self._J.shape[1])
         x[best.columns] = best.x
-        rows, aspect, in_plane, out_of_plane = (x[self._columns[kind]] for kind in KINDS)
+        rows, aspect, size, in_plane, out_of_plane = (x[self._columns[kind]] for kind in KINDS)
         weight = np.exp((np.array([s.logarithm for s in solved]) - best.logarithm) / VAGUE)
         weight /= weight.sum()
         steps = np.array([s.x[:6] for s in solved])
@@ -287,6 +299,7 @@ class DisturbanceFit:
             float(np.abs(self._modes[1] @ out_of_plane).max()),
             float(np.linalg.norm(rows)),
             float(aspect[0]),
+            float(size[0]),
         )
 
 

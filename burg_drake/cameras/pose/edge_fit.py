@@ -9,6 +9,7 @@ nothing is resampled.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,8 +35,8 @@ class EdgeFits:
 
     Attributes:
         offset: (N,) from the predicted place, along the gradient of u [pixels].
-        contrast: (N,) white minus black [linear light, of 255]; negative if colors are the wrong way
-            round.
+        contrast: (N,) white minus black [linear light, of 255]; negative if colors are the wrong
+            way round.
         information: (N,) inverse variance of the offset for noise that equals the contrast
             [1/pixels^2].
         noise: (N,) root mean square of what the fit leaves [linear light, of 255].
@@ -121,7 +122,7 @@ def _dot(one: Array, other: Array) -> Array:
     return np.asarray(np.einsum("nw,nw->n", one, other))
 
 
-def _gaussian(z: Array) -> tuple[Array, Array]:
+def _gaussian(z: NDArray[np.floating[Any]]) -> tuple[Array, Array]:
     """The normal distribution and its density, the former within 1e-7 (Abramowitz and Stegun,
     Handbook of Mathematical Functions, 1964, 26.2.17): a third of the time of the exact one."""
     density = np.exp(-0.5 * z * z) * (1.0 / np.sqrt(2.0 * np.pi))

@@ -18,20 +18,23 @@ from burg_drake.cameras.pose.detection import Detection, MarkerDetector, other_m
 from burg_drake.cameras.pose.edges import marker_edges
 from burg_drake.cameras.pose.estimate import BoardEstimate
 from burg_drake.cameras.pose.linear_light import linear_light
-from burg_drake.cameras.pose.print_size import (
+from burg_drake.cameras.pose.print_quality import (
+    ASPECT,
     LEAST_DEVIATION,
-    deformation,
+    print_doubt,
     scale_by_depth,
     scale_by_height,
+    wrong_print,
 )
 from burg_drake.cameras.pose.refinement import EdgeRefinement, RefinedPose
 from burg_drake.cameras.pose.wrong_board import WrongBoardCheck
 from burg_drake.core import Array, InvalidInputError
 from burg_drake.scene.document import Board
 
-OTHER_MARKER_SCALE = 0.05
-"""From this deviation on, markers are too large or too small for their distances to look for their
-edges; corners tell it to some hundredths, edges to some thousandths [-]."""
+OTHER_MARKER_SCALE = 0.05, 1.5
+"""From this deviation on, as a share and as a shift of a marker's sides [pixels], markers are too
+large or too small for their distances to look for their edges. Light that blooms shifts them by a
+pixel."""
 DECIDED = 30.0
 """By how much the squared normalised residuals of the second pose must exceed those of the first
 for the first to be right (odds of exp(15) if they were normal)."""
@@ -119,10 +122,10 @@ class BoardPose:
         refined, wrong = self._refine(light, coarse.X_SC, found)
         if refined is None:
             return BoardEstimate(reason=wrong)
-        printed = deformation(refined)
-        if printed.marker_scale_error:
-            return BoardEstimate(reason=self._other_size_reason(1.0 + printed.marker_scale_error))
-        return self._estimate(grey, light, refined, printed.aspect_error, depth, X_SC_known)
+        wrong = self._wrong_print_reason(refined)
+        if wrong:
+            return BoardEstimate(reason=wrong)
+        return self._estimate(grey, light, refined, depth, X_SC_known)
 
     def _refine(
         self, light: NDArray[np.float32], poses: list[Array], found: NDArray[np.intp]
@@ -153,7 +156,6 @@ class BoardPose:
         grey: NDArray[np.uint8],
         light: NDArray[np.float32],
         refined: RefinedPose,
-        aspect_error: float,
         depth: NDArray[np.floating[Any]] | None,
         X_SC_known: Array | None,
     ) -> BoardEstimate:
@@ -174,7 +176,7 @@ class BoardPose:
         return BoardEstimate(
             X_SC=refined.X_SC,
             valid=True,
-            reason=blank or _warnings(error, aspect_error),
+            reason=blank or print_doubt(refined.disturbance) or _residual_doubt(error),
             reprojection_error=error,
             covariance=refined.covariance,
             ids=tuple(int(i) for i in self._layout.ids[used]),
@@ -217,13 +219,29 @@ class BoardPose:
 
     def _other_board_reason(self, seen: Detection, coarse: CoarsePose) -> str:
         """Why the markers that were found are not this board; empty if they are."""
-        if abs(coarse.marker_scale - 1.0) > OTHER_MARKER_SCALE:
+        share, pixels = OTHER_MARKER_SCALE
+        off = abs(coarse.marker_scale - 1.0)
+        if off > share and off * _side(seen.corners) / 2.0 > pixels:
             return self._other_size_reason(coarse.marker_scale)
         n, fit = len(seen.index), int(coarse.inliers.sum())
         if not coarse.X_SC or fit < max(1, n / 2) or (n > 1 and fit < 2):
             return (
                 f"another board: only {fit} of {_markers(n)} in sight stand where this one has"
                 " them; are columns, rows and first_id right?"
+            )
+        return ""
+
+    def _wrong_print_reason(self, refined: RefinedPose) -> str:
+        """Why a print is none of this board; empty if it is."""
+        at = self.intrinsics.project((self._p_SQ - refined.X_SC[:3, 3]) @ refined.X_SC[:3, :3])
+        used = np.unique(self._edges.marker[refined.views.which[refined.weight > 0.0]])
+        marker_scale = wrong_print(refined.disturbance, _side(at[used]))
+        if marker_scale != 1.0:
+            return self._other_size_reason(marker_scale)
+        if abs(refined.disturbance.aspect) > ASPECT[1]:
+            return (
+                f"another board: {1.0 + refined.disturbance.aspect:.2f} times as long along y as"
+                " along x; or check the intrinsics"
             )
         return ""
 
@@ -267,6 +285,11 @@ def grey_image(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.asarray(cv2.cvtColor(np.ascontiguousarray(image), codes[image.shape[2]]))
 
 
+def _side(corners: Array) -> float:
+    """Median length of the sides of markers (N, 4, 2) [pixels]."""
+    return float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
+
+
 def _misfit(refined: RefinedPose) -> float:
     """Mean of the squared normalised residuals, those of what does not fit cut off at 3."""
     return float(np.minimum((refined.residual / refined.sd) ** 2, 9.0).mean())
@@ -286,13 +309,8 @@ def _scale_warning(scale: float) -> str:
     )
 
 
-def _warnings(error: float, aspect_error: float) -> str:
-    """What is doubtful about a pose; empty if all is well."""
-    if aspect_error:
-        return (
-            f"the board is printed {1.0 + aspect_error:.3f} times as long along y as along x:"
-            " measure its rulers and print it anew with what they measure, or check the intrinsics"
-        )
+def _residual_doubt(error: float) -> str:
+    """What is doubtful about residuals; empty if nothing is."""
     if error > DOUBTFUL_RESIDUAL:
         return (
             f"markers are off by {error:.1f} pixels on average: check the intrinsics, and that the"

@@ -8,7 +8,7 @@ part of them, take part as soon as the pose tells well enough where their edges 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +46,11 @@ MORE = 3
 LONG = 0.3
 """A first step that moves an edge by more is followed by another of its kind: edges are fitted best
 where they are expected [pixels]."""
+UNBLURRED = 0.5
+"""Variance of lens and pixel in a sharp image [pixels^2]."""
+LOPSIDED = 0.025
+"""Shift of an image by the blur beyond that, as a share of its standard deviation: motion and
+defocus are not quite alike on both sides."""
 KNOWN = 0.5
 """Standard deviation of an edge's predicted place up to which it is looked for [pixels]."""
 FEW = 0.25
@@ -95,19 +100,18 @@ class Spread:
 
 
 @dataclass(frozen=True, eq=False)
-class RefinedPose:
-    """A pose by edges.
+class EdgeRound:
+    """What a round of looking for edges found.
 
     Attributes:
         X_SC: (4, 4).
         covariance: (6, 6), see `BoardEstimate`.
-        views, fits: edges of the last round, as seen by the pose before it.
+        views, fits: edges as seen by the pose before the round, and where they were found.
         weight: (N,) of each edge, 0 to 1; 0 for what does not belong.
         residual: (N,) of each edge [pixels].
         sd: (N,) expected standard deviation of each edge's offset [pixels].
         spread: of the light.
-        moved: edges by the last round, root mean square [pixels].
-        disturbance: what else moves the markers.
+        moved: edges by the round, root mean square [pixels].
     """
 
     X_SC: Array
@@ -119,7 +123,17 @@ class RefinedPose:
     sd: Array
     spread: Spread
     moved: float
-    disturbance: Disturbance | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedPose(EdgeRound):
+    """A pose by edges: the last round's, with what else moves the markers.
+
+    Attributes:
+        disturbance: is that.
+    """
+
+    disturbance: Disturbance
 
 
 class EdgeRefinement:
@@ -162,24 +176,32 @@ class EdgeRefinement:
             result = result and self._iterate(light, result.X_SC, found[:LAST], result.spread)
             if result is None or result.moved < STILL:
                 break
-        return result and self._with_disturbance(result)
+        return None if result is None else self._with_disturbance(result)
 
-    def _with_disturbance(self, result: RefinedPose) -> RefinedPose:
+    def _with_disturbance(self, last: EdgeRound) -> RefinedPose:
         """The pose if markers may be shifted."""
-        views = result.views
-        _, motion = motion_of_points(self._intrinsics, result.X_SC, self._corners.mean(axis=1))
+        _, motion = motion_of_points(self._intrinsics, last.X_SC, self._corners.mean(axis=1))
         found = DisturbanceFit(
-            views,
-            result.residual,
-            result.weight / result.sd**2,
-            self._edges.marker[views.which],
+            last.views,
+            last.residual,
+            last.weight / last.sd**2,
+            self._edges.marker[last.views.which],
             motion,
             self._modes,
             self._intrinsics.height,
         ).fit(_bloom_prior())
-        covariance = found.covariance * variance_factor_of_blur(result.spread.blur)
-        X_SC = perturbed_pose(result.X_SC, found.step)
-        return replace(result, X_SC=X_SC, covariance=covariance, disturbance=found)
+        covariance = found.covariance.copy()
+        covariance[:3, :3] += self._shift_by_blur(last)
+        X_SC = perturbed_pose(last.X_SC, found.step)
+        return RefinedPose(
+            **(vars(last) | {"X_SC": X_SC, "covariance": covariance}), disturbance=found
+        )
+
+    def _shift_by_blur(self, last: EdgeRound) -> Array:
+        """(3, 3) covariance of the rotation that a blur makes which is not alike on both sides."""
+        sideways = last.X_SC[:3, :2] / self._intrinsics.focal  # rotation of a pixel
+        beyond = max(last.spread.variance - UNBLURRED, 0.0)
+        return np.asarray(LOPSIDED**2 * beyond * sideways @ sideways.T)
 
     def _first_spread(
         self, light: NDArray[np.float32], X_SC: Array, which: NDArray[np.intp]
@@ -193,7 +215,7 @@ class EdgeRefinement:
         unlike = fit_edges(light, self._edges, views, blurs).noise.reshape(len(BLURS), -1)
         return Spread(BLURS[int(np.argmin(np.median(unlike, axis=1)))])
 
-    def _missed_markers(self, result: RefinedPose, read: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _missed_markers(self, result: EdgeRound, read: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(N,) other markers that the image may show, whose place the pose tells well enough."""
         at, variance = predicted_places(
             self._corners, self._intrinsics, result.X_SC, result.covariance
@@ -202,7 +224,7 @@ class EdgeRefinement:
         in_image = np.asarray(((at > 0.0) & (at < size)).all(axis=2)).any(axis=1)
         return np.asarray(~read & in_image & (variance < KNOWN**2).all(axis=1))
 
-    def _seen(self, result: RefinedPose, found: NDArray[np.intp]) -> NDArray[np.intp]:
+    def _seen(self, result: EdgeRound, found: NDArray[np.intp]) -> NDArray[np.intp]:
         """Edges of the markers of which a part is in sight, and of those that were found."""
         marker, n = self._edges.marker[result.views.which], len(self._corners)
         good = np.bincount(marker, weights=result.weight > 0.0, minlength=n)
@@ -214,7 +236,7 @@ class EdgeRefinement:
 
     def _iterate(
         self, light: NDArray[np.float32], X_SC: Array, which: NDArray[np.intp], spread: Spread
-    ) -> RefinedPose | None:
+    ) -> EdgeRound | None:
         views = view_edges(self._edges, which, self._intrinsics, X_SC, spread.bloom)
         if len(views.which) < LEAST_EDGES:
             return None
@@ -228,9 +250,9 @@ class EdgeRefinement:
         residual = fits.offset - J @ step
         blur = _better_blur(spread.blur, views, fits.widening, weight > 0.5)
         spread = Spread(blur, spread.bloom + float(step[6]))
-        return RefinedPose(
+        return EdgeRound(
             perturbed_pose(X_SC, step[:6], self._edges.p_SE[views.which].mean(axis=0)),
-            self._covariance(views, residual, sd, weight) * variance_factor_of_blur(blur),
+            self._covariance(views, residual, sd, weight) * max(1.0, spread.variance),
             views,
             fits,
             weight,
@@ -269,9 +291,7 @@ def _offset_variance(fits: EdgeFits, good: NDArray[np.bool_]) -> Array:
     return np.asarray(noise**2 / (contrast * np.maximum(fits.information, 1e-6)))
 
 
-def _better_blur(
-    blur: Array, views: EdgeViews, widening: Array, good: NDArray[np.bool_]
-) -> Array:
+def _better_blur(blur: Array, views: EdgeViews, widening: Array, good: NDArray[np.bool_]) -> Array:
     """(2, 2) the blur with which edges fit better; of a change that no edge tells, none."""
     n = views.across[good]
     n = n / np.sqrt((n**2).sum(axis=1, keepdims=True))
@@ -287,16 +307,6 @@ def _better_blur(
     better = blur + root @ (axes * np.clip(share, -0.3, 0.5)) @ axes.T @ root.T
     variance, axes = np.linalg.eigh(better)
     return np.asarray((axes * np.clip(variance, LEAST_BLUR, MOST_BLUR)) @ axes.T)
-
-
-def variance_factor_of_blur(blur: Array) -> float:
-    """By how much blur increases the variance of a pose: what is within its width is fitted with
-    each of several edges, so that their errors are alike.
-
-    Normalised errors of 24 views each with blurs of standard deviations of 1, 1.5, 2 and 2.5 pixels
-    are 1.1, 1.5, 2.1 and 2.4 without it: the variance of the blur in pixels^2 is the factor.
-    """
-    return max(1.0, float(np.trace(blur)) / 2.0)
 
 
 def predicted_places(

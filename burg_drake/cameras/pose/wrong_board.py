@@ -102,9 +102,7 @@ class WrongBoardCheck:
             f" {self._layout.ids[-1]}: are count and first_id right?"
         )
 
-    def blank(
-        self, light: NDArray[np.float32], X_SC: Array, used: NDArray[np.intp]
-    ) -> str:
+    def blank(self, light: NDArray[np.float32], X_SC: Array, used: NDArray[np.intp]) -> str:
         """Which row or column next to those in sight is blank paper.
 
         Args:
