@@ -67,11 +67,14 @@ def print_doubt(found: Disturbance) -> str:
         )
     if found.in_plane > BESIDE:
         return (
-            f"markers lie up to {1e3 * found.in_plane:.1f} mm beside their places: are the pages"
-            " glued exactly?"
+            f"markers lie up to {1e3 * found.in_plane:.1f} mm beside their places: check that pages"
+            " are glued exactly, and the intrinsics"
         )
     if found.out_of_plane > HEIGHT:
-        return f"the sheet is up to {1e3 * found.out_of_plane:.1f} mm off its plane: lay it flat"
+        return (
+            f"the sheet is up to {1e3 * found.out_of_plane:.1f} mm off its plane: lay it flat, or"
+            " check the intrinsics"
+        )
     return ""
 
 
