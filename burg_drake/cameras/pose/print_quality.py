@@ -67,13 +67,13 @@ def print_doubt(found: Disturbance) -> str:
         )
     if found.in_plane > BESIDE:
         return (
-            f"markers lie up to {1e3 * found.in_plane:.1f} mm beside their places: check that pages"
-            " are glued exactly, and the intrinsics"
+            f"markers lie up to {1e3 * found.in_plane:.1f} mm beside their places: check the"
+            " intrinsics, and that pages are glued exactly"
         )
     if found.out_of_plane > HEIGHT:
         return (
-            f"the sheet is up to {1e3 * found.out_of_plane:.1f} mm off its plane: lay it flat, or"
-            " check the intrinsics"
+            f"the sheet is up to {1e3 * found.out_of_plane:.1f} mm off its plane: check the"
+            " intrinsics, and that it lies flat"
         )
     return ""
 
