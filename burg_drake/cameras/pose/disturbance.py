@@ -2,7 +2,7 @@
 place, a sheet that bulges, a print that is longer along one axis, a camera that moves while its
 rows are exposed one after the other.
 
-Shifts are taken for random, those of the sheet alike for markers that are near to each other. How
+MarkerShifts are taken for random, those of the sheet alike for markers that are near to each other. How
 large they are is what makes the residuals most probable; then the pose is the generalised least
 squares estimate, and its covariance says what such shifts leave open.
 """
@@ -19,7 +19,7 @@ from burg_drake.cameras.pose.edge_projection import EdgeViews
 from burg_drake.core import Array
 
 ALONE = 0.006, 0.02, 0.06, 0.2
-"""Shifts of single markers, for whatever else is not as assumed; standard deviations that are tried
+"""MarkerShifts of single markers, for whatever else is not as assumed; standard deviations that are tried
 [pixels]. In images without noise the first one is right."""
 IN_PLANE = 1.5e-4, 6e-4
 """Of pages along the sheet [m]."""
@@ -60,7 +60,7 @@ sheet."""
 
 
 @dataclass(frozen=True)
-class Shifts:
+class MarkerShifts:
     """Standard deviations of shifts; 0 for those that are not.
 
     Attributes:
@@ -97,7 +97,7 @@ class Disturbance:
 
     step: Array
     covariance: Array
-    shifts: Shifts
+    shifts: MarkerShifts
     in_plane: float
     out_of_plane: float
     rows: float
@@ -151,7 +151,7 @@ class _Solution:
     """
 
     logarithm: float
-    shifts: Shifts
+    shifts: MarkerShifts
     x: Array
     covariance: Array
     columns: NDArray[np.intp]
@@ -216,7 +216,7 @@ class DisturbanceFit:
         Args:
             prior: (7, 7) information about the step of pose and bloom that is known before.
         """
-        solved = [self._solve(Shifts(alone), prior) for alone in ALONE]
+        solved = [self._solve(MarkerShifts(alone), prior) for alone in ALONE]
         best = max(solved, key=_logarithm)
         for _ in range(len(KINDS)):
             tried = [self._solve(shifts, prior) for shifts in _with_another(best.shifts)]
@@ -265,7 +265,7 @@ class DisturbanceFit:
         volume = float(np.log(det * alone**4).sum())
         return left[:-1, :-1], left[:-1, -1], -0.5 * (float(left[-1, -1]) + volume)
 
-    def _solve(self, shifts: Shifts, prior: Array) -> _Solution:
+    def _solve(self, shifts: MarkerShifts, prior: Array) -> _Solution:
         pose = self._columns["pose"]
         sds = {kind: getattr(shifts, kind) for kind in KINDS if getattr(shifts, kind)}
         columns = np.concatenate([pose, *(self._columns[kind] for kind in sds)])
@@ -307,8 +307,8 @@ def _logarithm(solution: _Solution) -> float:
     return solution.logarithm
 
 
-def _with_another(shifts: Shifts) -> Iterator[Shifts]:
-    """Shifts that differ from some in one kind, and in those of single markers."""
+def _with_another(shifts: MarkerShifts) -> Iterator[MarkerShifts]:
+    """MarkerShifts that differ from some in one kind, and in those of single markers."""
     for alone in {shifts.alone, ALONE[0]}:
         for kind, values in KINDS.items():
             for value in values:
