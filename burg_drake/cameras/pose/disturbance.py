@@ -2,7 +2,7 @@
 place, a sheet that bulges, a print that is longer along one axis, a camera that moves while its
 rows are exposed one after the other.
 
-MarkerShifts are taken for random, those of the sheet alike for markers that are near to each other. How
+Shifts are taken for random, those of the sheet alike for markers that are near to each other. How
 large they are is what makes the residuals most probable; then the pose is the generalised least
 squares estimate, and its covariance says what such shifts leave open.
 """
@@ -19,7 +19,7 @@ from burg_drake.cameras.pose.edge_projection import EdgeViews
 from burg_drake.core import Array
 
 ALONE = 0.006, 0.02, 0.06, 0.2
-"""MarkerShifts of single markers, for whatever else is not as assumed; standard deviations that are tried
+"""Shifts of single markers, for whatever else is not as assumed; standard deviations that are tried
 [pixels]. In images without noise the first one is right."""
 IN_PLANE = 1.5e-4, 6e-4
 """Of pages along the sheet [m]."""
@@ -308,7 +308,7 @@ def _logarithm(solution: _Solution) -> float:
 
 
 def _with_another(shifts: MarkerShifts) -> Iterator[MarkerShifts]:
-    """MarkerShifts that differ from some in one kind, and in those of single markers."""
+    """Shifts that differ from some in one kind, and in those of single markers."""
     for alone in {shifts.alone, ALONE[0]}:
         for kind, values in KINDS.items():
             for value in values:

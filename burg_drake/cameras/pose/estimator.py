@@ -14,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from burg_drake.cameras.optics import Intrinsics
+from burg_drake.cameras.optics import Intrinsics, photo_light
 from burg_drake.cameras.pose.coarse import CoarsePose, coarse_pose
 from burg_drake.cameras.pose.detection import Detection, MarkerDetector, other_markers
 from burg_drake.cameras.pose.edges import marker_edges
 from burg_drake.cameras.pose.estimate import BoardEstimate
-from burg_drake.cameras.pose.linear_light import linear_light
 from burg_drake.cameras.pose.print_quality import (
     ASPECT,
     LEAST_DEVIATION,
@@ -296,9 +295,9 @@ def _untinted_light(image: NDArray[np.uint8]) -> NDArray[np.float32]:
     below the markers, look as white in it as paper does."""
     image = np.asarray(image)
     if image.ndim == 2:
-        return linear_light(np.ascontiguousarray(image))
+        return photo_light(np.ascontiguousarray(image))
     red, green, blue = cv2.split(image[..., :3])
-    return linear_light(cv2.max(red, cv2.max(green, blue)))
+    return photo_light(cv2.max(red, cv2.max(green, blue)))
 
 
 def grey_image(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -340,7 +339,7 @@ def _covariance_of_both(one: RefinedPose, other: RefinedPose) -> Array:
     """(6, 6) covariance of a pose if another one is as likely."""
     turn = Rotation.from_matrix(other.X_SC[:3, :3] @ one.X_SC[:3, :3].T).as_rotvec()
     apart = np.r_[turn, other.X_SC[:3, 3] - one.X_SC[:3, 3]]
-    return one.covariance + np.outer(apart, apart)
+    return np.asarray(one.covariance + np.outer(apart, apart))
 
 
 def _scale_warning(scale: float) -> str:

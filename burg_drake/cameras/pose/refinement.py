@@ -273,8 +273,9 @@ class EdgeRefinement:
         scale = (weight * (residual / sd) ** 2).sum() / max(total - 7.0, 1.0)
         alike = max(total / max(markers, 1) - 1.0, 0.0) * ALIKE_SD**2
         J = np.column_stack([views.motion, views.bloom])
-        J *= np.sqrt(weight / (scale * sd**2 + alike))[:, None]
-        return np.linalg.inv(J.T @ J + _bloom_prior())[:6, :6]
+        J = J * np.sqrt(weight / (scale * sd**2 + alike))[:, None]
+        covariance: Array = np.linalg.inv(J.T @ J + _bloom_prior())[:6, :6]
+        return covariance
 
 
 def _bloom_prior() -> Array:

@@ -22,7 +22,7 @@ LIGHT = _decoded()
 """Linear light [0 to 255] of each 8-bit level."""
 
 
-def linear_light(grey: NDArray[np.uint8]) -> NDArray[np.float32]:
+def photo_light(grey: NDArray[np.uint8]) -> NDArray[np.float32]:
     """(H, W) linear light [0 to 255] of an image (H, W), as if its camera encoded it as sRGB.
 
     That cameras encode otherwise moves all edges alike towards black or white, which whoever fits
@@ -31,3 +31,10 @@ def linear_light(grey: NDArray[np.uint8]) -> NDArray[np.float32]:
     import cv2
 
     return np.asarray(cv2.LUT(grey, LIGHT), dtype=np.float32)
+
+
+def even_levels(light: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """(H, W) levels that rise with the light, the brightest 255, for what reads the cells of
+    markers: in the levels of a photo a blurred edge is moved towards black, so that small black
+    cells get lost."""
+    return np.asarray(np.rint(light * (255.0 / max(float(light.max()), 1.0))), dtype=np.uint8)
