@@ -32,9 +32,9 @@ SIZE = 0.01
 from that within [-]."""
 ASPECT = 0.01
 """Of a print's length along y for that along x [-]."""
-PAGE, BEND = 0.15, 0.12
+PAGE, BEND = 0.15, 0.16
 """Distances within which shifts along the sheet, and heights, are alike [m]: half a page of A4, and
-a hill of paper."""
+a hill of paper is wide."""
 MODES = 40
 """Patterns of each kind of shift, at most."""
 FAINT = 1e-3
@@ -106,28 +106,39 @@ class Disturbance:
 
 
 class SheetModes:
-    """Patterns of shifts of a board's markers, which are independent of each other, and of which
-    the first few make up nearly all.
+    """Patterns of shifts of a board's edges, which are independent of each other, and of which the
+    first few make up nearly all.
 
     The frame S of a sheet with errors is the one that fits all its markers best, so that a pattern
     neither shifts nor turns the sheet as a whole.
 
     Attributes:
-        in_plane: (M, 2, K) of shifts along x and y, of unit variance.
-        out_of_plane: (M, L) of heights, of unit variance.
+        in_plane: (N, 2, K) of shifts along x and y, of unit variance.
+        out_of_plane: (N, L) of heights, of unit variance.
     """
 
-    def __init__(self, center: Array) -> None:
-        """Takes the markers' middles (M, 3) [m]."""
+    def __init__(self, center: Array, p_SE: Array) -> None:
+        """Takes the markers' middles (M, 3) and the edges' (N, 3) [m]."""
         n = len(center)
         x, y = (center[:, :2] - center[:, :2].mean(axis=0)).T
         one, zero = np.ones(n), np.zeros(n)
-        apart = ((center[:, None] - center) ** 2).sum(axis=-1)
-        alike = np.kron(np.exp(-apart / (2.0 * PAGE**2)), np.eye(2))
         moved = np.stack([[one, zero], [zero, one], [-y, x]], axis=-1)  # (2, n, 3)
-        modes = _modes(alike, moved.transpose(1, 0, 2).reshape(2 * n, 3))
-        self.in_plane = modes.reshape(n, 2, -1)
-        self.out_of_plane = _modes(np.exp(-apart / (2.0 * BEND**2)), np.stack([one, x, y], axis=-1))
+        alike, between = _alike(center, p_SE, PAGE)
+        modes = _modes(np.kron(alike, np.eye(2)), moved.transpose(1, 0, 2).reshape(2 * n, 3))
+        self.in_plane = np.tensordot(between, modes.reshape(n, 2, -1), axes=1)
+        alike, between = _alike(center, p_SE, BEND)
+        self.out_of_plane = between @ _modes(alike, np.stack([one, x, y], axis=-1))
+
+
+def _alike(center: Array, p_SE: Array, within: float) -> tuple[Array, Array]:
+    """(M, M) covariance of shifts of markers that are alike within a distance [m], and (N, M)
+    shifts of edges by those of the markers."""
+    covariance, to_edges = (
+        np.exp(-((p[:, None] - center) ** 2).sum(axis=-1) / (2.0 * within**2))
+        for p in (center, p_SE)
+    )
+    known = covariance + FAINT * np.eye(len(center))
+    return covariance, np.linalg.solve(known, to_edges.T).T
 
 
 def _modes(covariance: Array, whole: Array) -> Array:
@@ -166,7 +177,6 @@ class DisturbanceFit:
         information: (N,) inverse variance of each by the image's noise, 0 for those that do not
             count.
         marker: (N,) that each belongs to.
-        motion: (M, 2, 6) of the markers' middles, see `motion_of_points`.
         modes: patterns of shifts of the sheet.
         height: of the image [pixels].
     """
@@ -177,7 +187,6 @@ class DisturbanceFit:
         offset: Array,
         information: Array,
         marker: NDArray[np.intp],
-        motion: Array,
         modes: SheetModes,
         height: int,
     ) -> None:
@@ -190,19 +199,18 @@ class DisturbanceFit:
         self._sums = np.zeros((len(used), len(belongs)))
         self._sums[belongs, np.arange(len(belongs))] = information[kept]
         self._sums /= self._spread_within_markers(belongs)
-        self._modes = modes.in_plane[used], modes.out_of_plane[used]
-        P = motion[used][:, :, 3:]
+        which = views.which[kept]
+        self._modes = modes.in_plane[which], modes.out_of_plane[which]
         J = views.motion[kept]
         row = views.at[kept, 1:] / height - 0.5
         strength = np.sqrt((J**2).mean(axis=0)) + 1e-9
-        shifted = [P[:, :, :2] @ self._modes[0], P[:, :, 2:] * self._modes[1][:, None]]
         parts = {
             "pose": np.column_stack([J, views.bloom[kept]]),
             "rows": row * J / strength / np.sqrt(6.0),
             "aspect": 0.5 * views.print[kept, :1],
             "size": views.print[kept, 1:],
-            "in_plane": (self._normal[:, None] @ shifted[0][belongs])[:, 0],
-            "out_of_plane": (self._normal[:, None] @ shifted[1][belongs])[:, 0],
+            "in_plane": (J[:, None, 3:5] @ self._modes[0])[:, 0],
+            "out_of_plane": J[:, 5:] * self._modes[1],
         }
         ends = np.cumsum([0, *(part.shape[1] for part in parts.values())])
         self._columns = {kind: np.arange(*ends[k : k + 2]) for k, kind in enumerate(parts)}

@@ -144,7 +144,7 @@ class EdgeRefinement:
         self._edges = edges
         self._corners = p_SQ
         self._intrinsics = intrinsics
-        self._modes = SheetModes(p_SQ.mean(axis=1))
+        self._modes = SheetModes(p_SQ.mean(axis=1), edges.p_SE)
 
     def refine(
         self, light: NDArray[np.float32], X_SC: Array, markers: NDArray[np.intp]
@@ -180,13 +180,11 @@ class EdgeRefinement:
 
     def _with_disturbance(self, last: EdgeRound) -> RefinedPose:
         """The pose if markers may be shifted."""
-        _, motion = motion_of_points(self._intrinsics, last.X_SC, self._corners.mean(axis=1))
         found = DisturbanceFit(
             last.views,
             last.residual,
             last.weight / last.sd**2,
             self._edges.marker[last.views.which],
-            motion,
             self._modes,
             self._intrinsics.height,
         ).fit(_bloom_prior())
