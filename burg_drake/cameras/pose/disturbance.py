@@ -50,8 +50,8 @@ FEWEST = 5
 """Edges more than markers' shifts from which on their spread is known."""
 LEAST_SPREAD = 1e-3
 """Of that over what noise makes; keeps probabilities finite."""
-TOLD = 4.0
-"""By how much the logarithm of the probability must rise for another kind of shift."""
+RARE = 12.0
+"""By how much each kind of shift lowers the logarithm of the probability before it is seen."""
 
 
 VAGUE = 4.0
@@ -124,7 +124,8 @@ class SheetModes:
         one, zero = np.ones(n), np.zeros(n)
         moved = np.stack([[one, zero], [zero, one], [-y, x]], axis=-1)  # (2, n, 3)
         alike, between = _alike(center, p_SE, PAGE)
-        modes = _modes(np.kron(alike, np.eye(2)), moved.transpose(1, 0, 2).reshape(2 * n, 3))
+        along_both = np.asarray(np.kron(alike, np.eye(2)), dtype=float)
+        modes = _modes(along_both, moved.transpose(1, 0, 2).reshape(2 * n, 3))
         self.in_plane = np.tensordot(between, modes.reshape(n, 2, -1), axes=1)
         alike, between = _alike(center, p_SE, BEND)
         self.out_of_plane = between @ _modes(alike, np.stack([one, x, y], axis=-1))
@@ -230,7 +231,7 @@ class DisturbanceFit:
             tried = [self._solve(shifts, prior) for shifts in _with_another(best.shifts)]
             solved += tried
             better = max(tried, key=_logarithm)
-            if better.logarithm < best.logarithm + TOLD:
+            if better.logarithm < best.logarithm:
                 break
             best = better
         return self._disturbance(best, solved)
@@ -285,7 +286,7 @@ class DisturbanceFit:
         covariance = np.linalg.inv(A)
         x = covariance @ b
         logarithm += 0.5 * float(b @ x) - 0.5 * float(np.linalg.slogdet(A)[1])
-        logarithm -= float(np.log(known).sum())
+        logarithm -= float(np.log(known).sum()) + RARE * len(sds)
         return _Solution(logarithm, shifts, x, covariance, columns)
 
     def _disturbance(self, best: _Solution, solved: list[_Solution]) -> Disturbance:
