@@ -50,7 +50,7 @@ FEWEST = 5
 """Edges more than markers' shifts from which on their spread is known."""
 LEAST_SPREAD = 1e-3
 """Of that over what noise makes; keeps probabilities finite."""
-RARE = 12.0
+RARE = 8.0
 """By how much each kind of shift lowers the logarithm of the probability before it is seen."""
 
 
