@@ -27,7 +27,8 @@ SECOND_SEARCH = ((5, 21, 37), 5.0)
 """For dark or blurred images, or very large markers."""
 SEARCHES = (True, FIRST_SEARCH), (False, FIRST_SEARCH), (True, SECOND_SEARCH)
 """Which are made, one after the other, in the levels of the image or in its light: the latter finds
-a half more in images of a camera that moves, and a fifth more in dark ones."""
+a half more in images of a camera that moves, and a fifth more in dark ones. The last one is for
+images in which neither finds a marker."""
 SMALLEST = 0.06
 """Least perimeter of a marker, as a share of the image's longer side; cells of a pixel cannot be
 read."""
@@ -93,7 +94,7 @@ class MarkerDetector:
             again = self._search(image, windows, constant)
             if len(again.index) >= len(found.index):
                 found = again
-            if len(found.index) >= self._enough:
+            if len(found.index) >= (self._enough if encoded else 1):
                 break
         return found
 

@@ -27,7 +27,7 @@ from burg_drake.cameras.pose.print_quality import (
     scale_by_height,
     wrong_print,
 )
-from burg_drake.cameras.pose.refinement import EdgeRefinement, RefinedPose
+from burg_drake.cameras.pose.refinement import EdgeRefinement, EdgeRound, RefinedPose
 from burg_drake.cameras.pose.wrong_board import WrongBoardCheck
 from burg_drake.core import Array, InvalidInputError, rotation_angle
 from burg_drake.scene.document import Board
@@ -142,20 +142,21 @@ class BoardPose:
     ) -> tuple[RefinedPose | None, str]:
         """The pose that fits the edges best, or why there is none."""
         attempts = [self._refinement.refine(light, X_SC, found) for X_SC in poses]
-        refined = sorted((r for r in attempts if r is not None), key=_misfit)
-        if not refined:
+        rounds = sorted((r for r in attempts if r is not None), key=lambda r: self._off(r, found))
+        if not rounds:
             return (
                 None,
                 "the edges of the markers are too unclear (blur, contrast); see to the light",
             )
-        best, *others = refined
-        if others and _turn(best, others[0]) > DIFFERENT and not self._decided(refined, found):
-            if _turn(best, others[0]) > NEARBY:
+        best = self._refinement.with_disturbance(rounds[0])
+        turn = _turn(rounds[0], rounds[1]) if len(rounds) > 1 else 0.0
+        if turn > DIFFERENT and not self._decided(rounds[0], rounds[1], found):
+            if turn > NEARBY:
                 return None, (
                     f"{_markers(len(found))} in sight fit two poses alike;"
                     " come nearer or show more of the board"
                 )
-            best = replace(best, covariance=_covariance_of_both(best, others[0]))
+            best = replace(best, covariance=_covariance_of_both(best, rounds[1]))
         known = np.sqrt(np.linalg.eigvalsh(best.covariance[3:, 3:])[-1])
         if known > VAGUE * np.linalg.norm(best.X_SC[:3, 3] - self._p_SQ[found].mean(axis=(0, 1))):
             return None, (
@@ -167,14 +168,15 @@ class BoardPose:
             return None, "the markers' cells are not where their corners put them: another board?"
         return best, ""
 
-    def _decided(self, refined: list[RefinedPose], found: NDArray[np.intp]) -> bool:
+    def _decided(self, best: EdgeRound, second: EdgeRound, found: NDArray[np.intp]) -> bool:
         """Whether the edges of the markers that were read are clearly nearer to where the first
         pose puts them than to where the second one does."""
-        off = []
-        for one in refined[:2]:
-            own = np.isin(self._edges.marker[one.views.which], found)
-            off.append(float(np.median(np.abs(one.residual[own]))))
-        return off[1] > (1.0 + DECIDED / len(found)) * off[0]
+        return self._off(second, found) > (1.0 + DECIDED / len(found)) * self._off(best, found)
+
+    def _off(self, last: EdgeRound, found: NDArray[np.intp]) -> float:
+        """How far the edges of the markers that were read are off, the median [pixels]."""
+        own = np.isin(self._edges.marker[last.views.which], found)
+        return float(np.median(np.abs(last.residual[own])))
 
     def _estimate(
         self,
@@ -325,17 +327,12 @@ def _side(corners: Array) -> float:
     return float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
 
 
-def _misfit(refined: RefinedPose) -> float:
-    """Mean of the squared normalised residuals, those of what does not fit cut off at 3."""
-    return float(np.minimum((refined.residual / refined.sd) ** 2, 9.0).mean())
-
-
-def _turn(one: RefinedPose, other: RefinedPose) -> float:
+def _turn(one: EdgeRound, other: EdgeRound) -> float:
     """Angle between two poses [rad]."""
     return float(rotation_angle(one.X_SC[:3, :3].T @ other.X_SC[:3, :3]))
 
 
-def _covariance_of_both(one: RefinedPose, other: RefinedPose) -> Array:
+def _covariance_of_both(one: RefinedPose, other: EdgeRound) -> Array:
     """(6, 6) covariance of a pose if another one is as likely."""
     turn = Rotation.from_matrix(other.X_SC[:3, :3] @ one.X_SC[:3, :3].T).as_rotvec()
     apart = np.r_[turn, other.X_SC[:3, 3] - one.X_SC[:3, 3]]

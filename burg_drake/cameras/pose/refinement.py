@@ -39,7 +39,7 @@ LEAST_BLUR, MOST_BLUR = 0.08, 16.0
 """Variances in any direction [pixels^2]."""
 BLOOM_SD = 1.0
 """White that is too large on all sides by so much is not unlikely [pixels]."""
-STILL = 0.02
+STILL = 0.05
 """Edges that a round moves by less are where they belong, root mean square [pixels]."""
 MORE = 3
 """Rounds with all edges, at most."""
@@ -148,7 +148,7 @@ class EdgeRefinement:
 
     def refine(
         self, light: NDArray[np.float32], X_SC: Array, markers: NDArray[np.intp]
-    ) -> RefinedPose | None:
+    ) -> EdgeRound | None:
         """Refines a pose.
 
         Args:
@@ -157,7 +157,7 @@ class EdgeRefinement:
             markers: those that were found, as indices of the layout's.
 
         Returns:
-            The pose; None if too few edges look as they should.
+            The last round; None if too few edges look as they should.
         """
         read = np.zeros(len(self._corners), dtype=bool)
         read[markers] = True
@@ -176,10 +176,10 @@ class EdgeRefinement:
             result = result and self._iterate(light, result.X_SC, found[:LAST], result.spread)
             if result is None or result.moved < STILL:
                 break
-        return None if result is None else self._with_disturbance(result)
+        return result
 
-    def _with_disturbance(self, last: EdgeRound) -> RefinedPose:
-        """The pose if markers may be shifted."""
+    def with_disturbance(self, last: EdgeRound) -> RefinedPose:
+        """The pose of the last round if markers may be shifted."""
         found = DisturbanceFit(
             last.views,
             last.residual,
