@@ -11,6 +11,7 @@ import pytest
 from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.cameras.pose.estimate import BoardEstimate
 from burg_drake.cameras.pose.estimator import BoardPose, estimate_board
+from burg_drake.cameras.pose.refinement import perturbed_pose
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.scene.document.markers import Markers
 from burg_drake.scene.document.scene import Board
@@ -146,6 +147,29 @@ def test_motion_while_the_camera_exposes(poses: BoardPose, direction: float) -> 
     ]
     estimate = poses.estimate(degraded(np.mean(moved, axis=0), ImageDegradation()))
     assert near(estimate, VIEW, 0.3, 0.03)
+
+
+def test_rows_exposed_one_after_the_other_are_told() -> None:
+    board_pose = BoardPose(LITTLE, SMALL)
+    turn = 2.0 / SMALL.focal[0] * np.array([0.5, -0.7, 0.3])  # about 2 pixels in all
+    image, bands = board_image(LITTLE, SMALL, NEAR), 12
+    for band in range(bands):
+        rows = slice(band * SMALL.height // bands, (band + 1) * SMALL.height // bands)
+        X_SC = perturbed_pose(NEAR, np.r_[turn * ((band + 0.5) / bands - 0.5), 0.0, 0.0, 0.0])
+        image[rows] = board_image(LITTLE, SMALL, X_SC)[rows]
+    estimate = board_pose.estimate(image)
+    assert estimate.valid and "while its rows were exposed one after the other" in estimate.reason
+    off = error(estimate.X_SC, NEAR)
+    assert np.sqrt(off @ np.linalg.solve(estimate.covariance, off) / 6.0) < 3.0
+
+
+def test_markers_that_are_a_little_too_large_leave_the_scale_uncertain() -> None:
+    side = LITTLE.markers.side
+    larger = Markers(side=1.013 * side, spacing=LITTLE.markers.spacing - 0.013 * side)
+    image = board_image(replace(LITTLE, markers=larger), SMALL, NEAR)
+    estimate = estimate_board(image, SMALL, LITTLE)
+    assert estimate.valid
+    assert estimate.reason.startswith("uncertain scale: markers look 1.01")
 
 
 def test_errors_in_strongly_blurred_pictures_are_what_the_covariance_says() -> None:
