@@ -40,6 +40,9 @@ def print_intrinsics(intrinsics: Intrinsics) -> None:
         print(f"{words[0]:17}{', '.join(of_corners)} {words[1]}")
     if k.residual is not None:
         print(f"residual         {k.residual:.3f} pixels")
+    if k.known_to is not None:
+        but = f", but for the {', '.join(k.except_at)}" if k.except_at else " over the whole image"
+        print(f"known to         {k.known_to:.2f} pixels{but}")
 
 
 def field_of_view(intrinsics: Intrinsics) -> tuple[float, float, float]:

@@ -2,6 +2,7 @@ from .field_of_view import (
     NEAR as NEAR,
     FieldOfView as FieldOfView,
 )
+from .fisheye import fisheye_lens as fisheye_lens
 from .intrinsics import (
     HALF_PIXEL as HALF_PIXEL,
     Intrinsics as Intrinsics,

@@ -7,7 +7,7 @@ r = a (1 + k1 a^2 + k2 a^4 + k3 a^6 + k4 a^8), with the angle a [rad] and r in f
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -90,3 +90,10 @@ class FisheyeLens:
         straight = np.tan(np.minimum(self.angle(radius), WIDEST))
         scale = np.where(radius > 0.0, straight / np.maximum(radius, 1e-300), 1.0)
         return np.asarray(bent * scale[..., None])
+
+
+@lru_cache(maxsize=16)
+def fisheye_lens(coefficients: tuple[float, ...]) -> FisheyeLens:
+    """The lens with four coefficients."""
+    k1, k2, k3, k4 = coefficients
+    return FisheyeLens((k1, k2, k3, k4))

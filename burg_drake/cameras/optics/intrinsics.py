@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from burg_drake.cameras.optics.fisheye import COEFFICIENTS, FisheyeLens
+from burg_drake.cameras.optics.fisheye import COEFFICIENTS, fisheye_lens
 from burg_drake.core import Array, FieldError, InvalidInputError
 from burg_drake.station.document import HALF_PIXEL as HALF_PIXEL, Camera
 
@@ -36,6 +36,9 @@ class Intrinsics:
             s4[, tx, ty]]]], none for a pinhole camera; of a fisheye k1, k2, k3, k4 of
             `cv2.fisheye`.
         residual: root mean square reprojection error of the calibration [pixels], if known.
+        known_to: how far this camera and the true one show the same apart, at most, in 19 of 20
+            cases [pixels], as the calibration promises.
+        except_at: parts of the image where it does not, such as `upper left corner`.
     """
 
     version: int = 1
@@ -47,6 +50,8 @@ class Intrinsics:
     model: LensModel = "perspective"
     distortion: tuple[float, ...] = ()
     residual: float | None = None
+    known_to: float | None = None
+    except_at: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         numbers = [self.width, self.height, *self.focal, *self.center, *self.distortion]
@@ -94,12 +99,6 @@ class Intrinsics:
         """The lens is of the fisheye model, whose rays may come from beside the camera."""
         return self.model == "fisheye"
 
-    @cached_property
-    def fisheye(self) -> FisheyeLens:
-        """The lens of a fisheye."""
-        k1, k2, k3, k4 = self.distortion
-        return FisheyeLens((k1, k2, k3, k4))
-
     def require_size(self, width: int, height: int, source: str) -> None:
         """Refuses images of another size than the one that was calibrated.
 
@@ -131,7 +130,7 @@ class Intrinsics:
 
         p = np.asarray(p_CQ, dtype=float)
         if self.is_fisheye:
-            bent: Array = self.fisheye.bent(p) * self.focal + self.center
+            bent: Array = fisheye_lens(self.distortion).bent(p) * self.focal + self.center
             return bent
         if self.is_pinhole or not p.size:
             straight: Array = p[..., :2] / p[..., 2:] * self.focal + self.center
@@ -152,7 +151,7 @@ class Intrinsics:
         if self.is_pinhole:
             return q.copy()
         if self.is_fisheye:
-            flat: Array = self.fisheye.straightened((q - self.center) / self.focal)
+            flat: Array = fisheye_lens(self.distortion).straightened((q - self.center) / self.focal)
             return flat * self.focal + self.center
         # 40 rounds: OpenCV's 5 leave some hundredths of a pixel in the corners of a wide lens.
         criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-10)
@@ -164,7 +163,9 @@ class Intrinsics:
     def rays(self, pixels: Array) -> Array:
         """(..., 3) unit vectors in the camera's frame along which pixels (..., 2) look."""
         if self.is_fisheye:
-            return self.fisheye.rays((np.asarray(pixels, dtype=float) - self.center) / self.focal)
+            return fisheye_lens(self.distortion).rays(
+                (np.asarray(pixels, dtype=float) - self.center) / self.focal
+            )
         flat = (self.undistort(pixels) - self.center) / self.focal
         rays = np.concatenate([flat, np.ones((*flat.shape[:-1], 1))], axis=-1)
         unit: Array = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
