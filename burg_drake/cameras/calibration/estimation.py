@@ -36,7 +36,7 @@ SAME = 0.005
 OUTLIER, TOLERATED = 3.0, 0.3
 """A view is left out when its residual is beyond that many times the median view's, and beyond
 that many pixels."""
-WRONG_CORNER, TOLERATED_CORNER = 5.0, 0.5
+WRONG_CORNER, TOLERATED_CORNER = 5.0, 0.15
 """Likewise a corner, against the median corner."""
 ROUNDS = 6
 
@@ -178,7 +178,7 @@ def calibrate_views(
     _require_views(kept, refused)
     chosen = choose_lens(kept, target, model)
     for _ in range(ROUNDS):
-        cleaned, outliers = _without_outliers(kept, chosen.flexible)
+        cleaned, outliers = _without_outliers(kept, chosen.supported)
         if cleaned == kept:
             break
         kept, refused = cleaned, refused + outliers
@@ -194,7 +194,7 @@ def calibrate_views(
         fit.model,
         used,
         tuple(refused),
-        chosen.disagreement**2 * covariance_of(fit),
+        chosen.dispersion * covariance_of(fit),
         chosen.hypotheses,
     )
     promise = calibration.promise

@@ -20,7 +20,7 @@ def first_guess(
     views: Sequence[CharucoView], target: CharucoTarget, model: LensModel
 ) -> tuple[Intrinsics, Array]:
     """A camera without coefficients, and (V, 4, 4) the target in its frame, of the focal length
-    that explains most corners best."""
+    that explains the median view best."""
     width, height = views[0].size
     found = []
     for share in FOCAL_LENGTHS:
@@ -34,7 +34,9 @@ def first_guess(
             distortion=(0.0,) * 4,
         )
         posed = [_pose(view, target, camera) for view in views]
-        found.append((sum(error for error, _ in posed), camera, np.array([X for _, X in posed])))
+        found.append(
+            (np.median([error for error, _ in posed]), camera, np.array([X for _, X in posed]))
+        )
     _, camera, X_CT = min(found, key=lambda one: one[0])
     return camera, X_CT
 
@@ -46,12 +48,24 @@ def _pose(view: CharucoView, target: CharucoTarget, camera: Intrinsics) -> tuple
     _, rotations, translations, _ = cv2.solvePnPGeneric(
         p_TQ, straight, np.eye(3), None, flags=cv2.SOLVEPNP_IPPE
     )
-    best = (np.inf, np.eye(4))
+    best = (np.inf, _facing(p_TQ, straight))
     for rotation, translation in zip(rotations, translations, strict=True):
         X = np.eye(4)
         X[:3, :3], X[:3, 3] = cv2.Rodrigues(rotation)[0], np.ravel(translation)
-        off = camera.project(p_TQ @ X[:3, :3].T + X[:3, 3]) - view.corners
+        p_CQ = p_TQ @ X[:3, :3].T + X[:3, 3]
+        if not (p_CQ[:, 2] > 0.0).all():
+            continue
+        off = camera.project(p_CQ) - view.corners
         error = float(np.linalg.norm(off, axis=1).mean())
         if error < best[0]:
             best = error, X
     return best
+
+
+def _facing(p_TQ: Array, straight: Array) -> Array:
+    """(4, 4) the target upright before the camera, as large as it is seen: for views that no pose
+    explains, which turn out not to fit to the others."""
+    size = float(np.std(p_TQ[:, :2]) / max(float(np.std(straight)), 1e-9))
+    X = np.eye(4)
+    X[:3, 3] = size * np.r_[straight.mean(axis=0), 1.0] - p_TQ.mean(axis=0)
+    return X

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from burg_drake.cameras.calibration.first_guess import first_guess
-from burg_drake.cameras.calibration.lens_fit import COEFFICIENTS, LensFit, fit_lens
+from burg_drake.cameras.calibration.lens_fit import COEFFICIENTS, TAIL, Evidence, LensFit, fit_lens
 from burg_drake.cameras.calibration.lens_uncertainty import (
     LensHypothesis,
     error_of,
@@ -34,15 +34,15 @@ class LensChoice:
 
     Attributes:
         fit: of the model that was asked for, or that is supported best.
+        supported: the fit that is supported best, to tell which corners do not belong.
         hypotheses: what the lens may be.
-        disagreement: of the views, see `view_disagreement`.
-        flexible: the fit that follows the corners most closely.
+        dispersion: of the corners' errors, see `Evidence`.
     """
 
     fit: LensFit
+    supported: LensFit
     hypotheses: tuple[LensHypothesis, ...]
-    disagreement: float
-    flexible: LensFit
+    dispersion: float
 
 
 def choose_lens(views: Sequence[CharucoView], target: CharucoTarget, model: str) -> LensChoice:
@@ -59,29 +59,36 @@ def choose_lens(views: Sequence[CharucoView], target: CharucoTarget, model: str)
     perspective, fisheye = _perspective(views, target), _fisheye(views, target)
     fits = [*perspective, fisheye] if _is_wide(fisheye) else perspective
     # All lenses distort a little, so that a pinhole is not chosen.
-    best = min(fits[1:], key=lambda fit: fit.information(True))
-    disagreement = view_disagreement(best)
+    evidence = _evidence(fits[1:])
+    best = min(fits[1:], key=lambda fit: fit.information(evidence, True))
     # Beside the camera a perspective model means nothing, so it tells nothing about a fisheye.
-    hypotheses = hypotheses_of([best] if best is fisheye else fits, disagreement)
-    flexible = min(fits, key=lambda fit: fit.squares)
+    hypotheses = hypotheses_of([best] if best is fisheye else fits, evidence)
+    supported = best
     if model != AUTO:
         best = next(fit for fit in (*perspective, fisheye) if fit.model == model)
-        flexible = fisheye if model == fisheye.model else perspective[-1]
     elif best is not fisheye:
         corners = np.concatenate([view.corners for view in views])
-        best = _more_flexible(best, perspective[-1], hypotheses, corners)
-    return LensChoice(best, hypotheses, disagreement, flexible)
+        best = _more_flexible(best, perspective[-1], evidence, hypotheses, corners)
+    return LensChoice(best, supported, hypotheses, evidence.dispersion)
+
+
+def _evidence(fits: Sequence[LensFit]) -> Evidence:
+    """Views disagree by a model that is wrong, and by one that they do not determine, so that the
+    one by which they agree most tells how alike errors are."""
+    limit = TAIL * min(fit.typical for fit in fits)
+    return Evidence(limit, min(view_disagreement(fit) for fit in fits) ** 2)
 
 
 def _more_flexible(
     best: LensFit,
     rational: LensFit,
+    evidence: Evidence,
     hypotheses: tuple[LensHypothesis, ...],
     corners: Array,
 ) -> LensFit:
     """The rational fit, if Akaike's criterion, which is more generous, prefers it, and it is nearer
     to all that the lens may be: it can fit better and yet be wild where no corners were seen."""
-    if not rational.information(False) < best.information(False):
+    if not rational.information(evidence, False) < best.information(evidence, False):
         return best
     pixels = image_grid(best.intrinsics)
     worst = [

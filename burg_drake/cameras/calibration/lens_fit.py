@@ -34,6 +34,9 @@ SPREAD, ASIDE = 0.5, 0.1
 the image's, as shares of the diagonal. They hold a camera of which the views tell nothing."""
 NOISE = 0.05
 """Of corners, against which all that is weighed in a fit [pixels]."""
+TAIL, SMALLEST_TAIL = 3.0, 0.02
+"""Residuals beyond so many times the median one, and so many pixels, count linearly (Huber), so
+that a flexible model does not bend to corners that do not belong."""
 ROUNDS = 200
 SMALL_GAIN = 1e-9
 """The fit has ended when a round lowers the sum of squares by no larger a share."""
@@ -45,8 +48,24 @@ class _State(NamedTuple):
     X_CT: Array
     cost: float
     residuals: Array
+    weights: Array
     by_pose: Array
     by_camera: Array
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """How much corners tell about which model is right.
+
+    Attributes:
+        limit: residuals beyond are of corners that do not belong, and tell no more than this
+            [pixels].
+        dispersion: how many corners, with errors that are alike, tell as much as one with its own
+            (Burnham and Anderson, Model Selection and Multimodel Inference, 2002, section 2.5).
+    """
+
+    limit: float
+    dispersion: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,12 +105,19 @@ class LensFit:
         """Number of the camera's parameters."""
         return 4 + COEFFICIENTS[self.model]
 
-    def information(self, bayesian: bool) -> float:
+    @property
+    def typical(self) -> float:
+        """Median length of the residuals [pixels]."""
+        return float(np.median(np.linalg.norm(np.concatenate(self.residuals), axis=1)))
+
+    def information(self, evidence: Evidence, bayesian: bool) -> float:
         """Bayesian information criterion, or Akaike's, which is more generous to large models: the
         lowest of several models is best supported."""
-        n = sum(r.size for r in self.residuals)
+        squares = np.sum(np.concatenate(self.residuals) ** 2, axis=1)
+        n = 2 * len(squares)
+        total = np.minimum(squares, evidence.limit**2).sum()
         penalty = np.log(n) if bayesian else 2.0
-        return float(n * np.log(self.squares / n) + penalty * self.size)
+        return float(n * np.log(total / n) / evidence.dispersion + penalty * self.size)
 
 
 def fit_lens(
@@ -114,16 +140,10 @@ def fit_lens(
     """
     camera = _padded(start[0], model)
     problem = _Problem(views, target, camera)
-    state = problem.at(camera, start[1])
-    damping = 1e-3
-    for _ in range(ROUNDS):
-        better, damping = problem.step(state, damping)
-        if better is None:
-            break
-        gain, state = 1.0 - better.cost / state.cost, better
-        if gain < SMALL_GAIN:
-            break
-    problem.require_camera(state)
+    state = problem.fitted(camera, start[1])
+    typical = float(np.median(np.linalg.norm(state.residuals, axis=1)))
+    problem.limit = max(TAIL * typical, SMALLEST_TAIL)
+    state = problem.fitted(state.intrinsics, state.X_CT)
     ends = np.cumsum(problem.counts)[:-1]
     reduced = []
     for of_pose, of_camera in zip(
@@ -178,6 +198,7 @@ class _Problem:
         self, views: Sequence[CharucoView], target: CharucoTarget, camera: Intrinsics
     ) -> None:
         self.size = 4 + len(camera.distortion)
+        self.limit = np.inf
         self.counts = [len(view.ids) for view in views]
         self.view = np.repeat(np.arange(len(views)), self.counts)
         self.starts = np.r_[0, np.cumsum(self.counts)[:-1]]
@@ -189,14 +210,45 @@ class _Problem:
         p_CQ = np.einsum("nij,nj->ni", X_CT[self.view, :3, :3], self.p_TQ) + X_CT[self.view, :3, 3]
         pixels, by_pose, by_camera = lens_derivatives(intrinsics, p_CQ)
         residuals = self.pixels - pixels
-        cost = float(np.sum(residuals**2) + NOISE**2 * np.sum(prior(intrinsics)[0] ** 2))
+        length = np.maximum(np.linalg.norm(residuals, axis=1), 1e-12)
+        weights = np.minimum(1.0, self.limit / length)
+        # Huber's: r^2 up to the limit c, then 2 c r - c^2.
+        loss = np.sum(weights * length**2 * (2.0 - weights))
+        cost = float(loss + NOISE**2 * np.sum(prior(intrinsics)[0] ** 2))
         if not (np.isfinite(cost) and (intrinsics.is_fisheye or (p_CQ[:, 2] > 0.0).all())):
             cost = np.inf
-        return _State(intrinsics, X_CT, cost, residuals, by_pose, by_camera[..., : self.size])
+        by_camera = by_camera[..., : self.size]
+        return _State(intrinsics, X_CT, cost, residuals, weights, by_pose, by_camera)
+
+    def fitted(self, camera: Intrinsics, X_CT: Array) -> _State:
+        """The state of lowest cost that steps from a camera lead to.
+
+        Raises:
+            InvalidInputError: the views do not determine a camera.
+        """
+        state, damping = self.at(camera, X_CT), 1e-3
+        for _ in range(ROUNDS):
+            better, damping = self.step(state, damping)
+            if better is None:
+                break
+            gain, state = 1.0 - better.cost / state.cost, better
+            if gain < SMALL_GAIN:
+                break
+        if not np.isfinite(state.cost):
+            raise InvalidInputError(
+                f"{len(self.counts)} views of the target do not determine a camera; take more,"
+                " tilted to all sides"
+            )
+        return state
 
     def step(self, state: _State, damping: float) -> tuple[_State | None, float]:
         """A state of lower cost and the next damping; None if there is no such."""
-        Jp, Jc, r = state.by_pose, state.by_camera, state.residuals
+        root = np.sqrt(state.weights)[:, None]
+        Jp, Jc, r = (
+            state.by_pose * root[..., None],
+            state.by_camera * root[..., None],
+            state.residuals * root,
+        )
         pose = np.add.reduceat(np.einsum("nki,nkj->nij", Jp, Jp), self.starts)
         mixed = np.add.reduceat(np.einsum("nki,nkj->nij", Jp, Jc), self.starts)
         errors, slopes = prior(state.intrinsics)
@@ -236,15 +288,3 @@ class _Problem:
             R = cv2.Rodrigues(twist[:3])[0]
             X[:3, :3], X[:3, 3] = R @ X[:3, :3], R @ X[:3, 3] + twist[3:]
         return self.at(camera, X_CT)
-
-    def require_camera(self, state: _State) -> None:
-        """Refuses fits that ran away.
-
-        Raises:
-            InvalidInputError: the views do not determine a camera.
-        """
-        if not np.isfinite(state.cost):
-            raise InvalidInputError(
-                f"{len(self.counts)} views of the target do not determine a camera; take more,"
-                " tilted to all sides"
-            )

@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from burg_drake.cameras.calibration.lens_derivatives import lens_derivatives
-from burg_drake.cameras.calibration.lens_fit import LensFit, prior
+from burg_drake.cameras.calibration.lens_fit import Evidence, LensFit, prior
 from burg_drake.cameras.optics import Intrinsics
 from burg_drake.core import Array
 
@@ -70,20 +70,17 @@ def covariance_of(fit: LensFit) -> Array:
     return fit.variance * _inverse(_information(fit), fit)
 
 
-def hypotheses_of(fits: Sequence[LensFit], scale: float) -> tuple[LensHypothesis, ...]:
-    """Fits of several models to the same corners, weighed by Akaike's criterion.
-
-    Args:
-        fits: of different models.
-        scale: of their standard deviations, `view_disagreement` of one of them.
-    """
-    information = np.array([fit.information(False) for fit in fits])
+def hypotheses_of(fits: Sequence[LensFit], evidence: Evidence) -> tuple[LensHypothesis, ...]:
+    """Fits of several models to the same corners, weighed by Akaike's criterion."""
+    information = np.array([fit.information(evidence, False) for fit in fits])
     weights = np.exp(-0.5 * (information - information.min()))
     kept = [k for k in range(len(fits)) if weights[k] > LEAST_WEIGHT * weights.sum()]
     total = float(weights[kept].sum())
     return tuple(
         LensHypothesis(
-            float(weights[k]) / total, fits[k].intrinsics, scale**2 * covariance_of(fits[k])
+            float(weights[k]) / total,
+            fits[k].intrinsics,
+            evidence.dispersion * covariance_of(fits[k]),
         )
         for k in kept
     )
