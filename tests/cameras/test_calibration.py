@@ -14,6 +14,7 @@ from burg_drake.cameras.calibration.estimation import (
     displacement,
 )
 from burg_drake.cameras.calibration.first_guess import first_guess
+from burg_drake.cameras.calibration.guidance import wanted_views
 from burg_drake.cameras.calibration.image_parts import coverage
 from burg_drake.cameras.calibration.lens_fit import fit_lens
 from burg_drake.cameras.calibration.lens_uncertainty import (
@@ -254,6 +255,68 @@ def test_advice_names_what_was_not_seen() -> None:
     assert all(f"right {part}" in line for part in ("edge",)) and "left" not in line
     few = calibrate_views(views[:5], TARGET)
     assert "5 views are few: take 15 to 30" in advice(few)
+
+
+def facing(turns: list[tuple[float, float]], distances: tuple[float, ...]) -> list[CharucoView]:
+    """Views all over the image of a target that is turned about the image's x and y axes [rad]."""
+    rng, views = np.random.default_rng(0), []
+    for x, y in turns:
+        for distance in distances:
+            for aside in ([-0.3, -0.22], [0.3, -0.22], [-0.3, 0.22], [0.3, 0.22], [0.0, 0.0]):
+                X_CT = make_pose(cv2.Rodrigues(np.array([x, y, 0.0]))[0], np.zeros(3))
+                middle = distance * np.array([*aside, 1.0])
+                X_CT[:3, 3] = middle - X_CT[:3, :3] @ [*np.array(TARGET.size) / 2.0, 0.0]
+                name = f"view {len(views)}"
+                views.append(seen(LENSES["radial4"], np.linalg.inv(X_CT), 0.03, rng, name))
+    return [view for view in views if len(view.ids) > 8]
+
+
+def test_views_enough_of_all_kinds_want_no_others() -> None:
+    sides = [(0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5)]
+    assert wanted_views(calibrate_views(facing(sides, (0.2, 0.3)), TARGET)) == ()
+
+
+def test_the_sides_to_which_the_target_was_not_tilted_are_asked_for() -> None:
+    """Turned about y, which points down in the image, its right side comes nearer, and it faces
+    left; turned about x, its upper side comes nearer, and it faces down."""
+    for turns, missing in (
+        ([(0.5, 0.0), (-0.5, 0.0), (0.0, 0.5)], "right"),
+        ([(0.5, 0.0), (-0.5, 0.0), (0.0, -0.5)], "left"),
+        ([(0.0, 0.5), (0.0, -0.5), (-0.5, 0.0)], "down"),
+        ([(0.0, 0.5), (0.0, -0.5), (0.5, 0.0)], "up"),
+    ):
+        lines = wanted_views(calibrate_views(facing(turns, (0.2, 0.3)), TARGET))
+        assert lines == (f"tilt the target by 20 to 45 degrees, so that it faces {missing}",)
+
+
+def test_another_distance_is_asked_for() -> None:
+    sides = [(0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5)]
+    views = facing(sides, (0.25,))
+    lines = wanted_views(calibrate_views(views, TARGET))
+    assert "take some views from nearer" in lines
+    near = [replace(view, side=60.0) for view in views]
+    lines = wanted_views(calibrate_views(near, TARGET))
+    assert "take some views from farther away" in lines
+
+
+def test_corners_of_the_image_are_asked_for_by_what_is_known_of_them() -> None:
+    """The worst first, with the figure."""
+    sides = [(0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5)]
+    views = []
+    for view in facing(sides, (0.2, 0.3)):
+        inside = np.linalg.norm(view.corners - [320, 240], axis=1) < 265
+        views.append(replace(view, ids=view.ids[inside], corners=view.corners[inside]))
+    found = calibrate_views([view for view in views if len(view.ids) > 20], TARGET)
+    bounds = found.promise.parts
+    worst = max(bounds, key=lambda name: bounds[name])
+    assert "corner" in worst and bounds[worst] > 2.0 * bounds["middle"]
+    (line,) = (text for text in wanted_views(found) if text.startswith("bring the target"))
+    assert line.startswith(
+        f"bring the target to the {worst} of the image, known to {bounds[worst]:.2g} pixels, then"
+    )
+    assert all(f"{name} corner" in line for name in ("upper left", "lower left", "lower right"))
+    assert found.intrinsics.except_at[0] == worst
+    assert f"but for the {worst} ({bounds[worst]:.2g})" in str(found.promise)
 
 
 def test_coverage_counts_every_corner_in_its_part_of_the_image() -> None:

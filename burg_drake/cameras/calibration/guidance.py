@@ -9,6 +9,7 @@ import numpy as np
 from burg_drake.cameras.calibration.estimation import CalibratedView, Calibration
 from burg_drake.cameras.calibration.image_parts import coverage, unseen_parts
 from burg_drake.cameras.calibration.promise import UNCERTAIN, Promise
+from burg_drake.core import transform_points
 
 TILTED = np.radians(15.0)
 """Views that are tilted less hardly tell the focal length from the distance."""
@@ -39,7 +40,7 @@ def wanted_views(calibration: Calibration) -> tuple[str, ...]:
     if hidden:
         lines.append(f"bring the target to the {_listed(hidden, promise)}, and beyond")
     lines += _tilts(calibration.views)
-    lines += _distances(calibration.views)
+    lines += _distances(calibration)
     if poor:
         lines.append(f"show more of the target at the {_listed(poor, promise)}")
     count = len(calibration.views)
@@ -69,9 +70,11 @@ def _tilts(views: Sequence[CalibratedView]) -> list[str]:
     return [f"tilt the target by 20 to 45 degrees, so that it faces {', then '.join(missing)}"]
 
 
-def _distances(views: Sequence[CalibratedView]) -> list[str]:
+def _distances(calibration: Calibration) -> list[str]:
     """Whether the target was always as far away."""
-    distance = np.array([np.linalg.norm(used.X_CT[:3, 3]) for used in views])
+    views, middle = calibration.views, np.array([*calibration.target.size, 0.0]) / 2.0
+    places = transform_points(np.array([used.X_CT for used in views]), middle[None])
+    distance = np.linalg.norm(places, axis=-1)
     if distance.max() > NEARER * distance.min():
         return []
     near = max(used.view.side for used in views) >= LARGE
