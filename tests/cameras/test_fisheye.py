@@ -37,7 +37,7 @@ PINHOLE = replace(FISHEYE, model="perspective", distortion=())
 VIEWS = [
     view((0.29, 0.2), 0.45, 25.0, 40.0, 15.0),
     view((0.15, 0.1), 0.35, 40.0, 200.0, 100.0),
-    view((0.5, 0.0), 0.40, 20.0, 300.0, 10.0),  # the board to one side
+    view((0.8, 0.2), 0.35, 10.0, 0.0, 10.0),  # the board to one side
 ]
 
 
@@ -61,9 +61,9 @@ def test_the_pose_is_as_exact_as_through_other_lenses(
 
 
 def test_markers_far_off_the_axis_are_used(images: list[np.ndarray]) -> None:
-    estimate = BoardPose(BOARD, FISHEYE).estimate(images[1])
+    estimate = BoardPose(BOARD, FISHEYE).estimate(images[2])
     angles = np.degrees(np.arccos(FISHEYE.rays(estimate.corners.reshape(-1, 2))[:, 2]))
-    assert angles.max() > 55.0
+    assert len(estimate.ids) > 40 and angles.min() > 25.0 and angles.max() > 55.0
 
 
 def test_a_straightened_image_is_that_of_a_pinhole(images: list[np.ndarray]) -> None:
