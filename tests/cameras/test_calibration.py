@@ -276,6 +276,26 @@ def test_views_enough_of_all_kinds_want_no_others() -> None:
     assert wanted_views(calibrate_views(facing(sides, (0.2, 0.3)), TARGET)) == ()
 
 
+def test_live_views_are_asked_for_until_there_are_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the views that face left, two are needed."""
+    sides = [(0.5, 0.0), (-0.5, 0.0), (0.0, -0.5), (0.0, 0.5)]
+    views = facing(sides, (0.2, 0.3))
+    before = 3 * len(views) // 4
+    collector = ViewCollector(TARGET, views[:before])
+    blank = Frame(np.zeros((480, 640, 3), np.uint8), None, 0.0, "camera 0")
+
+    def offer(view: CharucoView) -> tuple[bool, str]:
+        name = "burg_drake.cameras.calibration.view_collector.find_target"
+        monkeypatch.setattr(name, lambda image, target, name: view)
+        assert collector.offer(blank) == (False, "hold still")
+        return collector.offer(blank)
+
+    tilt = "tilt the target by 20 to 45 degrees, so that it faces left"
+    assert offer(views[before]) == (True, tilt)
+    taken, word = offer(views[before + 1])
+    assert taken and word.startswith("enough, the camera is known to 0.") and collector.enough
+
+
 def test_the_sides_to_which_the_target_was_not_tilted_are_asked_for() -> None:
     """Turned about y, which points down in the image, its right side comes nearer, and it faces
     left; turned about x, its upper side comes nearer, and it faces down."""
