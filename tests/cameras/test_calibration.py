@@ -93,8 +93,10 @@ def test_exact_corners_give_the_exact_camera(model: str) -> None:
     views = views_of(LENSES[model], 12, 0.0)
     found = calibrate_views(views, TARGET, model=model)
     assert largest_deviation(LENSES[model], found.intrinsics, views) < 5e-3
-    if model != "fisheye":  # whose edges these views do not show
-        assert largest_deviation(LENSES[model], found.intrinsics) < 0.02
+    # These views do not show the edges of a fisheye's image; what they tell least of a rational
+    # lens is held by the prior.
+    most = {"fisheye": 5.0, "rational": 0.1}.get(model, 2e-3)
+    assert largest_deviation(LENSES[model], found.intrinsics) < most
     assert found.rms < 1e-3 and not found.rejected and found.model == model
     assert found.intrinsics.residual == found.rms
 

@@ -198,9 +198,8 @@ def calibrate_views(
         chosen.hypotheses,
     )
     promise = calibration.promise
-    promised = replace(
-        calibration.intrinsics, known_to=promise.known_to, except_at=promise.except_at
-    )
+    known_to = round(promise.known_to, 3) if np.isfinite(promise.known_to) else None
+    promised = replace(calibration.intrinsics, known_to=known_to, except_at=promise.except_at)
     return replace(calibration, intrinsics=promised)
 
 

@@ -44,6 +44,9 @@ MOST_DAMPING = 1e8
 
 
 class _State(NamedTuple):
+    """A camera and poses on the way: cost, and of N corners residuals (N, 2), weights (N,) and
+    derivatives (N, 2, 6) and (N, 2, P)."""
+
     intrinsics: Intrinsics
     X_CT: Array
     cost: float
@@ -115,7 +118,7 @@ class LensFit:
         lowest of several models is best supported."""
         squares = np.sum(np.concatenate(self.residuals) ** 2, axis=1)
         n = 2 * len(squares)
-        total = np.minimum(squares, evidence.limit**2).sum()
+        total = max(float(np.minimum(squares, evidence.limit**2).sum()), 1e-18)
         penalty = np.log(n) if bayesian else 2.0
         return float(n * np.log(total / n) / evidence.dispersion + penalty * self.size)
 
@@ -264,7 +267,8 @@ class _Problem:
             left = left - np.einsum("vij,vik->jk", mixed, solved[..., :-1])
             right = of_camera - np.einsum("vij,vi->j", mixed, solved[..., -1])
             scale = 1.0 / np.sqrt(np.maximum(np.diag(left), 1e-300))
-            change = scale * np.linalg.lstsq(left * np.outer(scale, scale), scale * right)[0]
+            scaled = left * np.outer(scale, scale)
+            change = scale * np.linalg.lstsq(scaled, scale * right, rcond=None)[0]
             poses = solved[..., -1] - solved[..., :-1] @ change
             found = self._moved(state, change, poses)
             if found is not None and found.cost < state.cost:
