@@ -107,17 +107,18 @@ def seen_views(
 
 
 def made_views(
-    camera: Camera, reach: float, count: int, rng: np.random.Generator
+    camera: Camera, reach: float, count: int, rng: np.random.Generator, bulge: float = 0.0
 ) -> list[burg.cameras.CharucoView]:
     """Views of corners that are projected, with errors."""
     columns, rows = (n - 1 for n in TARGET.squares)
     place = np.stack(np.meshgrid(np.arange(columns) + 1, np.arange(rows) + 1), axis=-1)
     flat = TARGET.square * (place.reshape(-1, 2) - np.array(TARGET.squares) / 2) * [1.0, -1.0]
     middle = np.array([0.105, 0.1485])
+    height = bulge * (1.0 - (flat[:, 1] / middle[1]) ** 2)
     views: list[burg.cameras.CharucoView] = []
     while len(views) < count:
         X_SC = view_at(camera, reach, rng)
-        p_C = (np.c_[flat + middle, np.zeros(len(flat))] - X_SC[:3, 3]) @ X_SC[:3, :3]
+        p_C = (np.c_[flat + middle, height] - X_SC[:3, 3]) @ X_SC[:3, :3]
         ahead = p_C[:, 2] > np.cos(np.radians(88.0)) * np.linalg.norm(p_C, axis=1)
         pixels = camera.project(np.where(ahead[:, None], p_C, [0.0, 0.0, 1.0]))
         inside = ahead & ((pixels > 6) & (pixels < np.array(camera.size) - 7)).all(axis=1)
@@ -201,15 +202,15 @@ def main() -> None:
     heads = ("rms", "off", "promised", "ratio", "worst", "except", "off", "bound", "worst", "s")
     print(f"{'':34}{'':24}" + "".join(f"{head:>9}" for head in heads))
     every: list[Judgement] = []
+    bulge = 1e-3 * arguments.bulge_mm
     for name in arguments.lenses:
         for where, reach in REACHES.items():
             rng = np.random.default_rng([arguments.seed, list(LENSES).index(name)])
             found = []
             for _ in range(arguments.calibrations):
                 if arguments.corners:
-                    views = made_views(LENSES[name], reach, arguments.views, rng)
+                    views = made_views(LENSES[name], reach, arguments.views, rng, bulge)
                 else:
-                    bulge = 1e-3 * arguments.bulge_mm
                     views = seen_views(LENSES[name], reach, arguments.views, rng, bulge)
                 found.append(judged(LENSES[name], views))
             print_row(f"{name}, {where}", found)

@@ -13,8 +13,9 @@ from room.lens import Camera, Fisheye
 from room.target import target_picture, view_at
 from room.views import look_at, seen_at
 
-from burg_drake.cameras.calibration.estimation import calibrate_views
+from burg_drake.cameras.calibration.estimation import Calibration, calibrate_views
 from burg_drake.cameras.calibration.image_parts import PARTS, part_of
+from burg_drake.cameras.calibration.lens_fit import fit_lens
 from burg_drake.cameras.calibration.target import find_target
 
 RATIONAL = Camera((640, 480), (500.0, 502.0), (322.0, 236.0), (0.4, 0.1, 1e-3, -1e-3, 0.0, 0.6))
@@ -54,6 +55,27 @@ def test_a_simpler_model_that_fits_as_well_is_known_to_be_off() -> None:
     for name in corners:
         assert off[part == name].max() < promise.parts[name]
     assert off[part == "middle"].max() < promise.known_to < 1.0
+
+
+def test_a_target_that_bulges_is_noticed_and_does_little_harm() -> None:
+    """The squares are 200 mm high between their outer corners, of a sheet of 297 that rises by 0.5
+    mm to its middle."""
+    camera = calibration.LENSES["barrel"]
+    rng = np.random.default_rng(2)
+    views = calibration.made_views(camera, 1.0, 15, rng, bulge=0.5e-3)
+    found = calibrate_views(views, calibration.TARGET)
+    assert found.bulge == pytest.approx(0.5e-3 * (0.09 / 0.1485) ** 2, rel=0.15)
+    flat = fit_lens(
+        views, calibration.TARGET, "radial4", (found.intrinsics, _poses(found)), bend=0.0
+    )
+    off = calibration.errors(camera, found.intrinsics)[1].max()
+    assert off < 0.25 < 0.5 < calibration.errors(camera, flat.intrinsics)[1].max()
+    judged = calibration.judged(camera, views)
+    assert judged.ratio < 1.5
+
+
+def _poses(found: Calibration) -> np.ndarray:
+    return np.array([used.X_CT for used in found.views])
 
 
 @pytest.mark.parametrize("camera", [RATIONAL, EQUIDISTANT])

@@ -226,6 +226,7 @@ def _print(calibration: Calibration) -> None:
         print("  " + " ".join(f"{count:4d}" for count in row))
     print()
     print_intrinsics(calibration.intrinsics)
+    print(f"target           bulges by {1e3 * calibration.bulge:.2f} mm")
     print("known, in 19 of 20 cases, to so many pixels")
     parts = calibration.promise.parts
     for row in (PARTS[:3], PARTS[3:6], PARTS[6:]):

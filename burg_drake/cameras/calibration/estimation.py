@@ -79,6 +79,7 @@ class Calibration:
         rejected: names of the other images, and why each does not count.
         covariance: (P, P) of fx, fy, cx, cy and the coefficients, if the lens is of this model.
         hypotheses: what the lens may be by these corners, see `uncertainty`.
+        bulge: how far the target is from flat, by its highest and lowest corner [m].
     """
 
     intrinsics: Intrinsics
@@ -88,6 +89,7 @@ class Calibration:
     rejected: tuple[tuple[str, str], ...]
     covariance: Array
     hypotheses: tuple[LensHypothesis, ...]
+    bulge: float
 
     @cached_property
     def corners(self) -> Array:
@@ -196,6 +198,7 @@ def calibrate_views(
         tuple(refused),
         chosen.dispersion * covariance_of(fit),
         chosen.hypotheses,
+        fit.bulge,
     )
     promise = calibration.promise
     known_to = round(promise.known_to, 3) if np.isfinite(promise.known_to) else None

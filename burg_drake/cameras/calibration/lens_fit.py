@@ -1,7 +1,7 @@
 """One least-squares fit of a camera model to views of a target.
 
-Levenberg and Marquardt's steps on the camera and the poses of all views. Of each view's pose there
-is only what the camera's parameters need: the equations are reduced to these (Schur).
+Levenberg and Marquardt's steps on the camera, the bend of the target and the poses of all views. Of
+each view's pose there is only what the others need: the equations are reduced to these (Schur).
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 
 from burg_drake.cameras.calibration.lens_derivatives import lens_derivatives
+from burg_drake.cameras.calibration.lens_prior import BENDS, prior
 from burg_drake.cameras.calibration.target import CharucoTarget, CharucoView
 from burg_drake.cameras.optics import Intrinsics, LensModel
 from burg_drake.core import Array, InvalidInputError
@@ -22,18 +23,11 @@ COEFFICIENTS = {"pinhole": 0, "radial4": 4, "radial": 5, "rational": 8, "fisheye
 """Number of distortion coefficients of each lens model."""
 PERSPECTIVE_NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 FISHEYE_NAMES = ("k1", "k2", "k3", "k4")
-POWERS = np.array([2, 4, 2, 2, 6, 2, 4, 6])
-FISHEYE_POWERS = np.array([2, 4, 6, 8])
-"""Of the distance from the middle, with which each coefficient counts."""
-LARGEST = 1.0
-"""What a term of a lens's formula is at most, about, in the image's corners, or one focal length
-from the middle if that is nearer. It holds what corners say nothing about: the rational model has
-such a direction if the lens is nearly of a simpler one [-]."""
-SPREAD, ASIDE = 0.5, 0.1
-"""Of the logarithm of focal lengths, over the image's diagonal, and of the center's distance from
-the image's, as shares of the diagonal. They hold a camera of which the views tell nothing."""
 NOISE = 0.05
 """Of corners, against which all that is weighed in a fit [pixels]."""
+BEND = 0.3e-3
+"""How far targets bulge, about, from their middle to the ends of their longer side [m]. Glued paper
+is not flat; taken as flat, one that rises by 0.5 mm puts cameras off by 0.8 to 2.3 pixels."""
 TAIL, SMALLEST_TAIL = 3.0, 0.02
 """Residuals beyond so many times the median one, and so many pixels, count linearly (Huber), so
 that a flexible model does not bend to corners that do not belong."""
@@ -44,16 +38,17 @@ MOST_DAMPING = 1e8
 
 
 class _State(NamedTuple):
-    """A camera and poses on the way: cost, and of N corners residuals (N, 2), weights (N,) and
-    derivatives (N, 2, 6) and (N, 2, P)."""
+    """A camera, the target's bends (3,) and poses on the way: cost, and of N corners residuals
+    (N, 2), weights (N,) and derivatives (N, 2, 6) and (N, 2, P + 3)."""
 
     intrinsics: Intrinsics
+    bends: Array
     X_CT: Array
     cost: float
     residuals: Array
     weights: Array
     by_pose: Array
-    by_camera: Array
+    by_others: Array
 
 
 @dataclass(frozen=True)
@@ -81,22 +76,26 @@ class LensFit:
         X_CT: (V, 4, 4) target in the camera's frame, of each view.
         residuals: of each view (N, 2): where corners were seen less where the model puts them
             [pixels].
-        reduced: of each view (2 N, P) derivatives of its pixels by fx, fy, cx, cy and the
-            coefficients, without what a change of the view's pose explains, which is no information
-            about the camera.
+        bends: (3,) of the target along x^2, x y and y^2 [of what is usual].
+        bulge: difference of the target's highest and lowest corner by these [m].
+        reduced: of each view (2 N, P + 3) derivatives of its pixels by fx, fy, cx, cy, the
+            coefficients and bends, without what a change of the view's pose explains, which is no
+            information about them.
     """
 
     model: str
     intrinsics: Intrinsics
     X_CT: Array
     residuals: tuple[Array, ...]
+    bends: Array
+    bulge: float
     reduced: tuple[Array, ...]
 
     @property
     def variance(self) -> float:
         """Of a coordinate of a corner, as the residuals tell it [pixels^2]."""
         count = sum(r.size for r in self.residuals)
-        return self.squares / max(count - self.size - 6 * len(self.residuals), 1)
+        return self.squares / max(count - self.size - BENDS - 6 * len(self.residuals), 1)
 
     @property
     def squares(self) -> float:
@@ -128,6 +127,7 @@ def fit_lens(
     target: CharucoTarget,
     model: str,
     start: tuple[Intrinsics, Array],
+    bend: float = BEND,
 ) -> LensFit:
     """Fits a camera model.
 
@@ -137,52 +137,40 @@ def fit_lens(
         model: of the lens, a key of `COEFFICIENTS`.
         start: a camera near by, of a simpler model or the same, and (V, 4, 4) the target in its
             frame.
+        bend: how far the target bulges, about [m].
 
     Raises:
         InvalidInputError: the views do not determine a camera.
     """
     camera = _padded(start[0], model)
-    problem = _Problem(views, target, camera)
-    state = problem.fitted(camera, start[1])
+    problem = _Problem(views, target, camera, bend)
+    state = problem.fitted(camera, np.zeros(BENDS), start[1])
     typical = float(np.median(np.linalg.norm(state.residuals, axis=1)))
     problem.limit = max(TAIL * typical, SMALLEST_TAIL)
-    state = problem.fitted(state.intrinsics, state.X_CT)
+    state = problem.fitted(state.intrinsics, state.bends, state.X_CT)
     ends = np.cumsum(problem.counts)[:-1]
     reduced = []
-    for of_pose, of_camera in zip(
-        np.split(state.by_pose, ends), np.split(state.by_camera, ends), strict=True
+    for of_pose, of_others in zip(
+        np.split(state.by_pose, ends), np.split(state.by_others, ends), strict=True
     ):
         basis = np.linalg.qr(of_pose.reshape(-1, 6))[0]
-        flat = of_camera.reshape(len(basis), -1)
+        flat = of_others.reshape(len(basis), -1)
         reduced.append(flat - basis @ (basis.T @ flat))
-    residuals = tuple(np.split(state.residuals, ends))
-    return LensFit(model, state.intrinsics, state.X_CT, residuals, tuple(reduced))
+    return LensFit(
+        model,
+        state.intrinsics,
+        state.X_CT,
+        tuple(np.split(state.residuals, ends)),
+        state.bends,
+        float(np.ptp(problem.rise @ state.bends)),
+        tuple(reduced),
+    )
 
 
 def names_of(camera: Intrinsics) -> tuple[str, ...]:
     """Of a camera's parameters."""
     names = FISHEYE_NAMES if camera.is_fisheye else PERSPECTIVE_NAMES[: len(camera.distortion)]
     return ("fx", "fy", "cx", "cy", *names)
-
-
-def prior(camera: Intrinsics) -> tuple[Array, Array]:
-    """What is known of a camera before any corner is seen.
-
-    Returns:
-        `(errors, slopes)`: (P,) how many standard deviations its parameters are from what is
-        expected, and the derivatives of that.
-    """
-    size = np.array([camera.width, camera.height])
-    diagonal = float(np.hypot(*size))
-    reach = min(1.0, 0.5 * diagonal / camera.focal[0])
-    powers = FISHEYE_POWERS if camera.is_fisheye else POWERS[: len(camera.distortion)]
-    weights = reach**powers / LARGEST
-    aside = (np.array(camera.center) - 0.5 * (size - 1)) / (ASIDE * diagonal)
-    errors = np.r_[
-        np.log(np.array(camera.focal) / diagonal) / SPREAD, aside, weights * camera.distortion
-    ]
-    slopes = np.r_[1.0 / (SPREAD * np.array(camera.focal)), [1.0 / (ASIDE * diagonal)] * 2, weights]
-    return errors, slopes
 
 
 def _padded(camera: Intrinsics, model: str) -> Intrinsics:
@@ -198,7 +186,11 @@ class _Problem:
     """The sum of squares of a fit, and steps that lower it."""
 
     def __init__(
-        self, views: Sequence[CharucoView], target: CharucoTarget, camera: Intrinsics
+        self,
+        views: Sequence[CharucoView],
+        target: CharucoTarget,
+        camera: Intrinsics,
+        bend: float,
     ) -> None:
         self.size = 4 + len(camera.distortion)
         self.limit = np.inf
@@ -207,29 +199,36 @@ class _Problem:
         self.starts = np.r_[0, np.cumsum(self.counts)[:-1]]
         self.p_TQ = np.concatenate([target.p_TQ[view.ids] for view in views])
         self.pixels = np.concatenate([view.corners for view in views])
+        half = 0.5 * np.array(target.size)
+        x, y = ((self.p_TQ[:, :2] - half) / half.max()).T
+        self.rise = bend * np.stack([x * x, x * y, y * y], axis=1)
 
-    def at(self, intrinsics: Intrinsics, X_CT: Array) -> _State:
+    def at(self, intrinsics: Intrinsics, bends: Array, X_CT: Array) -> _State:
         """Cost and derivatives."""
-        p_CQ = np.einsum("nij,nj->ni", X_CT[self.view, :3, :3], self.p_TQ) + X_CT[self.view, :3, 3]
+        X = X_CT[self.view]
+        p_TQ = self.p_TQ + (self.rise @ bends)[:, None] * [0.0, 0.0, 1.0]
+        p_CQ = np.einsum("nij,nj->ni", X[:, :3, :3], p_TQ) + X[:, :3, 3]
         pixels, by_pose, by_camera = lens_derivatives(intrinsics, p_CQ)
         residuals = self.pixels - pixels
         length = np.maximum(np.linalg.norm(residuals, axis=1), 1e-12)
         weights = np.minimum(1.0, self.limit / length)
         # Huber's: r^2 up to the limit c, then 2 c r - c^2.
         loss = np.sum(weights * length**2 * (2.0 - weights))
-        cost = float(loss + NOISE**2 * np.sum(prior(intrinsics)[0] ** 2))
+        cost = float(loss + NOISE**2 * np.sum(prior(intrinsics, bends)[0] ** 2))
         if not (np.isfinite(cost) and (intrinsics.is_fisheye or (p_CQ[:, 2] > 0.0).all())):
             cost = np.inf
-        by_camera = by_camera[..., : self.size]
-        return _State(intrinsics, X_CT, cost, residuals, weights, by_pose, by_camera)
+        by_rise = np.einsum("nki,ni->nk", by_pose[..., 3:], X[:, :3, 2])
+        by_bends = by_rise[:, :, None] * self.rise[:, None]
+        by_others = np.concatenate([by_camera[..., : self.size], by_bends], axis=2)
+        return _State(intrinsics, bends, X_CT, cost, residuals, weights, by_pose, by_others)
 
-    def fitted(self, camera: Intrinsics, X_CT: Array) -> _State:
+    def fitted(self, camera: Intrinsics, bends: Array, X_CT: Array) -> _State:
         """The state of lowest cost that steps from a camera lead to.
 
         Raises:
             InvalidInputError: the views do not determine a camera.
         """
-        state, damping = self.at(camera, X_CT), 1e-3
+        state, damping = self.at(camera, bends, X_CT), 1e-3
         for _ in range(ROUNDS):
             better, damping = self.step(state, damping)
             if better is None:
@@ -249,12 +248,12 @@ class _Problem:
         root = np.sqrt(state.weights)[:, None]
         Jp, Jc, r = (
             state.by_pose * root[..., None],
-            state.by_camera * root[..., None],
+            state.by_others * root[..., None],
             state.residuals * root,
         )
         pose = np.add.reduceat(np.einsum("nki,nkj->nij", Jp, Jp), self.starts)
         mixed = np.add.reduceat(np.einsum("nki,nkj->nij", Jp, Jc), self.starts)
-        errors, slopes = prior(state.intrinsics)
+        errors, slopes = prior(state.intrinsics, state.bends)
         camera = np.einsum("nki,nkj->ij", Jc, Jc) + NOISE**2 * np.diag(slopes**2)
         of_pose = np.add.reduceat(np.einsum("nki,nk->ni", Jp, r), self.starts)
         of_camera = np.einsum("nki,nk->i", Jc, r)
@@ -278,7 +277,7 @@ class _Problem:
 
     def _moved(self, state: _State, change: Array, poses: Array) -> _State | None:
         k = state.intrinsics
-        values = np.r_[k.focal, k.center, k.distortion] + change
+        values = np.r_[k.focal, k.center, k.distortion] + change[: self.size]
         if not np.isfinite(values).all() or values[:2].min() <= 0.0:
             return None
         camera = replace(
@@ -291,4 +290,4 @@ class _Problem:
         for X, twist in zip(X_CT, poses, strict=True):
             R = cv2.Rodrigues(twist[:3])[0]
             X[:3, :3], X[:3, 3] = R @ X[:3, :3], R @ X[:3, 3] + twist[3:]
-        return self.at(camera, X_CT)
+        return self.at(camera, state.bends + change[self.size :], X_CT)

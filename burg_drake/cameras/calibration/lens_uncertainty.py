@@ -15,7 +15,8 @@ from typing import Protocol
 import numpy as np
 
 from burg_drake.cameras.calibration.lens_derivatives import lens_derivatives
-from burg_drake.cameras.calibration.lens_fit import Evidence, LensFit, prior
+from burg_drake.cameras.calibration.lens_fit import Evidence, LensFit
+from burg_drake.cameras.calibration.lens_prior import prior
 from burg_drake.cameras.optics import Intrinsics
 from burg_drake.core import Array
 
@@ -67,7 +68,7 @@ def image_grid(intrinsics: Intrinsics, columns: int = 13, rows: int = 9) -> Arra
 
 def covariance_of(fit: LensFit) -> Array:
     """(P, P) of the camera's parameters, as if the corners' errors were independent."""
-    return fit.variance * _inverse(_information(fit), fit)
+    return _covariance(fit)[: fit.size, : fit.size]
 
 
 def hypotheses_of(fits: Sequence[LensFit], evidence: Evidence) -> tuple[LensHypothesis, ...]:
@@ -93,13 +94,13 @@ def view_disagreement(fit: LensFit) -> float:
     line. What the camera changes by when one view is left out knows that (the jackknife), over
     where corners were seen. At least 1.
     """
-    H, squares = _information(fit), np.zeros((fit.size, fit.size))
+    H, squares = _information(fit), np.zeros_like(_information(fit))
     count = len(fit.residuals)
     for J, r in zip(fit.reduced, fit.residuals, strict=True):
         change = _inverse(H - J.T @ J, fit) @ (J.T @ r.ravel())
         squares += (count - 1) / count * np.outer(change, change)
     J = np.concatenate(fit.reduced)
-    independent = float(np.einsum("ni,ij,nj->", J, covariance_of(fit), J))
+    independent = float(np.einsum("ni,ij,nj->", J, _covariance(fit), J))
     seen = float(np.einsum("ni,ij,nj->", J, squares, J))
     return float(np.sqrt(max(1.0, seen / max(independent, 1e-300))))
 
@@ -157,10 +158,15 @@ class _Differences:
         )
 
 
+def _covariance(fit: LensFit) -> Array:
+    """(P + 3, P + 3) of the parameters of camera and target."""
+    return np.asarray(fit.variance * _inverse(_information(fit), fit))
+
+
 def _information(fit: LensFit) -> Array:
-    """(P, P) inverse covariance for corners of variance 1, the prior's included."""
+    """(P + 3, P + 3) inverse covariance for corners of variance 1, the prior's included."""
     J = np.concatenate(fit.reduced)
-    return np.asarray(J.T @ J + fit.variance * np.diag(prior(fit.intrinsics)[1] ** 2))
+    return np.asarray(J.T @ J + fit.variance * np.diag(prior(fit.intrinsics, fit.bends)[1] ** 2))
 
 
 def _inverse(information: Array, fit: LensFit) -> Array:

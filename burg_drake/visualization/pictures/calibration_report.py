@@ -54,7 +54,8 @@ def write_report(calibration: Calibration, advice: list[str], path: str) -> None
         element(
             "p",
             f"{k.width} x {k.height} pixels; {len(calibration.views)} views; lens model"
-            f" {calibration.model}; residual {calibration.rms:.3f} pixels (root mean square)",
+            f" {calibration.model}; residual {calibration.rms:.3f} pixels (root mean square);"
+            f" the target bulges by {1e3 * calibration.bulge:.2f} mm",
         ),
         element("p", f"In 19 of 20 cases {calibration.promise}."),
         *(element("p", line, class_="advice") for line in advice),
