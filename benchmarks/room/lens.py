@@ -1,4 +1,5 @@
-"""The camera's lens: pinhole and the distortion of Brown and Conrady."""
+"""The camera's lens: pinhole with the distortion of Brown and Conrady or a rational one, or a
+fisheye by the closed forms of optics."""
 
 from __future__ import annotations
 
@@ -19,13 +20,14 @@ class Camera:
         size: width and height [pixels].
         focal: along u and v [pixels].
         center: principal point [pixels]; the middle of the upper left pixel is (0, 0).
-        coefficients: k1, k2, p1, p2, k3 of Brown (1966), in OpenCV's order.
+        coefficients: k1, k2, p1, p2, k3 of Brown (1966), in OpenCV's order, and k4, k5, k6 of a
+            polynomial that divides the radial one.
     """
 
     size: tuple[int, int]
     focal: tuple[float, float]
     center: tuple[float, float]
-    coefficients: tuple[float, float, float, float, float] = (0.0,) * 5
+    coefficients: tuple[float, ...] = (0.0,) * 5
 
     def project(self, p_C: Array) -> Array:
         """(..., 2) pixels of points (..., 3) in the optical frame [m]."""
@@ -34,10 +36,11 @@ class Camera:
 
     def bent(self, xy: Array) -> Array:
         """(..., 2) where the lens puts directions (x/z, y/z)."""
-        k1, k2, p1, p2, k3 = self.coefficients
+        k1, k2, p1, p2, k3, k4, k5, k6 = (*self.coefficients, 0.0, 0.0, 0.0)[:8]
         x, y = xy[..., 0], xy[..., 1]
         r2 = x * x + y * y
         radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        radial = radial / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)))
         return np.stack(
             [
                 x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
@@ -55,6 +58,47 @@ class Camera:
             if np.abs(xy - last).max() < 1e-13:
                 break
         return xy
+
+
+FARTHEST = np.radians(87.0)
+"""From the axis of a fisheye; pixels beyond look there."""
+PROJECTIONS = {
+    "equidistant": (lambda angle: angle, lambda r: r),
+    "equisolid": (
+        lambda angle: 2 * np.sin(angle / 2),
+        lambda r: 2 * np.arcsin(np.minimum(r / 2, 1.0)),
+    ),
+    "stereographic": (lambda angle: 2 * np.tan(angle / 2), lambda r: 2 * np.arctan(r / 2)),
+}
+"""How far from the middle, in focal lengths, an angle off the axis is seen, and the inverse."""
+
+
+@dataclass(frozen=True)
+class Fisheye(Camera):
+    """A camera with a fisheye.
+
+    Attributes:
+        projection: of `PROJECTIONS`.
+    """
+
+    projection: str = "equisolid"
+
+    def project(self, p_C: Array) -> Array:
+        """As of any camera; points may be beside it."""
+        aside = np.linalg.norm(p_C[..., :2], axis=-1)
+        r = PROJECTIONS[self.projection][0](np.arctan2(aside, p_C[..., 2]))
+        return p_C[..., :2] * (r / np.maximum(aside, 1e-12))[..., None] * self.focal + self.center
+
+    def angles(self, pixels: Array) -> Array:
+        """(...,) off the axis [rad] at which pixels look."""
+        r = np.linalg.norm((pixels - np.array(self.center)) / self.focal, axis=-1)
+        return PROJECTIONS[self.projection][1](r)
+
+    def directions(self, pixels: Array) -> Array:
+        """As of any camera, `FARTHEST` at most."""
+        bent = (pixels - np.array(self.center)) / self.focal
+        slope = np.tan(np.minimum(self.angles(pixels), FARTHEST))
+        return bent * (slope / np.maximum(np.linalg.norm(bent, axis=-1), 1e-12))[..., None]
 
 
 @lru_cache(maxsize=4)

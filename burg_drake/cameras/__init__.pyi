@@ -3,6 +3,8 @@ from .calibration.estimation import (
     Calibration as Calibration,
     calibrate as calibrate,
 )
+from .calibration.lens_uncertainty import LensHypothesis as LensHypothesis
+from .calibration.promise import Promise as Promise
 from .calibration.target import (
     CharucoTarget as CharucoTarget,
     CharucoView as CharucoView,

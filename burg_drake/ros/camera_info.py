@@ -7,7 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from burg_drake.cameras.optics import HALF_PIXEL, ROS_MODELS, Intrinsics
+from burg_drake.cameras.optics import (
+    HALF_PIXEL,
+    ROS_FISHEYE,
+    ROS_MODELS,
+    Intrinsics,
+    is_ros_fisheye,
+)
 from burg_drake.core import InvalidInputError
 
 
@@ -40,6 +46,7 @@ def intrinsics_of(message: Any, *, rectified: bool = False) -> Intrinsics:
         ).about("intrinsics")
     if skew:
         raise InvalidInputError(f"camera_info has sheared pixels, skew {skew:g}")
+    fisheye = not rectified and is_ros_fisheye(message.distortion_model, distortion)
     region = message.roi
     merged_x, merged_y = max(message.binning_x, 1), max(message.binning_y, 1)
     return Intrinsics(
@@ -51,19 +58,20 @@ def intrinsics_of(message: Any, *, rectified: bool = False) -> Intrinsics:
             (cx - region.x_offset + HALF_PIXEL) / merged_x - HALF_PIXEL,
             (cy - region.y_offset + HALF_PIXEL) / merged_y - HALF_PIXEL,
         ),
+        model="fisheye" if fisheye else "perspective",
         distortion=distortion,
     )
 
 
 def _distortion(message: Any) -> tuple[float, ...]:
     coefficients = tuple(float(v) for v in _field(message, "D"))
-    if not any(coefficients):
+    if not any(coefficients) and not is_ros_fisheye(message.distortion_model, coefficients):
         return ()
     if message.distortion_model not in ROS_MODELS:
         raise InvalidInputError(
-            f"camera_info has the distortion model {message.distortion_model!r}, plumb_bob and"
-            " rational_polynomial are read; rectify the images (image_proc) and start the node"
-            " for rectified ones"
+            f"camera_info has the distortion model {message.distortion_model!r}; plumb_bob,"
+            f" rational_polynomial and {ROS_FISHEYE} are read; rectify the images (image_proc) and"
+            " start the node for rectified ones"
         ).about("rectified")
     return coefficients
 

@@ -74,6 +74,12 @@ def test_photos_of_the_target_give_the_intrinsics(
     page = report.read_text()
     assert "photo13.png" in page and "photo91.png" in page and "http" not in page
     assert page.count("<svg") == 4 + 14
+    # The promise: the same figure in the document, its header, the page and the terminal.
+    assert found.known_to is not None and 0.0 < found.known_to < 1.0
+    known = f"known to {found.known_to:.2f} pixels"
+    assert f"# In 19 of 20 cases {known}" in (tmp_path / "K.yaml").read_text()
+    assert f"In 19 of 20 cases {known}" in page and f"known to         {found.known_to:.2f}" in out
+    assert "upper left corner " in out
 
 
 @pytest.mark.thorough
@@ -96,6 +102,9 @@ def test_live_views_are_taken_from_whatever_moves(
     taken = len(list(kept.glob("view_*.png")))
     assert taken >= 5 and f"{taken} of 20 views: " in err and "hold still" in err
     assert np.allclose(load_intrinsics(tmp_path / "K.yaml").focal, TRUTH.focal, rtol=0.01)
+    assert "1 of 20 views: show the target from other sides" in err
+    asked = [line for line in err.splitlines() if line.startswith(f"{taken} of 20 views: ")]
+    assert any("bring the target to the " in line or "tilt the target" in line for line in asked)
 
 
 def test_a_result_that_tells_little_is_not_written(tmp_path: Path, capsys: Capture) -> None:
@@ -106,7 +115,7 @@ def test_a_result_that_tells_little_is_not_written(tmp_path: Path, capsys: Captu
     command = ["camera", "calibrate", *images, *BOARD, "--model", "radial", "-o", str(output)]
     assert main(command) == 1
     err = capsys.readouterr().err
-    assert "tilt the target by 20 to 45 degrees to all sides" in err
+    assert "tilt the target by 20 to 45 degrees, so that it faces left" in err
     assert "no file without --keep" in err and not output.exists()
     assert main([*command, "--keep"]) == 1
     assert output.exists()
@@ -181,6 +190,22 @@ def test_field_of_view_of_a_pinhole_camera() -> None:
     across, down, diagonal = field_of_view(k)
     assert across == pytest.approx(math.pi / 2) == pytest.approx(down)
     assert diagonal == pytest.approx(2 * math.atan(math.sqrt(2.0)))
+
+
+def test_a_fisheye_may_see_behind_itself(tmp_path: Path, capsys: Capture) -> None:
+    """Even angles, 160 pixels a radian: 640 pixels are 4 radians."""
+    k = Intrinsics(
+        width=640, height=480, focal=(160.0, 160.0), center=(319.5, 239.5),
+        model="fisheye", distortion=(0.0, 0.0, 0.0, 0.0),
+    )  # fmt: skip
+    across, down, diagonal = field_of_view(k)
+    assert (across, down, diagonal) == pytest.approx((4.0, 3.0, 5.0))
+    save_intrinsics(k, tmp_path / "K.yaml")
+    assert main(["camera", "show", str(tmp_path / "K.yaml")]) == 0
+    out = capsys.readouterr().out
+    corner = math.degrees(math.hypot(319.5, 239.5) / 160.0)
+    assert "lens model       fisheye" in out
+    assert f"corners look     upper left {corner:.1f}, upper right {corner:.1f}" in out
 
 
 def test_a_station_has_intrinsics_too(capsys: Capture) -> None:

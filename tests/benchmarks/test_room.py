@@ -14,7 +14,7 @@ import pytest
 from reportlab.pdfgen.canvas import Canvas
 from room.covers import nothing, things
 from room.exposure import PAPER, Surface, no_gloss, radiance, table
-from room.lens import SMALL, Camera
+from room.lens import SMALL, Camera, Fisheye
 from room.light import Light, Shadow, irradiance, map_of
 from room.paper import Board, printed, read_pages
 from room.rows import Row, picture
@@ -36,6 +36,8 @@ VIEWS = (
     look_at(np.array([0.18, 0.16]), 1.00, np.radians(60), -2.0, 1.0),
 )
 STEEP = look_at(np.array([0.2, 0.15]), 0.5, np.radians(35), 0.5, 0.2)
+FISHEYE = Fisheye((640, 480), (330.0, 331.0), (322.0, 236.0), projection="equidistant")
+"""Whose even angles are those of the fisheye model without coefficients."""
 SMALL_BOARD = Board(size=(0.30, 0.25), count=(4, 3))
 
 
@@ -286,18 +288,21 @@ def test_things_cover_the_stated_share_of_markers(share: float) -> None:
     assert covered.mean() == pytest.approx(stated, abs=0.03)
 
 
-def test_the_board_is_found_in_a_picture_of_the_room() -> None:
+@pytest.mark.parametrize("camera", [SMALL, FISHEYE])
+def test_the_board_is_found_in_a_picture_of_the_room(camera: Camera) -> None:
     """An estimator and a room that share no code agree."""
     row = Row(sensor=Sensor())
-    taken = picture(row, SMALL, (5, 0), SMALL_BOARD)
-    again = picture(row, SMALL, (5, 0), SMALL_BOARD)
+    taken = picture(row, camera, (5, 0), SMALL_BOARD)
+    again = picture(row, camera, (5, 0), SMALL_BOARD)
     assert (taken.image == again.image).all()
+    is_fisheye = isinstance(camera, Fisheye)
     intrinsics = burg.cameras.Intrinsics(
         width=640,
         height=480,
-        focal=SMALL.focal,
-        center=SMALL.center,
-        distortion=SMALL.coefficients,
+        focal=camera.focal,
+        center=camera.center,
+        model="fisheye" if is_fisheye else "perspective",
+        distortion=camera.coefficients[: 4 if is_fisheye else 5],
     )
     markers = burg.scenes.Markers(count=SMALL_BOARD.count)
     board = burg.scenes.Board(size=SMALL_BOARD.size, markers=markers)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from pydrake.systems.sensors import CameraInfo
 
+from burg_drake.cameras.optics.fisheye import fisheye_lens
 from burg_drake.cameras.optics.intrinsics import Intrinsics, camera_info, of_camera, of_camera_info
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
@@ -17,6 +18,18 @@ from burg_drake.station.document.station_document import Camera
 PINHOLE = Intrinsics(width=640, height=480, focal=(600.0, 610.0), center=(315.0, 241.0))
 RADIAL = replace(PINHOLE, distortion=(-0.3, 0.1, 0.001, -0.002, -0.01))
 RATIONAL = replace(PINHOLE, distortion=(0.35, 0.02, 0.0002, -0.0003, 0.004, 0.75, 0.12, 0.01))
+FISHEYE = replace(
+    PINHOLE, focal=(220.0, 222.0), model="fisheye", distortion=(0.03, -0.02, 0.006, -0.001)
+)
+
+
+def wide_points(most: float = 85.0) -> np.ndarray:
+    """Up to so many degrees off the axis."""
+    rng = np.random.default_rng(0)
+    angle, turn = np.radians(rng.uniform(0, most, 200)), rng.uniform(0, 2 * np.pi, 200)
+    aside = np.sin(angle)
+    rays = np.column_stack([aside * np.cos(turn), aside * np.sin(turn), np.cos(angle)])
+    return rays * rng.uniform(0.3, 2.0, (200, 1))
 
 
 def some_points() -> np.ndarray:
@@ -50,6 +63,43 @@ def test_undistorted_pixels_are_those_of_a_pinhole_camera(intrinsics: Intrinsics
     assert np.abs(straight - by_hand(PINHOLE, p_C)).max() < 1e-3
 
 
+def test_a_fisheye_is_that_of_opencv() -> None:
+    p_C = wide_points()
+    k = np.array(FISHEYE.distortion)
+    theirs, _ = cv2.fisheye.projectPoints(p_C[:, None], np.zeros(3), np.zeros(3), FISHEYE.K, k)
+    pixels = FISHEYE.project(p_C)
+    assert np.allclose(pixels, theirs[:, 0], atol=1e-9)
+    assert FISHEYE.project(p_C[None, :, None]).shape == (1, 200, 1, 2)
+    unit = p_C / np.linalg.norm(p_C, axis=1, keepdims=True)
+    assert np.allclose(FISHEYE.rays(pixels), unit, atol=1e-9)
+    straight = p_C[:, :2] / p_C[:, 2:] * FISHEYE.focal + FISHEYE.center
+    assert np.allclose(FISHEYE.undistort(pixels), straight, atol=1e-6)
+    middle = np.array([FISHEYE.center])
+    assert np.allclose(FISHEYE.undistort(middle), middle)
+    assert np.allclose(FISHEYE.rays(middle), [[0.0, 0.0, 1.0]])
+    assert not FISHEYE.is_pinhole and not replace(FISHEYE, distortion=(0.0,) * 4).is_pinhole
+
+
+def test_a_fisheye_puts_nothing_into_its_image_that_it_does_not_see() -> None:
+    """Points beside and behind, of a lens whose polynomial has its highest value on the way."""
+    lens = replace(FISHEYE, distortion=(-0.1, -0.03, 0.0, 0.0))
+    # Its derivative is 1 - 0.3 a^2 - 0.15 a^4.
+    assert fisheye_lens(lens.distortion).turn ** 2 == pytest.approx((np.sqrt(0.69) - 0.3) / 0.3)
+    angle = np.radians(np.linspace(0.0, 180.0, 181))
+    rays = np.column_stack([np.sin(angle), 0.0 * angle, np.cos(angle)])
+    u = lens.project(rays)[:, 0]
+    assert (np.diff(u) > 0.0).all()
+    assert np.allclose(lens.rays(lens.project(rays[:72])), rays[:72], atol=1e-6)
+
+
+def test_what_a_fisheye_sees_beside_itself_is_put_at_the_edge_of_a_straight_image() -> None:
+    """Of 170 degrees across, whose corners look behind the camera."""
+    seen = FISHEYE.rays(np.array([[0.0, 0.0], [0.0, 241.0]]))
+    assert seen[0, 2] < 0.0 < seen[1, 2]
+    straight = (FISHEYE.undistort(np.array([[0.0, 0.0]])) - FISHEYE.center) / FISHEYE.focal
+    assert np.linalg.norm(straight) == pytest.approx(np.tan(np.radians(87.0)))
+
+
 def test_drake_has_the_principal_point_half_a_pixel_further() -> None:
     info = camera_info(PINHOLE)
     assert (info.center_x(), info.center_y()) == (315.5, 241.5)
@@ -57,8 +107,10 @@ def test_drake_has_the_principal_point_half_a_pixel_further() -> None:
     # A centred camera: Drake's principal point is half of the size, ours the middle pixel's centre.
     centred = of_camera_info(CameraInfo(640, 480, 600.0, 600.0, 320.0, 240.0))
     assert centred.center == (319.5, 239.5) == of_camera(Camera(X_WC=Pose())).center
-    with pytest.raises(InvalidInputError, match="no lens distortion"):
+    with pytest.raises(InvalidInputError, match="pinholes without lens distortion"):
         camera_info(RADIAL)
+    with pytest.raises(InvalidInputError, match="pinholes without lens distortion"):
+        camera_info(replace(FISHEYE, distortion=(0.0,) * 4))
 
 
 def test_images_of_another_size_are_refused() -> None:
@@ -78,6 +130,7 @@ def test_images_of_another_size_are_refused() -> None:
         ({"center": (320.0, np.inf)}, "must be finite"),
         ({"distortion": (0.1, np.nan, 0.0, 0.0)}, "must be finite"),
         ({"width": 640.5}, "width 640.5 and height 480 of a camera must be whole pixels"),
+        ({"model": "fisheye"}, "distortion has 0 coefficients; a fisheye has 4: k1, k2, k3, k4"),
         ({"distortion": (0.1,)}, "distortion has 1 coefficients; OpenCV's model takes 0, 4, 5, 8"),
     ],
 )

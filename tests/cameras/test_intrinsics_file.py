@@ -28,6 +28,8 @@ RADIAL = Intrinsics(
 )
 RATIONAL = replace(RADIAL, distortion=(0.35, 0.02, 0.0002, -0.0003, 0.004, 0.75, 0.12, 0.01))
 PINHOLE = replace(RADIAL, distortion=())
+FISHEYE = replace(RADIAL, model="fisheye", distortion=(0.03, -0.02, 0.006, -0.001))
+EQUIDISTANT = replace(FISHEYE, distortion=(0.0, 0.0, 0.0, 0.0))
 
 # As camera_calibration of ROS writes it.
 CAMERA_INFO = """\
@@ -81,7 +83,9 @@ def written(tmp_path: Path, text: str, name: str = "K.yaml") -> Path:
     return path
 
 
-@pytest.mark.parametrize("intrinsics", [PINHOLE, RADIAL, RATIONAL, replace(RADIAL, residual=0.12)])
+@pytest.mark.parametrize(
+    "intrinsics", [PINHOLE, RADIAL, RATIONAL, FISHEYE, replace(RADIAL, residual=0.12)]
+)
 def test_ours_reads_back(tmp_path: Path, intrinsics: Intrinsics) -> None:
     save_intrinsics(intrinsics, tmp_path / "K.yaml", "made by a test")
     assert load_intrinsics(tmp_path / "K.yaml") == intrinsics
@@ -94,7 +98,7 @@ def test_camera_info_of_ros(tmp_path: Path, text: str) -> None:
     assert found.camera == ("narrow_stereo" if text is CAMERA_INFO else "")
 
 
-@pytest.mark.parametrize("intrinsics", [PINHOLE, RADIAL, RATIONAL])
+@pytest.mark.parametrize("intrinsics", [PINHOLE, RADIAL, RATIONAL, FISHEYE, EQUIDISTANT])
 def test_what_ros_gets_is_complete_and_reads_back(tmp_path: Path, intrinsics: Intrinsics) -> None:
     path = tmp_path / "camera_info.yaml"
     save_camera_info(intrinsics, path)
@@ -104,7 +108,11 @@ def test_what_ros_gets_is_complete_and_reads_back(tmp_path: Path, intrinsics: In
     for matrix in [value for value in data.values() if isinstance(value, dict)]:
         assert len(matrix["data"]) == matrix["rows"] * matrix["cols"]
     assert data["distortion_model"] == (
-        "rational_polynomial" if len(intrinsics.distortion) == 8 else "plumb_bob"
+        "equidistant"
+        if intrinsics.model == "fisheye"
+        else "rational_polynomial"
+        if len(intrinsics.distortion) == 8
+        else "plumb_bob"
     )
     P = np.array(data["projection_matrix"]["data"]).reshape(3, 4)
     assert np.array_equal(P, np.column_stack([intrinsics.K, np.zeros(3)]))
@@ -130,17 +138,17 @@ def test_files_that_opencv_wrote(tmp_path: Path, suffix: str, padding: int) -> N
     assert load_intrinsics(path) == replace(RADIAL, camera="", residual=0.25)
 
 
-def test_a_fisheye_file_of_opencv_is_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize("intrinsics", [FISHEYE, EQUIDISTANT])
+def test_a_fisheye_file_of_opencv(tmp_path: Path, intrinsics: Intrinsics) -> None:
     path = tmp_path / "camera.yml"
     storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
     storage.write("image_width", 640)
     storage.write("image_height", 480)
     storage.write("fisheye_model", 1)
-    storage.write("camera_matrix", RADIAL.K)
-    storage.write("distortion_coefficients", np.zeros((4, 1)))
+    storage.write("camera_matrix", intrinsics.K)
+    storage.write("distortion_coefficients", np.array([intrinsics.distortion]).T)
     storage.release()
-    with pytest.raises(InvalidInputError, match="the fisheye model is not supported"):
-        load_intrinsics(path)
+    assert load_intrinsics(path) == replace(intrinsics, camera="")
 
 
 def test_a_camera_of_a_station() -> None:
@@ -153,7 +161,7 @@ def test_a_camera_of_a_station() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (CAMERA_INFO.replace("plumb_bob", "equidistant"), "'equidistant' (a fisheye lens) is not"),
+        (CAMERA_INFO.replace("plumb_bob", "equidistant"), "has 5 coefficients; 4 are"),
         (CAMERA_INFO.replace("plumb_bob", "fov"), "distortion_model 'fov' is not supported"),
         (CAMERA_INFO.replace("plumb_bob", "rational_polynomial"), "has 5 coefficients; 8 are"),
         (CAMERA_INFO.replace("image_width: 640", "image_width: wide"), "whole number of pixels"),

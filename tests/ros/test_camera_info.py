@@ -48,6 +48,18 @@ def test_no_distortion_whatever_the_model(
         assert intrinsics_of(message).is_pinhole
 
 
+def test_a_fisheye(intrinsics: Intrinsics, info_message: Callable[..., Any]) -> None:
+    """OpenCV's own projection is the oracle."""
+    coefficients = [0.03, -0.02, 0.006, -0.001]
+    message = info_message(intrinsics, distortion_model="equidistant", d=coefficients)
+    p_CQ = np.array([[1.2, -0.1, 0.3], [-0.3, 0.2, 0.9]])
+    K, k = np.array(message.k).reshape(3, 3), np.array(coefficients)
+    expected, _ = cv2.fisheye.projectPoints(p_CQ[:, None], np.zeros(3), np.zeros(3), K, k)
+    assert intrinsics_of(message).project(p_CQ) == pytest.approx(expected[:, 0], abs=1e-9)
+    straight = intrinsics_of(message, rectified=True)
+    assert straight.is_pinhole
+
+
 def test_rectified_images_have_the_projection_matrix(
     intrinsics: Intrinsics, info_message: Callable[..., Any]
 ) -> None:
@@ -80,10 +92,11 @@ def test_binning_and_region(intrinsics: Intrinsics, info_message: Callable[..., 
         ({"k": [0.0] * 9}, False, "K = 0, the camera is not calibrated"),
         ({"p": [0.0] * 12}, True, "P = 0, the camera is not calibrated"),
         (
-            {"distortion_model": "equidistant"},
+            {"distortion_model": "thin_prism_fisheye"},
             False,
-            "distortion model 'equidistant', plumb_bob and",
+            "distortion model 'thin_prism_fisheye'; plumb_bob, rational_polynomial and equidistant",
         ),
+        ({"distortion_model": "equidistant"}, False, "5 coefficients; a fisheye has 4"),
         ({"d": [np.nan, 0.2, 0.0, 0.0, 0.0]}, False, "not finite"),
         ({"k": [np.inf] * 9}, False, "not finite"),
         ({"d": [0.1, 0.2, 0.3]}, False, "3 coefficients"),

@@ -22,17 +22,27 @@ def print_intrinsics(intrinsics: Intrinsics) -> None:
     )
     across, down, diagonal = (math.degrees(angle) for angle in field_of_view(k))
     print(f"field of view    {across:.1f} x {down:.1f} degrees, diagonal {diagonal:.1f}")
+    if k.is_fisheye:
+        print("lens model       fisheye")
     if k.is_pinhole:
         print("distortion       none")
     else:
         print("distortion       " + ", ".join(f"{value:.5g}" for value in k.distortion))
         corners = np.array([(u, v) for v in (0, k.height - 1) for u in (0, k.width - 1)], float)
-        moved = np.linalg.norm(corners - k.undistort(corners), axis=1)
+        if k.is_fisheye:
+            figures = np.degrees(np.arccos(k.rays(corners)[:, 2]))
+            words = "corners look", "degrees off the axis"
+        else:
+            figures = np.linalg.norm(corners - k.undistort(corners), axis=1)
+            words = "moves corners by", "pixels"
         names = ("upper left", "upper right", "lower left", "lower right")
-        of_corners = (f"{name} {m:.1f}" for name, m in zip(names, moved, strict=True))
-        print(f"moves corners by {', '.join(of_corners)} pixels")
+        of_corners = (f"{name} {figure:.1f}" for name, figure in zip(names, figures, strict=True))
+        print(f"{words[0]:17}{', '.join(of_corners)} {words[1]}")
     if k.residual is not None:
         print(f"residual         {k.residual:.3f} pixels")
+    if k.known_to is not None:
+        but = f", but for the {', '.join(k.except_at)}" if k.except_at else " over the whole image"
+        print(f"known to         {k.known_to:.2f} pixels{but}")
 
 
 def field_of_view(intrinsics: Intrinsics) -> tuple[float, float, float]:
@@ -43,8 +53,9 @@ def field_of_view(intrinsics: Intrinsics) -> tuple[float, float, float]:
     w, h = k.width - 0.5, k.height - 0.5
     cx, cy = k.center
     ends = [((-0.5, cy), (w, cy)), ((cx, -0.5), (cx, h)), ((-0.5, -0.5), (w, h))]
-    straight = (k.undistort(np.array(ends, dtype=float)) - k.center) / k.focal
-    rays = np.concatenate([straight, np.ones((3, 2, 1))], axis=-1)
-    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
-    angles = np.arccos((rays[:, 0] * rays[:, 1]).sum(axis=-1)).tolist()
+    rays = k.rays(np.array(ends, dtype=float))
+    between = np.arccos(np.clip((rays[:, 0] * rays[:, 1]).sum(axis=-1), -1.0, 1.0))
+    # Of a fisheye it may be more than half a turn.
+    beyond = np.arccos(rays[..., 2]).sum(axis=1) > np.pi
+    angles = np.where(beyond, 2.0 * np.pi - between, between).tolist()
     return angles[0], angles[1], angles[2]

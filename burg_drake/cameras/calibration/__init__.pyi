@@ -2,14 +2,18 @@ from .estimation import (
     Calibration as Calibration,
     calibrate_views as calibrate_views,
 )
+from .image_parts import (
+    CELLS as CELLS,
+    PARTS as PARTS,
+    coverage as coverage,
+)
 from .lens_uncertainty import (
+    BOUND as BOUND,
     image_grid as image_grid,
     uncertainty as uncertainty,
 )
 from .quality import (
-    CELLS as CELLS,
     advice as advice,
-    coverage as coverage,
     is_useless as is_useless,
 )
 from .target import (

@@ -1,7 +1,7 @@
 """Intrinsics of a camera from images of a ChArUco target.
 
-`lens_fit` fits; here is which images and corners count, and which model of the lens they support.
-`quality` tells how far the result can be trusted.
+Here is which images and corners count. `lens_choice` fits models of the lens to them, `promise` and
+`quality` tell how far the result can be trusted.
 """
 
 from __future__ import annotations
@@ -9,11 +9,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from burg_drake.cameras.calibration.lens_fit import MODELS, NAMES, LensFit, fit_lens
-from burg_drake.cameras.calibration.lens_uncertainty import image_grid, uncertainty
+from burg_drake.cameras.calibration.lens_choice import AUTO, MODELS, choose_lens
+from burg_drake.cameras.calibration.lens_fit import LensFit, names_of
+from burg_drake.cameras.calibration.lens_uncertainty import LensHypothesis, covariance_of
+from burg_drake.cameras.calibration.promise import Promise, promise_of
 from burg_drake.cameras.calibration.target import (
     LEAST_CORNERS,
     CharucoTarget,
@@ -24,7 +27,6 @@ from burg_drake.cameras.optics import Intrinsics
 from burg_drake.cameras.sources import Image
 from burg_drake.core import Array, InvalidInputError, UnknownNameError, nearest
 
-AUTO = "auto"
 LEAST_VIEWS = 3
 """Fewer do not determine a camera."""
 BLURRED = 0.08
@@ -34,7 +36,7 @@ SAME = 0.005
 OUTLIER, TOLERATED = 3.0, 0.3
 """A view is left out when its residual is beyond that many times the median view's, and beyond
 that many pixels."""
-WRONG_CORNER, TOLERATED_CORNER = 5.0, 0.5
+WRONG_CORNER, TOLERATED_CORNER = 5.0, 0.15
 """Likewise a corner, against the median corner."""
 ROUNDS = 6
 
@@ -71,11 +73,13 @@ class Calibration:
     Attributes:
         intrinsics: with the residual of the calibration.
         target: that was seen.
-        model: of the lens: `pinhole`, `radial4` (k1, k2, p1, p2), `radial` (k3 also) or `rational`
-            (k4, k5, k6 also).
+        model: of the lens: `pinhole`, `radial4` (k1, k2, p1, p2), `radial` (k3 also), `rational`
+            (k4, k5, k6 also) or `fisheye`.
         views: that were used.
         rejected: names of the other images, and why each does not count.
-        covariance: (P, P) of fx, fy, cx, cy and the coefficients.
+        covariance: (P, P) of fx, fy, cx, cy and the coefficients, if the lens is of this model.
+        hypotheses: what the lens may be by these corners, see `uncertainty`.
+        bulge: how far the target is from flat, by its highest and lowest corner [m].
     """
 
     intrinsics: Intrinsics
@@ -84,6 +88,18 @@ class Calibration:
     views: tuple[CalibratedView, ...]
     rejected: tuple[tuple[str, str], ...]
     covariance: Array
+    hypotheses: tuple[LensHypothesis, ...]
+    bulge: float
+
+    @cached_property
+    def corners(self) -> Array:
+        """(N, 2) of all views [pixels]."""
+        return np.concatenate([used.view.corners for used in self.views])
+
+    @cached_property
+    def promise(self) -> Promise:
+        """To how many pixels the camera is known, and where it is not."""
+        return promise_of(self)
 
     @property
     def rms(self) -> float:
@@ -96,7 +112,7 @@ class Calibration:
         k = self.intrinsics
         values = (*k.focal, *k.center, *k.distortion)
         deviations = np.sqrt(np.diag(self.covariance)).tolist()
-        return dict(zip(NAMES, zip(values, deviations, strict=True), strict=False))
+        return dict(zip(names_of(k), zip(values, deviations, strict=True), strict=True))
 
 
 def rms_of(residuals: Array) -> float:
@@ -146,8 +162,9 @@ def calibrate_views(
     Args:
         views: of one camera.
         target: that they show.
-        model: of the lens: `pinhole`, `radial4`, `radial`, `rational`, or `auto`: the one of the
-            last three that the residuals support best.
+        model: of the lens: `pinhole`, `radial4`, `radial`, `rational`, `fisheye`, or `auto`: the
+            one of the last four that the residuals support best; a fisheye only if the lens is
+            wide.
         rejected: images that are no views, and why.
 
     Raises:
@@ -161,36 +178,32 @@ def calibrate_views(
     kept, refused = _usable(views)
     refused = [*rejected, *refused]
     _require_views(kept, refused)
-    fit = fit_lens(kept, target, "rational" if model == "rational" else "radial")
+    chosen = choose_lens(kept, target, model)
     for _ in range(ROUNDS):
-        cleaned, outliers = _without_outliers(kept, fit)
+        cleaned, outliers = _without_outliers(kept, chosen.supported)
         if cleaned == kept:
             break
         kept, refused = cleaned, refused + outliers
         _require_views(kept, refused)
-        fit = fit_lens(kept, target, fit.model, fit)
-    fit = _best(kept, target, fit) if model == AUTO else fit
-    if model not in (AUTO, fit.model):
-        fit = fit_lens(kept, target, model)
+        chosen = choose_lens(kept, target, model)
+    fit = chosen.fit
     found = zip(kept, fit.X_CT, fit.residuals, strict=True)
     used = tuple(CalibratedView(*of_view) for of_view in found)
     residual = rms_of(np.concatenate(fit.residuals))
-    intrinsics = replace(fit.intrinsics, residual=residual)
-    return Calibration(intrinsics, target, fit.model, used, tuple(refused), fit.covariance)
-
-
-def _best(views: list[CharucoView], target: CharucoTarget, radial: LensFit) -> LensFit:
-    """The lens model that the views support best.
-
-    The rational one can fit better and yet be wild where no corners were seen: it has to be known
-    better over the whole image, too.
-    """
-    best = min(fit_lens(views, target, "radial4"), radial, key=lambda fit: fit.information(True))
-    rational = fit_lens(views, target, "rational", radial)
-    rational = fit_lens(views, target, "rational", rational)  # OpenCV 4 ends before the minimum
-    worst = [float(uncertainty(fit, image_grid(fit.intrinsics)).max()) for fit in (best, rational)]
-    supported = rational.information(False) < best.information(False)
-    return rational if supported and worst[1] <= worst[0] else best
+    calibration = Calibration(
+        replace(fit.intrinsics, residual=residual),
+        target,
+        fit.model,
+        used,
+        tuple(refused),
+        chosen.dispersion * covariance_of(fit),
+        chosen.hypotheses,
+        fit.bulge,
+    )
+    promise = calibration.promise
+    known_to = round(promise.known_to, 3) if np.isfinite(promise.known_to) else None
+    promised = replace(calibration.intrinsics, known_to=known_to, except_at=promise.except_at)
+    return replace(calibration, intrinsics=promised)
 
 
 def _usable(

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from burg_drake.cameras.calibration.estimation import BLURRED, displacement
-from burg_drake.cameras.calibration.quality import coverage, uncovered
+from burg_drake.cameras.calibration.estimation import (
+    BLURRED,
+    calibrate_views,
+    displacement,
+)
+from burg_drake.cameras.calibration.guidance import wanted_views
 from burg_drake.cameras.calibration.target import CharucoTarget, CharucoView, find_target
 from burg_drake.cameras.sources import Frame
+from burg_drake.core import InvalidInputError
 
 STILL = 0.004
 """The target moved less between two frames, as a share of the image's diagonal: no motion blur,
@@ -15,6 +20,8 @@ and no skew by a shutter that reads line by line."""
 DIFFERENT = 0.025
 """Corners of two views that are both worth having lie that far apart on average, likewise: a target
 that fills half of the image moves its corners that far when it is tilted by 25 degrees."""
+FIRST_VIEWS = 5
+"""Views by which the camera is known well enough to ask for those that are missing."""
 
 
 @dataclass(eq=False)
@@ -24,10 +31,14 @@ class ViewCollector:
     Attributes:
         target: that the camera sees.
         views: that were taken.
+        wanted: what to tell the one who holds the target.
+        enough: the views that were taken make a good calibration.
     """
 
     target: CharucoTarget
     views: list[CharucoView] = field(default_factory=list)
+    wanted: str = "show the target"
+    enough: bool = False
     _before: CharucoView | None = None
 
     def offer(self, frame: Frame) -> tuple[bool, str]:
@@ -46,13 +57,20 @@ class ViewCollector:
         if view.blur > BLURRED * view.side:
             return False, "blurred: more light, or focus"
         if any(displacement(view, other) < DIFFERENT for other in self.views):
-            return False, self.missing_view(frame.image.shape[1], frame.image.shape[0])
+            return False, self.wanted
         self.views.append(view)
-        return True, self.missing_view(frame.image.shape[1], frame.image.shape[0])
+        self.wanted, self.enough = self._missing()
+        return True, self.wanted
 
-    def missing_view(self, width: int, height: int) -> str:
-        """What view is wanted next."""
-        empty = uncovered(coverage(self.views, (width, height)))
-        if empty:
-            return f"bring the target to the {empty[len(self.views) % len(empty)]}"
-        return "tilt the target " + ("left", "right", "forward", "back")[len(self.views) % 4]
+    def _missing(self) -> tuple[str, bool]:
+        """What view is wanted next, and whether there are enough."""
+        if len(self.views) < FIRST_VIEWS:
+            return "show the target from other sides, tilted by 20 to 45 degrees", False
+        try:
+            calibration = calibrate_views(self.views, self.target)
+        except InvalidInputError as error:
+            return str(error), False
+        wanted = wanted_views(calibration)
+        if wanted:
+            return wanted[0], False
+        return f"enough, the camera is {calibration.promise}", True

@@ -29,7 +29,8 @@ class FieldOfView:
 
     @cached_property
     def directions(self) -> Array:
-        """(H, W, 3) where the centre of each pixel looks, in the camera's frame, at z = 1."""
+        """(H, W, 3) where the centre of each pixel looks, in the camera's frame, at z = 1; at most
+        87 degrees off the axis of a fisheye."""
         width, height = self.intrinsics.width, self.intrinsics.height
         grid = np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).astype(float)
         flat = (self.intrinsics.undistort(grid) - self.intrinsics.center) / self.intrinsics.focal

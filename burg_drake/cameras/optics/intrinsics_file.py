@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics, of_camera
+from burg_drake.cameras.optics.fisheye import COEFFICIENTS
+from burg_drake.cameras.optics.intrinsics import Intrinsics, LensModel, of_camera
 from burg_drake.cameras.optics.opencv_file import is_opencv, read_opencv
 from burg_drake.cameras.optics.station_camera import SIMULATED, simulated_camera
 from burg_drake.core import DocumentError, InvalidInputError, quoted
@@ -17,8 +19,15 @@ from burg_drake.core.files import atomic_write, read_text
 ROS_MATRIX = ("camera_matrix", "K", "k")
 ROS_DISTORTION = ("distortion_coefficients", "D", "d")
 """Keys of a calibration file, and of a printed message of ROS 1 and ROS 2."""
-ROS_MODELS = {"plumb_bob": (4, 5), "rational_polynomial": (8,), "none": (0,), "": (0,)}
-"""Distortion models of ROS that OpenCV's projection covers, and how many coefficients they have."""
+ROS_FISHEYE = "equidistant"
+ROS_MODELS = {
+    "plumb_bob": (4, 5),
+    "rational_polynomial": (8,),
+    ROS_FISHEYE: (4,),
+    "none": (0,),
+    "": (0,),
+}
+"""Distortion models of ROS that our lens models cover, and how many coefficients they have."""
 
 
 def load_intrinsics(path: str | Path) -> Intrinsics:
@@ -91,6 +100,8 @@ def ros_distortion(intrinsics: Intrinsics) -> tuple[str, list[float]]:
         InvalidInputError: ROS has no name for this number of coefficients.
     """
     k = list(intrinsics.distortion)
+    if intrinsics.is_fisheye:
+        return ROS_FISHEYE, k
     if len(k) > 8:
         raise InvalidInputError(
             f"ROS has no distortion model of {len(k)} coefficients; calibrate with 8 (rational) or"
@@ -113,23 +124,31 @@ def _of_ros(data: Tree, name: str) -> Intrinsics:
     _refuse_part_of_image(data, name)
     coefficients = _numbers(data, ROS_DISTORTION, name)
     if model not in ROS_MODELS:
-        fisheye = " (a fisheye lens)" if model in ("equidistant", "fisheye") else ""
         raise InvalidInputError(
-            f"{name}: distortion_model {quoted(model)}{fisheye} is not supported, plumb_bob and"
-            " rational_polynomial are; `burg-drake camera calibrate` makes one of the latter"
+            f"{name}: distortion_model {quoted(model)} is not supported; plumb_bob,"
+            f" rational_polynomial and {ROS_FISHEYE} (fisheye) are, of which"
+            " `burg-drake camera calibrate` makes one"
         )
     if any(coefficients) and len(coefficients) not in ROS_MODELS[model]:
         raise DocumentError(
             f"{name}: distortion_model {model!r} has {len(coefficients)} coefficients;"
             f" {' or '.join(map(str, ROS_MODELS[model]))} are expected"
         )
+    fisheye = is_ros_fisheye(model, coefficients)
     return _intrinsics(
         name,
         camera=_text(data, "camera_name", name),
         size=_size(data, name),
         K=K,
-        coefficients=coefficients if any(coefficients) else [],
+        model="fisheye" if fisheye else "perspective",
+        coefficients=coefficients if any(coefficients) or fisheye else [],
     )
+
+
+def is_ros_fisheye(model: str, coefficients: Sequence[float]) -> bool:
+    """Whether a distortion model of ROS is a fisheye's. With four zeros it is one, whose angles are
+    even; messages without coefficients, or with five zeros, are of cameras without distortion."""
+    return model == ROS_FISHEYE and (len(coefficients) == COEFFICIENTS or any(coefficients))
 
 
 def _refuse_part_of_image(data: Tree, name: str) -> None:
@@ -203,8 +222,6 @@ def _of_opencv(data: Tree, name: str) -> Intrinsics:
         raise DocumentError(
             f"{name}: fisheye_model and avg_reprojection_error have to be numbers"
         ) from error
-    if is_fisheye:
-        raise InvalidInputError(f"{name}: the fisheye model is not supported; the rational one is")
     key = ROS_DISTORTION[0]
     coefficients = _numbers(data, (key,), name) if key in data else []
     if not any(coefficients[5:]):
@@ -214,7 +231,8 @@ def _of_opencv(data: Tree, name: str) -> Intrinsics:
         camera="",
         size=_size(data, name),
         K=K,
-        coefficients=coefficients if any(coefficients) else [],
+        model="fisheye" if is_fisheye else "perspective",
+        coefficients=coefficients if any(coefficients) or is_fisheye else [],
         residual=rms,
     )
 
@@ -225,6 +243,7 @@ def _intrinsics(
     camera: str,
     size: tuple[int, int],
     K: list[float],
+    model: LensModel,
     coefficients: list[float],
     residual: float | None = None,
 ) -> Intrinsics:
@@ -236,6 +255,7 @@ def _intrinsics(
             height=size[1],
             focal=(K[0], K[4]),
             center=(K[2], K[5]),
+            model=model,
             distortion=tuple(coefficients),
             residual=residual,
         )

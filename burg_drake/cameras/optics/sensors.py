@@ -105,6 +105,7 @@ def scaled(intrinsics: Intrinsics, width: int, height: int) -> Intrinsics:
         focal=(sx * fx, sy * fy),
         center=(sx * (cx + HALF_PIXEL) - HALF_PIXEL, sy * (cy + HALF_PIXEL) - HALF_PIXEL),
         residual=None if intrinsics.residual is None else sx * intrinsics.residual,
+        known_to=None if intrinsics.known_to is None else sx * intrinsics.known_to,
     )
 
 

@@ -25,7 +25,8 @@ class View:
             if None.
 
     Raises:
-        InvalidInputError: the depth range does not rise from above 0, or the pose is none.
+        InvalidInputError: the depth range does not rise from above 0, the pose is none, or the
+            camera is a fisheye, which sees what no image of Drake's cameras shows.
     """
 
     camera: str
@@ -36,6 +37,11 @@ class View:
 
     def __post_init__(self) -> None:
         check_pose(self.X_SC, "X_SC")
+        if self.intrinsics.is_fisheye:
+            raise InvalidInputError(
+                f"camera {self.camera} of a view is a fisheye, whose images cannot be rendered;"
+                " give a perspective model"
+            )
         near, far = self.depth_range
         if not 0.0 < near < far:
             raise InvalidInputError(

@@ -6,7 +6,14 @@ import math
 
 import numpy as np
 
-from burg_drake.cameras.calibration import CELLS, Calibration, coverage, image_grid, uncertainty
+from burg_drake.cameras.calibration import (
+    BOUND,
+    CELLS,
+    Calibration,
+    coverage,
+    image_grid,
+    uncertainty,
+)
 from burg_drake.core import Array
 from burg_drake.core.files import atomic_write
 from burg_drake.visualization.style import Html, element, html_document, join
@@ -14,6 +21,8 @@ from burg_drake.visualization.style import Html, element, html_document, join
 WIDTH = 460.0
 """Of a drawing of the image [CSS pixels]."""
 INK, RULE, ACCENT, SHADE = "#1f2630", "#c4cad4", "#b3261e", "#2f6db5"
+SHADED = 10.0
+"""Larger errors are not told apart [pixels]."""
 STYLE = f"""
 body {{ font: 15px/1.5 system-ui, sans-serif; color: {INK}; max-width: 62rem; margin: 2rem auto;
   padding: 0 1rem; }}
@@ -45,8 +54,10 @@ def write_report(calibration: Calibration, advice: list[str], path: str) -> None
         element(
             "p",
             f"{k.width} x {k.height} pixels; {len(calibration.views)} views; lens model"
-            f" {calibration.model}; residual {calibration.rms:.3f} pixels (root mean square)",
+            f" {calibration.model}; residual {calibration.rms:.3f} pixels (root mean square);"
+            f" the target bulges by {1e3 * calibration.bulge:.2f} mm",
         ),
+        element("p", f"In 19 of 20 cases {calibration.promise}."),
         *(element("p", line, class_="advice") for line in advice),
         element("h2", "Camera"),
         _parameters(calibration),
@@ -185,26 +196,33 @@ def _uncertainty(calibration: Calibration) -> tuple[Html, str]:
     k = calibration.intrinsics
     u = (np.arange(columns) + 0.5) * k.width / columns - 0.5
     v = (np.arange(rows) + 0.5) * k.height / rows - 0.5
-    of_cells = uncertainty(calibration, np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2))
-    worst = float(uncertainty(calibration, image_grid(k)).max())
-    shades = np.clip(of_cells / max(1.0, of_cells.max()), 0.0, 1.0).reshape(CELLS)
-    drawn = _cells(calibration, shades, [f"{value:.2f}" for value in of_cells.tolist()], ACCENT)
+    places = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
+    bounds = np.nan_to_num(BOUND * uncertainty(calibration, places), posinf=1e9, nan=1e9)
+    shades = np.clip(bounds / max(1.0, min(bounds.max(), SHADED)), 0.0, 1.0).reshape(CELLS)
+    words = [f"{value:.2f}" if value < SHADED else f">{SHADED:g}" for value in bounds.tolist()]
+    drawn = _cells(calibration, shades, words, ACCENT)
     return drawn, (
-        "How far the camera model may be off, estimated from the scatter of the residuals"
-        f" [pixels]; {worst:.2f} at worst, at the edge."
+        "How far the camera model may be off, in 19 of 20 cases [pixels]: by the scatter of the"
+        " residuals, by how far the views disagree, and by how far all lens models that fit the"
+        " corners differ. Where no corners were seen that is the most; bring the target there."
     )
 
 
 def _distortion(calibration: Calibration) -> tuple[Html, str]:
     k = calibration.intrinsics
     seen = image_grid(k, 17, 13)
-    moved = seen - k.undistort(seen)
+    moved, straight = seen - k.undistort(seen), "a straight image"
+    if k.is_fisheye:
+        rays = k.rays(seen)
+        angle = np.arccos(rays[:, 2:])
+        even = rays[:, :2] / np.maximum(np.sin(angle), 1e-9) * angle
+        moved, straight = seen - (even * k.focal + k.center), "an image of even angles"
     longest = float(np.linalg.norm(moved, axis=1).max())
     scale = _round(min(1.0, 0.08 * k.width / max(longest, 1e-6)))
     arrows = _arrows(calibration, seen - scale * moved, scale * moved, SHADE)
     return (
         _image(calibration, *arrows),
-        f"Where the lens moves points of a straight image to (dots: from), {scale:g} times as long;"
+        f"Where the lens moves points of {straight} to (dots: from), {scale:g} times as long;"
         f" {longest:.1f} pixels at most.",
     )
 
