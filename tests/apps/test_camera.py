@@ -65,7 +65,7 @@ def test_photos_of_the_target_give_the_intrinsics(
     out = capsys.readouterr().out
     found = load_intrinsics(tmp_path / "K.yaml")
     assert found.camera == "webcam" and (found.width, found.height) == (320, 240)
-    assert np.allclose(found.focal, TRUTH.focal, atol=0.5)
+    assert np.allclose(found.focal, TRUTH.focal, atol=1.0)
     assert np.allclose(found.center, TRUTH.center, atol=0.5)
     assert found.residual is not None and found.residual < 0.1
     assert "left out: photo90.png does not show the target" in out
