@@ -17,7 +17,8 @@ square of errors over standard deviations (1 if these are right) of displacement
 `measured` beyond 3 standard deviations and 1 mm or 1 degree, or another object than it says, of all
 `measured`; `>5 sd`, uncertain ones with numbers beyond 5 standard deviations, of all uncertain ones
 within range; `missing`, that are `not_seen`; `swapped`, whose reason names the other; `extra`,
-named within 30 mm; `too many`, named though there is none; CPU time of a photo, median [s].
+named within 50 mm of its middle; `too many`, named though there is none; CPU
+time of a photo, median [s].
 """
 
 from __future__ import annotations
@@ -40,8 +41,8 @@ from room.rows import BOARD
 import burg_drake as burg
 
 SEEN = 0.5
-NEAR = 0.03
-"""Of an extra object to where it is named [m]."""
+NEAR = 0.05
+"""Of an extra object's middle to where it is named: less than half of the largest's length [m]."""
 LEAST = (1e-3, np.deg2rad(1.0))
 """Errors below these do not mislead anybody [m, rad]; see the column `false`."""
 
@@ -90,8 +91,11 @@ def checked(photos: list[PlacedPhoto], camera: Camera, tally: Tally, arguments: 
             scene, photos[0].image, intrinsics, estimate=estimates[0]
         )
     else:
-        check = burg.cameras.check_placements(
-            scene, [photo.image for photo in photos], intrinsics, estimates=estimates
+        check = burg.cameras.combine_checks(
+            [
+                burg.cameras.check_placement(scene, photo.image, intrinsics, estimate=estimate)
+                for photo, estimate in zip(photos, estimates, strict=True)
+            ]
         )
     tally.seconds.append((time.process_time() - start) / len(photos))
     tally.photos += 1
