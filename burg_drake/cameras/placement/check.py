@@ -6,6 +6,7 @@ them, and are displaced in the plane of the board and turned about the vertical.
 from __future__ import annotations
 
 from datetime import datetime
+from functools import lru_cache
 from pathlib import Path
 
 import cv2
@@ -170,9 +171,14 @@ def _aligner(
     if depth is not None:
         return DepthAligner(view, straight.depth(depth))
     image = straight.color(color)
-    tints = height_map(scene, TINTS).image
-    picture = empty_board(scene.board, image, intrinsics.K, estimate.X_SC, scale, tints)
+    picture = empty_board(scene.board, image, intrinsics.K, estimate.X_SC, scale, _tints(scene))
     return NO_CONTRAST if picture is None else SilhouetteAligner(view, image, picture)
+
+
+@lru_cache(maxsize=4)
+def _tints(scene: Scene) -> NDArray[np.uint8]:
+    """(R, C, 3) the height map that may be printed on the sheet."""
+    return height_map(scene, TINTS).image
 
 
 def _blind(straight: Undistortion, size: tuple[int, int]) -> NDArray[np.bool_]:

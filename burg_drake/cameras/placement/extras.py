@@ -57,16 +57,24 @@ def _described(view: PinholeView, mask: NDArray[np.bool_]) -> tuple[float, Extra
     """
     row, column = np.nonzero(mask)
     p_S = _on_the_board(view, np.stack([column, row], axis=-1).astype(float))
-    away = p_S.mean(axis=0) - view.X_SC[:2, 3]
-    away /= max(float(np.linalg.norm(away)), 1e-9)
+    area = float(_pixel_area(view, p_S).sum())
+    arm = p_S - view.X_SC[:2, 3]
+    away = arm.mean(axis=0) / max(float(np.linalg.norm(arm.mean(axis=0))), 1e-9)
     across = np.array([-away[1], away[0]])
-    deep, side = p_S @ away, p_S @ across
+    deep, side = arm @ away, arm @ across
     near = float(np.quantile(deep, 0.02))
-    left, right = np.quantile(side[deep < near + THICK], [0.02, 0.98]).tolist()
-    width = max(right - left, THICK)
-    middle = (near + width / 2) * away + (left + right) / 2 * across
-    x, y = np.round(middle, 4).tolist()
-    return float(_pixel_area(view, p_S).sum()), ExtraObject(position=(x, y), width=round(width, 4))
+    if near < THICK:  # the camera looks straight down on it
+        return area, _extra(p_S.mean(axis=0), 2.0 * float(np.sqrt(area / np.pi)))
+    # seen from above the camera's foot, the hidden board widens like a shadow
+    left, right = np.quantile(side / np.maximum(deep, 1e-3), [0.02, 0.98]).tolist()
+    width = max((right - left) * near, THICK)
+    middle = view.X_SC[:2, 3] + (near + width / 2) * (away + (left + right) / 2 * across)
+    return area, _extra(middle, width)
+
+
+def _extra(position: Array, width: float) -> ExtraObject:
+    x, y = np.round(position, 4).tolist()
+    return ExtraObject(position=(x, y), width=round(width, 4))
 
 
 def _on_the_board(view: PinholeView, pixels: Array) -> Array:

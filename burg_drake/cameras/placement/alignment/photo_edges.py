@@ -184,9 +184,11 @@ def near_edges(on: NormalProfiles, picture: EmptyBoard) -> PhotoEdges:
     behind, left_outside = _behind(on, outer)
     used = (core | (t > -1.0)) & (t > start - BESIDE) & (t < clear + OUTSIDE)
     paper = picture.contrast
-    fit = fit_steps(
-        StepLines(t, on.light, behind, color, on.tone, strip, used), blur, picture.noise, paper
+    seen = used.any(axis=0)
+    lines = StepLines(
+        t[seen], on.light[:, seen], behind[:, seen], color, on.tone, strip, used[:, seen]
     )
+    fit = fit_steps(lines, blur, picture.noise, paper)
     variance = fit.variance + (FLOOR * paper / np.maximum(fit.contrast, 1e-4)) ** 2
     known: NDArray[np.bool_] = np.asarray(np.all(on.known[:, t >= 0.0], axis=1))
     board_inside = known & (_mean(on.evidence[..., None], inner)[:, 0] < BOARD_INSIDE)

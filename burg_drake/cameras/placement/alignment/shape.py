@@ -4,7 +4,7 @@ a turn about the vertical can be seen at all."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -112,8 +112,9 @@ class TargetShape:
         return self.displacement(q) @ self.X_SO
 
 
+@lru_cache(maxsize=4)
 def target_shapes(scene: Scene) -> dict[str, TargetShape]:
-    """The shapes of all instances of a scene, free ones first.
+    """The shapes of all instances of a scene, free ones first; kept for the scene's next photo.
 
     Raises:
         UnknownNameError: a mesh file is missing.

@@ -26,6 +26,8 @@ from burg_drake.core import Array
 FAR = (1 / 45, 1 / 45, 1 / 80, 1 / 110)
 """How far `far_edges` looks, round by round, as a share of the image's width."""
 NEAR_ROUNDS = 6
+FEW_ROUNDS = 3
+"""The same of an angle that is only compared."""
 SETTLED = 0.04
 """Steps that move no point of the outline farther than this end the rounds [pixels]."""
 AGREES = 1.5
@@ -43,7 +45,7 @@ edges, ink spreads, the mesh is coarse [pixels]."""
 GROUNDED, CLEAR_HEIGHT = 0.6, 4e-3
 """Standard deviation of how much too large an outline may look where it meets the board, as a thin
 shadow hides where that is [pixels], and height above the board at which that is over [m]."""
-SHIFTED, TWISTED, SQUEEZED = 0.4, 0.2, 0.3
+SHIFTED, TWISTED, SQUEEZED = 0.4, 0.35, 0.6
 """Standard deviation of a shift of the whole outline that nothing explains, of one of its two ends
 against each other, and of its sides against its ends, as shares of the residual, which is `FINE` at
 least."""
@@ -135,7 +137,7 @@ class SilhouetteAligner:
     ) -> Alignment | None:
         """The alignment, from a displacement that is a few pixels off."""
         start, result = q, None
-        for _ in range(NEAR_ROUNDS):
+        for _ in range(NEAR_ROUNDS if turn else FEW_ROUNDS):
             contour = outline(self.view, shape, q, others)
             if len(contour) < MIN_EDGES:
                 return None
