@@ -29,6 +29,15 @@ SHADE, STRIP = (0.15, 0.03), (0.8, 0.15)
 tone, as a share of paper's light: against a little farther in, and of a strip."""
 
 
+COARSE = 0.5
+"""Weight of differences of tone over that of brightness: cameras and JPEG blur tones more, and a
+bright side then seems to end too early."""
+TONES = (np.diag([1.0, COARSE, COARSE]) @ np.linalg.qr(np.ones((3, 1)), "complete")[0].T).astype(
+    np.float32
+)
+"""(3, 3) brightness and two tones of red, green and blue, weighted."""
+
+
 @dataclass(frozen=True, eq=False)
 class StepLines:
     """Lines across steps.
@@ -116,8 +125,8 @@ def fit_steps(lines: StepLines, blur: float, noise: float, paper: float) -> Step
         for channel in range(3):
             J[..., channel, edge.start + channel] = (covered - deep)[..., 0]
             J[..., channel, inner.start + channel] = deep[..., 0]
-        J = (J * weight[..., None]).reshape(len(x), -1, n)
-        e = (left * weight).reshape(len(x), -1).astype(np.float32)
+        J = (TONES @ J * weight[..., None]).reshape(len(x), -1, n)
+        e = (left @ TONES.T * weight).reshape(len(x), -1).astype(np.float32)
         # what is rough on a line says less
         rough = np.maximum((e**2).sum(axis=1) / count, 1.0)[:, None, None]
         normal = J.transpose(0, 2, 1) @ J / rough + prior
