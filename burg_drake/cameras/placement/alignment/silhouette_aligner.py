@@ -25,9 +25,9 @@ from burg_drake.core import Array
 
 FAR = (1 / 45, 1 / 45, 1 / 80, 1 / 110)
 """How far `far_edges` looks, round by round, as a share of the image's width."""
-NEAR_ROUNDS = 6
-FEW_ROUNDS = 3
-"""The same of an angle that is only compared."""
+NEAR_ROUNDS, FEW_ROUNDS = 6, 3
+"""How often edges are measured anew, from where they are to a part of a pixel; and for a place that
+is only compared, or aligned once more when its neighbours are."""
 SETTLED = 0.04
 """Steps that move no point of the outline farther than this end the rounds [pixels]."""
 AGREES = 1.5
@@ -97,7 +97,10 @@ class SilhouetteAligner:
             None if the photo does not determine where it is.
         """
         near = self._coarse_fit(shape, q, others) if far else q
-        return None if near is None else self._fine_fit(shape, near, others, turn)
+        if near is None:
+            return None
+        rounds = FEW_ROUNDS if far or not turn else NEAR_ROUNDS
+        return self._fine_fit(shape, near, others, turn, rounds)
 
     def likeness(self, shape: TargetShape, q: Array, others: Array) -> float:
         """How alike the tones of a displaced object and of its mesh are; see `appearance`."""
@@ -133,11 +136,11 @@ class SilhouetteAligner:
         return q
 
     def _fine_fit(
-        self, shape: TargetShape, q: Array, others: Array, turn: bool
+        self, shape: TargetShape, q: Array, others: Array, turn: bool, rounds: int
     ) -> Alignment | None:
         """The alignment, from a displacement that is a few pixels off."""
         start, result = q, None
-        for _ in range(NEAR_ROUNDS if turn else FEW_ROUNDS):
+        for _ in range(rounds):
             contour = outline(self.view, shape, q, others)
             if len(contour) < MIN_EDGES:
                 return None
