@@ -66,7 +66,7 @@ def placed_photo(light: str, camera: Camera, seed: tuple[int, ...], view: int = 
     """
     kind = KINDS[seed[-1] % len(KINDS)]
     rng = np.random.default_rng(seed)
-    things, odd, extra = _standing(kind, rng)
+    things, odd, extra = standing(kind, rng)
     lit = _light(LIGHTS[light], rng)
     ground = table(rng)
     rng = np.random.default_rng([*seed, view, *camera.size])
@@ -129,11 +129,19 @@ def kept(path: Path, light: str, camera: Camera, seed: tuple[int, ...], view: in
         )
 
 
-def _standing(
+def standing(
     kind: str, rng: np.random.Generator
 ) -> tuple[dict[str, Thing], tuple[str, ...], Array | None]:
-    """The objects of a photo by name; those that are not as they should be; and where one too many
-    stands."""
+    """The objects of a photo.
+
+    Args:
+        kind: of `KINDS`.
+        rng: of where they stand.
+
+    Returns:
+        Those of the scene by name, and `extra`; names of those that are missing or swapped; and
+        (2,) the middle of one too many [m].
+    """
     while True:
         things = {
             name: replace(_displaced(thing, rng), contrast=rng.uniform(0.0, 0.4))
