@@ -51,10 +51,12 @@ from .overlay.renderer import (
 )
 from .overlay.style import OverlayStyle as OverlayStyle
 from .placement.check import check_placement as check_placement
+from .placement.combination import combine_checks as combine_checks
 from .placement.document import (
     CameraPlace as CameraPlace,
     CheckedImage as CheckedImage,
     CheckedScene as CheckedScene,
+    ExtraObject as ExtraObject,
     Placement as Placement,
     PlacementCheck as PlacementCheck,
     load_placement as load_placement,

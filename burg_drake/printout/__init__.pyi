@@ -22,6 +22,7 @@ from .relief import (
     HeightMap as HeightMap,
     height_map as height_map,
 )
+from .sheet import frame_width as frame_width
 from .tiling import (
     Tile as Tile,
     Tiling as Tiling,

@@ -121,7 +121,7 @@ def place_names(sheet: Sheet, tiling: Tiling) -> tuple[Sheet, list[str]]:
     inner = np.array([[0.0, 0.0], sheet.size]) + 2 * NAME_CLEAR * np.array([[1.0], [-1.0]])
     space.take_beyond(np.maximum(on_paper[0], inner[0]), np.minimum(on_paper[1], inner[1]))
     space.take((0.0, 0.0), (ORIGIN, ORIGIN))
-    clear = max(NAME_CLEAR, _frame(sheet.layout))
+    clear = max(NAME_CLEAR, frame_width(sheet.layout))
     for corners in sheet.layout.p_SQ[:, :, :2]:
         space.take(corners.min(axis=0), corners.max(axis=0), clear)
     for x in tiling.x_cuts:
@@ -219,7 +219,7 @@ def _draw_markers(pen: Pen, layout: MarkerLayout) -> None:
     White lines lead from the corners of a frame outwards: a tint all around it would else have a
     square edge, which a detector can take for that of the marker.
     """
-    gap, frame = _gap(layout), _frame(layout)
+    gap, frame = _gap(layout), frame_width(layout)
     frames = []
     for corners in layout.p_SQ[:, :, :2]:
         lower, upper = corners.min(axis=0), corners.max(axis=0)
@@ -263,8 +263,8 @@ def _black_cells(layout: MarkerLayout) -> list[Array]:
     ]
 
 
-def _frame(layout: MarkerLayout) -> float:
-    """Width of the white frames [m]."""
+def frame_width(layout: MarkerLayout) -> float:
+    """Width of the white frames around the markers, which tints keep clear of [m]."""
     return min(FRAME, FRAME_SHARE * _gap(layout))
 
 

@@ -13,6 +13,7 @@ from room.exposure import Surface, no_gloss, table
 from room.lens import SMALL
 from room.light import AROUND, Light, irradiance, map_of
 from room.objects import Objects, Thing, arranged, light_left, photographed
+from room.placed import KINDS, standing
 from room.sheet import flat, texture_of
 from room.views import look_at
 
@@ -129,3 +130,32 @@ def test_built_in_objects_stand_on_the_board() -> None:
     for thing in things.values():
         z = (thing.mesh.vertices @ thing.X_SO[:3, :3].T + thing.X_SO[:3, 3])[:, 2]
         assert abs(z.min()) < 1e-3
+
+
+def middle(thing: Thing) -> np.ndarray:
+    p = np.asarray(thing.mesh.vertices) @ thing.X_SO[:3, :3].T + thing.X_SO[:3, 3]
+    return (p.min(axis=0) + p.max(axis=0))[:2] / 2
+
+
+@pytest.mark.parametrize("kind", sorted(set(KINDS)))
+def test_displaced_objects_are_near_their_places_but_for_the_odd_ones(kind: str) -> None:
+    places = arranged("tabletop_six")
+    things, odd, extra = standing(kind, np.random.default_rng(3))
+    off = {
+        name: float(np.linalg.norm(middle(thing) - middle(places[name])))
+        for name, thing in things.items()
+        if name in places
+    }
+    assert all(distance < 0.035 for name, distance in off.items() if name not in odd)
+    assert max(off.values()) > 0.0
+    assert len(odd) == {"missing": 1, "swapped": 2}.get(kind, 0)
+    if kind == "missing":
+        assert not set(odd) & set(things)
+    if kind == "swapped":
+        a, b = odd
+        assert np.linalg.norm(middle(things[a]) - middle(places[b])) < 0.035
+        assert np.linalg.norm(middle(things[b]) - middle(places[a])) < 0.035
+    assert (extra is None) == (kind != "extra")
+    for thing in things.values():
+        p = np.asarray(thing.mesh.vertices) @ thing.X_SO[:3, :3].T + thing.X_SO[:3, 3]
+        assert abs(p[:, 2].min()) < 1e-3

@@ -1,8 +1,8 @@
 """Photos of a scene whose objects stand off their targets, by Drake's renderer: truth for tests of
 the placement check, and of one's own.
 
-Colours are rendered finer than asked for and averaged, so that a pixel has those of all that it
-covers, as in a camera. Depth is that of the pixel's middle.
+Colours are rendered finer than asked for and averaged as light, so that a pixel has those of all
+that it covers, as in a camera. Depth is that of the pixel's middle.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ class ScenePhotographer:
         label[label >= SURROUNDINGS] = -1
         size = (intrinsics.width, intrinsics.height)
         return Photo(
-            cv2.resize(color, size, interpolation=cv2.INTER_AREA),
+            _averaged(color, size),
             np.where(np.isfinite(depth[..., 0]), depth[..., 0], np.float32(0.0)),
             label,
         )
@@ -148,6 +148,15 @@ class ScenePhotographer:
         look.AddProperty("phong", "diffuse", Rgba(*color))
         geometry.set_perception_properties(look)
         self._graph.RegisterAnchoredGeometry(self._source, geometry)
+
+
+def _averaged(levels: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
+    """A finer image's mean light in each pixel; levels are sRGB (IEC 61966-2-1)."""
+    share = levels / 255.0
+    light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    light = cv2.resize(light, size, interpolation=cv2.INTER_AREA)
+    share = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    return np.round(255.0 * share).astype(np.uint8)
 
 
 def _look(label: int) -> PerceptionProperties:

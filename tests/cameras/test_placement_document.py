@@ -13,6 +13,7 @@ from burg_drake.cameras.placement.document import (
     CameraPlace,
     CheckedImage,
     CheckedScene,
+    ExtraObject,
     Placement,
     PlacementCheck,
     image_of_file,
@@ -29,6 +30,7 @@ CHECK = PlacementCheck(
     taken="2026-01-02T03:04:05+00:00",
     method="depth",
     image=CheckedImage(file="photo.png", content="123"),
+    more_images=(CheckedImage(file="other.png", content="124"),),
     depth=CheckedImage(file="depth.png", content="456"),
     intrinsics=Intrinsics(width=640, height=480, focal=(600.0, 601.0), center=(320.0, 240.0)),
     camera=CameraPlace(
@@ -55,6 +57,7 @@ CHECK = PlacementCheck(
             object="can", status="not_seen", reason="it is out of view", target=Pose()
         ),
     },
+    extra=(ExtraObject(position=(0.3, 0.2), width=0.05),),
     versions={"burg_drake": "0.1"},
 )
 

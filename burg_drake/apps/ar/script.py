@@ -6,6 +6,7 @@ import sys
 from typing import Any
 
 from burg_drake.apps.ar.session_status import placement_row
+from burg_drake.apps.camera import extra_line
 from burg_drake.cameras.live import LiveSession, ViewActions, pose_line
 from burg_drake.cameras.overlay import OverlayStyle
 from burg_drake.cameras.placement import PlacementCheck
@@ -59,7 +60,7 @@ def placement_lines(check: PlacementCheck, style: OverlayStyle) -> list[str]:
     return [
         f"  {name:{width}}  {_words(placement_row(placed, style))}"
         for name, placed in check.instances.items()
-    ]
+    ] + [f"  {extra_line(extra)}" for extra in check.extra]
 
 
 def _words(row: dict[str, Any]) -> str:

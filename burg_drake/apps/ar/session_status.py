@@ -86,6 +86,10 @@ def _placement(check: PlacementCheck, style: OverlayStyle) -> dict[str, Any]:
         "method": check.method,
         "taken": check.taken,
         "objects": {name: placement_row(placed, style) for name, placed in check.instances.items()},
+        "extra": [
+            {"xy_mm": [round(1e3 * c, 1) for c in e.position], "wide_mm": round(1e3 * e.width, 1)}
+            for e in check.extra
+        ],
     }
 
 

@@ -20,8 +20,10 @@ from burg_drake.apps.options import (
 from burg_drake.core.terminal import TextTable, format_number
 
 if TYPE_CHECKING:
-    from burg_drake.cameras.placement import Placement, PlacementCheck
+    from burg_drake.cameras.optics import Intrinsics
+    from burg_drake.cameras.placement import ExtraObject, Placement, PlacementCheck
     from burg_drake.cameras.pose import BoardEstimate
+    from burg_drake.scene.document import Scene
 
 FEW_MARKERS = 4
 """With fewer in sight, the camera's place is doubtful."""
@@ -36,17 +38,23 @@ def add_to(group: Any) -> None:
         "measure on a photo of the finished scene how far each object stands from its target",
         "burg-drake camera placement tabletop_six photo.png --intrinsics K.yaml",
         "burg-drake camera placement scene.yaml photo.png --intrinsics K.yaml -o placement.yaml",
+        "burg-drake camera placement scene.yaml left.png right.png --intrinsics K.yaml",
         "burg-drake camera placement scene.yaml photo.png --intrinsics K.yaml --depth depth.png",
         "",
-        "Exit code 1 if an object is not seen, or its measurement is doubtful; 2 if there is no",
-        "board in the photo, and then nothing is written.",
+        "Exit code 1 if an object is not seen, a measurement is doubtful, or something else stands",
+        "there; 2 if there is no board in a photo, and then nothing is written.",
         options=_add_options,
     )
 
 
 def _add_options(parser: Parser) -> None:
     add_scene(parser)
-    parser.add_argument("photo", metavar="PHOTO", help="image of the scene on its board")
+    parser.add_argument(
+        "photo",
+        metavar="PHOTO",
+        nargs="+",
+        help="image of the scene on its board; several are measured as one",
+    )
     add_intrinsics(parser, required=True)
     add_measured_board(parser)
     parser.add_argument(
@@ -64,9 +72,8 @@ def _add_options(parser: Parser) -> None:
 def run_placement(arguments: argparse.Namespace) -> int:
     """Measures, prints a line an object, and writes what is asked for."""
     from burg_drake.cameras.optics import load_intrinsics
-    from burg_drake.cameras.placement import check_placement, image_of_file, save_placement
-    from burg_drake.cameras.pose import BoardPose
-    from burg_drake.cameras.sources import read_depth, read_image, require_image_format
+    from burg_drake.cameras.placement import combine_checks, save_placement
+    from burg_drake.cameras.sources import read_image, require_image_format
     from burg_drake.core import InvalidInputError
     from burg_drake.core.files import require_writable
     from burg_drake.scene.document import load_scene
@@ -75,14 +82,40 @@ def run_placement(arguments: argparse.Namespace) -> int:
         require_writable(path)
     if arguments.overlay:
         require_image_format(arguments.overlay)
+    if arguments.depth and len(arguments.photo) > 1:
+        raise InvalidInputError("--depth belongs to one photo; give one alone")
     scene, intrinsics = load_scene(arguments.scene), load_intrinsics(arguments.intrinsics)
-    photo = read_image(arguments.photo)
-    intrinsics.require_size(photo.shape[1], photo.shape[0], arguments.photo)
+    scene.require_markers()
+    checks = [_checked(path, scene, intrinsics, arguments) for path in arguments.photo]
+    check = combine_checks(checks) if len(checks) > 1 else checks[0]
+    placement_table(check.instances).show()
+    for extra in check.extra:
+        print(extra_line(extra))
+    if arguments.output:
+        save_placement(check, arguments.output)
+        print(f"wrote {arguments.output}")
+    if arguments.overlay:
+        _write_overlay(arguments.overlay, check, scene, read_image(arguments.photo[0]))
+        print(f"wrote {arguments.overlay}")
+    whole = all(p.status == "measured" for p in check.instances.values())
+    return 0 if whole and not check.extra else 1
+
+
+def _checked(
+    path: str, scene: Scene, intrinsics: Intrinsics, arguments: argparse.Namespace
+) -> PlacementCheck:
+    """The check of one photo."""
+    from burg_drake.cameras.placement import check_placement, image_of_file
+    from burg_drake.cameras.pose import BoardPose
+    from burg_drake.cameras.sources import read_depth, read_image
+    from burg_drake.core import InvalidInputError
+
+    photo = read_image(path)
+    intrinsics.require_size(photo.shape[1], photo.shape[0], path)
     depth = None
     if arguments.depth:
         depth = read_depth(arguments.depth, arguments.depth_unit)
         intrinsics.require_size(depth.shape[1], depth.shape[0], arguments.depth)
-    scene.require_markers()
     scale = print_scale(arguments)
     estimate = BoardPose(scene.board, intrinsics, scale).estimate(photo, depth=depth)
     check = check_placement(
@@ -92,21 +125,14 @@ def run_placement(arguments: argparse.Namespace) -> int:
         depth=depth,
         estimate=estimate,
         scale=scale,
-        image_source=image_of_file(arguments.photo),
+        image_source=image_of_file(path),
         depth_source=image_of_file(arguments.depth) if arguments.depth else None,
     )
     if check.reason:
-        raise InvalidInputError(f"{arguments.photo}: {check.reason}")
+        raise InvalidInputError(f"{path}: {check.reason}")
     for warning in _doubts(estimate, len(scene.board.layout.ids)):
-        print(f"burg-drake: warning: {arguments.photo}: {warning}", file=sys.stderr)
-    placement_table(check.instances).show()
-    if arguments.output:
-        save_placement(check, arguments.output)
-        print(f"wrote {arguments.output}")
-    if arguments.overlay:
-        _write_overlay(arguments.overlay, check, scene, photo)
-        print(f"wrote {arguments.overlay}")
-    return 0 if all(p.status == "measured" for p in check.instances.values()) else 1
+        print(f"burg-drake: warning: {path}: {warning}", file=sys.stderr)
+    return check
 
 
 def _doubts(estimate: BoardEstimate, markers: int) -> list[str]:
@@ -126,6 +152,15 @@ def placement_table(placements: Mapping[str, Placement]) -> TextTable:
     for name, placement in placements.items():
         table.row(name, *_cells(placement))
     return table
+
+
+def extra_line(extra: ExtraObject) -> str:
+    """What to do about something that is no object of the scene."""
+    x, y = (1e3 * c for c in extra.position)
+    return (
+        f"something stands at x {x:.0f} mm, y {y:.0f} mm, {1e3 * extra.width:.0f} mm wide, that is"
+        " no object of the scene"
+    )
 
 
 def _cells(placement: Placement) -> list[str]:

@@ -227,6 +227,12 @@ def placement_summary(check: PlacementCheck) -> str:
     words = [f"{counts['measured']} of {len(check.instances)} objects measured"]
     words += [f"{counts['uncertain']} uncertain"] if counts["uncertain"] else []
     words += [f"{counts['not_seen']} not seen"] if counts["not_seen"] else []
+    if check.extra:
+        words += (
+            ["1 thing stands there that is none"]
+            if len(check.extra) == 1
+            else [f"{len(check.extra)} things stand there that are none"]
+        )
     return ", ".join(words) + (f"; {check.reason}" if check.reason else "")
 
 

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from burg_drake.cameras.overlay.style import OverlayStyle
-from burg_drake.cameras.placement import Placement
+from burg_drake.cameras.placement import ExtraObject, Placement
 from burg_drake.core import Array
 
 PlacementVerdict = Literal["placed", "off", "uncertain", "not_seen"]
@@ -75,6 +75,17 @@ def mark(placement: Placement, style: OverlayStyle, height: float) -> Mark:
     if turned:
         lines.append(_turn(target, turn))
     return Mark(verdict, _text(placement, uncertain), np.concatenate(lines))
+
+
+def ring(extra: ExtraObject) -> Array:
+    """(N, 2, 3) lines on the board around something that is no object of the scene, in S [m]."""
+    around = np.linspace(0.0, 2.0 * np.pi, 2 * PARTS + 1)
+    radius = max(0.6 * extra.width, HEAD)
+    x, y = extra.position
+    points = np.column_stack(
+        [x + radius * np.cos(around), y + radius * np.sin(around), np.zeros_like(around)]
+    )
+    return np.stack([points[:-1], points[1:]], axis=1)
 
 
 def _text(placement: Placement, uncertain: bool) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.cameras.optics import FieldOfView, Intrinsics
-from burg_drake.cameras.overlay.corrections import COLORS, Mark, mark
+from burg_drake.cameras.overlay.corrections import COLORS, Mark, PlacementVerdict, mark, ring
 from burg_drake.cameras.overlay.painting import Ink, fill, stroke
 from burg_drake.cameras.overlay.style import OverlayStyle
 from burg_drake.cameras.overlay.tag_layout import lay_out
@@ -128,6 +128,8 @@ class Overlay:
         colors = np.array([self._colors[name] for name in shape.names], dtype=float)
         fill(drawn, surface, colors, style.opacity)
         inks = [_outlines(state, _bright(colors), style.outline_width), *self._arrows(state)]
+        if placement is not None and style.errors:
+            inks += [self._lines(ring(extra), "off", state.X_CS) for extra in placement.extra]
         if style.footprints:
             inks.append(self._footprints(state, standing, standing_owner, _bright(colors)))
         stroke(drawn, inks)
@@ -174,12 +176,13 @@ class Overlay:
         )
 
     def _arrows(self, state: _DrawState) -> list[Ink]:
-        inks = []
-        for note in state.marks.values():
-            ends, _ = clip_lines(transform_points(state.X_CS, note.lines), self._view)
-            colors = np.tile(np.array(COLORS[note.verdict], dtype=float), (len(ends), 1))
-            inks.append(_ink(self.intrinsics.project(ends), colors, ARROW_WIDTH, 1.0, RIM))
-        return inks
+        return [self._lines(note.lines, note.verdict, state.X_CS) for note in state.marks.values()]
+
+    def _lines(self, lines: Array, verdict: PlacementVerdict, X_CS: Array) -> Ink:
+        """Lines (N, 2, 3) in S, in the color of what they say."""
+        ends, _ = clip_lines(transform_points(X_CS, lines), self._view)
+        colors = np.tile(np.array(COLORS[verdict], dtype=float), (len(ends), 1))
+        return _ink(self.intrinsics.project(ends), colors, ARROW_WIDTH, 1.0, RIM)
 
     def _write(self, drawn: Bytes, state: _DrawState, names: bool) -> None:
         """Names of what can be seen, and how it stands."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import cast
 
 import numpy as np
@@ -26,6 +27,9 @@ SUPPORT = 0.45
 """Mean evidence in the silhouette from which on it is filled."""
 SPILL = 0.35
 """Share around the silhouette that may be something else: a shadow, a hand, a cable."""
+COLORFUL, UNLIKE = 0.6, 0.4
+"""Likeness that objects have in the middle where their meshes' colors are the real ones, and the
+share of it below which one of them is doubtful."""
 VAGUE = np.deg2rad(3.0)
 """Standard deviation of the angle above which an angle is not worth much [rad]."""
 LOOSE = 0.003
@@ -39,6 +43,7 @@ def placement_of(
     found: Located,
     camera: Array,
     rough: float,
+    typical: float,
 ) -> Placement:
     """The entry of an object.
 
@@ -49,6 +54,7 @@ def placement_of(
         found: what was found.
         camera: (6, 6) covariance of the camera's pose, NaN if unknown.
         rough: residual of the alignment from which on it is another object's.
+        typical: likeness of the scene's objects in the photo, see `typical_likeness`.
     """
     missing = _missing(found)
     if missing or found.alignment is None:
@@ -56,7 +62,7 @@ def placement_of(
     alignment = found.alignment
     q, spread = alignment.q, alignment.spread(camera)
     deviation = np.sqrt(np.maximum(np.diag(spread), 0.0))
-    reason = _doubt(shape, found, deviation, rough)
+    reason = _doubt(shape, found, deviation, rough, typical)
     status: PlacementStatus = "uncertain" if reason else "measured"
     residual = alignment.residual
     angle = float((q[2] + np.pi) % (2.0 * np.pi) - np.pi)
@@ -74,6 +80,12 @@ def placement_of(
         seen=round(found.seen, 4),
         residual=float(residual) if np.isfinite(residual) else None,
     )
+
+
+def typical_likeness(located: Iterable[Located]) -> float:
+    """Median likeness of the objects that were found; 0 of fewer than three."""
+    likeness = [f.likeness for f in located if f.alignment is not None and f.seen > WELL]
+    return float(np.median(likeness)) if len(likeness) > 2 else 0.0
 
 
 def unseen(scene: Scene, name: str, reason: str, seen: float = 0.0) -> Placement:
@@ -99,7 +111,9 @@ def _missing(found: Located) -> str:
     return ""
 
 
-def _doubt(shape: TargetShape, found: Located, deviation: Array, rough: float) -> str:
+def _doubt(
+    shape: TargetShape, found: Located, deviation: Array, rough: float, typical: float
+) -> str:
     """What is doubtful about a measurement; empty if nothing is."""
     alignment = found.alignment
     assert alignment is not None
@@ -114,6 +128,8 @@ def _doubt(shape: TargetShape, found: Located, deviation: Array, rough: float) -
         )
     if alignment.residual > rough:
         return "its outline does not quite fit: is it another object, or in another pose?"
+    if shape.colors is not None and found.likeness < UNLIKE * typical and typical > COLORFUL:
+        return "it does not have the colors of its mesh: is it another object?"
     if found.spill > SPILL:
         return "something stands out beside it: is it another object, or in another pose?"
     if alignment.ambiguous:

@@ -6,8 +6,10 @@ them, and are displaced in the plane of the board and turned about the vertical.
 from __future__ import annotations
 
 from datetime import datetime
+from functools import lru_cache
 from pathlib import Path
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,21 +23,27 @@ from burg_drake.cameras.placement.alignment import (
     empty_board,
     target_shapes,
 )
-from burg_drake.cameras.placement.assessment import placement_of, unseen
+from burg_drake.cameras.placement.assessment import placement_of, typical_likeness, unseen
 from burg_drake.cameras.placement.document import (
     CameraPlace,
     CheckedImage,
     CheckedScene,
+    ExtraObject,
     Placement,
     PlacementCheck,
     camera_versions,
 )
+from burg_drake.cameras.placement.exchanged import exchanged_objects
+from burg_drake.cameras.placement.extras import extra_objects
 from burg_drake.cameras.placement.localization import locate_objects
 from burg_drake.cameras.pose import BoardEstimate, BoardPose
 from burg_drake.core import InvalidInputError, content_hash
 from burg_drake.core.documents import Pose
+from burg_drake.printout import height_map
 from burg_drake.scene.document import Scene, SceneLike, as_scene
 
+TINTS = 1e-3
+"""Side of a pixel of the height map that may be printed on the sheet [m]."""
 NO_CONTRAST = "the board's paper and ink look alike in the photo; give it more light"
 
 
@@ -75,7 +83,7 @@ def check_placement(
         depth = check_depth(depth, intrinsics)
     if estimate is None:
         estimate = BoardPose(scene.board, intrinsics, scale).estimate(color)
-    instances, reason = _measured(scene, color, depth, intrinsics, estimate, scale)
+    instances, extra, reason = _measured(scene, color, depth, intrinsics, estimate, scale)
     return PlacementCheck(
         scene=_scene(scene),
         taken=datetime.now().astimezone().isoformat(timespec="seconds"),
@@ -86,6 +94,7 @@ def check_placement(
         camera=_camera(estimate),
         reason=reason,
         instances=instances,
+        extra=extra,
         versions=camera_versions(),
     )
 
@@ -102,18 +111,47 @@ def _measured(
     intrinsics: Intrinsics,
     estimate: BoardEstimate,
     scale: tuple[float, float],
-) -> tuple[dict[str, Placement], str]:
-    """Placements by name; and why nothing was measured, if so."""
+) -> tuple[dict[str, Placement], tuple[ExtraObject, ...], str]:
+    """Placements by name; what else stands there; and why nothing was measured, if so."""
     aligner = _aligner(scene, color, depth, intrinsics, estimate, scale)
     if isinstance(aligner, str):
         names = (*scene.instances, *scene.background)
-        return {name: unseen(scene, name, aligner) for name in names}, aligner
+        return {name: unseen(scene, name, aligner) for name in names}, (), aligner
     shapes = target_shapes(scene)
     located = locate_objects(aligner, shapes)
-    return {
-        name: placement_of(scene, name, shapes[name], found, estimate.covariance, aligner.rough)
+    typical = typical_likeness(located.values())
+    placements = {
+        name: placement_of(
+            scene, name, shapes[name], found, estimate.covariance, aligner.rough, typical
+        )
         for name, found in located.items()
-    }, ""
+    }
+    doubtful = [name for name, placed in placements.items() if placed.status != "measured"]
+    stands = exchanged_objects(aligner, shapes, located, doubtful)
+    elsewhere = {name: place for place, (name, _) in stands.items()}
+    placed = [
+        (shapes[name], found.alignment.q)
+        for name, found in located.items()
+        if found.alignment is not None and name not in stands and name not in elsewhere
+    ]
+    extra = extra_objects(aligner, [*placed, *(where for _, where in stands.values())])
+    for name in {*stands, *elsewhere}:
+        reason = _exchange(name, stands[name][0] if name in stands else "", elsewhere.get(name, ""))
+        placements[name] = unseen(scene, name, reason, located[name].seen)
+    return placements, extra, ""
+
+
+def _exchange(name: str, instead: str, place: str) -> str:
+    """Why an object is not where it belongs, when others' places are mixed up with it.
+
+    Args:
+        name: of the object.
+        instead: what stands in its place; empty if that is not known.
+        place: in whose place it stands; empty if that is not known.
+    """
+    if instead and place:
+        return f"{instead} stands in its place, and {name} where {place} belongs"
+    return f"{instead} stands in its place" if instead else f"it stands where {place} belongs"
 
 
 def _aligner(
@@ -127,13 +165,26 @@ def _aligner(
     """What objects are aligned by; or why nothing can be measured."""
     if not estimate.valid:
         return f"the board was not found: {estimate.reason}" if estimate.reason else "no board"
-    view = PinholeView(intrinsics.K, (intrinsics.width, intrinsics.height), estimate.X_SC)
+    size = intrinsics.width, intrinsics.height
     straight = Undistortion(intrinsics)
+    view = PinholeView(intrinsics.K, size, estimate.X_SC, _blind(straight, size))
     if depth is not None:
         return DepthAligner(view, straight.depth(depth))
-    image = straight.color(color).astype(float)
-    picture = empty_board(scene.board, image, intrinsics.K, estimate.X_SC, scale)
+    image = straight.color(color)
+    picture = empty_board(scene.board, image, intrinsics.K, estimate.X_SC, scale, _tints(scene))
     return NO_CONTRAST if picture is None else SilhouetteAligner(view, image, picture)
+
+
+@lru_cache(maxsize=4)
+def _tints(scene: Scene) -> NDArray[np.uint8]:
+    """(R, C, 3) the height map that may be printed on the sheet."""
+    return height_map(scene, TINTS).image
+
+
+def _blind(straight: Undistortion, size: tuple[int, int]) -> NDArray[np.bool_]:
+    """(H, W) pixels of a straight image that are beyond the given one, or next to these."""
+    beyond = straight.depth(np.ones(size[::-1], np.float32)) == 0.0
+    return np.asarray(cv2.dilate(beyond.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0)
 
 
 def _checked_image(image: NDArray[np.uint8], intrinsics: Intrinsics) -> NDArray[np.uint8]:

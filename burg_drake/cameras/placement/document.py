@@ -114,6 +114,19 @@ class Placement:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ExtraObject:
+    """Something that stands on the board and is no object of the scene.
+
+    Attributes:
+        position: x and y in S of about the middle of where it stands [m].
+        width: how wide it looks, across the view [m].
+    """
+
+    position: tuple[float, float]
+    width: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class PlacementCheck:
     """Schema of a placement file.
 
@@ -122,11 +135,13 @@ class PlacementCheck:
         taken: date and time of the check, ISO 8601 with time zone.
         method: `silhouette` from colour, `depth` from distances.
         image: the photo.
+        more_images: further photos of the same, if several were combined.
         depth: the depth image, where one was used.
         intrinsics: of the camera.
         camera: where it was; None if no board was found, and then nothing was measured.
         reason: why nothing was measured; empty otherwise.
         instances: by name, in the scene's order, those of the background as well.
+        extra: what stands on the board and is no object of the scene, the largest first.
         versions: of the software.
     """
 
@@ -135,11 +150,13 @@ class PlacementCheck:
     taken: str = ""
     method: Method
     image: CheckedImage
+    more_images: tuple[CheckedImage, ...] = ()
     depth: CheckedImage | None = None
     intrinsics: Intrinsics
     camera: CameraPlace | None = None
     reason: str = ""
     instances: dict[str, Placement] = field(default_factory=dict)
+    extra: tuple[ExtraObject, ...] = ()
     versions: dict[str, str] = field(default_factory=dict)
 
 

@@ -23,6 +23,8 @@ STEP = np.deg2rad(5.0)
 """Second, finer steps of the angle."""
 WIDTH = 320
 """Columns of the image that the search looks at [pixels]."""
+LOOKED = 5
+"""Angles, the best ones, at which the place is looked for once more from where it seems to be."""
 KEPT = 3
 """Places that are handed on of each kind of angle."""
 PRIOR = 0.03
@@ -52,7 +54,7 @@ def find_places(view: PinholeView, shape: TargetShape, evidence: Array) -> list[
     """
     search = SilhouetteSearch(view, shape, evidence)
     if shape.symmetric:
-        return [search.slide(0.0)]
+        return [search.slide(0.0, search.slide(0.0).q)]
     return search.best(NEAR_TURNS) + search.best(FAR_TURNS)
 
 
@@ -69,16 +71,19 @@ class SilhouetteSearch:
 
     def best(self, turns: Array) -> list[SearchResult]:
         """The best places among some angles and those beside the best two."""
-        found = sorted((self.slide(float(turn)) for turn in turns), key=lambda f: -f.score)
+        rough = sorted((self.slide(float(turn)) for turn in turns), key=lambda f: -f.score)
+        found = [self.slide(f.q[2], f.q) for f in rough[:LOOKED]]
+        found.sort(key=lambda f: -f.score)
         found += [self.slide(f.q[2] + side * STEP, f.q) for f in found[:2] for side in (-1, 1)]
         return _distinct(sorted(found, key=lambda f: -f.score))[:KEPT]
 
     def slide(self, turn: float, start: Array | None = None) -> SearchResult:
-        """The best translation at an angle: twice, as a silhouette changes with its place."""
-        q = np.array([0.0, 0.0, turn] if start is None else [start[0], start[1], turn])
-        reach = RANGE if start is None else RANGE / 4
-        for reach_here in (reach, RANGE / 8):
-            q, score = self._step(q, reach_here)
+        """The best translation at an angle: anywhere, or near to where it seems to be, as the
+        silhouette changes with its place."""
+        near = start if start is not None else np.zeros(2)
+        q, score = self._step(
+            np.array([near[0], near[1], turn]), RANGE if start is None else RANGE / 4
+        )
         off = np.hypot(q[0], q[1]) / RANGE
         return SearchResult(q, score - PRIOR * min(off, 2.0) ** 2)
 

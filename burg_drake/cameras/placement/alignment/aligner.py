@@ -65,13 +65,16 @@ class Aligner(Protocol):
     residual_floor: float
     """Residuals below this tell nothing about which of two alignments is better."""
     convincing_rating: float
-    """Rating of a place near the target's angle at which no other is tried; at most 3."""
+    """Rating of a place near the target's angle at which no other is tried; at most 3, or 4
+    with colors."""
     required_gain: float
     """By how much a place far from the target's angle must be rated higher."""
     clearly: float
     """By how much a place must be rated higher than any other to be sure."""
     strict: bool
     """What stands beside the object speaks against a place."""
+    sees_colors: bool
+    """The image has colors."""
     rough: float
     """Root mean square that the alignment of the right object does not leave."""
 
@@ -79,6 +82,10 @@ class Aligner(Protocol):
         self, shape: TargetShape, q: Array, others: Array, *, far: bool = True, turn: bool = True
     ) -> Alignment | None:
         """Aligns an object; None if the image does not determine where it is."""
+
+    def likeness(self, shape: TargetShape, q: Array, others: Array) -> float:
+        """How well the colors of a displaced object agree, from 0 to 1; 0 for an image without,
+        0.5 for an object without."""
 
     def misfit(
         self, shape: TargetShape, q: Array, others: Array, window: Window

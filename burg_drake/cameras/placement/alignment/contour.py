@@ -11,10 +11,18 @@ from burg_drake.cameras.placement.alignment.pinhole import NEAR, PinholeView, sa
 from burg_drake.cameras.placement.alignment.shape import TargetShape
 from burg_drake.core import Array, inverse, transform_points
 
-SPACING = 1.5
+SPACING = 2.0
 """Between points along the outline [pixels]."""
 BESIDE = np.array([0.6, 1.2, -0.6])
 """Where, outwards from a point on the outline, all must be free, free and covered [pixels]."""
+CREASE = 0.82
+"""Least cosine between the normals of points that get similar light."""
+RIM = 0.25
+"""From how far inside an outline on normals are compared [pixels]."""
+SOON = 2.5
+"""How far inside they are [pixels]."""
+MATERIAL = 0.08
+"""Difference of reflectance from which on two points are of different materials."""
 EDGE_DEPTH = 2e-3
 """What is nearer by this much than a point on the outline hides it [m]."""
 
@@ -49,9 +57,41 @@ class ImageContour:
         """(N, T, 2) points on the normals, at distances (T,) from the outline [pixels]."""
         return self.pixels[:, None] + offsets[:, None] * self.normals[:, None]
 
-    def inside(self, pixels: Array) -> NDArray[np.bool_]:
-        """Which (...,) of some image points (..., 2) the object itself covers."""
-        return np.isfinite(self.view.cast(self.shape, self.q, pixels))
+    def inside(self, pixels: Array, t: Array) -> tuple[NDArray[np.bool_], Array, Array]:
+        """What the object covers of points (N, T, 2) on the normals.
+
+        Args:
+            pixels: the points.
+            t: (T,) their distances from the outline, rising.
+
+        Returns:
+            (N, T) whether it covers them; (N,) at which distance the surface that begins at the
+            outline ends inwards, -infinity if it does not: at a bend, another material, or where
+            it hides another part; and (N, 3) its reflectance over that of what begins there.
+        """
+        face, depth = self.view.hits(self.shape, self.q, pixels)
+        covered = np.isfinite(depth)
+        normal, colors = self.shape.normals[face], self.shape.colors
+        color = np.full((*face.shape, 3), 0.5) if colors is None else colors[face]
+        both = covered[:, 1:] & covered[:, :-1] & (t[1:] <= 0.0)
+        middle = (t[1:] + t[:-1]) / 2
+        other = np.abs(np.diff(color, axis=1)).max(axis=-1) > MATERIAL
+        p = self.view.points(self.shape, self.q, pixels, np.where(covered, depth, 1.0))
+        away = np.diff(p, axis=1)
+        here, before = (np.einsum("nti,nti->nt", n, away) for n in (normal[:, 1:], normal[:, :-1]))
+        other |= np.minimum(np.abs(here), np.abs(before)) > 2.0 * EDGE_DEPTH
+        strip = np.where(other & both, middle, -np.inf).max(axis=1)
+        last = np.argmax(np.where(covered & (t <= -RIM), t, -np.inf), axis=1)
+        begin = normal[np.arange(len(last)), last]
+        turned = np.einsum("nti,ni->nt", normal[:, :-1], begin) < CREASE
+        turned &= both & (middle > -SOON)
+        bend = np.where(turned, middle, -np.inf).max(axis=1)
+        strip = np.where(np.isfinite(strip), strip, bend)
+        line = np.arange(len(strip))
+        deep = np.maximum(np.searchsorted(t, np.where(np.isfinite(strip), strip, t[0])) - 2, 0)
+        deep = np.where(covered[line, deep] & np.isfinite(strip), deep, last)
+        tone = np.maximum(color[line, last], 0.01) / np.maximum(color[line, deep], 0.01)
+        return covered, strip, tone
 
 
 def outline(view: PinholeView, shape: TargetShape, q: Array, others: Array) -> ImageContour:

@@ -104,6 +104,7 @@ class DepthAligner:
         self.residual_floor, self.rough = self._noise, ROUGH
         self._stands = self._valid & (height > HEIGHT * self._noise)
         evidence = np.clip(height / (HEIGHT * self._noise), 0.0, 1.0) * 2.0 - 1.0
+        self.sees_colors = False
         self.evidence = np.where(self._valid, evidence, 0.0)
 
     def align(
@@ -123,6 +124,10 @@ class DepthAligner:
                 break
         assert best is not None
         return best[0].result(q, best[1])
+
+    def likeness(self, shape: TargetShape, q: Array, others: Array) -> float:
+        """Depth has no colors."""
+        return 0.0
 
     def misfit(
         self, shape: TargetShape, q: Array, others: Array, window: Window

@@ -26,11 +26,13 @@ class PinholeView:
         K: (3, 3) camera matrix, pixel centres at integers.
         size: width and height of its image [pixels].
         X_SC: (4, 4) where it is.
+        blind: (H, W) pixels that show nothing; None if all do.
     """
 
     K: Array
     size: tuple[int, int]
     X_SC: Array
+    blind: NDArray[np.bool_] | None = None
 
     @cached_property
     def X_CS(self) -> Array:
@@ -54,7 +56,11 @@ class PinholeView:
         return np.stack([x, y], axis=1) @ self.X_CS[:3, :3]
 
     def cast(self, shape: TargetShape, q: Array, pixels: Array) -> Array:
-        """Depth of a displaced shape at image points.
+        """(...,) depth of a displaced shape at image points; see `hits`."""
+        return self.hits(shape, q, pixels)[1]
+
+    def hits(self, shape: TargetShape, q: Array, pixels: Array) -> tuple[NDArray[np.int64], Array]:
+        """What of a displaced shape is seen at image points.
 
         Args:
             shape: the object.
@@ -62,7 +68,8 @@ class PinholeView:
             pixels: (..., 2).
 
         Returns:
-            (...,) distance along the optical axis [m]; infinity where the shape is not.
+            (...,) its faces, -1 where the shape is not; and distances along the optical axis [m],
+            infinity there.
         """
         at = pixels.reshape(-1, 2)
         rays = np.ones((len(at), 3))
@@ -71,8 +78,17 @@ class PinholeView:
         X_OC = inverse(shape.displacement(q)) @ self.X_SC
         direction = (rays / length[:, None]) @ X_OC[:3, :3].T
         origins = np.broadcast_to(X_OC[:3, 3], direction.shape)
-        _, distance = shape.rays.first_hits(origins, direction)
-        return (distance / length).reshape(pixels.shape[:-1])
+        face, distance = shape.rays.first_hits(origins, direction)
+        at_pixels = pixels.shape[:-1]
+        return face.reshape(at_pixels), (distance / length).reshape(at_pixels)
+
+    def points(self, shape: TargetShape, q: Array, pixels: Array, depth: Array) -> Array:
+        """(..., 3) points that a displaced shape has at image points (..., 2), with depths (...,),
+        as they are before it is displaced [m]."""
+        xy = (pixels - self.K[:2, 2]) / self.K[[0, 1], [0, 1]]
+        p_CQ = np.concatenate([xy, np.ones_like(xy[..., :1])], axis=-1) * depth[..., None]
+        X_SC = inverse(shape.displacement(q)) @ self.X_SC
+        return np.asarray(transform_points(X_SC, p_CQ.reshape(-1, 3)).reshape(p_CQ.shape))
 
     def buffer(self, shape: TargetShape, q: Array, window: Window) -> Array:
         """Depth of a displaced shape at the pixels of a window's raster; see `cast`."""
@@ -88,8 +104,11 @@ class PinholeView:
         return window_around(pixels, margin, self.size, 1.0)
 
     def depth(self, placed: Iterable[tuple[TargetShape, Array]]) -> Array:
-        """(H, W) depth of the nearest of several displaced shapes; infinity where there is none."""
+        """(H, W) depth of the nearest of several displaced shapes; infinity where there is none, 0
+        where the camera is blind."""
         nearest = np.full(self.size[::-1], np.inf)
+        if self.blind is not None:
+            nearest[self.blind] = 0.0
         for shape, q in placed:
             window = self.window(shape, q, 1.0)
             part = nearest[window_slices(window)]

@@ -4,7 +4,8 @@ a turn about the vertical can be seen at all."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -13,6 +14,7 @@ import trimesh
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, cKDTree
 
+from burg_drake.cameras.placement.alignment.linear_light import linear_light
 from burg_drake.cameras.projection import MeshOutline
 from burg_drake.core import Array, inverse, make_pose, rot_z, transform_points
 from burg_drake.geometry import RayCaster
@@ -41,6 +43,7 @@ class TargetShape:
         X_SO: (4, 4) the target.
         p_OR: (3,) reference point, in the plane of the board at the target [m].
         symmetric: a turn about the vertical through the reference point changes nothing.
+        colors: (F, 3) linear reflectance that the library's mesh has; None without.
     """
 
     vertices: Array
@@ -48,6 +51,7 @@ class TargetShape:
     X_SO: Array
     p_OR: Array
     symmetric: bool
+    colors: Array | None
 
     @cached_property
     def p_SR(self) -> Array:
@@ -68,6 +72,13 @@ class TargetShape:
     def rays(self) -> RayCaster:
         """The mesh at the target, in S, prepared for rays."""
         return RayCaster(self.p_SV, self.faces)
+
+    @cached_property
+    def normals(self) -> Array:
+        """(F, 3) of the faces at the target, in S."""
+        a, b, c = np.moveaxis(self.p_SV[self.faces], 1, 0)
+        normal = np.cross(b - a, c - a)
+        return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
 
     @cached_property
     def surface(self) -> tuple[Array, Array]:
@@ -101,32 +112,51 @@ class TargetShape:
         return self.displacement(q) @ self.X_SO
 
 
+@lru_cache(maxsize=4)
 def target_shapes(scene: Scene) -> dict[str, TargetShape]:
-    """The shapes of all instances of a scene, free ones first.
+    """The shapes of all instances of a scene, free ones first; kept for the scene's next photo.
 
     Raises:
         UnknownNameError: a mesh file is missing.
     """
     shapes: dict[str, TargetShape] = {}
     for name in (*scene.instances, *scene.background):
+        entry = scene.entry(name)
         mesh = scene.library.surface(scene.instance(name).object)
-        shapes[name] = target_shape(np.asarray(mesh.vertices), mesh.faces, scene.X_SO(name))
+        colors = _colors(mesh, scene.library.path(entry.mesh))
+        vertices = np.asarray(mesh.vertices)
+        shapes[name] = target_shape(vertices, mesh.faces, scene.X_SO(name), colors)
     return shapes
 
 
-def target_shape(vertices: Array, faces: NDArray[Any], X_SO: Array) -> TargetShape:
+def _colors(surface: trimesh.Trimesh, path: Path) -> Array | None:
+    """(F, 3) linear reflectance of a surface's faces, from the mesh file that has its look; None if
+    that has no colors."""
+    seen = trimesh.load(path, force="mesh", process=False)
+    if not seen.visual.defined:
+        return None
+    visual = seen.visual.to_color() if seen.visual.kind == "texture" else seen.visual
+    levels = np.asarray(visual.vertex_colors)[:, :3][seen.faces].mean(axis=1)
+    _, nearest = cKDTree(seen.triangles_center).query(surface.triangles_center)
+    return np.asarray(linear_light(np.round(levels).astype(np.uint8))[nearest], dtype=float)
+
+
+def target_shape(
+    vertices: Array, faces: NDArray[Any], X_SO: Array, colors: Array | None = None
+) -> TargetShape:
     """The shape of a mesh at its target.
 
     Args:
         vertices: (V, 3) in O [m].
         faces: (F, 3).
         X_SO: (4, 4) target.
+        colors: (F, 3) linear reflectance; None if it is not known.
     """
     p_SV = transform_points(X_SO, vertices)
     p_SR = np.array([*_middle(p_SV[:, :2]), 0.0])
     p_OR = transform_points(inverse(X_SO), p_SR[None])[0]
     surface = trimesh.Trimesh(p_SV - p_SR, faces, process=False)
-    return TargetShape(vertices, np.asarray(faces), X_SO, p_OR, _is_round(surface))
+    return TargetShape(vertices, np.asarray(faces), X_SO, p_OR, _is_round(surface), colors)
 
 
 def _middle(points: Array) -> Array:

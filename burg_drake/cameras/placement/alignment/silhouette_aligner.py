@@ -6,9 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.cameras.placement.alignment.aligner import Alignment, sectors
+from burg_drake.cameras.placement.alignment.appearance import likeness
 from burg_drake.cameras.placement.alignment.background import EmptyBoard
 from burg_drake.cameras.placement.alignment.contour import ImageContour, outline
 from burg_drake.cameras.placement.alignment.least_squares import DisplacementFit, fit_displacement
+from burg_drake.cameras.placement.alignment.linear_light import linear_light
 from burg_drake.cameras.placement.alignment.photo_edges import (
     REACH,
     PhotoEdges,
@@ -23,8 +25,10 @@ from burg_drake.core import Array
 
 FAR = (1 / 45, 1 / 45, 1 / 80, 1 / 110)
 """How far `far_edges` looks, round by round, as a share of the image's width."""
-NEAR_ROUNDS = 8
-SETTLED = 0.02
+NEAR_ROUNDS, FEW_ROUNDS = 6, 3
+"""How often edges are measured anew, from where they are to a part of a pixel; and for a place that
+is only compared, or aligned once more when its neighbours are."""
+SETTLED = 0.04
 """Steps that move no point of the outline farther than this end the rounds [pixels]."""
 AGREES = 1.5
 """An edge that is within this of the outline agrees with it [pixels]."""
@@ -35,15 +39,19 @@ FINE = 0.1
 MIN_EDGES = 12
 SHADED = 0.15
 """Standard deviation of the share by which an object is darker at its very edge than beside it."""
-GROWN = 0.1
+GROWN = 0.2
 """Standard deviation of how much too large all of an outline may look: bright paper outshines dark
 edges, ink spreads, the mesh is coarse [pixels]."""
-SHIFTED, TWISTED = 0.4, 0.2
-"""Standard deviation of a shift of the whole outline that nothing explains, and of one of its two
-ends against each other, as shares of the residual, which is `FINE` at least."""
+GROUNDED, CLEAR_HEIGHT = 0.6, 4e-3
+"""Standard deviation of how much too large an outline may look where it meets the board, as a thin
+shadow hides where that is [pixels], and height above the board at which that is over [m]."""
+SHIFTED, TWISTED, SQUEEZED = 0.4, 0.35, 0.6
+"""Standard deviation of a shift of the whole outline that nothing explains, of one of its two ends
+against each other, and of its sides against its ends, as shares of the residual, which is `FINE` at
+least."""
 
 
-ROUGH = 0.35
+ROUGH = 0.8
 """What the fit of the right object does not leave in a sharp photo [pixels]; in a blurred one it is
 as many times as much as the blur's standard deviation has pixels."""
 
@@ -53,22 +61,24 @@ class SilhouetteAligner:
 
     Args:
         view: its camera.
-        image: (H, W, 3) without lens distortion [8-bit levels].
+        image: (H, W, 3) without lens distortion, sRGB.
         picture: the board without objects.
     """
 
-    def __init__(self, view: PinholeView, image: Array, picture: EmptyBoard) -> None:
+    def __init__(self, view: PinholeView, image: NDArray[np.uint8], picture: EmptyBoard) -> None:
         self.view = view
         self.convincing_rating, self.required_gain, self.clearly, self.strict = (
-            2.8,
+            3.4,
             0.15,
             0.08,
             False,
         )
+        self.sees_colors = True
         self.evidence = picture.evidence
         self.rough = ROUGH * max(1.0, picture.blur)
         self.residual_floor = FINE
-        self._image: NDArray[np.float32] = np.ascontiguousarray(image, dtype=np.float32)
+        self._light = linear_light(image)
+        self._balanced = self._light / picture.paper
         self._picture = picture
 
     def align(
@@ -87,7 +97,14 @@ class SilhouetteAligner:
             None if the photo does not determine where it is.
         """
         near = self._coarse_fit(shape, q, others) if far else q
-        return None if near is None else self._fine_fit(shape, near, others, turn)
+        if near is None:
+            return None
+        rounds = FEW_ROUNDS if far or not turn else NEAR_ROUNDS
+        return self._fine_fit(shape, near, others, turn, rounds)
+
+    def likeness(self, shape: TargetShape, q: Array, others: Array) -> float:
+        """How alike the tones of a displaced object and of its mesh are; see `appearance`."""
+        return likeness(self.view, shape, q, others, self._balanced)
 
     def misfit(
         self, shape: TargetShape, q: Array, others: Array, window: Window
@@ -110,7 +127,7 @@ class SilhouetteAligner:
             if len(contour) < MIN_EDGES:
                 return None
             on = normal_profiles(
-                contour, self._image, self._picture, others, share * self.view.size[0]
+                contour, self._light, self._picture, others, share * self.view.size[0]
             )
             solved = _solve(shape, contour, far_edges(on, self._picture))
             if solved is None:
@@ -119,16 +136,16 @@ class SilhouetteAligner:
         return q
 
     def _fine_fit(
-        self, shape: TargetShape, q: Array, others: Array, turn: bool
+        self, shape: TargetShape, q: Array, others: Array, turn: bool, rounds: int
     ) -> Alignment | None:
         """The alignment, from a displacement that is a few pixels off."""
         start, result = q, None
-        for _ in range(NEAR_ROUNDS):
+        for _ in range(rounds):
             contour = outline(self.view, shape, q, others)
             if len(contour) < MIN_EDGES:
                 return None
             edges = near_edges(
-                normal_profiles(contour, self._image, self._picture, others, REACH), self._picture
+                normal_profiles(contour, self._light, self._picture, others, REACH), self._picture
             )
             solved = _solve(shape, contour, edges, turn)
             if solved is None or np.linalg.norm(q[:2] - start[:2]) > LOST:
@@ -155,7 +172,13 @@ def _solve(
         sectors(contour)[used],
         shape.symmetric or not turn,
         unit,
-        np.column_stack([-SHADED * edges.shading[used], np.full(used.sum(), GROWN)]),
+        np.column_stack(
+            [
+                -SHADED * edges.shading[used],
+                np.full(used.sum(), GROWN),
+                GROUNDED * np.exp(-np.maximum(contour.p_SQ[used, 2], 0.0) / CLEAR_HEIGHT),
+            ]
+        ),
     )
 
 
@@ -177,9 +200,12 @@ def _result(
     twisted = (
         TWISTED * rough * solved.sensitivity @ (normals * _ends(contour.pixels[used])[:, None])
     )
+    squeezed = (
+        SQUEEZED * rough * solved.sensitivity @ _sides(contour.pixels[used], normals)[:, None]
+    )
     return Alignment(
         q,
-        solved.covariance + shifted @ shifted.T + twisted @ twisted.T,
+        solved.covariance + sum(s @ s.T for s in (shifted, twisted, squeezed)),
         -solved.sensitivity @ contour.camera[used],
         float(agrees.sum() / max(edges.expected.sum(), 1)),
         float(agrees.sum() / max(len(contour), 1)),
@@ -193,6 +219,13 @@ def _ends(pixels: Array) -> Array:
     away = pixels - pixels.mean(axis=0)
     _, axes = np.linalg.eigh(away.T @ away)
     return np.where(away @ axes[:, 1] > 0.0, 1.0, -1.0)
+
+
+def _sides(pixels: Array, normals: Array) -> Array:
+    """(N,) from 1 to -1, whether each point of an outline is at its side or its end."""
+    away = pixels - pixels.mean(axis=0)
+    _, axes = np.linalg.eigh(away.T @ away)
+    return np.asarray(2.0 * (normals @ axes[:, 0]) ** 2 - 1.0)
 
 
 def _rms(left: Array, deviation: Array) -> float:

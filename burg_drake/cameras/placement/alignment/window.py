@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,6 +29,10 @@ class Window:
     def shape(self) -> tuple[int, int]:
         """Rows and columns of the raster."""
         return round(self.height * self.scale), round(self.width * self.scale)
+
+    def scaled(self, scale: float) -> Window:
+        """The same part, seen by a raster of another scale."""
+        return replace(self, scale=scale)
 
     def pixels(self) -> Array:
         """(H, W, 2) image points of the raster's pixels."""

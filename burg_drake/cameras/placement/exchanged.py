@@ -1,0 +1,101 @@
+"""Objects that stand on each other's places.
+
+An object that was not found where it belongs, or only fits badly there, may stand where another one
+belongs that was not found either. So the shape of the one is looked for around the target of the
+other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from burg_drake.cameras.placement.alignment import Aligner, Alignment, TargetShape
+from burg_drake.cameras.placement.candidates import (
+    Placed,
+    candidates,
+    promising,
+    support_of,
+    uncovered,
+)
+from burg_drake.cameras.placement.localization import Located, best_alignment
+from burg_drake.core import Array
+
+FITS = 0.7
+"""Agreement of an object's outline from which on it may stand in another's place."""
+FILLED = 0.6
+"""Mean evidence in its silhouette for that."""
+COLORED = 0.4
+"""Likeness of its colors for that, where they are known."""
+CLEARER = 0.25
+"""By how much better than the object that belongs there it has to fit, in all of these together."""
+
+
+def exchanged_objects(
+    aligner: Aligner,
+    shapes: dict[str, TargetShape],
+    located: dict[str, Located],
+    doubtful: list[str],
+) -> dict[str, tuple[str, Placed]]:
+    """Which object stands in the place of which, and where exactly.
+
+    Args:
+        aligner: of the image.
+        shapes: the objects by name.
+        located: what was found.
+        doubtful: names of those that were not found for sure, the only ones looked at.
+
+    Returns:
+        By the name of the place: the name of what stands there, its shape as if that were its
+        target, and its displacement from there.
+    """
+    sure = {
+        name: (shapes[name], found.alignment.q)
+        for name, found in located.items()
+        if name not in doubtful and found.alignment is not None
+    }
+    others = aligner.view.depth(sure.values())
+    own = {name: _fit(aligner, shapes[name], located[name].alignment, others) for name in doubtful}
+    rated = []
+    for place in doubtful:
+        for name in doubtful:
+            if name == place:
+                continue
+            shape = at_place_of(shapes[name], shapes[place])
+            found = _found(aligner, shape, sure, others)
+            fit = _fit(aligner, shape, found, others)
+            if found is not None and fit > max(own[place], own[name]) + CLEARER:
+                rated.append((fit, place, name, (shape, found.q)))
+    stands: dict[str, tuple[str, Placed]] = {}
+    for _, place, name, placed in sorted(rated, key=lambda r: -r[0]):
+        if place not in stands and name not in {other for other, _ in stands.values()}:
+            stands[place] = name, placed
+    return stands
+
+
+def at_place_of(shape: TargetShape, place: TargetShape) -> TargetShape:
+    """An object as if its target were where another one's reference point belongs."""
+    X_SO = shape.X_SO.copy()
+    X_SO[:2, 3] += (place.p_SR - shape.p_SR)[:2]
+    return replace(shape, X_SO=X_SO)
+
+
+def _found(
+    aligner: Aligner, shape: TargetShape, sure: dict[str, Placed], others: Array
+) -> Alignment | None:
+    evidence = uncovered(aligner, sure)
+    starts = promising(candidates(aligner.view, shape, evidence))
+    return best_alignment(aligner, shape, starts, others, far=True)
+
+
+def _fit(aligner: Aligner, shape: TargetShape, found: Alignment | None, others: Array) -> float:
+    """How well an object fits: agreement, evidence and likeness together; 0 if one is too low."""
+    if found is None:
+        return 0.0
+    filled, _ = support_of(aligner.view, shape, found.q, aligner.evidence, others)
+    alike = aligner.likeness(shape, found.q, others)
+    colored = alike > COLORED or not aligner.sees_colors or shape.colors is None
+    if found.agreement < FITS or filled < FILLED or not colored:
+        return 0.0
+    return float(np.clip(found.agreement, 0.0, 1.0)) + filled + alike

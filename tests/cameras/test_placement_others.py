@@ -1,0 +1,153 @@
+"""What stands where it does not belong: extra objects, objects on each other's places, and what
+several photos say together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.placement.alignment.background import empty_board
+from burg_drake.cameras.placement.alignment.pinhole import PinholeView
+from burg_drake.cameras.placement.alignment.silhouette_aligner import SilhouetteAligner
+from burg_drake.cameras.placement.combination import combine_checks
+from burg_drake.cameras.placement.document import (
+    CheckedImage,
+    CheckedScene,
+    ExtraObject,
+    Placement,
+    PlacementCheck,
+)
+from burg_drake.cameras.placement.exchanged import exchanged_objects
+from burg_drake.cameras.placement.extras import extra_objects
+from burg_drake.cameras.placement.localization import locate_objects
+from burg_drake.core.documents.schema import Pose
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import make_pose
+from tests.cameras.plates import BOARD, INTRINSICS, aligner, as_photo, cover, drawing, plate
+from tests.cameras.synthetic import ImageDegradation, board_image
+
+LOOK = ImageDegradation(blur=0.7, noise=2.0)
+HERE, THERE = (0.30, 0.19, 0.3), (0.40, 0.23, 0.3)
+LONG, SHORT = (0.09, 0.03), (0.05, 0.05)
+ON_PLACE = np.zeros(3)
+
+
+def test_what_is_no_object_of_the_scene_is_named_where_it_stands() -> None:
+    there = aligner(drawing([cover(LONG, HERE, ON_PLACE), cover(SHORT, THERE, ON_PLACE)], LOOK))
+    shape = plate(LONG, HERE)
+    (extra,) = extra_objects(there, [(shape, ON_PLACE)])
+    assert np.hypot(*np.subtract(extra.position, THERE[:2])) < 0.015
+    assert extra.width == pytest.approx(0.06, abs=0.02)
+    assert extra_objects(there, [(shape, ON_PLACE), (plate(SHORT, THERE), ON_PLACE)]) == ()
+
+
+def test_straight_below_the_camera_it_is_named_in_its_middle() -> None:
+    X_SC = make_pose(np.diag([1.0, -1.0, -1.0]), (*THERE[:2], 0.8))
+    image = as_photo(
+        board_image(BOARD, INTRINSICS, X_SC, covers=np.array([cover(SHORT, THERE, ON_PLACE)]))
+        / 255.0
+    )
+    picture = empty_board(BOARD, image, INTRINSICS.K, X_SC)
+    assert picture is not None
+    view = PinholeView(INTRINSICS.K, (INTRINSICS.width, INTRINSICS.height), X_SC)
+    (extra,) = extra_objects(SilhouetteAligner(view, image, picture), [])
+    assert np.hypot(*np.subtract(extra.position, THERE[:2])) < 0.004
+    assert extra.width == pytest.approx(0.056, abs=0.012)  # of a disk as large
+
+
+def test_objects_on_each_others_places_are_told() -> None:
+    there = aligner(drawing([cover(SHORT, HERE, ON_PLACE), cover(LONG, THERE, ON_PLACE)], LOOK))
+    shapes = {"long": plate(LONG, HERE), "short": plate(SHORT, THERE)}
+    located = locate_objects(there, shapes)
+    stands = exchanged_objects(there, shapes, located, ["long", "short"])
+    assert {place: name for place, (name, _) in stands.items()} == {
+        "long": "short",
+        "short": "long",
+    }
+    for _, q in (placed for _, placed in stands.values()):
+        assert np.abs(q[:2]).max() < 1.5e-3
+
+
+def test_objects_on_their_own_places_are_not() -> None:
+    there = aligner(drawing([cover(LONG, HERE, ON_PLACE), cover(SHORT, THERE, ON_PLACE)], LOOK))
+    shapes = {"long": plate(LONG, HERE), "short": plate(SHORT, THERE)}
+    located = locate_objects(there, shapes)
+    assert exchanged_objects(there, shapes, located, ["long", "short"]) == {}
+
+
+def mug(x: float, sd: float, angle: float = 0.1, **changes: object) -> Placement:
+    """A placement of a mug that is off along x."""
+    placed = Placement(
+        object="mug",
+        status="measured",
+        target=Pose(translation=(0.2, 0.1, 0.0)),
+        measured=Pose(translation=(0.2 + x, 0.1, 0.0)),
+        reference=(0.01, 0.0, 0.0),
+        displacement=(x, 0.0),
+        displacement_sd=(sd, 1e-3),
+        angle=angle,
+        angle_sd=0.02,
+        seen=0.8,
+    )
+    return replace(placed, **changes)  # type: ignore[arg-type]
+
+
+def check(
+    placement: Placement, extra: tuple[ExtraObject, ...] = (), scene: str = "a"
+) -> PlacementCheck:
+    return PlacementCheck(
+        scene=CheckedScene(name="scene", content=scene),
+        method="silhouette",
+        image=CheckedImage(content=f"{placement.displacement}"),
+        intrinsics=Intrinsics(width=64, height=48, focal=(60.0, 60.0), center=(31.5, 23.5)),
+        instances={"mug": placement},
+        extra=extra,
+    )
+
+
+def test_photos_are_weighted_by_their_variances() -> None:
+    both = combine_checks([check(mug(1.0e-3, 1e-3)), check(mug(2.0e-3, 0.5e-3))])
+    found = both.instances["mug"]
+    assert found.status == "measured"
+    assert found.displacement == pytest.approx((1.8e-3, 0.0))  # weights 1 and 4
+    assert found.displacement_sd == pytest.approx((1e-3 / np.sqrt(5.0), 1e-3 / np.sqrt(2.0)))
+    assert found.angle_sd == pytest.approx(0.02 / np.sqrt(2.0))
+    assert len(both.more_images) == 1
+    assert found.measured is not None
+    X_SO = found.measured.matrix()  # the reference point moved as told, the object turned
+    np.testing.assert_allclose((X_SO @ (0.01, 0.0, 0.0, 1.0))[:3], (0.2118, 0.1, 0.0), atol=1e-9)
+    assert np.arctan2(X_SO[1, 0], X_SO[0, 0]) == pytest.approx(0.1)
+
+
+def test_photos_that_contradict_each_other_make_an_object_uncertain() -> None:
+    found = combine_checks([check(mug(0.0, 1e-4)), check(mug(4e-3, 1e-4))]).instances["mug"]
+    assert found.status == "uncertain"
+    assert found.reason == "the photos disagree by 2.0 mm"
+    assert found.displacement_sd is not None
+    assert found.displacement_sd[0] == pytest.approx(2e-3)
+
+
+def test_what_one_photo_measures_another_one_may_not_see() -> None:
+    hidden = Placement(object="mug", status="not_seen", reason="hidden", target=Pose())
+    doubtful = mug(9e-3, 5e-3, status="uncertain", reason="only 30 % of it can be seen")
+    photos = [check(hidden), check(mug(1e-3, 1e-3)), check(doubtful)]
+    assert combine_checks(photos).instances["mug"] == mug(1e-3, 1e-3)
+    assert combine_checks([photos[0], photos[2]]).instances["mug"] == doubtful
+
+
+def test_extra_objects_of_all_photos_are_named_once() -> None:
+    first = ExtraObject(position=(0.10, 0.10), width=0.05)
+    again = ExtraObject(position=(0.12, 0.10), width=0.06)
+    other = ExtraObject(position=(0.40, 0.10), width=0.03)
+    both = combine_checks([check(mug(0, 1e-3), (first,)), check(mug(0, 1e-3), (again, other))])
+    assert [e.position for e in both.extra] == [pytest.approx((0.11, 0.10)), other.position]
+
+
+def test_checks_of_different_scenes_are_not_combined() -> None:
+    with pytest.raises(InvalidInputError, match="different scenes"):
+        combine_checks([check(mug(0, 1e-3)), check(mug(0, 1e-3), scene="b")])
+    with pytest.raises(InvalidInputError, match="give one at least"):
+        combine_checks([])
