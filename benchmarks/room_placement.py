@@ -1,7 +1,7 @@
 """Placement checks in ambient light and in sun, of objects off their places, missing or too many.
 
     python benchmarks/room_placement.py [--rows NAME ...] [--photos N] [--size 640x480 ...]
-                                        [--views N] [--keep FOLDER] [--true-pose] [-v]
+                                        [--views N] [--keep FOLDER] [--recolored] [--true-pose] [-v]
 
 Photos of `benchmarks/room`, which shares no code with what reads them: `tabletop_six` on its
 printed board, each object 0 to 30 mm and up to 20 degrees off, one in four on its place; a camera
@@ -9,7 +9,8 @@ with noise, blur and a lens 0.6 to 1 m away, 35 to 70 degrees above the board, o
 have stripes of up to 40 % contrast. Of six photos one has an object too many, one lacks one, and in
 one two stand on each other's places. The board's pose is `BoardPose`'s, or with --true-pose the
 true one; photos without a valid one are skipped, and counted. With --views the same scene is
-taken from several sides and checked as one.
+taken from several sides and checked as one. With --recolored the objects do not have the colors
+of their meshes.
 
 Columns: `measured`, of the objects that stand within 30 mm of their place and of which more than
 half is seen; their errors of displacement [mm] and turn [deg], median and 95 %; `sd`, root mean
@@ -209,6 +210,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--views", type=int, default=1, help="photos that are checked as one")
     parser.add_argument("--keep", type=Path, help="folder that pictures are kept in")
+    parser.add_argument("--recolored", action="store_true", help="unlike the library's meshes")
     parser.add_argument("--true-pose", action="store_true", help="of the board")
     parser.add_argument("-v", "--verbose", action="store_true", help="what went wrong")
     arguments = parser.parse_args()
@@ -227,7 +229,8 @@ def _row(row: str, size: str, arguments: argparse.Namespace, folder: Path) -> Ta
     tally, camera = Tally(), CAMERAS[size]
     for k in range(arguments.first, arguments.first + arguments.photos):
         photos = [
-            kept(folder, row, camera, (arguments.seed, k), view) for view in range(arguments.views)
+            kept(folder, row, camera, (arguments.seed, k), view, arguments.recolored)
+            for view in range(arguments.views)
         ]
         check = checked(photos, camera, tally, arguments)
         if check is not None:

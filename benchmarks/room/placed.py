@@ -7,6 +7,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import trimesh
 from scipy.spatial.transform import Rotation
 
 from .covers import nothing
@@ -55,7 +56,9 @@ class PlacedPhoto:
     extra: Array | None
 
 
-def placed_photo(light: str, camera: Camera, seed: tuple[int, ...], view: int = 0) -> PlacedPhoto:
+def placed_photo(
+    light: str, camera: Camera, seed: tuple[int, ...], view: int = 0, recolored: bool = False
+) -> PlacedPhoto:
     """A photo of `tabletop_six`; the same seed makes the same one.
 
     Args:
@@ -63,6 +66,7 @@ def placed_photo(light: str, camera: Camera, seed: tuple[int, ...], view: int = 
         camera: that takes it.
         seed: of the scene; the last number chooses the kind as well.
         view: of the same scene, in the same light.
+        recolored: red, green and blue of the objects are exchanged.
     """
     kind = KINDS[seed[-1] % len(KINDS)]
     rng = np.random.default_rng(seed)
@@ -80,6 +84,8 @@ def placed_photo(light: str, camera: Camera, seed: tuple[int, ...], view: int = 
         nothing(),
         no_gloss(),
     )
+    if recolored:
+        things = {name: _recolored(thing) for name, thing in things.items()}
     objects = Objects(list(things.values()))
     seen = photographed(camera, X_SC, surface, lit, objects, BOARD.size, rng)
     image = image_of(seen.radiance, PAPER, WEBCAM, rng)
@@ -98,12 +104,19 @@ def placed_photo(light: str, camera: Camera, seed: tuple[int, ...], view: int = 
     )
 
 
-def kept(path: Path, light: str, camera: Camera, seed: tuple[int, ...], view: int) -> PlacedPhoto:
+def kept(
+    path: Path,
+    light: str,
+    camera: Camera,
+    seed: tuple[int, ...],
+    view: int,
+    recolored: bool = False,
+) -> PlacedPhoto:
     """The same, from a folder if it has been there before."""
-    name = f"{light.replace(' ', '_')}-{camera.size[0]}-{'-'.join(map(str, seed))}-{view}.npz"
-    file = path / name
+    words = (light.replace(" ", "_"), camera.size[0], *seed, view, *["recolored"] * recolored)
+    file = path / f"{'-'.join(map(str, words))}.npz"
     if not file.exists():
-        photo = placed_photo(light, camera, seed, view)
+        photo = placed_photo(light, camera, seed, view, recolored)
         path.mkdir(parents=True, exist_ok=True)
         np.savez(
             file,
@@ -184,6 +197,16 @@ def _extra(rng: np.random.Generator) -> Thing:
     X_SO[:2, 3] = rng.uniform(0.15, 0.85, 2) * BOARD.size
     X_SO[2, 3] = -lowest
     return Thing(mesh, X_SO, contrast=float(rng.uniform(0.0, 0.4)))
+
+
+def _recolored(thing: Thing) -> Thing:
+    mesh = thing.mesh.copy()
+    if mesh.visual.kind == "texture":
+        mesh.visual = mesh.visual.to_color()
+    colors = np.array(mesh.visual.vertex_colors)
+    colors[:, :3] = np.roll(colors[:, :3], 1, axis=1)
+    mesh.visual = trimesh.visual.ColorVisuals(mesh, vertex_colors=colors)
+    return replace(thing, mesh=mesh)
 
 
 def _moved(thing: Thing, shift: Array) -> Thing:

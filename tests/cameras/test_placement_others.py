@@ -122,10 +122,17 @@ def test_photos_are_weighted_by_their_variances() -> None:
     assert np.arctan2(X_SO[1, 0], X_SO[0, 0]) == pytest.approx(0.1)
 
 
+def test_angles_are_averaged_across_half_a_turn() -> None:
+    photos = [check(mug(0.0, 1e-3, angle=np.pi - 0.01)), check(mug(0.0, 1e-3, angle=-np.pi + 0.03))]
+    found = combine_checks(photos).instances["mug"]
+    assert found.status == "measured"
+    assert found.angle == pytest.approx(-np.pi + 0.01)
+
+
 def test_photos_that_contradict_each_other_make_an_object_uncertain() -> None:
     found = combine_checks([check(mug(0.0, 1e-4)), check(mug(4e-3, 1e-4))]).instances["mug"]
     assert found.status == "uncertain"
-    assert found.reason == "the photos disagree by 2.0 mm"
+    assert found.reason == "the photos disagree by 2.0 mm and 0.0 deg"
     assert found.displacement_sd is not None
     assert found.displacement_sd[0] == pytest.approx(2e-3)
 

@@ -53,6 +53,7 @@ def _combined(placements: list[Placement]) -> Placement:
     if len(measured) < 2:
         return max(placements, key=_worth)
     values = np.array([_numbers(p)[0] for p in measured])
+    values[:, 2] = values[0, 2] + (values[:, 2] - values[0, 2] + np.pi) % (2.0 * np.pi) - np.pi
     sd = np.array([_numbers(p)[1] for p in measured])
     weight = sd**-2.0
     mean = (weight * values).sum(axis=0) / weight.sum(axis=0)
@@ -62,8 +63,10 @@ def _combined(placements: list[Placement]) -> Placement:
     if contradicts:
         mean_sd = np.maximum(mean_sd, off.max(axis=0))
     best = max(measured, key=_worth)
-    reason = f"the photos disagree by {1e3 * off[:, :2].max():.1f} mm" if contradicts else ""
     turned = best.angle is not None
+    reason = f"the photos disagree by {1e3 * off[:, :2].max():.1f} mm" if contradicts else ""
+    if contradicts and turned:
+        reason += f" and {np.rad2deg(off[:, 2].max()):.1f} deg"
     angle = float((mean[2] + np.pi) % (2.0 * np.pi) - np.pi)
     return replace(
         best,

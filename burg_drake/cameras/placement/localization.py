@@ -34,8 +34,12 @@ SUPPORTED = 0.35
 """Mean evidence in the silhouette below which an object is not there."""
 BEYOND = 0.06
 """Farther from its target nothing is an object's place [m]."""
-RING = (2.0, 7.0)
-"""Where, beside the silhouette, nothing should stand [pixels]."""
+FITS_WELL, NUDGE = 0.93, np.deg2rad(4.0)
+"""Agreement below which an alignment may have caught on a wrong edge, and by how much the object is
+turned to get it off [rad]."""
+RING = 5.0
+"""How wide, beside the silhouette and what the evidence smears of it, nothing should stand
+[pixels]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +107,7 @@ def _align(
     """Aligns objects, from their candidates or where they are; leaves out what fails."""
     for name in names:
         others = _others(aligner.view, shapes, q, name)
-        starts = q[name] if far else [aligned[name].q]
+        starts = q[name] if far else _nudged(shapes[name], aligned[name])
         best = best_alignment(aligner, shapes[name], starts, others, far)
         if best is not None and not far:
             best = replace(best, ambiguous=aligned[name].ambiguous)
@@ -112,6 +116,14 @@ def _align(
             aligned.pop(name, None)
         else:
             aligned[name], q[name] = best, [best.q]
+
+
+def _nudged(shape: TargetShape, found: Alignment) -> list[Array]:
+    """Where to begin the last alignment: where an object was found, and turned a little from there
+    if not all fits, as outlines catch on wrong edges."""
+    if shape.symmetric or found.agreement > FITS_WELL:
+        return [found.q]
+    return [found.q + np.array([0.0, 0.0, turn]) for turn in (0.0, NUDGE, -NUDGE)]
 
 
 def _others(
@@ -142,24 +154,25 @@ def best_alignment(
     if not rated:
         return None
     score, best = max(rated, key=lambda r: r[0])
-    best = min(
-        (
-            f
-            for _, f in rated
-            if f is best or (_turned_far(f, best) and shape.looks_alike(f.q, best.q))
-        ),
-        key=lambda f: abs(_wrapped(f.q[2])),
-    )
     rivals = (
         rating
         for rating, found in rated
         if differ(found, best) and not shape.looks_alike(found.q, best.q)
     )
-    return replace(best, ambiguous=max(rivals, default=-np.inf) > score - aligner.clearly)
+    ambiguous = max(rivals, default=-np.inf) > score - aligner.clearly
+    return replace(best, q=_least_turned(shape, best.q), ambiguous=ambiguous)
 
 
-def _turned_far(a: Alignment, b: Alignment) -> bool:
-    return bool(abs(_wrapped(a.q[2] - b.q[2])) > TURNED)
+def _least_turned(shape: TargetShape, q: Array) -> Array:
+    """Of the displacements that look like this one, as a box's does after half a turn, the one
+    nearest to the target's angle."""
+    alike = [q]
+    for quarter in (1, 2, 3) if abs(_wrapped(q[2])) > TURNED else ():
+        other = q + np.array([0.0, 0.0, quarter * np.pi / 2])
+        other[2] = _wrapped(other[2])
+        if shape.looks_alike(q, other):
+            alike.append(other)
+    return min(alike, key=lambda p: abs(_wrapped(p[2])))
 
 
 def _wrapped(angle: float) -> float:
@@ -190,11 +203,12 @@ def _located(
         alignment = with_rotation_ambiguity(aligner, shape, alignment, others)
     in_image, seen = view.seen(shape, at, others)
     support, _ = support_of(view, shape, at, aligner.evidence, others)
-    window = view.window(shape, at, RING[1] + 1.0)
+    near = 2.0 + aligner.smear
+    window = view.window(shape, at, near + RING + 1.0)
     part = window_slices(window)
     mask = np.isfinite(view.buffer(shape, at, window)).astype(np.uint8)
     away = cv2.distanceTransform(1 - mask, cv2.DIST_L2, 3) if mask.any() else np.zeros(mask.shape)
-    ring = (away > RING[0]) & (away < RING[1]) & ~np.isfinite(others[part])
+    ring = (away > near) & (away < near + RING) & ~np.isfinite(others[part])
     around = aligner.evidence[part][ring]
     spill = float(np.maximum(around, 0.0).sum() / max(np.abs(around).sum(), 1.0))
     alike = aligner.likeness(shape, at, others) if aligner.sees_colors else 0.5

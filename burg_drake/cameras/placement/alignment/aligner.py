@@ -62,6 +62,8 @@ class Aligner(Protocol):
 
     view: PinholeView
     evidence: Array
+    smear: float
+    """How far evidence reaches beyond what stands there [pixels]."""
     residual_floor: float
     """Residuals below this tell nothing about which of two alignments is better."""
     convincing_rating: float

@@ -14,7 +14,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras.placement.alignment.evidence import Evidence, evidence_of, texture
+from burg_drake.cameras.placement.alignment.evidence import (
+    LEAST_WINDOW,
+    Evidence,
+    evidence_of,
+    texture,
+    window_of,
+)
 from burg_drake.cameras.placement.alignment.linear_light import linear_light
 from burg_drake.cameras.placement.alignment.sheet_projection import (
     places_on_sheet,
@@ -51,6 +57,7 @@ class EmptyBoard:
         contrast: paper less ink, mean over channels and sheet [full scale, linear].
         blur: of the photo [pixels].
         noise: standard deviation of the photo's noise over paper [full scale, linear].
+        smear: how far evidence reaches beyond what stands there [pixels].
     """
 
     color: NDArray[np.float32]
@@ -60,6 +67,7 @@ class EmptyBoard:
     contrast: float
     blur: float
     noise: float
+    smear: float
 
 
 def empty_board(
@@ -120,6 +128,7 @@ def empty_board(
         contrast,
         blur,
         float(np.clip(noise, 0.002, 0.1 * contrast)),
+        max(window_of(cell) - LEAST_WINDOW, 0.0),
     )
 
 

@@ -104,7 +104,7 @@ class DepthAligner:
         self.residual_floor, self.rough = self._noise, ROUGH
         self._stands = self._valid & (height > HEIGHT * self._noise)
         evidence = np.clip(height / (HEIGHT * self._noise), 0.0, 1.0) * 2.0 - 1.0
-        self.sees_colors = False
+        self.sees_colors, self.smear = False, 0.0
         self.evidence = np.where(self._valid, evidence, 0.0)
 
     def align(

@@ -68,6 +68,11 @@ class Texture:
     weight: Array
 
 
+def window_of(cell: float) -> float:
+    """Standard deviation of the neighbourhood for cells of a size [pixels]."""
+    return max(WINDOW * cell, LEAST_WINDOW)
+
+
 def texture(light: NDArray[np.float32], ink: Array, black: float, cell: float) -> Texture:
     """Compares logarithms of a photo and of the board in neighbourhoods.
 
@@ -80,7 +85,7 @@ def texture(light: NDArray[np.float32], ink: Array, black: float, cell: float) -
         black: light of ink over that of paper.
         cell: side of a marker's cell [pixels].
     """
-    sigma = max(WINDOW * cell, LEAST_WINDOW)
+    sigma = window_of(cell)
     grey = light.mean(axis=-1)
     # what paper gives around here, so that `FAINT` is the same share in shade and sun
     local = cv2.GaussianBlur(cv2.dilate(grey, np.ones((5, 5))), (0, 0), 2.0 * sigma)

@@ -73,7 +73,7 @@ class SilhouetteAligner:
             0.08,
             False,
         )
-        self.sees_colors = True
+        self.sees_colors, self.smear = True, picture.smear
         self.evidence = picture.evidence
         self.rough = ROUGH * max(1.0, picture.blur)
         self.residual_floor = FINE
