@@ -14,7 +14,7 @@ from burg_drake.core.arrays import Array
 from burg_drake.core.frames import make_pose, rot_z
 from burg_drake.scene.document.scene import Board
 from tests.cameras.placement_views import looking
-from tests.cameras.synthetic import ImageDegradation, board_image
+from tests.cameras.synthetic import ImageDegradation, board_image, levels, light_of
 
 BOARD = Board()
 INTRINSICS = Intrinsics(width=320, height=240, focal=(600.0, 600.0), center=(159.5, 119.5))
@@ -50,14 +50,10 @@ def drawing(
     """
     covers = np.array(plates).reshape(-1, 5)
     rng = np.random.default_rng(0)
-    light = board_image(BOARD, INTRINSICS, X_SC, covers=covers, look=look, rng=rng) / 255.0
-    return as_photo(light if shade is None else light * shade[..., None])
-
-
-def as_photo(light: Array) -> Array:
-    """Levels in sRGB of light, 1 at full scale (IEC 61966-2-1)."""
-    levels = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-    return np.asarray(np.round(255.0 * levels).astype(np.uint8))
+    photo = board_image(BOARD, INTRINSICS, X_SC, covers=covers, look=look, rng=rng)
+    if shade is None:
+        return photo
+    return np.rint(levels(light_of(photo) * shade[..., None])).astype(np.uint8)
 
 
 def aligner(image: Array) -> SilhouetteAligner:

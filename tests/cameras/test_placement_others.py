@@ -26,7 +26,7 @@ from burg_drake.cameras.placement.localization import locate_objects
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import make_pose
-from tests.cameras.plates import BOARD, INTRINSICS, aligner, as_photo, cover, drawing, plate
+from tests.cameras.plates import BOARD, INTRINSICS, aligner, cover, drawing, plate
 from tests.cameras.synthetic import ImageDegradation, board_image
 
 LOOK = ImageDegradation(blur=0.7, noise=2.0)
@@ -46,10 +46,8 @@ def test_what_is_no_object_of_the_scene_is_named_where_it_stands() -> None:
 
 def test_straight_below_the_camera_it_is_named_in_its_middle() -> None:
     X_SC = make_pose(np.diag([1.0, -1.0, -1.0]), (*THERE[:2], 0.8))
-    image = as_photo(
-        board_image(BOARD, INTRINSICS, X_SC, covers=np.array([cover(SHORT, THERE, ON_PLACE)]))
-        / 255.0
-    )
+    covers = np.array([cover(SHORT, THERE, ON_PLACE)])
+    image = board_image(BOARD, INTRINSICS, X_SC, covers=covers)
     picture = empty_board(BOARD, image, INTRINSICS.K, X_SC)
     assert picture is not None
     view = PinholeView(INTRINSICS.K, (INTRINSICS.width, INTRINSICS.height), X_SC)

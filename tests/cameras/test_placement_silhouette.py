@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from burg_drake.cameras.optics import photo_light
 from burg_drake.cameras.placement.alignment.background import empty_board
-from burg_drake.cameras.placement.alignment.linear_light import linear_light
 from burg_drake.cameras.placement.localization import locate_objects
 from burg_drake.cameras.placement.search import find_places
 from tests.cameras.plates import (
@@ -15,7 +15,6 @@ from tests.cameras.plates import (
     VIEW,
     X_SC,
     aligner,
-    as_photo,
     cover,
     drawing,
     plate,
@@ -47,7 +46,7 @@ def test_a_plate_is_found_and_measured(look: ImageDegradation) -> None:
 
 def test_a_scaled_print_is_an_empty_board_only_to_who_knows_its_scale() -> None:
     scale = (0.97, 0.98)
-    image = as_photo(board_image(BOARD, INTRINSICS, X_SC, scale=scale) / 255.0)
+    image = board_image(BOARD, INTRINSICS, X_SC, scale=scale)
     known = empty_board(BOARD, image, INTRINSICS.K, X_SC, scale)
     unknown = empty_board(BOARD, image, INTRINSICS.K, X_SC)
     assert known is not None and unknown is not None
@@ -61,7 +60,7 @@ def test_an_empty_board_in_uneven_light_is_empty() -> None:
     assert picture is not None
     here = picture.sheet
     assert (picture.evidence[here] > 0.1).mean() < 0.01
-    assert np.abs(picture.color[here] - linear_light(image)[here]).mean() < 6.0 / 255.0
+    assert np.abs(picture.color[here] - photo_light(image)[here]).mean() < 6.0 / 255.0
     assert 0.4 < picture.blur < 1.2
     assert 1.5 < 255.0 * picture.noise < 6.0
 

@@ -8,7 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from burg_drake.cameras.calibration.first_guess import first_guess
-from burg_drake.cameras.calibration.lens_fit import COEFFICIENTS, TAIL, Evidence, LensFit, fit_lens
+from burg_drake.cameras.calibration.lens_fit import (
+    COEFFICIENTS,
+    TAIL,
+    LensEvidence,
+    LensFit,
+    fit_lens,
+)
 from burg_drake.cameras.calibration.lens_uncertainty import (
     LensHypothesis,
     error_of,
@@ -36,7 +42,7 @@ class LensChoice:
         fit: of the model that was asked for, or that is supported best.
         supported: the fit that is supported best, to tell which corners do not belong.
         hypotheses: what the lens may be.
-        dispersion: of the corners' errors, see `Evidence`.
+        dispersion: of the corners' errors, see `LensEvidence`.
     """
 
     fit: LensFit
@@ -72,17 +78,17 @@ def choose_lens(views: Sequence[CharucoView], target: CharucoTarget, model: str)
     return LensChoice(best, supported, hypotheses, evidence.dispersion)
 
 
-def _evidence(fits: Sequence[LensFit]) -> Evidence:
+def _evidence(fits: Sequence[LensFit]) -> LensEvidence:
     """Views disagree by a model that is wrong, and by one that they do not determine, so that the
     one by which they agree most tells how alike errors are."""
     limit = TAIL * min(fit.typical for fit in fits)
-    return Evidence(limit, min(view_disagreement(fit) for fit in fits) ** 2)
+    return LensEvidence(limit, min(view_disagreement(fit) for fit in fits) ** 2)
 
 
 def _more_flexible(
     best: LensFit,
     rational: LensFit,
-    evidence: Evidence,
+    evidence: LensEvidence,
     hypotheses: tuple[LensHypothesis, ...],
     corners: Array,
 ) -> LensFit:

@@ -52,7 +52,7 @@ class _State(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Evidence:
+class LensEvidence:
     """How much corners tell about which model is right.
 
     Attributes:
@@ -112,7 +112,7 @@ class LensFit:
         """Median length of the residuals [pixels]."""
         return float(np.median(np.linalg.norm(np.concatenate(self.residuals), axis=1)))
 
-    def information(self, evidence: Evidence, bayesian: bool) -> float:
+    def information(self, evidence: LensEvidence, bayesian: bool) -> float:
         """Bayesian information criterion, or Akaike's, which is more generous to large models: the
         lowest of several models is best supported."""
         squares = np.sum(np.concatenate(self.residuals) ** 2, axis=1)

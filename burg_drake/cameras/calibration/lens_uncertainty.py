@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from burg_drake.cameras.calibration.lens_derivatives import lens_derivatives
-from burg_drake.cameras.calibration.lens_fit import Evidence, LensFit
+from burg_drake.cameras.calibration.lens_fit import LensEvidence, LensFit
 from burg_drake.cameras.calibration.lens_prior import prior
 from burg_drake.cameras.optics import Intrinsics
 from burg_drake.core import Array
@@ -71,7 +71,7 @@ def covariance_of(fit: LensFit) -> Array:
     return _covariance(fit)[: fit.size, : fit.size]
 
 
-def hypotheses_of(fits: Sequence[LensFit], evidence: Evidence) -> tuple[LensHypothesis, ...]:
+def hypotheses_of(fits: Sequence[LensFit], evidence: LensEvidence) -> tuple[LensHypothesis, ...]:
     """Fits of several models to the same corners, weighed by Akaike's criterion."""
     information = np.array([fit.information(evidence, False) for fit in fits])
     weights = np.exp(-0.5 * (information - information.min()))

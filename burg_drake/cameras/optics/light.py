@@ -12,29 +12,29 @@ from numpy.typing import NDArray
 
 
 def _decoded() -> NDArray[np.float32]:
-    """Linear light of each 8-bit level, of 0 to 255, by the curve of sRGB (IEC 61966-2-1)."""
+    """Linear light of each 8-bit level, 1 at full scale, by the curve of sRGB (IEC 61966-2-1)."""
     level = np.arange(256) / 255.0
     light = np.where(level <= 0.04045, level / 12.92, ((level + 0.055) / 1.055) ** 2.4)
-    return (255.0 * light).astype(np.float32)
+    return light.astype(np.float32)
 
 
 LIGHT = _decoded()
-"""Linear light [0 to 255] of each 8-bit level."""
+"""Linear light [0 to 1] of each 8-bit level."""
 
 
-def photo_light(grey: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """(H, W) linear light [0 to 255] of an image (H, W), as if its camera encoded it as sRGB.
+def photo_light(image: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """(...) linear light [0 to 1] of levels (...), as if their camera encoded them as sRGB.
 
     That cameras encode otherwise moves all edges alike towards black or white, which whoever fits
     edges must allow for.
     """
-    import cv2
-
-    return np.asarray(cv2.LUT(grey, LIGHT), dtype=np.float32)
+    return np.asarray(LIGHT.take(image))
 
 
 def even_levels(light: NDArray[np.float32]) -> NDArray[np.uint8]:
     """(H, W) levels that rise with the light, the brightest 255, for what reads the cells of
     markers: in the levels of a photo a blurred edge is moved towards black, so that small black
     cells get lost."""
-    return np.asarray(np.rint(light * (255.0 / max(float(light.max()), 1.0))), dtype=np.uint8)
+    return np.asarray(
+        np.rint(light * (255.0 / max(float(light.max()), 1.0 / 255.0))), dtype=np.uint8
+    )

@@ -25,8 +25,8 @@ BLURRED = 1.2
 """Variance from which on it is [pixels^2]."""
 WIDE_CELL = 2.2
 """Cells of at least so many pixels keep what is two cells away out of the window."""
-LEAST_CONTRAST = 0.1
-"""Below it an offset means nothing; keeps the division finite [linear light, of 255]."""
+LEAST_CONTRAST = 4e-4
+"""Below it an offset means nothing; keeps the division finite [linear light]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,11 +35,11 @@ class EdgeFits:
 
     Attributes:
         offset: (N,) from the predicted place, along the gradient of u [pixels].
-        contrast: (N,) white minus black [linear light, of 255]; negative if colors are the wrong
+        contrast: (N,) white minus black [linear light]; negative if colors are the wrong
             way round.
         information: (N,) inverse variance of the offset for noise that equals the contrast
             [1/pixels^2].
-        noise: (N,) root mean square of what the fit leaves [linear light, of 255].
+        noise: (N,) root mean square of what the fit leaves [linear light].
         widening: (N, 2) numerator and denominator of the increase of the blur's variance across the
             edge that would fit it better [pixels^2].
     """

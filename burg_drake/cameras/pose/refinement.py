@@ -285,7 +285,7 @@ def _bloom_prior() -> Array:
 
 def _offset_variance(fits: EdgeFits, good: NDArray[np.bool_]) -> Array:
     """(N,) variance of offsets by the image's noise [pixels^2]: light is noisy by its root."""
-    contrast = np.maximum(np.abs(fits.contrast), 1e-3)
+    contrast = np.maximum(np.abs(fits.contrast), 4e-6)
     noise = np.median(fits.noise[good] / np.sqrt(contrast[good]))
     return np.asarray(noise**2 / (contrast * np.maximum(fits.information, 1e-6)))
 

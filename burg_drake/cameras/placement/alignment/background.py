@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from burg_drake.cameras.optics import photo_light
 from burg_drake.cameras.placement.alignment.evidence import (
     LEAST_WINDOW,
     Evidence,
@@ -21,7 +22,6 @@ from burg_drake.cameras.placement.alignment.evidence import (
     texture,
     window_of,
 )
-from burg_drake.cameras.placement.alignment.linear_light import linear_light
 from burg_drake.cameras.placement.alignment.sheet_projection import (
     places_on_sheet,
     projected_print,
@@ -93,7 +93,7 @@ def empty_board(
         None if there is no contrast of paper and ink in the photo.
     """
     size = image.shape[1], image.shape[0]
-    light = linear_light(image)
+    light = photo_light(image)
     H_pixel_S = K @ inverse(X_SC)[:3][:, [0, 1, 3]] @ np.diag([*scale, 1.0])  # of the document
     ink, frames, sheet = projected_print(board, H_pixel_S, size)
     tint = projected_tints(board, tints, H_pixel_S, size)

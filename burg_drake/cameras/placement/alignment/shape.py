@@ -14,7 +14,7 @@ import trimesh
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, cKDTree
 
-from burg_drake.cameras.placement.alignment.linear_light import linear_light
+from burg_drake.cameras.optics import photo_light
 from burg_drake.cameras.projection import MeshOutline
 from burg_drake.core import Array, inverse, make_pose, rot_z, transform_points
 from burg_drake.geometry import RayCaster
@@ -138,7 +138,7 @@ def _colors(surface: trimesh.Trimesh, path: Path) -> Array | None:
     visual = seen.visual.to_color() if seen.visual.kind == "texture" else seen.visual
     levels = np.asarray(visual.vertex_colors)[:, :3][seen.faces].mean(axis=1)
     _, nearest = cKDTree(seen.triangles_center).query(surface.triangles_center)
-    return np.asarray(linear_light(np.round(levels).astype(np.uint8))[nearest], dtype=float)
+    return np.asarray(photo_light(np.round(levels).astype(np.uint8))[nearest], dtype=float)
 
 
 def target_shape(

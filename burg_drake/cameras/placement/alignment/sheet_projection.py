@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras.placement.alignment.linear_light import linear_light
+from burg_drake.cameras.optics import photo_light
 from burg_drake.core import Array
 from burg_drake.printout import frame_width
 from burg_drake.scene.document import Board
@@ -69,7 +69,7 @@ def projected_tints(
     H_S_texel = np.array([[x, 0, x / 2], [0, -y, board.size[1] - y / 2], [0, 0, 1]])
     return np.asarray(
         cv2.warpPerspective(
-            linear_light(tints),
+            photo_light(tints),
             H_pixel_S @ H_S_texel,
             size,
             borderMode=cv2.BORDER_CONSTANT,

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from burg_drake.cameras.optics import photo_light
 from burg_drake.cameras.placement.alignment.aligner import Alignment, sectors
 from burg_drake.cameras.placement.alignment.appearance import likeness
 from burg_drake.cameras.placement.alignment.background import EmptyBoard
 from burg_drake.cameras.placement.alignment.contour import ImageContour, outline
 from burg_drake.cameras.placement.alignment.least_squares import DisplacementFit, fit_displacement
-from burg_drake.cameras.placement.alignment.linear_light import linear_light
 from burg_drake.cameras.placement.alignment.photo_edges import (
     REACH,
     PhotoEdges,
@@ -77,7 +77,7 @@ class SilhouetteAligner:
         self.evidence = picture.evidence
         self.rough = ROUGH * max(1.0, picture.blur)
         self.residual_floor = FINE
-        self._light = linear_light(image)
+        self._light = photo_light(image)
         self._balanced = self._light / picture.paper
         self._picture = picture
 
