@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,7 +11,6 @@ from burg_drake.cameras.calibration.target import CharucoTarget
 from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.cameras.sources.frame import Image
 from burg_drake.core.arrays import Array
-from burg_drake.core.errors import InvalidInputError
 from burg_drake.scene.document.markers import marker_dictionary
 from tests.cameras import synthetic
 
@@ -48,17 +46,11 @@ def target_image(
     Raises:
         InvalidInputError: part of the image looks past the plane; noise without `rng`.
     """
-    if noise > 0.0 and rng is None:
-        raise InvalidInputError("noise needs a random generator; give rng")
     # The synthetic images have z out of their sheet: turn T by 180 degrees about its x axis.
     flip = np.diag([1.0, -1.0, -1.0, 1.0])
     sheet: Any = _TargetSheet(target)
-    image = synthetic.area_means(sheet, intrinsics, flip @ np.asarray(X_TC, dtype=float))
-    if blur > 0.0:
-        image = cv2.GaussianBlur(image, (0, 0), blur, borderType=cv2.BORDER_REPLICATE)
-    if rng is not None and noise > 0.0:
-        image = image + rng.normal(0.0, noise, image.shape)
-    return np.clip(np.rint(image), 0, 255).astype(np.uint8)
+    light = synthetic.area_means(sheet, intrinsics, flip @ np.asarray(X_TC, dtype=float))
+    return synthetic.degraded(light, synthetic.ImageDegradation(blur=blur, noise=noise), rng)
 
 
 class _TargetSheet:

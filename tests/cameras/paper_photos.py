@@ -10,6 +10,7 @@ import numpy as np
 
 from burg_drake.printout.board_printout import PrintSettings, print_board
 from burg_drake.scene.document.scene import load_scene
+from tests.cameras.synthetic import levels, light_of
 from tests.printout.paper import rasterised
 
 DPI = 100
@@ -27,8 +28,8 @@ def paper() -> np.ndarray:
 
 
 def shown_at(p_S: np.ndarray) -> np.ndarray:
-    """(H, W) brightness of points (H, W, 2) of the sheet [m]."""
-    page = paper()
+    """(H, W) linear light [0 to 1] of points (H, W, 2) of the sheet [m]."""
+    page = light_of(paper())
     column = p_S[..., 0] / 0.0254 * DPI - 0.5
     row = page.shape[0] - p_S[..., 1] / 0.0254 * DPI - 0.5
     at = column.astype(np.float32), row.astype(np.float32)
@@ -37,7 +38,7 @@ def shown_at(p_S: np.ndarray) -> np.ndarray:
         *at,
         cv2.INTER_LINEAR,
         borderMode=cv2.BORDER_CONSTANT,
-        borderValue=TABLE,
+        borderValue=float(light_of(np.array(TABLE))),
     )
 
 
@@ -62,4 +63,4 @@ def photo(X_SC: np.ndarray, size: tuple[int, int], focal: float, bend: float = 0
     depth = -X_SC[2, 3] / rays_S[..., 2]
     fine = shown_at((X_SC[:3, 3] + depth[..., None] * rays_S)[..., :2])
     mean = fine.reshape(height, FINE, width, FINE).mean(axis=(1, 3))
-    return np.repeat(np.round(mean).astype(np.uint8)[..., None], 3, axis=2)
+    return np.repeat(np.round(levels(mean)).astype(np.uint8)[..., None], 3, axis=2)

@@ -3,13 +3,12 @@
 Made without a renderer: each pixel is the mean over its area of what the sheet shows there, so that
 an edge lies where the pose puts it to a few hundredths of a pixel, or better if asked. White paper
 with the markers on a table; covers may lie on it, and blur, noise, uneven light and lens distortion
-may be added.
+may be added. Pixels and blur mix light, as those of cameras do; levels are those of sRGB.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,8 +39,9 @@ class ImageDegradation:
     Attributes:
         blur: standard deviation of a Gaussian blur [pixels].
         noise: standard deviation of noise [8-bit levels].
-        gain: all brightness is multiplied by it.
-        gradient: how much brighter the right edge of the image is than its left, as a share.
+        gain: all light is multiplied by it.
+        gradient: how much more light there is at the right edge of the image than at its left, as a
+            share.
     """
 
     blur: float = 0.0
@@ -89,14 +89,12 @@ def board_image(
 
 
 def degraded(
-    image: NDArray[np.floating[Any] | np.uint8],
-    look: ImageDegradation,
-    rng: np.random.Generator | None = None,
+    light: Array, look: ImageDegradation, rng: np.random.Generator | None = None
 ) -> NDArray[np.uint8]:
-    """(H, W, 3) an image under another light, blurred, and with noise, in this order.
+    """(H, W, 3) an image in another light, blurred, and with noise, in this order.
 
     Args:
-        image: (H, W, 3).
+        light: (H, W, 3) linear light [0 to 1].
         look: what degrades it.
         rng: for noise.
 
@@ -107,14 +105,28 @@ def degraded(
 
     if look.noise > 0.0 and rng is None:
         raise InvalidInputError("noise needs a random generator; give rng")
-    width = image.shape[1]
-    light = look.gain * (1.0 + look.gradient * (np.arange(width) / width - 0.5))
-    image = image * light[None, :, None]
+    width = light.shape[1]
+    gain = look.gain * (1.0 + look.gradient * (np.arange(width) / width - 0.5))
+    light = light * gain[None, :, None]
     if look.blur > 0.0:
-        image = cv2.GaussianBlur(image, (0, 0), look.blur, borderType=cv2.BORDER_REPLICATE)
+        light = cv2.GaussianBlur(light, (0, 0), look.blur, borderType=cv2.BORDER_REPLICATE)
+    image = levels(light)
     if rng is not None and look.noise > 0.0:
         image = image + rng.normal(0.0, look.noise, image.shape)
     return np.clip(np.rint(image), 0, 255).astype(np.uint8)
+
+
+def levels(light: Array) -> Array:
+    """Levels [0 to 255] of linear light [0 to 1], as sRGB has them (IEC 61966-2-1)."""
+    light = np.clip(light, 0.0, 1.0)
+    bright = 1.055 * np.maximum(light, 0.0031308) ** (1.0 / 2.4) - 0.055
+    return np.asarray(255.0 * np.where(light <= 0.0031308, 12.92 * light, bright))
+
+
+def light_of(levels: Array) -> Array:
+    """Linear light [0 to 1] of levels [0 to 255]."""
+    share = np.asarray(levels, dtype=float) / 255.0
+    return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
 
 
 def board_depth(intrinsics: Intrinsics, X_SC: Array) -> NDArray[np.float32]:
@@ -227,7 +239,7 @@ def _under(covers: Array, p_S: Array) -> NDArray[np.bool_]:
 
 
 def area_means(sheet: _Sheet, intrinsics: Intrinsics, X_SC: Array, samples: int = COARSE) -> Array:
-    """(H, W, 3) color, averaged over each pixel's area."""
+    """(H, W, 3) linear light [0 to 1], averaged over each pixel's area."""
     h, w = intrinsics.height, intrinsics.width
     u, v = np.meshgrid(np.arange(w + 1) - 0.5, np.arange(h + 1) - 0.5)
     rays = _rays(intrinsics, np.stack([u, v], axis=-1)) @ X_SC[:3, :3].T
@@ -237,7 +249,7 @@ def area_means(sheet: _Sheet, intrinsics: Intrinsics, X_SC: Array, samples: int 
     at = sheet.region(_on_plane(X_SC, rays).reshape(-1, 1, 2)).reshape(h + 1, w + 1)
     corners = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]])
     looks, kinds = np.unique(
-        np.column_stack([sheet.colors, sheet.on_table]), axis=0, return_inverse=True
+        np.column_stack([light_of(sheet.colors), sheet.on_table]), axis=0, return_inverse=True
     )
     kinds = kinds.ravel().astype(np.int8)
     image = looks[kinds[corners[0]]]
@@ -289,7 +301,7 @@ def _lattice(samples: int) -> tuple[Array, Array]:
 
 
 def _grain(p_S: Array) -> Array:
-    """Grain of a wooden table, brighter and darker lines along x [8-bit levels]."""
+    """Grain of a wooden table, brighter and darker lines along x [linear light]."""
     x, y = p_S[..., 0], p_S[..., 1]
     wave = y + 0.004 * np.sin(9.0 * x) + 0.0015 * np.sin(31.0 * x + 40.0 * y)
-    return 12.0 * np.sin(2 * np.pi * wave / 0.021) + 7.0 * np.sin(2 * np.pi * wave / 0.0083)
+    return 0.04 * np.sin(2 * np.pi * wave / 0.021) + 0.023 * np.sin(2 * np.pi * wave / 0.0083)

@@ -11,11 +11,20 @@ import pytest
 from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.cameras.pose.estimate import BoardEstimate
 from burg_drake.cameras.pose.estimator import BoardPose, estimate_board
+from burg_drake.cameras.pose.refinement import perturbed_pose
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.scene.document.markers import Markers
 from burg_drake.scene.document.scene import Board
 from tests.cameras.board_views import CAMERA, SMALL, error, view
-from tests.cameras.synthetic import FINE, ImageDegradation, board_depth, board_image, covers_of
+from tests.cameras.synthetic import (
+    FINE,
+    ImageDegradation,
+    board_depth,
+    board_image,
+    covers_of,
+    degraded,
+    light_of,
+)
 from tests.thorough import thorough
 
 BOARD = Board()
@@ -107,13 +116,60 @@ def test_the_covariance_is_that_of_the_errors() -> None:
     assert 2.5 < np.mean(normalised) < 9.0
 
 
-def test_dark_and_blurred_pictures(poses: BoardPose, clean: np.ndarray) -> None:
-    rng = np.random.default_rng(1)
-    for gain, blur, mm, degrees in ((0.25, 0.6, 0.3, 0.025), (1.0, 1.5, 0.6, 0.05)):
-        noise = rng.normal(0.0, 2.0, clean.shape)
-        picture = cv2.GaussianBlur(gain * clean, (0, 0), blur) + noise
-        estimate = poses.estimate(np.clip(np.rint(picture), 0, 255).astype(np.uint8))
-        assert near(estimate, VIEW, mm, degrees), (gain, blur)
+@pytest.mark.parametrize(
+    ("gain", "blur", "mm", "degrees"), [(0.05, 0.6, 0.3, 0.025), (1.0, 1.5, 0.3, 0.025)]
+)
+def test_dark_and_blurred_pictures(
+    poses: BoardPose, gain: float, blur: float, mm: float, degrees: float
+) -> None:
+    look, rng = ImageDegradation(gain=gain, blur=blur, noise=2.0), np.random.default_rng(1)
+    estimate = poses.estimate(board_image(BOARD, CAMERA, VIEW, look=look, rng=rng))
+    assert near(estimate, VIEW, mm, degrees)
+
+
+@pytest.mark.parametrize(("gain", "mm"), [(1.4, 0.5), (2.0, 0.5)])
+def test_paper_that_is_overexposed_is_no_other_board(
+    poses: BoardPose, gain: float, mm: float
+) -> None:
+    look = ImageDegradation(gain=gain, blur=0.7)
+    estimate = poses.estimate(board_image(BOARD, CAMERA, VIEW, look=look))
+    assert near(estimate, VIEW, mm, 0.05)
+
+
+@pytest.mark.parametrize("direction", [0.0, 30.0, 90.0])
+def test_motion_while_the_camera_exposes(poses: BoardPose, direction: float) -> None:
+    light = light_of(board_image(BOARD, CAMERA, VIEW))
+    along = np.array([np.cos(np.deg2rad(direction)), np.sin(np.deg2rad(direction))])
+    line = np.linspace(-2.0, 2.0, 17)[:, None] * along  # 4 pixels
+    size = (CAMERA.width, CAMERA.height)
+    moved = [
+        cv2.warpAffine(light, np.c_[np.eye(2), by], size, flags=cv2.INTER_LINEAR) for by in line
+    ]
+    estimate = poses.estimate(degraded(np.mean(moved, axis=0), ImageDegradation()))
+    assert near(estimate, VIEW, 0.3, 0.03)
+
+
+def test_rows_exposed_one_after_the_other_are_told() -> None:
+    board_pose = BoardPose(LITTLE, SMALL)
+    turn = 2.0 / SMALL.focal[0] * np.array([0.5, -0.7, 0.3])  # about 2 pixels in all
+    image, bands = board_image(LITTLE, SMALL, NEAR), 12
+    for band in range(bands):
+        rows = slice(band * SMALL.height // bands, (band + 1) * SMALL.height // bands)
+        X_SC = perturbed_pose(NEAR, np.r_[turn * ((band + 0.5) / bands - 0.5), 0.0, 0.0, 0.0])
+        image[rows] = board_image(LITTLE, SMALL, X_SC)[rows]
+    estimate = board_pose.estimate(image)
+    assert estimate.valid and "while its rows were exposed one after the other" in estimate.reason
+    off = error(estimate.X_SC, NEAR)
+    assert np.sqrt(off @ np.linalg.solve(estimate.covariance, off) / 6.0) < 3.0
+
+
+def test_markers_that_are_a_little_too_large_leave_the_scale_uncertain() -> None:
+    side = LITTLE.markers.side
+    larger = Markers(side=1.013 * side, spacing=LITTLE.markers.spacing - 0.013 * side)
+    image = board_image(replace(LITTLE, markers=larger), SMALL, NEAR)
+    estimate = estimate_board(image, SMALL, LITTLE)
+    assert estimate.valid
+    assert estimate.reason.startswith("uncertain scale: markers look 1.01")
 
 
 def test_errors_in_strongly_blurred_pictures_are_what_the_covariance_says() -> None:
@@ -121,7 +177,7 @@ def test_errors_in_strongly_blurred_pictures_are_what_the_covariance_says() -> N
     normalised = []
     for roll in (0.0, 100.0, 230.0):
         truth = view((0.15, 0.1), 0.4, 25.0, 200.0, roll)
-        image = cv2.GaussianBlur(board_image(LITTLE, SMALL, truth).astype(float), (0, 0), 2.0)
+        image = board_image(LITTLE, SMALL, truth, look=ImageDegradation(blur=2.0)).astype(float)
         for _ in range(10):
             noisy = np.clip(np.rint(image + rng.normal(0.0, 4.0, image.shape)), 0, 255)
             estimate = board_pose.estimate(noisy.astype(np.uint8))

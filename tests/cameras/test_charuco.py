@@ -18,6 +18,7 @@ from burg_drake.core.errors import BurgError, InvalidInputError
 from burg_drake.core.frames import make_pose
 from burg_drake.printout.board_printout import PrintSettings
 from tests.cameras.charuco_image import target_image
+from tests.cameras.synthetic import levels, light_of
 from tests.printout.paper import rasterised
 
 TARGET = CharucoTarget()
@@ -69,16 +70,20 @@ def sharp() -> Image:
     return target_image(TARGET, CAMERA, looking(0.13, 0.0, 0.0))
 
 
+def levels_of(light: np.ndarray) -> Image:
+    return np.rint(levels(light)).astype(np.uint8)
+
+
 @pytest.mark.parametrize("blur", [1.0, 1.5, 2.0])
 def test_blur_is_measured(sharp: Image, blur: float) -> None:
-    view = find_target(cv2.GaussianBlur(sharp, (0, 0), blur), TARGET)
+    view = find_target(levels_of(cv2.GaussianBlur(light_of(sharp), (0, 0), blur)), TARGET)
     assert isinstance(view, CharucoView)
     # A pixel's own width counts, too: its variance is 1/12.
     assert view.blur == pytest.approx(np.sqrt(blur**2 + 1 / 12), rel=0.15)
 
 
 def test_motion_blurs_edges_of_one_direction(sharp: Image) -> None:
-    moved = find_target(cv2.blur(sharp, (7, 1)), TARGET)
+    moved = find_target(levels_of(cv2.blur(light_of(sharp), (7, 1))), TARGET)
     assert isinstance(moved, CharucoView) and moved.blur > 1.8
 
 
@@ -99,13 +104,13 @@ def test_synthetic_images_show_what_opencv_draws(squares: tuple[int, int], legac
     small = cv2.blur(drawing(target), (5, 5))
     warped = cv2.warpPerspective(small, H, (360 * fine, 270 * fine), borderValue=255)
     theirs = cv2.resize(warped, (360, 270), interpolation=cv2.INTER_AREA).astype(float)
-    ours = cv2.cvtColor(target_image(target, camera, X_TC), cv2.COLOR_RGB2GRAY).astype(float)
+    ours = light_of(cv2.cvtColor(target_image(target, camera, X_TC), cv2.COLOR_RGB2GRAY))
     on_board = cv2.warpPerspective(
         np.full_like(small, 255), H, (360 * fine, 270 * fine), borderValue=0
     )
     inside = cv2.resize(on_board, (360, 270), interpolation=cv2.INTER_AREA) == 255
-    levels = np.polyfit(theirs[inside], ours[inside], 1)
-    assert np.abs(np.polyval(levels, theirs) - ours)[inside].mean() < 3.0
+    line = np.polyfit(theirs[inside], ours[inside], 1)
+    assert np.abs(np.polyval(line, theirs) - ours)[inside].mean() < 0.012
     assert np.corrcoef(theirs[inside], ours[inside])[0, 1] > 0.998
 
 

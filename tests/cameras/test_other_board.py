@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
+from burg_drake.cameras.optics import photo_light
 from burg_drake.cameras.pose.estimator import BoardPose
 from burg_drake.cameras.pose.wrong_board import WrongBoardCheck
 from burg_drake.scene.document.markers import Markers
@@ -108,6 +109,7 @@ def test_frames_are_looked_at_where_the_ring_is() -> None:
     X_SC = VIEW.copy()  # marker 5 of the sheet stands where the board of one has its own
     X_SC[:3, 3] -= BOARD.layout.p_SQ[5].mean(axis=0) - one.layout.p_SQ[0].mean(axis=0)
     grey = board_image(BOARD, SMALL, VIEW)[:, :, 1]
-    said = WrongBoardCheck(one, SMALL, (1.0, 1.0)).beyond(grey, X_SC, 200.0)
+    light = photo_light(grey)
+    said = WrongBoardCheck(one, SMALL, (1.0, 1.0)).beyond(grey, light, X_SC)
     assert "ids 0, 1, 2 ..." in said
-    assert not WrongBoardCheck(BOARD, SMALL, (1.0, 1.0)).beyond(grey, VIEW, 200.0)
+    assert not WrongBoardCheck(BOARD, SMALL, (1.0, 1.0)).beyond(grey, light, VIEW)

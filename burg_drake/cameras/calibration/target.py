@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from burg_drake.cameras.optics import even_levels, photo_light
 from burg_drake.cameras.sources import Image
 from burg_drake.core import MILLIMETRES, Array, FieldError, InvalidInputError, setting
 from burg_drake.scene.document import marker_dictionary
@@ -133,7 +134,8 @@ def find_target(image: Image, target: CharucoTarget, name: str = "image") -> Cha
         The view; or why there is none, in a few words.
     """
     gray = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
-    found, ids, _, marker_ids = target._detector.detectBoard(gray)
+    light = photo_light(gray)
+    found, ids, _, marker_ids = target._detector.detectBoard(even_levels(light))
     if ids is None or len(ids) == 0:
         seen = 0 if marker_ids is None else len(marker_ids)
         return (
@@ -155,18 +157,18 @@ def find_target(image: Image, target: CharucoTarget, name: str = "image") -> Cha
     spread = np.linalg.svd(corners - corners.mean(axis=0), compute_uv=False)[1]
     if 2.0 * spread / np.sqrt(len(ids)) < LEAST_SPREAD * np.hypot(*gray.shape):
         return "shows corners of the target in one line only"
-    refined = refine_corners(gray, corners, ids, target)
-    blur, side = _edges(gray, refined, ids, target)
+    refined = refine_corners(light, corners, ids, target)
+    blur, side = _edges(light, refined, ids, target)
     return CharucoView(name, (gray.shape[1], gray.shape[0]), ids, refined, blur, side)
 
 
 def refine_corners(
-    gray: NDArray[np.uint8], corners: Array, ids: NDArray[np.int32], target: CharucoTarget
+    light: NDArray[np.float32], corners: Array, ids: NDArray[np.int32], target: CharucoTarget
 ) -> Array:
     """Moves corners to where the edges that meet there cross.
 
     Args:
-        gray: (H, W) image.
+        light: (H, W) image in linear light.
         corners: (N, 2) near the corners [pixels].
         ids: (N,) which corners they are.
         target: whose they are.
@@ -176,7 +178,7 @@ def refine_corners(
     """
     windows = np.clip(np.floor(_gaps(corners, ids, target)), 2, 31).astype(int)
     criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 50, 1e-4)
-    smooth = cv2.GaussianBlur(gray.astype(np.float32), (0, 0), SMOOTHING)
+    smooth = cv2.GaussianBlur(light, (0, 0), SMOOTHING)
     refined = corners.astype(np.float32).reshape(-1, 1, 2)
     for window in np.unique(windows):
         these = windows == window
@@ -217,7 +219,7 @@ def _neighbours(ids: NDArray[np.int32], target: CharucoTarget) -> NDArray[np.int
 
 
 def _edges(
-    gray: NDArray[np.uint8], corners: Array, ids: NDArray[np.int32], target: CharucoTarget
+    light: NDArray[np.float32], corners: Array, ids: NDArray[np.int32], target: CharucoTarget
 ) -> tuple[float, float]:
     """Blur and length of the squares' sides [pixels].
 
@@ -237,7 +239,7 @@ def _edges(
     p = start[:, None] + along[:, None] * places[:, None]
     p = (p[:, :, None] + across[:, None, None] * t[:, None, :, None]).astype(np.float32)
     lines = cv2.remap(
-        gray.astype(np.float32),
+        light,
         p[..., 0].reshape(len(p), -1),
         p[..., 1].reshape(len(p), -1),
         cv2.INTER_LINEAR,

@@ -15,9 +15,10 @@ from burg_drake.cameras.optics import Intrinsics
 from burg_drake.cameras.pose.edge_projection import cross, image_points
 from burg_drake.core import Array, inverse
 
-MISPLACED = 3.0
-"""Distance from its place from which on a corner does not belong [pixels]; corners of sharp and
-blurred markers are found within one."""
+MISPLACED = 3.0, 0.1
+"""Distance from its place from which on a corner does not belong, the larger of so many pixels and
+such a share of a marker's side. Corners of sharp and blurred markers are found within one pixel,
+those of a camera that moves within as many as it does."""
 RIVAL = (3.0, 0.5)
 """The second pose is a rival of the first up to so many times its error, plus so much [pixels]."""
 FAR = (10.0, 5.0)
@@ -52,8 +53,9 @@ def coarse_pose(p_SQ: Array, corners: Array, intrinsics: Intrinsics) -> CoarsePo
     straight = intrinsics.undistort(corners)
     inliers = np.ones(len(p_SQ), dtype=bool)
     poses, errors = _planar_poses(p_SQ, straight, intrinsics.K)
-    if len(p_SQ) > 1 and (not errors or errors[0] > 0.5 * MISPLACED):
-        inliers = _agreeing(p_SQ, straight)
+    misplaced = max(MISPLACED[0], MISPLACED[1] * float(np.median(_sides(corners))))
+    if len(p_SQ) > 1 and (not errors or errors[0] > 0.5 * misplaced):
+        inliers = _agreeing(p_SQ, straight, misplaced)
         if inliers.any():
             poses, errors = _planar_poses(p_SQ[inliers], straight[inliers], intrinsics.K)
     rivals = [X for X, e in zip(poses, errors, strict=True) if e <= RIVAL[0] * errors[0] + RIVAL[1]]
@@ -90,13 +92,14 @@ def _planar_poses(p_SQ: Array, straight: Array, K: Array) -> tuple[list[Array], 
     return [X for _, X in found], [error for error, _ in found]
 
 
-def _agreeing(p_SQ: Array, straight: Array) -> NDArray[np.bool_]:
-    """Markers whose corners fit the homography that most corners agree on."""
+def _agreeing(p_SQ: Array, straight: Array, misplaced: float) -> NDArray[np.bool_]:
+    """Markers whose corners fit the homography that most corners agree on, up to a distance
+    [pixels]."""
     import cv2
 
     cv2.setRNGSeed(0)
     _, fits = cv2.findHomography(
-        p_SQ.reshape(-1, 3)[:, :2], straight.reshape(-1, 2), cv2.RANSAC, MISPLACED
+        p_SQ.reshape(-1, 3)[:, :2], straight.reshape(-1, 2), cv2.RANSAC, misplaced
     )
     if fits is None:
         return np.zeros(len(p_SQ), dtype=bool)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from burg_drake.cameras.optics import even_levels, photo_light
 from burg_drake.cameras.pose.quadrilaterals import LEAST_CONTRAST, dark_quadrilaterals, read_cells
 from burg_drake.core import Array
 from burg_drake.scene.document import MarkerLayout, marker_dictionary
@@ -24,6 +25,10 @@ as many markers on boards at 0.5 to 1 m as OpenCV's own values (windows 3, 13 an
 in less than half the time."""
 SECOND_SEARCH = ((5, 21, 37), 5.0)
 """For dark or blurred images, or very large markers."""
+SEARCHES = (True, FIRST_SEARCH), (False, FIRST_SEARCH), (True, SECOND_SEARCH)
+"""Which are made, one after the other, in the levels of the image or in its light: the latter finds
+a half more in images of a camera that moves, and a fifth more in dark ones. The last one is for
+images in which neither finds a marker."""
 SMALLEST = 0.06
 """Least perimeter of a marker, as a share of the image's longer side; cells of a pixel cannot be
 read."""
@@ -84,11 +89,12 @@ class MarkerDetector:
     def detect(self, grey: NDArray[np.uint8]) -> Detection:
         """Finds markers in an image (H, W). One that is seen twice counts as not seen."""
         found = Detection()
-        for windows, constant in (FIRST_SEARCH, SECOND_SEARCH):
-            again = self._search(grey, windows, constant)
+        for encoded, (windows, constant) in SEARCHES:
+            image = grey if encoded else even_levels(photo_light(grey))
+            again = self._search(image, windows, constant)
             if len(again.index) >= len(found.index):
                 found = again
-            if len(found.index) >= self._enough:
+            if len(found.index) >= (self._enough if encoded else 1):
                 break
         return found
 

@@ -1,14 +1,15 @@
 """Fits single edges of markers to the pixels across them.
 
 A few pixels of the row or column that crosses an edge are compared with what they would show if
-the edge were where it is predicted: the cells around it, blurred by lens and pixel. Brightness,
-contrast and offset are fitted by linear least squares, to the pixels as they are: nothing is
-resampled.
+the edge were where it is predicted: the cells around it, blurred by lens, motion and pixel.
+Brightness, contrast and offset are fitted by linear least squares, to the pixels as they are:
+nothing is resampled.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +25,8 @@ BLURRED = 1.2
 """Variance from which on it is [pixels^2]."""
 WIDE_CELL = 2.2
 """Cells of at least so many pixels keep what is two cells away out of the window."""
-LEAST_CONTRAST = 1.0
-"""Below it an offset means nothing; keeps the division finite [8-bit levels]."""
+LEAST_CONTRAST = 0.1
+"""Below it an offset means nothing; keeps the division finite [linear light, of 255]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,12 +35,13 @@ class EdgeFits:
 
     Attributes:
         offset: (N,) from the predicted place, along the gradient of u [pixels].
-        contrast: (N,) white minus black [8-bit levels]; negative if colors are the wrong way round.
+        contrast: (N,) white minus black [linear light, of 255]; negative if colors are the wrong
+            way round.
         information: (N,) inverse variance of the offset for noise that equals the contrast
             [1/pixels^2].
-        noise: (N,) root mean square of what the fit leaves [8-bit levels].
-        widening: (N, 2) numerator and denominator of the increase of the blur's variance that would
-            fit the edge better [pixels^2].
+        noise: (N,) root mean square of what the fit leaves [linear light, of 255].
+        widening: (N, 2) numerator and denominator of the increase of the blur's variance across the
+            edge that would fit it better [pixels^2].
     """
 
     offset: Array
@@ -50,33 +52,33 @@ class EdgeFits:
 
 
 def fit_edges(
-    grey: NDArray[np.uint8], edges: MarkerEdges, views: EdgeViews, blur: float | Array
+    light: NDArray[np.float32], edges: MarkerEdges, views: EdgeViews, blur: Array
 ) -> EdgeFits:
     """Fits brightness, contrast and offset of each edge.
 
     Args:
-        grey: (H, W) image.
+        light: (H, W) image in linear light.
         edges: table.
         views: N of them.
-        blur: variance of lens and pixel together [pixels^2], of all edges or (N,) of each.
+        blur: covariance of lens, motion and pixel together [pixels^2], (2, 2) of all edges or
+            (N, 2, 2) of each.
     """
-    blur = np.reshape(blur, (-1, 1))
+    sigma_u, sigma_v = (_width(blur, gradient) for gradient in (views.across, views.along))
+    normal = np.sqrt((views.across**2).sum(axis=1, keepdims=True))
+    sigma = sigma_u / normal  # across the edge [pixels]
     in_row = (np.abs(views.across[:, 0]) >= np.abs(views.across[:, 1]))[:, None]
     nearest = np.rint(views.at).astype(np.intp)
-    window = np.where(blur < BLURRED, WINDOW, 2 * WINDOW)
+    window = np.where(sigma**2 < BLURRED, WINDOW, 2 * WINDOW)
     columns = nearest[:, :1] + np.where(in_row, window, 0)
     rows = nearest[:, 1:] + np.where(in_row, 0, window)
     dx, dy = columns - views.at[:, :1], rows - views.at[:, 1:]
     # Half the memory and time of doubles, and 1e-5 pixels at worst.
     u = (views.across[:, :1] * dx + views.across[:, 1:] * dy).astype(np.float32)
     v = (views.along[:, :1] * dx + views.along[:, 1:] * dy).astype(np.float32)
-    sigma = np.sqrt(blur)
-    sigma_u = (sigma * np.sqrt((views.across**2).sum(axis=1, keepdims=True))).astype(np.float32)
-    sigma_v = (sigma * np.sqrt((views.along**2).sum(axis=1, keepdims=True))).astype(np.float32)
 
     before, behind = _gaussian((-0.5 - v) / sigma_v)[0], _gaussian((v - 0.5) / sigma_v)[0]
     share = np.stack([before, 1.0 - before - behind, behind], axis=-1)  # of the rows of cells
-    wide = bool((sigma_u * WIDE_CELL < sigma).all() and (blur < BLURRED).all())
+    wide = bool((normal * WIDE_CELL < 1.0).all() and (sigma**2 < BLURRED).all())
     reach = 1 if wide else REACH
     near = slice(REACH - reach, REACH + reach + 1)
     steps = share @ edges.steps[views.which][:, :, near]
@@ -85,8 +87,14 @@ def fit_edges(
     bell = steps * density
     shape = np.einsum("nwk,nwk->nw", steps, below)
     slope = bell.sum(axis=-1) / sigma  # derivatives by the distance in pixels
-    bend = np.einsum("nwk,nwk->nw", bell, z) / -blur
-    return _fit(grey[rows, columns].astype(float), shape, slope, bend)
+    bend = np.einsum("nwk,nwk->nw", bell, z) / -(sigma**2)
+    return _fit(light[rows, columns].astype(float), shape, slope, bend)
+
+
+def _width(blur: Array, gradient: Array) -> NDArray[np.float32]:
+    """(N, 1) standard deviation of a blur along gradients (N, 2), in their units."""
+    variance = ((gradient[:, None] @ blur)[:, 0] * gradient).sum(axis=1, keepdims=True)
+    return np.asarray(np.sqrt(variance), dtype=np.float32)
 
 
 def _fit(values: Array, shape: Array, slope: Array, bend: Array) -> EdgeFits:
@@ -114,7 +122,7 @@ def _dot(one: Array, other: Array) -> Array:
     return np.asarray(np.einsum("nw,nw->n", one, other))
 
 
-def _gaussian(z: Array) -> tuple[Array, Array]:
+def _gaussian(z: NDArray[np.floating[Any]]) -> tuple[Array, Array]:
     """The normal distribution and its density, the former within 1e-7 (Abramowitz and Stegun,
     Handbook of Mathematical Functions, 1964, 26.2.17): a third of the time of the exact one."""
     density = np.exp(-0.5 * z * z) * (1.0 / np.sqrt(2.0 * np.pi))

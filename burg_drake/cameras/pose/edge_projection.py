@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.cameras.optics import Intrinsics
-from burg_drake.cameras.pose.edges import MarkerEdges
+from burg_drake.cameras.pose.edges import REACH, MarkerEdges
 from burg_drake.core import Array
 
 MARGIN = 8
@@ -32,6 +32,7 @@ class EdgeViews:
         print: (N, 2) the same if the print is longer along y by a share and shorter by it along x,
             about S's origin; and if its markers are larger by a share, each about its middle
             [pixels].
+        bloom: (N,) the same if light spreads, so that white grows by a pixel on all sides: 1 or -1.
     """
 
     which: NDArray[np.intp]
@@ -40,12 +41,25 @@ class EdgeViews:
     along: Array
     motion: Array
     print: Array
+    bloom: Array
 
 
 def view_edges(
-    edges: MarkerEdges, which: NDArray[np.intp], intrinsics: Intrinsics, X_SC: Array
+    edges: MarkerEdges,
+    which: NDArray[np.intp],
+    intrinsics: Intrinsics,
+    X_SC: Array,
+    bloom: float = 0.0,
 ) -> EdgeViews:
-    """Projects edges, and leaves out those that are not in the image."""
+    """Projects edges, and leaves out those that are not in the image.
+
+    Args:
+        edges: table.
+        which: of them, as indices.
+        intrinsics: of the camera.
+        X_SC: (4, 4) pose.
+        bloom: by which white is larger on all sides [pixels].
+    """
     R_SC = X_SC[:3, :3]
     q_S = edges.p_SE[which] - X_SC[:3, 3]
     p_CE = q_S @ R_SC
@@ -65,7 +79,27 @@ def view_edges(
     motion = np.hstack([cross(g, q_S), -g])
     aspect = g[:, 1] * edges.p_SE[which, 1] - g[:, 0] * edges.p_SE[which, 0]
     growth = (g * edges.from_center[which]).sum(axis=1)
-    return EdgeViews(which, at, across, along, motion, np.column_stack([aspect, growth]))
+    toward_black = -edges.steps[which, 1, REACH].astype(float)
+    return EdgeViews(
+        which,
+        at + bloom * toward_black[:, None] * normal,
+        across,
+        along,
+        motion,
+        np.column_stack([aspect, growth]),
+        toward_black,
+    )
+
+
+def motion_of_points(intrinsics: Intrinsics, X_SC: Array, p_S: Array) -> tuple[Array, Array]:
+    """Image points (N, 2) of points (N, 3), and (N, 2, 6) how they move with a small rotation and
+    translation of the camera, as in `BoardEstimate.covariance`. Points behind it are anywhere."""
+    q_S = p_S - X_SC[:3, 3]
+    p_C = q_S @ X_SC[:3, :3]
+    ahead = p_C[:, 2:] > NEAREST
+    at, by_C = image_points(intrinsics, np.where(ahead, p_C, [0.0, 0.0, 1.0]))
+    by_S = by_C @ X_SC[:3, :3].T
+    return at, np.concatenate([cross(by_S, q_S[:, None]), -by_S], axis=2)
 
 
 def image_points(intrinsics: Intrinsics, p_CQ: Array) -> tuple[Array, Array]:

@@ -6,36 +6,50 @@ the exact one. What a picture shows never raises: an estimate that is not valid 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from burg_drake.cameras.optics import Intrinsics
+from burg_drake.cameras.optics import Intrinsics, photo_light
 from burg_drake.cameras.pose.coarse import CoarsePose, coarse_pose
 from burg_drake.cameras.pose.detection import Detection, MarkerDetector, other_markers
 from burg_drake.cameras.pose.edges import marker_edges
 from burg_drake.cameras.pose.estimate import BoardEstimate
-from burg_drake.cameras.pose.print_size import (
+from burg_drake.cameras.pose.print_quality import (
+    ASPECT,
     LEAST_DEVIATION,
-    deformation,
+    print_doubt,
     scale_by_depth,
     scale_by_height,
+    wrong_print,
 )
-from burg_drake.cameras.pose.refinement import EdgeRefinement, RefinedPose
+from burg_drake.cameras.pose.refinement import EdgeRefinement, EdgeRound, RefinedPose
 from burg_drake.cameras.pose.wrong_board import WrongBoardCheck
-from burg_drake.core import Array, InvalidInputError
+from burg_drake.core import Array, InvalidInputError, rotation_angle
 from burg_drake.scene.document import Board
 
-OTHER_MARKER_SCALE = 0.05
-"""From this deviation on, markers are too large or too small for their distances to look for their
-edges; corners tell it to some hundredths, edges to some thousandths [-]."""
-DECIDED = 30.0
-"""By how much the squared normalised residuals of the second pose must exceed those of the first
-for the first to be right (odds of exp(15) if they were normal)."""
+OTHER_MARKER_SCALE = 0.05, 1.5
+"""From this deviation on, as a share and as a shift of a marker's sides [pixels], markers are too
+large or too small for their distances to look for their edges. Light that blooms shifts them by a
+pixel."""
+DECIDED = 0.7
+"""By how much the edges of a read marker must be farther off in a second pose for the first one to
+be right, as a share; less, the more markers there are. Of 92 pairs of poses in pictures of which
+covers, motion or the image's rim leave one or two markers, the wrong one was the better one by up
+to 0.6."""
+NEARBY = 0.03
+"""Two poses that fit alike and differ by less are one, which is known less well [rad]."""
 PLAUSIBLE = 0.3
 """Share of the edges of markers that were read which must be seen for a pose to be right."""
+DIFFERENT = 0.01
+"""Angle between poses that are not the same [rad]."""
+VAGUE = 0.05
+"""Standard deviation of the camera's position, as a share of its distance from the board, from
+which on it counts as unknown."""
 USED_EDGES = 6
 """Edges of a marker that must have been seen for it to count as used."""
 DOUBTFUL_RESIDUAL = 0.3
@@ -95,13 +109,14 @@ class BoardPose:
                 " same camera"
             )
         try:
-            return self._estimate_coarse_to_fine(grey, depth, X_SC_known)
+            return self._estimate_coarse_to_fine(grey, _untinted_light(image), depth, X_SC_known)
         except (np.linalg.LinAlgError, cv2.error):  # a degenerate view, such as one line of edges
             return BoardEstimate(reason="what is in sight of the board does not determine a pose")
 
     def _estimate_coarse_to_fine(
         self,
         grey: NDArray[np.uint8],
+        light: NDArray[np.float32],
         depth: NDArray[np.floating[Any]] | None,
         X_SC_known: Array | None,
     ) -> BoardEstimate:
@@ -114,49 +129,65 @@ class BoardPose:
         if wrong:
             return BoardEstimate(reason=wrong)
         found = seen.index[coarse.inliers]
-        refined, wrong = self._refine(grey, coarse.X_SC, found)
+        refined, wrong = self._refine(light, coarse.X_SC, found)
         if refined is None:
             return BoardEstimate(reason=wrong)
-        printed = deformation(refined)
-        if printed.marker_scale_error:
-            return BoardEstimate(reason=self._other_size_reason(1.0 + printed.marker_scale_error))
-        return self._estimate(grey, refined, printed.aspect_error, depth, X_SC_known)
+        wrong = self._wrong_print_reason(refined)
+        if wrong:
+            return BoardEstimate(reason=wrong)
+        return self._estimate(grey, light, refined, depth, X_SC_known)
 
     def _refine(
-        self, grey: NDArray[np.uint8], poses: list[Array], found: NDArray[np.intp]
+        self, light: NDArray[np.float32], poses: list[Array], found: NDArray[np.intp]
     ) -> tuple[RefinedPose | None, str]:
         """The pose that fits the edges best, or why there is none."""
-        attempts = [self._refinement.refine(grey, X_SC, found) for X_SC in poses]
-        refined = sorted((r for r in attempts if r is not None), key=_misfit)
-        if not refined:
+        attempts = [self._refinement.refine(light, X_SC, found) for X_SC in poses]
+        rounds = sorted((r for r in attempts if r is not None), key=lambda r: self._off(r, found))
+        if not rounds:
             return (
                 None,
                 "the edges of the markers are too unclear (blur, contrast); see to the light",
             )
-        best = refined[0]
-        if len(refined) > 1 and _differ(best, refined[1]):
-            advantage = (_misfit(refined[1]) - _misfit(best)) * len(best.weight)
-            if advantage < DECIDED:
+        best = self._refinement.with_disturbance(rounds[0])
+        turn = _turn(rounds[0], rounds[1]) if len(rounds) > 1 else 0.0
+        if turn > DIFFERENT and not self._decided(rounds[0], rounds[1], found):
+            if turn > NEARBY:
                 return None, (
                     f"{_markers(len(found))} in sight fit two poses alike;"
                     " come nearer or show more of the board"
                 )
+            best = replace(best, covariance=_covariance_of_both(best, rounds[1]))
+        known = np.sqrt(np.linalg.eigvalsh(best.covariance[3:, 3:])[-1])
+        if known > VAGUE * np.linalg.norm(best.X_SC[:3, 3] - self._p_SQ[found].mean(axis=(0, 1))):
+            return None, (
+                f"{_markers(len(found))} in sight tell where the camera is to {1e3 * known:.0f} mm"
+                " only; come nearer or show more of the board"
+            )
         own = np.isin(self._edges.marker[best.views.which], found)
         if (best.weight[own] > 0.0).mean() < PLAUSIBLE:
             return None, "the markers' cells are not where their corners put them: another board?"
         return best, ""
 
+    def _decided(self, best: EdgeRound, second: EdgeRound, found: NDArray[np.intp]) -> bool:
+        """Whether the edges of the markers that were read are clearly nearer to where the first
+        pose puts them than to where the second one does."""
+        return self._off(second, found) > (1.0 + DECIDED / len(found)) * self._off(best, found)
+
+    def _off(self, last: EdgeRound, found: NDArray[np.intp]) -> float:
+        """How far the edges of the markers that were read are off, the median [pixels]."""
+        own = np.isin(self._edges.marker[last.views.which], found)
+        return float(np.median(np.abs(last.residual[own])))
+
     def _estimate(
         self,
         grey: NDArray[np.uint8],
+        light: NDArray[np.float32],
         refined: RefinedPose,
-        aspect_error: float,
         depth: NDArray[np.floating[Any]] | None,
         X_SC_known: Array | None,
     ) -> BoardEstimate:
         """What to tell about a pose."""
-        contrast = float(np.median(refined.fits.contrast[refined.weight > 0.0]))
-        wrong = self._other_board.beyond(grey, refined.X_SC, contrast)
+        wrong = self._other_board.beyond(grey, light, refined.X_SC)
         if wrong:
             return BoardEstimate(reason=wrong)
         used, corners, error = self._seen_corners(refined)
@@ -168,11 +199,11 @@ class BoardPose:
             scale = scale_by_height(refined.X_SC, X_SC_known)
         if abs(scale - 1.0) > LEAST_DEVIATION:
             return BoardEstimate(reason=_scale_warning(scale), scale=scale)
-        blank = self._other_board.blank(grey, refined.X_SC, contrast, used) if len(used) else ""
+        blank = self._other_board.blank(light, refined.X_SC, used) if len(used) else ""
         return BoardEstimate(
             X_SC=refined.X_SC,
             valid=True,
-            reason=blank or _warnings(error, aspect_error),
+            reason=blank or print_doubt(refined.disturbance) or _residual_doubt(error),
             reprojection_error=error,
             covariance=refined.covariance,
             ids=tuple(int(i) for i in self._layout.ids[used]),
@@ -215,13 +246,29 @@ class BoardPose:
 
     def _other_board_reason(self, seen: Detection, coarse: CoarsePose) -> str:
         """Why the markers that were found are not this board; empty if they are."""
-        if abs(coarse.marker_scale - 1.0) > OTHER_MARKER_SCALE:
+        share, pixels = OTHER_MARKER_SCALE
+        off = abs(coarse.marker_scale - 1.0)
+        if off > share and off * _side(seen.corners) / 2.0 > pixels:
             return self._other_size_reason(coarse.marker_scale)
         n, fit = len(seen.index), int(coarse.inliers.sum())
         if not coarse.X_SC or fit < max(1, n / 2) or (n > 1 and fit < 2):
             return (
                 f"another board: only {fit} of {_markers(n)} in sight stand where this one has"
                 " them; are columns, rows and first_id right?"
+            )
+        return ""
+
+    def _wrong_print_reason(self, refined: RefinedPose) -> str:
+        """Why a print is none of this board; empty if it is."""
+        at = self.intrinsics.project((self._p_SQ - refined.X_SC[:3, 3]) @ refined.X_SC[:3, :3])
+        used = np.unique(self._edges.marker[refined.views.which[refined.weight > 0.0]])
+        marker_scale = wrong_print(refined.disturbance, _side(at[used]))
+        if marker_scale != 1.0:
+            return self._other_size_reason(marker_scale)
+        if abs(refined.disturbance.aspect) > ASPECT[1]:
+            return (
+                f"another board: {1.0 + refined.disturbance.aspect:.2f} times as long along y as"
+                " along x; or check the intrinsics"
             )
         return ""
 
@@ -245,6 +292,16 @@ def estimate_board(
     return BoardPose(board, intrinsics).estimate(image, depth=depth, X_SC_known=X_SC_known)
 
 
+def _untinted_light(image: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """(H, W) linear light of the lightest channel: the tints of a height map, which is printed
+    below the markers, look as white in it as paper does."""
+    image = np.asarray(image)
+    if image.ndim == 2:
+        return photo_light(np.ascontiguousarray(image))
+    red, green, blue = cv2.split(image[..., :3])
+    return photo_light(cv2.max(red, cv2.max(green, blue)))
+
+
 def grey_image(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """(H, W) brightness of an image (H, W), RGB (H, W, 3) or RGBA (H, W, 4).
 
@@ -265,15 +322,21 @@ def grey_image(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.asarray(cv2.cvtColor(np.ascontiguousarray(image), codes[image.shape[2]]))
 
 
-def _misfit(refined: RefinedPose) -> float:
-    """Mean of the squared normalised residuals, those of what does not fit cut off at 3."""
-    return float(np.minimum((refined.residual / refined.sd) ** 2, 9.0).mean())
+def _side(corners: Array) -> float:
+    """Median length of the sides of markers (N, 4, 2) [pixels]."""
+    return float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
 
 
-def _differ(one: RefinedPose, other: RefinedPose) -> bool:
-    """Two refinements ended in different poses."""
-    difference = one.X_SC[:3, :3].T @ other.X_SC[:3, :3]
-    return bool(np.arccos(np.clip((np.trace(difference) - 1.0) / 2.0, -1.0, 1.0)) > 0.01)
+def _turn(one: EdgeRound, other: EdgeRound) -> float:
+    """Angle between two poses [rad]."""
+    return float(rotation_angle(one.X_SC[:3, :3].T @ other.X_SC[:3, :3]))
+
+
+def _covariance_of_both(one: RefinedPose, other: EdgeRound) -> Array:
+    """(6, 6) covariance of a pose if another one is as likely."""
+    turn = Rotation.from_matrix(other.X_SC[:3, :3] @ one.X_SC[:3, :3].T).as_rotvec()
+    apart = np.r_[turn, other.X_SC[:3, 3] - one.X_SC[:3, 3]]
+    return np.asarray(one.covariance + np.outer(apart, apart))
 
 
 def _scale_warning(scale: float) -> str:
@@ -284,13 +347,8 @@ def _scale_warning(scale: float) -> str:
     )
 
 
-def _warnings(error: float, aspect_error: float) -> str:
-    """What is doubtful about a pose; empty if all is well."""
-    if aspect_error:
-        return (
-            f"the board is printed {1.0 + aspect_error:.3f} times as long along y as along x:"
-            " measure its rulers and print it anew with what they measure, or check the intrinsics"
-        )
+def _residual_doubt(error: float) -> str:
+    """What is doubtful about residuals; empty if nothing is."""
     if error > DOUBTFUL_RESIDUAL:
         return (
             f"markers are off by {error:.1f} pixels on average: check the intrinsics, and that the"

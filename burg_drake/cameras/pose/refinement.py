@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from burg_drake.cameras.optics import Intrinsics
+from burg_drake.cameras.pose.disturbance import Disturbance, DisturbanceFit, SheetModes
 from burg_drake.cameras.pose.edge_fit import EdgeFits, fit_edges
 from burg_drake.cameras.pose.edge_projection import (
     NEAREST,
     EdgeViews,
-    cross,
-    image_points,
+    motion_of_points,
     view_edges,
 )
 from burg_drake.cameras.pose.edges import MarkerEdges
@@ -28,12 +28,29 @@ from burg_drake.core import Array
 
 FIRST, LATER, LAST = 160, 320, 800
 """Edges that the rounds look at: the pose is coarse at first, and a few suffice."""
-BLURS = (0.1, 0.5, 2.5)
-"""Variances of lens and pixel together to begin with [pixels^2]; a pixel alone has 1/12."""
-LEAST_BLUR, MOST_BLUR = 0.08, 9.0
+BLURS = np.array(
+    [variance * np.eye(2) for variance in (0.1, 0.5, 2.5)]
+    + [[[0.4 + 4.0 * c * c, 4.0 * c * s], [4.0 * c * s, 0.4 + 4.0 * s * s]]
+       for c, s in ((1.0, 0.0), (0.7071, 0.7071), (0.0, 1.0), (0.7071, -0.7071))]
+)  # fmt: skip
+"""Covariances of lens, motion and pixel together to begin with [pixels^2]: without motion, and with
+one of 7 pixels; a pixel alone has 1/12."""
+LEAST_BLUR, MOST_BLUR = 0.08, 16.0
+"""Variances in any direction [pixels^2]."""
+BLOOM_SD = 1.0
+"""White that is too large on all sides by so much is not unlikely [pixels]."""
+STILL = 0.05
+"""Edges that a round moves by less are where they belong, root mean square [pixels]."""
+MORE = 3
+"""Rounds with all edges, at most."""
 LONG = 0.3
 """A first step that moves an edge by more is followed by another of its kind: edges are fitted best
 where they are expected [pixels]."""
+UNBLURRED = 0.5
+"""Variance of lens and pixel in a sharp image [pixels^2]."""
+LOPSIDED = 0.025
+"""Shift of an image by the blur beyond that, as a share of its standard deviation: motion and
+defocus are not quite alike on both sides."""
 KNOWN = 0.5
 """Standard deviation of an edge's predicted place up to which it is looked for [pixels]."""
 FEW = 0.25
@@ -64,17 +81,37 @@ LEAST_EDGES = 24
 
 
 @dataclass(frozen=True, eq=False)
-class RefinedPose:
-    """A pose by edges.
+class Spread:
+    """How light spreads in an image.
+
+    Attributes:
+        blur: (2, 2) covariance of lens, motion and pixel together [pixels^2].
+        bloom: by which white is larger on all sides than the print has it: overexposure, another
+            encoding of the levels than sRGB, ink that is short [pixels].
+    """
+
+    blur: Array
+    bloom: float = 0.0
+
+    @property
+    def variance(self) -> float:
+        """Mean of both directions [pixels^2]."""
+        return float(np.trace(self.blur)) / 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeRound:
+    """What a round of looking for edges found.
 
     Attributes:
         X_SC: (4, 4).
         covariance: (6, 6), see `BoardEstimate`.
-        views, fits: edges of the last round, as seen by the pose before it.
+        views, fits: edges as seen by the pose before the round, and where they were found.
         weight: (N,) of each edge, 0 to 1; 0 for what does not belong.
         residual: (N,) of each edge [pixels].
         sd: (N,) expected standard deviation of each edge's offset [pixels].
-        blur: variance of lens and pixel together [pixels^2].
+        spread: of the light.
+        moved: edges by the round, root mean square [pixels].
     """
 
     X_SC: Array
@@ -84,7 +121,19 @@ class RefinedPose:
     weight: Array
     residual: Array
     sd: Array
-    blur: float
+    spread: Spread
+    moved: float
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedPose(EdgeRound):
+    """A pose by edges: the last round's, with what else moves the markers.
+
+    Attributes:
+        disturbance: is that.
+    """
+
+    disturbance: Disturbance
 
 
 class EdgeRefinement:
@@ -95,46 +144,76 @@ class EdgeRefinement:
         self._edges = edges
         self._corners = p_SQ
         self._intrinsics = intrinsics
+        self._modes = SheetModes(p_SQ.mean(axis=1), edges.p_SE)
 
     def refine(
-        self, grey: NDArray[np.uint8], X_SC: Array, markers: NDArray[np.intp]
-    ) -> RefinedPose | None:
+        self, light: NDArray[np.float32], X_SC: Array, markers: NDArray[np.intp]
+    ) -> EdgeRound | None:
         """Refines a pose.
 
         Args:
-            grey: (H, W) image.
+            light: (H, W) image in linear light.
             X_SC: (4, 4) pose that puts the edges of `markers` within about a pixel.
             markers: those that were found, as indices of the layout's.
 
         Returns:
-            The pose; None if too few edges look as they should.
+            The last round; None if too few edges look as they should.
         """
         read = np.zeros(len(self._corners), dtype=bool)
         read[markers] = True
         found = np.flatnonzero(read[self._edges.marker])
-        blur = self._first_blur(grey, X_SC, found[:FIRST])
-        result = self._iterate(grey, X_SC, found[:FIRST], blur)
+        spread = self._first_spread(light, X_SC, found[:FIRST])
+        result = self._iterate(light, X_SC, found[:FIRST], spread)
         if result and np.abs(result.fits.offset - result.residual).max() > LONG:
-            result = self._iterate(grey, result.X_SC, found[:FIRST], result.blur)
+            result = self._iterate(light, result.X_SC, found[:FIRST], result.spread)
         others = self._missed_markers(result, read) if result else read
         if result and others.sum() > FEW * read.sum():
             unread = np.flatnonzero(others[self._edges.marker])
             which = np.concatenate([found[:FIRST], unread[:LATER]])
-            result = self._iterate(grey, result.X_SC, which, result.blur)
+            result = self._iterate(light, result.X_SC, which, result.spread)
             found = found if result is None else self._seen(result, found)
-        return result and self._iterate(grey, result.X_SC, found[:LAST], result.blur)
+        for _ in range(MORE):
+            result = result and self._iterate(light, result.X_SC, found[:LAST], result.spread)
+            if result is None or result.moved < STILL:
+                break
+        return result
 
-    def _first_blur(self, grey: NDArray[np.uint8], X_SC: Array, which: NDArray[np.intp]) -> float:
+    def with_disturbance(self, last: EdgeRound) -> RefinedPose:
+        """The pose of the last round if markers may be shifted."""
+        found = DisturbanceFit(
+            last.views,
+            last.residual,
+            last.weight / last.sd**2,
+            self._edges.marker[last.views.which],
+            self._modes,
+            self._intrinsics.height,
+        ).fit(_bloom_prior())
+        covariance = found.covariance.copy()
+        covariance[:3, :3] += self._shift_by_blur(last)
+        X_SC = perturbed_pose(last.X_SC, found.step)
+        return RefinedPose(
+            **(vars(last) | {"X_SC": X_SC, "covariance": covariance}), disturbance=found
+        )
+
+    def _shift_by_blur(self, last: EdgeRound) -> Array:
+        """(3, 3) covariance of the rotation that a blur makes which is not alike on both sides."""
+        sideways = last.X_SC[:3, :2] / self._intrinsics.focal  # rotation of a pixel
+        beyond = max(last.spread.variance - UNBLURRED, 0.0)
+        return np.asarray(LOPSIDED**2 * beyond * sideways @ sideways.T)
+
+    def _first_spread(
+        self, light: NDArray[np.float32], X_SC: Array, which: NDArray[np.intp]
+    ) -> Spread:
         """The blur with which edges are most like what they should be."""
         tried = np.tile(which[: FIRST // len(BLURS)], len(BLURS))
         views = view_edges(self._edges, tried, self._intrinsics, X_SC)
         if len(views.which) == 0:
-            return BLURS[0]
-        blurs = np.repeat(BLURS, len(views.which) // len(BLURS))
-        unlike = fit_edges(grey, self._edges, views, blurs).noise.reshape(len(BLURS), -1)
-        return BLURS[int(np.argmin(np.median(unlike, axis=1)))]
+            return Spread(BLURS[0])
+        blurs = np.repeat(BLURS, len(views.which) // len(BLURS), axis=0)
+        unlike = fit_edges(light, self._edges, views, blurs).noise.reshape(len(BLURS), -1)
+        return Spread(BLURS[int(np.argmin(np.median(unlike, axis=1)))])
 
-    def _missed_markers(self, result: RefinedPose, read: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _missed_markers(self, result: EdgeRound, read: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(N,) other markers that the image may show, whose place the pose tells well enough."""
         at, variance = predicted_places(
             self._corners, self._intrinsics, result.X_SC, result.covariance
@@ -143,7 +222,7 @@ class EdgeRefinement:
         in_image = np.asarray(((at > 0.0) & (at < size)).all(axis=2)).any(axis=1)
         return np.asarray(~read & in_image & (variance < KNOWN**2).all(axis=1))
 
-    def _seen(self, result: RefinedPose, found: NDArray[np.intp]) -> NDArray[np.intp]:
+    def _seen(self, result: EdgeRound, found: NDArray[np.intp]) -> NDArray[np.intp]:
         """Edges of the markers of which a part is in sight, and of those that were found."""
         marker, n = self._edges.marker[result.views.which], len(self._corners)
         good = np.bincount(marker, weights=result.weight > 0.0, minlength=n)
@@ -154,37 +233,31 @@ class EdgeRefinement:
         return np.flatnonzero(seen[self._edges.marker])
 
     def _iterate(
-        self, grey: NDArray[np.uint8], X_SC: Array, which: NDArray[np.intp], blur: float
-    ) -> RefinedPose | None:
-        views = view_edges(self._edges, which, self._intrinsics, X_SC)
+        self, light: NDArray[np.float32], X_SC: Array, which: NDArray[np.intp], spread: Spread
+    ) -> EdgeRound | None:
+        views = view_edges(self._edges, which, self._intrinsics, X_SC, spread.bloom)
         if len(views.which) < LEAST_EDGES:
             return None
-        fits = fit_edges(grey, self._edges, views, blur)
+        fits = fit_edges(light, self._edges, views, spread.blur)
         good = _has_expected_profile(fits)
         if good.sum() < LEAST_EDGES:
             return None
-        noise = np.median(fits.noise[good])
-        safe = np.maximum(np.abs(fits.contrast), 1.0) ** 2 * np.maximum(fits.information, 1e-6)
-        sd = np.sqrt(noise**2 / safe + MODEL_SD**2)
-        step, weight = _robust_step(views.motion, fits.offset, sd, good)
-        residual = fits.offset - views.motion @ step
-        change, total = fits.widening[weight > 0.5].sum(axis=0)
-        blur = float(
-            np.clip(
-                blur + np.clip(change / max(total, 1e-9), -0.3 * blur, 0.5 * blur),
-                LEAST_BLUR,
-                MOST_BLUR,
-            )
-        )
-        return RefinedPose(
-            perturbed_pose(X_SC, step, self._edges.p_SE[views.which].mean(axis=0)),
-            self._covariance(views, residual, sd, weight) * variance_factor_of_blur(blur),
+        sd = np.sqrt(_offset_variance(fits, good) + MODEL_SD**2)
+        J = np.column_stack([views.motion, views.bloom])
+        step, weight = _robust_step(J, fits.offset, sd, good)
+        residual = fits.offset - J @ step
+        blur = _better_blur(spread.blur, views, fits.widening, weight > 0.5)
+        spread = Spread(blur, spread.bloom + float(step[6]))
+        return EdgeRound(
+            perturbed_pose(X_SC, step[:6], self._edges.p_SE[views.which].mean(axis=0)),
+            self._covariance(views, residual, sd, weight) * max(1.0, spread.variance),
             views,
             fits,
             weight,
             residual,
             sd,
-            blur,
+            spread,
+            float(np.sqrt(np.average((J @ step) ** 2, weights=weight))),
         )
 
     def _covariance(self, views: EdgeViews, residual: Array, sd: Array, weight: Array) -> Array:
@@ -195,20 +268,44 @@ class EdgeRefinement:
         """
         total = weight.sum()
         markers = np.count_nonzero(np.bincount(self._edges.marker[views.which[weight > 0.0]]))
-        scale = (weight * (residual / sd) ** 2).sum() / max(total - 6.0, 1.0)
+        scale = (weight * (residual / sd) ** 2).sum() / max(total - 7.0, 1.0)
         alike = max(total / max(markers, 1) - 1.0, 0.0) * ALIKE_SD**2
-        J = views.motion * np.sqrt(weight / (scale * sd**2 + alike))[:, None]
-        return np.linalg.inv(J.T @ J)
+        J = np.column_stack([views.motion, views.bloom])
+        J = J * np.sqrt(weight / (scale * sd**2 + alike))[:, None]
+        covariance: Array = np.linalg.inv(J.T @ J + _bloom_prior())[:6, :6]
+        return covariance
 
 
-def variance_factor_of_blur(blur: float) -> float:
-    """By how much blur increases the variance of a pose: what is within its width is fitted with
-    each of several edges, so that their errors are alike.
+def _bloom_prior() -> Array:
+    """(7, 7) information about a step that is known before."""
+    prior = np.zeros((7, 7))
+    prior[6, 6] = 1.0 / BLOOM_SD**2
+    return prior
 
-    Normalised errors of 24 views each with blurs of standard deviations of 1, 1.5, 2 and 2.5 pixels
-    are 1.1, 1.5, 2.1 and 2.4 without it: the variance of the blur in pixels^2 is the factor.
-    """
-    return max(1.0, blur)
+
+def _offset_variance(fits: EdgeFits, good: NDArray[np.bool_]) -> Array:
+    """(N,) variance of offsets by the image's noise [pixels^2]: light is noisy by its root."""
+    contrast = np.maximum(np.abs(fits.contrast), 1e-3)
+    noise = np.median(fits.noise[good] / np.sqrt(contrast[good]))
+    return np.asarray(noise**2 / (contrast * np.maximum(fits.information, 1e-6)))
+
+
+def _better_blur(blur: Array, views: EdgeViews, widening: Array, good: NDArray[np.bool_]) -> Array:
+    """(2, 2) the blur with which edges fit better; of a change that no edge tells, none."""
+    n = views.across[good]
+    n = n / np.sqrt((n**2).sum(axis=1, keepdims=True))
+    across, information = widening[good].T
+    A = np.column_stack([n[:, 0] ** 2, 2.0 * n[:, 0] * n[:, 1], n[:, 1] ** 2])
+    normal = (A * information[:, None]).T @ A
+    normal += 1e-3 * max(np.trace(normal), 1e-9) * np.eye(3)
+    x = np.linalg.solve(normal, A.T @ across)
+    root = np.linalg.cholesky(blur)
+    inverse = np.linalg.inv(root)
+    relative = inverse @ np.array([[x[0], x[1]], [x[1], x[2]]]) @ inverse.T
+    share, axes = np.linalg.eigh(relative)
+    better = blur + root @ (axes * np.clip(share, -0.3, 0.5)) @ axes.T @ root.T
+    variance, axes = np.linalg.eigh(better)
+    return np.asarray((axes * np.clip(variance, LEAST_BLUR, MOST_BLUR)) @ axes.T)
 
 
 def predicted_places(
@@ -216,12 +313,9 @@ def predicted_places(
 ) -> tuple[Array, Array]:
     """Places (..., 2) in the image of points (..., 3) [pixels], and their variance (...) along the
     larger axis [pixels^2]: infinite for points behind the camera."""
-    q_S = p_SQ.reshape(-1, 3) - X_SC[:3, 3]
-    p_C = q_S @ X_SC[:3, :3]
-    ahead = p_C[:, 2] > NEAREST
-    at, by_C = image_points(intrinsics, np.where(ahead[:, None], p_C, [0.0, 0.0, 1.0]))
-    by_S = by_C @ X_SC[:3, :3].T
-    motion = np.concatenate([cross(by_S, q_S[:, None]), -by_S], axis=2)
+    p_S = p_SQ.reshape(-1, 3)
+    ahead = (p_S - X_SC[:3, 3]) @ X_SC[:3, 2] > NEAREST
+    at, motion = motion_of_points(intrinsics, X_SC, p_S)
     spread = motion @ covariance @ motion.transpose(0, 2, 1)
     variance = np.where(ahead, np.linalg.eigvalsh(spread)[:, -1], np.inf)
     return at.reshape(*p_SQ.shape[:-1], 2), variance.reshape(p_SQ.shape[:-1])
@@ -266,7 +360,7 @@ def _has_expected_profile(fits: EdgeFits) -> NDArray[np.bool_]:
 def _robust_step(
     motion: Array, offset: Array, sd: Array, good: NDArray[np.bool_]
 ) -> tuple[Array, Array]:
-    """Least squares with Tukey's weights: step (6,), and weights (N,)."""
+    """Least squares with Tukey's weights: step (7,), pose and bloom, and weights (N,)."""
     J, e = motion / sd[:, None], offset / sd
     weight = good.astype(float)
     step = _weighted_step(J, e, weight)
@@ -280,4 +374,4 @@ def _robust_step(
 
 def _weighted_step(J: Array, e: Array, weight: Array) -> Array:
     weighted = J * weight[:, None]
-    return np.asarray(np.linalg.solve(weighted.T @ J, weighted.T @ e))
+    return np.asarray(np.linalg.solve(weighted.T @ J + _bloom_prior(), weighted.T @ e))

@@ -20,8 +20,8 @@ from burg_drake.core import Array
 from burg_drake.scene.document import Board, marker_dictionary
 
 FRAME = 0.4
-"""Least difference of a marker's border and the white around it, as a share of the contrast of the
-board's own; blur takes a part of it."""
+"""Least difference of a marker's border and the white around it, as a share of the latter's light;
+blur takes a part of it."""
 FRAME_SIDES = 3
 """Sides of four on which a place must look like a marker's border to be read."""
 FEWEST = 2
@@ -31,9 +31,8 @@ FEWEST_BLANK = 3
 """Places of a row or column that must be in the image, or all, if it has fewer."""
 POINTS_PER_AXIS = 4
 """Points along both axes at which a place must be blank, the first and last on the border."""
-BLANK = 0.25
-"""Most that brightness in the place of a marker may differ from paper's, as a share of the
-contrast of ink and paper."""
+BLANK = 0.35
+"""Most that light from the place of a marker may differ from paper's nearby, as a share of it."""
 FIELD_OF_VIEW = 1.02
 """Slopes of rays that are looked at, by those of the image's corners; the model of a lens may fold
 farther ones back into the image."""
@@ -76,13 +75,13 @@ class WrongBoardCheck:
         middles = np.linspace(cell - 1.0, 1.0 - cell, POINTS_PER_AXIS)
         self._looks = np.stack(np.meshgrid(middles, middles), axis=-1).reshape(-1, 2)
 
-    def beyond(self, grey: NDArray[np.uint8], X_SC: Array, contrast: float) -> str:
+    def beyond(self, grey: NDArray[np.uint8], light: NDArray[np.float32], X_SC: Array) -> str:
         """Which markers stand around the grid, where the document has none.
 
         Args:
             grey: (H, W) image.
+            light: (H, W) the same in linear light.
             X_SC: (4, 4) pose that fits the markers.
-            contrast: between the board's paper and ink [8-bit levels].
 
         Returns:
             What is wrong; empty if nothing is.
@@ -90,8 +89,8 @@ class WrongBoardCheck:
         at, seen = self._places(X_SC, self._around, self._frame)
         if not seen.any():
             return ""
-        values = _brightness(grey, at[seen])
-        darker = (values[:, 4:] - values[:, :4] > FRAME * contrast).sum(axis=1)
+        values = _brightness(light, at[seen])
+        darker = (values[:, :4] < (1.0 - FRAME) * values[:, 4:]).sum(axis=1)
         suspects = self._around[seen][darker >= FRAME_SIDES]
         ids = self._read(grey, X_SC, suspects) if len(suspects) >= FEWEST else []
         if len(ids) < FEWEST:
@@ -103,13 +102,11 @@ class WrongBoardCheck:
             f" {self._layout.ids[-1]}: are count and first_id right?"
         )
 
-    def blank(
-        self, grey: NDArray[np.uint8], X_SC: Array, contrast: float, used: NDArray[np.intp]
-    ) -> str:
+    def blank(self, light: NDArray[np.float32], X_SC: Array, used: NDArray[np.intp]) -> str:
         """Which row or column next to those in sight is blank paper.
 
         Args:
-            grey, X_SC, contrast: see `beyond`.
+            light, X_SC: see `beyond`.
             used: markers that were seen, as indices of the layout's.
 
         Returns:
@@ -118,15 +115,14 @@ class WrongBoardCheck:
         rows, columns = np.divmod(used, self._columns)
         for across, lines, count in ((True, rows, self._rows), (False, columns, self._columns)):
             for line in (lines.min() - 1, lines.max() + 1):
-                if 0 <= line < count and self._is_blank(grey, X_SC, contrast, used, across, line):
+                if 0 <= line < count and self._is_blank(light, X_SC, used, across, line):
                     return self._doubt(across, int(line), int(lines.min()), int(lines.max()))
         return ""
 
     def _is_blank(
         self,
-        grey: NDArray[np.uint8],
+        light: NDArray[np.float32],
         X_SC: Array,
-        contrast: float,
         used: NDArray[np.intp],
         across: bool,
         line: int,
@@ -137,17 +133,17 @@ class WrongBoardCheck:
         at, seen = self._places(X_SC, self._inside[which], self._looks)
         if seen.sum() < min(FEWEST_BLANK, len(which)):
             return False
-        values = _brightness(grey, at[seen])
-        if (np.ptp(values, axis=1) > 2.0 * BLANK * contrast).any():
+        values = _brightness(light, at[seen])
+        if (np.ptp(values, axis=1) > 2.0 * BLANK * values.max(axis=1)).any():
             return False
         white, in_image = self._places(X_SC, self._inside[used], self._frame[4:])
         if not in_image.any():
             return False
-        paper = np.median(_brightness(grey, white[in_image]), axis=1)
+        paper = np.median(_brightness(light, white[in_image]), axis=1)
         # Light falls unevenly: the paper beside the nearest markers that are in sight counts.
         away = self._inside[which][seen][:, None] - self._inside[used][in_image]
         nearest = paper[(away**2).sum(axis=2).argmin(axis=1)]
-        return bool((np.abs(values - nearest[:, None]) < BLANK * contrast).all())
+        return bool((np.abs(values - nearest[:, None]) < BLANK * nearest[:, None]).all())
 
     def _doubt(self, across: bool, line: int, first: int, last: int) -> str:
         names = ("row", "from the top") if across else ("column", "from the left")
@@ -196,9 +192,9 @@ class WrongBoardCheck:
         return sorted(ids)
 
 
-def _brightness(grey: NDArray[np.uint8], at: Array) -> Array:
-    """(N, M) brightness at pixels (N, M, 2), bilinear."""
+def _brightness(light: NDArray[np.float32], at: Array) -> Array:
+    """(N, M) light at pixels (N, M, 2), bilinear."""
     import cv2
 
     u, v = np.moveaxis(at.astype(np.float32), 2, 0)
-    return np.asarray(cv2.remap(grey, u, v, cv2.INTER_LINEAR), dtype=float)
+    return np.asarray(cv2.remap(light, u, v, cv2.INTER_LINEAR), dtype=float)

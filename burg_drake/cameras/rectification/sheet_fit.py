@@ -91,7 +91,7 @@ class SheetFinder:
         middle, radius = 0.5 * (size - 1.0), 0.5 * float(np.linalg.norm(size))
         p_SQ = self._layout.p_SQ[seen.index][..., :2]
         corners = (seen.corners - middle) / radius
-        tolerance = max(MISPLACED / radius, LENIENT * float(side_lengths(corners).mean()))
+        tolerance = max(MISPLACED[0] / radius, LENIENT * float(side_lengths(corners).mean()))
         kept = _agreeing(p_SQ, corners, tolerance)
         n, fit = len(kept), int(kept.sum())
         if fit < max(1, n / 2) or (n > 1 and fit < 2):

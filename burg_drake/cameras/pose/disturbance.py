@@ -1,0 +1,324 @@
+"""What moves markers in an image besides the camera's pose: pages that are glued beside their
+place, a sheet that bulges, a print that is longer along one axis, a camera that moves while its
+rows are exposed one after the other.
+
+Shifts are taken for random, those of the sheet alike for markers that are near to each other. How
+large they are is what makes the residuals most probable; then the pose is the generalised least
+squares estimate, and its covariance says what such shifts leave open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.cameras.pose.edge_projection import EdgeViews
+from burg_drake.core import Array
+
+ALONE = 0.006, 0.02, 0.06, 0.2
+"""Shifts of single markers, for whatever else is not as assumed; standard deviations that are tried
+[pixels]. In images without noise the first one is right."""
+IN_PLANE = 1.5e-4, 6e-4
+"""Of pages along the sheet [m]."""
+OUT_OF_PLANE = 4e-4, 1.5e-3
+"""Of the height of a sheet that does not lie flat [m]."""
+ROWS = 0.8
+"""By what the camera does from the first row of an image to the last one [pixels]."""
+SIZE = 0.01
+"""Of the markers for their distances: light spreads further from the white around a marker than
+from that within [-]."""
+ASPECT = 0.01
+"""Of a print's length along y for that along x [-]."""
+PAGE, BEND = 0.15, 0.16
+"""Distances within which shifts along the sheet, and heights, are alike [m]: half a page of A4, and
+a hill of paper is wide."""
+MODES = 40
+"""Patterns of each kind of shift, at most."""
+FAINT = 1e-3
+"""Patterns of less than this share of the strongest one's variance are left out."""
+KINDS: dict[str, tuple[float, ...]] = {
+    "rows": (ROWS,),
+    "aspect": (ASPECT,),
+    "size": (SIZE,),
+    "in_plane": IN_PLANE,
+    "out_of_plane": OUT_OF_PLANE,
+}
+FEWEST = 5
+"""Edges more than markers' shifts from which on their spread is known."""
+LEAST_SPREAD = 1e-3
+"""Of that over what noise makes; keeps probabilities finite."""
+RARE = 8.0
+"""By how much each kind of shift lowers the logarithm of the probability before it is seen."""
+
+
+VAGUE = 4.0
+"""Logarithms of probabilities count by this part of them: patterns are not quite those of a real
+sheet."""
+
+
+@dataclass(frozen=True)
+class MarkerShifts:
+    """Standard deviations of shifts; 0 for those that are not.
+
+    Attributes:
+        alone: of single markers [pixels].
+        in_plane: along the sheet [m].
+        out_of_plane: of the sheet's height [m].
+        rows: while the rows of the image are exposed [pixels].
+        aspect: of the print's length along y for that along x [-].
+        size: of the markers for their distances [-].
+    """
+
+    alone: float = ALONE[0]
+    in_plane: float = 0.0
+    out_of_plane: float = 0.0
+    rows: float = 0.0
+    aspect: float = 0.0
+    size: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Disturbance:
+    """A step of a pose that allows for shifts of markers.
+
+    Attributes:
+        step: (6,) from the pose at which edges were looked for, see `perturbed_pose`.
+        covariance: (6, 6) of it.
+        shifts: how large they are.
+        in_plane: largest shift along the sheet of a marker that was seen [m].
+        out_of_plane: largest height of one [m].
+        rows: what the camera did from the first row to the last one [pixels].
+        aspect: how much longer the print is along y than along x [-].
+        size: by how much the markers are larger for their distances [-].
+    """
+
+    step: Array
+    covariance: Array
+    shifts: MarkerShifts
+    in_plane: float
+    out_of_plane: float
+    rows: float
+    aspect: float
+    size: float
+
+
+class SheetModes:
+    """Patterns of shifts of a board's edges, which are independent of each other, and of which the
+    first few make up nearly all.
+
+    The frame S of a sheet with errors is the one that fits all its markers best, so that a pattern
+    neither shifts nor turns the sheet as a whole.
+
+    Attributes:
+        in_plane: (N, 2, K) of shifts along x and y, of unit variance.
+        out_of_plane: (N, L) of heights, of unit variance.
+    """
+
+    def __init__(self, center: Array, p_SE: Array) -> None:
+        """Takes the markers' middles (M, 3) and the edges' (N, 3) [m]."""
+        n = len(center)
+        x, y = (center[:, :2] - center[:, :2].mean(axis=0)).T
+        one, zero = np.ones(n), np.zeros(n)
+        moved = np.stack([[one, zero], [zero, one], [-y, x]], axis=-1)  # (2, n, 3)
+        alike, between = _alike(center, p_SE, PAGE)
+        along_both = np.asarray(np.kron(alike, np.eye(2)), dtype=float)
+        modes = _modes(along_both, moved.transpose(1, 0, 2).reshape(2 * n, 3))
+        self.in_plane = np.tensordot(between, modes.reshape(n, 2, -1), axes=1)
+        alike, between = _alike(center, p_SE, BEND)
+        self.out_of_plane = between @ _modes(alike, np.stack([one, x, y], axis=-1))
+
+
+def _alike(center: Array, p_SE: Array, within: float) -> tuple[Array, Array]:
+    """(M, M) covariance of shifts of markers that are alike within a distance [m], and (N, M)
+    shifts of edges by those of the markers."""
+    covariance, to_edges = (
+        np.exp(-((p[:, None] - center) ** 2).sum(axis=-1) / (2.0 * within**2))
+        for p in (center, p_SE)
+    )
+    known = covariance + FAINT * np.eye(len(center))
+    return covariance, np.linalg.solve(known, to_edges.T).T
+
+
+def _modes(covariance: Array, whole: Array) -> Array:
+    """(N, K) independent patterns of a covariance (N, N) without what moves all (N, 3)."""
+    Q, _ = np.linalg.qr(whole)
+    rest = np.eye(len(covariance)) - Q @ Q.T
+    variance, patterns = np.linalg.eigh(rest @ covariance @ rest)
+    kept = np.flatnonzero(variance > FAINT * variance[-1])[-MODES:]
+    return np.asarray(patterns[:, kept] * np.sqrt(variance[kept]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Solution:
+    """What shifts of some size leave of the step.
+
+    Attributes:
+        logarithm: of the probability of what was seen, but for a constant.
+        shifts: the size.
+        x, covariance: (K,) and (K, K) step of pose and bloom, and strengths of patterns.
+        columns: (K,) of all that there are.
+    """
+
+    logarithm: float
+    shifts: MarkerShifts
+    x: Array
+    covariance: Array
+    columns: NDArray[np.intp]
+
+
+class DisturbanceFit:
+    """Fits shifts of markers to the edges of an image.
+
+    Args:
+        views: edges as seen by a pose.
+        offset: (N,) of each from there [pixels].
+        information: (N,) inverse variance of each by the image's noise, 0 for those that do not
+            count.
+        marker: (N,) that each belongs to.
+        modes: patterns of shifts of the sheet.
+        height: of the image [pixels].
+    """
+
+    def __init__(
+        self,
+        views: EdgeViews,
+        offset: Array,
+        information: Array,
+        marker: NDArray[np.intp],
+        modes: SheetModes,
+        height: int,
+    ) -> None:
+        kept = information > 0.0
+        used, belongs = np.unique(marker[kept], return_inverse=True)
+        across = views.across[kept]
+        self._normal = across / np.sqrt((across**2).sum(axis=1, keepdims=True))
+        self._offset = offset[kept]
+        # sums of edges by marker, weighted
+        self._sums = np.zeros((len(used), len(belongs)))
+        self._sums[belongs, np.arange(len(belongs))] = information[kept]
+        self._sums /= self._spread_within_markers(belongs)
+        which = views.which[kept]
+        self._modes = modes.in_plane[which], modes.out_of_plane[which]
+        J = views.motion[kept]
+        row = views.at[kept, 1:] / height - 0.5
+        strength = np.sqrt((J**2).mean(axis=0)) + 1e-9
+        parts = {
+            "pose": np.column_stack([J, views.bloom[kept]]),
+            "rows": row * J / strength / np.sqrt(6.0),
+            "aspect": 0.5 * views.print[kept, :1],
+            "size": views.print[kept, 1:],
+            "in_plane": (J[:, None, 3:5] @ self._modes[0])[:, 0],
+            "out_of_plane": J[:, 5:] * self._modes[1],
+        }
+        ends = np.cumsum([0, *(part.shape[1] for part in parts.values())])
+        self._columns = {kind: np.arange(*ends[k : k + 2]) for k, kind in enumerate(parts)}
+        self._J = np.column_stack(list(parts.values()))
+        self._add_up()
+        self._equations = {alone: self._normal_equations(alone) for alone in ALONE}
+
+    def fit(self, prior: Array) -> Disturbance:
+        """The most probable shifts, and the step of the pose with them.
+
+        Args:
+            prior: (7, 7) information about the step of pose and bloom that is known before.
+        """
+        solved = [self._solve(MarkerShifts(alone), prior) for alone in ALONE]
+        best = max(solved, key=_logarithm)
+        for _ in range(len(KINDS)):
+            tried = [self._solve(shifts, prior) for shifts in _with_another(best.shifts)]
+            solved += tried
+            better = max(tried, key=_logarithm)
+            if better.logarithm < best.logarithm:
+                break
+            best = better
+        return self._disturbance(best, solved)
+
+    def _by_marker(self) -> tuple[Array, Array]:
+        """(n, 2, 2) information about the shift of each marker, and (n, 2) times what is seen."""
+        G = self._sums @ (self._normal[:, :, None] * self._normal[:, None]).reshape(-1, 4)
+        return G.reshape(-1, 2, 2), self._sums @ (self._normal * self._offset[:, None])
+
+    def _spread_within_markers(self, belongs: NDArray[np.intp]) -> float:
+        """Variance of offsets within markers over that by the image's noise."""
+        G, g = self._by_marker()
+        G = G + 1e-6 * np.trace(G, axis1=1, axis2=2)[:, None, None] * np.eye(2)
+        shift = np.linalg.solve(G, g[..., None])[..., 0]
+        rest = self._offset - (self._normal * shift[belongs]).sum(axis=1)
+        freedom = len(belongs) - 2 * len(self._sums)
+        if freedom < FEWEST:
+            return 1.0
+        return max(float((self._sums @ rest**2).sum()) / freedom, LEAST_SPREAD)
+
+    def _add_up(self) -> None:
+        """Sums over all edges, and those by marker, of the columns and of what is seen."""
+        G, g = self._by_marker()
+        both = self._sums @ (self._normal[:, :, None] * self._J[:, None]).reshape(len(self._J), -1)
+        both = np.concatenate([both.reshape(*g.shape, -1), g[..., None]], axis=2)
+        self._G, self._shares = G, both  # (n, 2, 2), (n, 2, K + 1)
+        weight = self._sums.sum(axis=0)
+        seen = np.column_stack([self._J, self._offset])
+        self._squares = (seen * weight[:, None]).T @ seen
+
+    def _normal_equations(self, alone: float) -> tuple[Array, Array, float]:
+        """(K, K) and (K,) normal equations of all columns if single markers are shifted as well,
+        and what that leaves of the logarithm of the probability."""
+        inner = self._G + np.eye(2) / alone**2
+        a, b, c = inner[:, 0, 0], inner[:, 0, 1], inner[:, 1, 1]
+        det = a * c - b * b
+        inverse = np.stack([c, -b, -b, a], axis=-1).reshape(-1, 2, 2) / det[:, None, None]
+        shares = self._shares.reshape(-1, self._shares.shape[2])
+        left = self._squares - shares.T @ (inverse @ self._shares).reshape(shares.shape)
+        volume = float(np.log(det * alone**4).sum())
+        return left[:-1, :-1], left[:-1, -1], -0.5 * (float(left[-1, -1]) + volume)
+
+    def _solve(self, shifts: MarkerShifts, prior: Array) -> _Solution:
+        pose = self._columns["pose"]
+        sds = {kind: getattr(shifts, kind) for kind in KINDS if getattr(shifts, kind)}
+        columns = np.concatenate([pose, *(self._columns[kind] for kind in sds)])
+        known = np.repeat(np.array(list(sds.values())), [len(self._columns[kind]) for kind in sds])
+        A, b, logarithm = self._equations[shifts.alone]
+        A, b = A[np.ix_(columns, columns)], b[columns]
+        A[: len(pose), : len(pose)] += prior
+        A[range(len(pose), len(A)), range(len(pose), len(A))] += known**-2.0
+        covariance = np.linalg.inv(A)
+        x = covariance @ b
+        logarithm += 0.5 * float(b @ x) - 0.5 * float(np.linalg.slogdet(A)[1])
+        logarithm -= float(np.log(known).sum()) + RARE * len(sds)
+        return _Solution(logarithm, shifts, x, covariance, columns)
+
+    def _disturbance(self, best: _Solution, solved: list[_Solution]) -> Disturbance:
+        """What the best solution says, its step and covariance those of all, by probability."""
+        x = np.zeros(self._J.shape[1])
+        x[best.columns] = best.x
+        rows, aspect, size, in_plane, out_of_plane = (x[self._columns[kind]] for kind in KINDS)
+        weight = np.exp((np.array([s.logarithm for s in solved]) - best.logarithm) / VAGUE)
+        weight /= weight.sum()
+        steps = np.array([s.x[:6] for s in solved])
+        step = weight @ steps
+        apart = steps - step
+        covariance = np.einsum("s,sij->ij", weight, [s.covariance[:6, :6] for s in solved])
+        return Disturbance(
+            step,
+            covariance + (apart * weight[:, None]).T @ apart,
+            best.shifts,
+            float(np.linalg.norm(self._modes[0] @ in_plane, axis=1).max()),
+            float(np.abs(self._modes[1] @ out_of_plane).max()),
+            float(np.linalg.norm(rows)),
+            float(aspect[0]),
+            float(size[0]),
+        )
+
+
+def _logarithm(solution: _Solution) -> float:
+    return solution.logarithm
+
+
+def _with_another(shifts: MarkerShifts) -> Iterator[MarkerShifts]:
+    """Shifts that differ from some in one kind, and in those of single markers."""
+    for alone in {shifts.alone, ALONE[0]}:
+        for kind, values in KINDS.items():
+            for value in values:
+                yield replace(shifts, alone=alone, **{kind: value})
