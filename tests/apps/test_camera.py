@@ -26,7 +26,8 @@ TURNS = [(0.5, 0.0), (-0.5, 0.1), (0.0, 0.6), (0.1, -0.5), (0.4, 0.4), (-0.4, 0.
 
 
 def photo(tilt: tuple[float, float], distance: float = 0.24) -> Image:
-    """OpenCV's drawing of the board, warped as a pinhole camera sees it; 16 rays a pixel."""
+    """OpenCV's drawing of the board, warped as a pinhole camera sees it; 16 rays a pixel, whose
+    light adds up, in the levels of sRGB."""
     per_mm, fine = 6, 4
     width, height = (round(1e3 * side * per_mm) for side in TARGET.size)
     flat = TARGET.board.generateImage((width + 60 * per_mm, height + 60 * per_mm), marginSize=180)
@@ -39,7 +40,10 @@ def photo(tilt: tuple[float, float], distance: float = 0.24) -> Image:
     to_metres[:2, 2] = 0.5e-3 / per_mm - 0.03
     H = K @ np.column_stack([R[:, 0], R[:, 1], t]) @ to_metres
     large = cv2.warpPerspective(flat, H, (320 * fine, 240 * fine), borderValue=200)
-    gray = cv2.resize(large, (320, 240), interpolation=cv2.INTER_AREA)
+    light = cv2.resize(large.astype(float) / 255.0, (320, 240), interpolation=cv2.INTER_AREA)
+    low = light <= 0.0031308
+    srgb = np.where(low, 12.92 * light, 1.055 * np.maximum(light, 1e-9) ** (1 / 2.4) - 0.055)
+    gray = np.rint(255.0 * srgb).astype(np.uint8)
     return np.dstack([gray] * 3)
 
 
