@@ -50,6 +50,11 @@ from .frames import (
     swap_fingers as swap_fingers,
     transform_points as transform_points,
 )
+from .light import (
+    even_levels as even_levels,
+    levels_of_light as levels_of_light,
+    photo_light as photo_light,
+)
 from .settings import (
     DEGREES as DEGREES,
     LARGEST_SEED as LARGEST_SEED,

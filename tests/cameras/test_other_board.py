@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.optics import photo_light
 from burg_drake.cameras.pose.estimator import BoardPose
 from burg_drake.cameras.pose.wrong_board import WrongBoardCheck
+from burg_drake.core import photo_light
 from burg_drake.scene.document.markers import Markers
 from burg_drake.scene.document.scene import Board
 from tests.cameras.board_views import SMALL, error, view

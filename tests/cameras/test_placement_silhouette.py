@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.cameras.optics import photo_light
 from burg_drake.cameras.placement.alignment.background import empty_board
 from burg_drake.cameras.placement.localization import locate_objects
 from burg_drake.cameras.placement.search import find_places
+from burg_drake.core import photo_light
 from tests.cameras.plates import (
     BOARD,
     INTRINSICS,

@@ -17,6 +17,7 @@ from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.document.station_document import Camera, Station, load_station
 from burg_drake.station.world.area_camera import finer
 from burg_drake.system_libraries import missing_render_libraries
+from tests.cameras.synthetic import levels, light_of
 
 needs_renderer = pytest.mark.skipif(
     bool(missing_render_libraries()), reason="the renderer's system libraries are missing"
@@ -66,7 +67,8 @@ def test_mean_of_the_fine_image(n: int) -> None:
             sensor = diagram.GetSubsystemByName(f"camera.{name}")
             mine = sensor.GetMyMutableContextFromRoot(context)
             sensor.SetX_PB(mine, RigidTransform(X_WC.matrix()))
-        means = image("fine").reshape(120, n, 160, n, 4).mean(axis=(1, 3))
+        light = light_of(image("fine")).reshape(120, n, 160, n, 4)
+        means = levels(light.mean(axis=(1, 3)))
         assert np.abs(image("area") - means).max() <= 0.51
         assert means.std() > 50
         for kind in ("depth", "label"):  # these stay one ray a pixel

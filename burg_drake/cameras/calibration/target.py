@@ -15,9 +15,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras.optics import even_levels, photo_light
 from burg_drake.cameras.sources import Image
-from burg_drake.core import MILLIMETRES, Array, FieldError, InvalidInputError, setting
+from burg_drake.core import (
+    MILLIMETRES,
+    Array,
+    FieldError,
+    InvalidInputError,
+    even_levels,
+    photo_light,
+    setting,
+)
 from burg_drake.scene.document import marker_dictionary
 
 LEAST_CORNERS = 8

@@ -18,10 +18,6 @@ from .intrinsics_file import (
     save_camera_info as save_camera_info,
     save_intrinsics as save_intrinsics,
 )
-from .light import (
-    even_levels as even_levels,
-    photo_light as photo_light,
-)
 from .sensors import (
     SENSORS as SENSORS,
     sensor as sensor,

@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras.optics import even_levels, photo_light
 from burg_drake.cameras.pose.quadrilaterals import LEAST_CONTRAST, dark_quadrilaterals, read_cells
-from burg_drake.core import Array
+from burg_drake.core import Array, even_levels, photo_light
 from burg_drake.scene.document import MarkerLayout, marker_dictionary
 
 FIRST_SEARCH = ((13,), 15.0)

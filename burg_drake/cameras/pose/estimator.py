@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from burg_drake.cameras.optics import Intrinsics, photo_light
+from burg_drake.cameras.optics import Intrinsics
 from burg_drake.cameras.pose.coarse import CoarsePose, coarse_pose
 from burg_drake.cameras.pose.detection import Detection, MarkerDetector, other_markers
 from burg_drake.cameras.pose.edges import marker_edges
@@ -29,7 +29,7 @@ from burg_drake.cameras.pose.print_quality import (
 )
 from burg_drake.cameras.pose.refinement import EdgeRefinement, EdgeRound, RefinedPose
 from burg_drake.cameras.pose.wrong_board import WrongBoardCheck
-from burg_drake.core import Array, InvalidInputError, rotation_angle
+from burg_drake.core import Array, InvalidInputError, photo_light, rotation_angle
 from burg_drake.scene.document import Board
 
 OTHER_MARKER_SCALE = 0.05, 1.5

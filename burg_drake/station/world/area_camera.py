@@ -1,4 +1,4 @@
-"""A colour camera whose pixels are means over their area, as those of a real sensor are.
+"""A colour camera whose pixels are means of light over their area, as those of real sensors are.
 
 Drake renders one ray a pixel and smooths the steps of edges afterwards (FXAA), which moves edges by
 some hundredths of a pixel; what that costs a board's pose is in `benchmarks/board_loop.py`.
@@ -15,6 +15,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, LeafSystem
 from pydrake.systems.sensors import ImageRgba8U
 
+from burg_drake.core import levels_of_light, photo_light
 from burg_drake.station.document import HALF_PIXEL, Camera
 
 
@@ -64,7 +65,8 @@ class AreaCamera(LeafSystem):
         query = self._query.Eval(context)
         fine = query.RenderColorImage(self._rendered, self._world, self._X_WC.Eval(context))
         image = ImageRgba8U(*self._size)
-        image.mutable_data[:] = cv2.resize(
-            np.asarray(fine.data), self._size, interpolation=cv2.INTER_AREA
+        light = photo_light(np.asarray(fine.data))
+        image.mutable_data[:] = levels_of_light(
+            cv2.resize(light, self._size, interpolation=cv2.INTER_AREA)
         )
         output.set_value(image)

@@ -14,7 +14,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras.optics import photo_light
 from burg_drake.cameras.placement.alignment.evidence import (
     LEAST_WINDOW,
     Evidence,
@@ -27,7 +26,7 @@ from burg_drake.cameras.placement.alignment.sheet_projection import (
     projected_print,
     projected_tints,
 )
-from burg_drake.core import Array, inverse
+from burg_drake.core import Array, inverse, photo_light
 from burg_drake.scene.document import Board
 
 BLURS = (0.3, 0.5, 0.7, 0.9, 1.2, 1.6, 2.1, 2.7)

@@ -14,9 +14,8 @@ import trimesh
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, cKDTree
 
-from burg_drake.cameras.optics import photo_light
 from burg_drake.cameras.projection import MeshOutline
-from burg_drake.core import Array, inverse, make_pose, rot_z, transform_points
+from burg_drake.core import Array, inverse, make_pose, photo_light, rot_z, transform_points
 from burg_drake.geometry import RayCaster
 from burg_drake.objects.physics import sample_surface
 from burg_drake.scene.document import Scene

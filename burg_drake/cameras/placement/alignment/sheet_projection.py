@@ -6,8 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras.optics import photo_light
-from burg_drake.core import Array
+from burg_drake.core import Array, photo_light
 from burg_drake.printout import frame_width
 from burg_drake.scene.document import Board
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras.optics import photo_light
 from burg_drake.cameras.placement.alignment.aligner import Alignment, sectors
 from burg_drake.cameras.placement.alignment.appearance import likeness
 from burg_drake.cameras.placement.alignment.background import EmptyBoard
@@ -21,7 +20,7 @@ from burg_drake.cameras.placement.alignment.photo_edges import (
 from burg_drake.cameras.placement.alignment.pinhole import PinholeView, sample_nearest
 from burg_drake.cameras.placement.alignment.shape import TargetShape
 from burg_drake.cameras.placement.alignment.window import Window
-from burg_drake.core import Array
+from burg_drake.core import Array, photo_light
 
 FAR = (1 / 45, 1 / 45, 1 / 80, 1 / 110)
 """How far `far_edges` looks, round by round, as a share of the image's width."""

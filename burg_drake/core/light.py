@@ -7,6 +7,8 @@ more.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,6 +31,13 @@ def photo_light(image: NDArray[np.uint8]) -> NDArray[np.float32]:
     edges must allow for.
     """
     return np.asarray(LIGHT.take(image))
+
+
+def levels_of_light(light: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
+    """(...) levels of linear light (...) [0 to 1] in sRGB, the inverse of `photo_light`."""
+    bright = 1.055 * np.maximum(light, 0.0031308) ** (1.0 / 2.4) - 0.055
+    level = np.where(light <= 0.0031308, 12.92 * light, bright)
+    return np.asarray(np.rint(255.0 * np.clip(level, 0.0, 1.0)), dtype=np.uint8)
 
 
 def even_levels(light: NDArray[np.float32]) -> NDArray[np.uint8]:
