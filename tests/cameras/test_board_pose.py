@@ -297,7 +297,7 @@ def test_one_small_marker_has_two_poses() -> None:
     estimate = estimate_board(image, CAMERA, board)
     assert not estimate.valid
     assert estimate.reason == (
-        "1 marker in sight fit two poses alike; come nearer or show more of the board"
+        "1 marker in sight: two poses fit alike; come nearer or show more of the board"
     )
     close = view((0.05, 0.05), 0.12, 35.0, 30.0, 10.0)
     assert near(estimate_board(board_image(board, CAMERA, close), CAMERA, board), close, 0.2, 0.1)

@@ -32,7 +32,7 @@ SIZE = 0.01
 from that within [-]."""
 ASPECT = 0.01
 """Of a print's length along y for that along x [-]."""
-PAGE, BEND = 0.15, 0.16
+PAGE, HILL = 0.15, 0.16
 """Distances within which shifts along the sheet, and heights, are alike [m]: half a page of A4, and
 a hill of paper is wide."""
 MODES = 40
@@ -50,11 +50,11 @@ FEWEST = 5
 """Edges more than markers' shifts from which on their spread is known."""
 LEAST_SPREAD = 1e-3
 """Of that over what noise makes; keeps probabilities finite."""
-RARE = 8.0
+RARE = 6.0
 """By how much each kind of shift lowers the logarithm of the probability before it is seen."""
 
 
-VAGUE = 4.0
+TEMPER = 4.0
 """Logarithms of probabilities count by this part of them: patterns are not quite those of a real
 sheet."""
 
@@ -90,7 +90,8 @@ class Disturbance:
         shifts: how large they are.
         in_plane: largest shift along the sheet of a marker that was seen [m].
         out_of_plane: largest height of one [m].
-        rows: what the camera did from the first row to the last one [pixels].
+        rows: by what markers move in the time from the first row of the image to the last one,
+            root mean square [pixels].
         aspect: how much longer the print is along y than along x [-].
         size: by how much the markers are larger for their distances [-].
     """
@@ -127,7 +128,7 @@ class SheetModes:
         along_both = np.asarray(np.kron(alike, np.eye(2)), dtype=float)
         modes = _modes(along_both, moved.transpose(1, 0, 2).reshape(2 * n, 3))
         self.in_plane = np.tensordot(between, modes.reshape(n, 2, -1), axes=1)
-        alike, between = _alike(center, p_SE, BEND)
+        alike, between = _alike(center, p_SE, HILL)
         self.out_of_plane = between @ _modes(alike, np.stack([one, x, y], axis=-1))
 
 
@@ -205,9 +206,11 @@ class DisturbanceFit:
         J = views.motion[kept]
         row = views.at[kept, 1:] / height - 0.5
         strength = np.sqrt((J**2).mean(axis=0)) + 1e-9
+        # What the camera does from the first row to the last one moves each edge by [pixels].
+        self._turning = J / strength / np.sqrt(6.0)
         parts = {
             "pose": np.column_stack([J, views.bloom[kept]]),
-            "rows": row * J / strength / np.sqrt(6.0),
+            "rows": row * self._turning,
             "aspect": 0.5 * views.print[kept, :1],
             "size": views.print[kept, 1:],
             "in_plane": (J[:, None, 3:5] @ self._modes[0])[:, 0],
@@ -225,16 +228,16 @@ class DisturbanceFit:
         Args:
             prior: (7, 7) information about the step of pose and bloom that is known before.
         """
-        solved = [self._solve(MarkerShifts(alone), prior) for alone in ALONE]
-        best = max(solved, key=_logarithm)
+        solved = {s: self._solve(s, prior) for s in map(MarkerShifts, ALONE)}
+        best = max(solved.values(), key=_logarithm)
         for _ in range(len(KINDS)):
-            tried = [self._solve(shifts, prior) for shifts in _with_another(best.shifts)]
-            solved += tried
-            better = max(tried, key=_logarithm)
-            if better.logarithm < best.logarithm:
+            others = [s for s in _with_another(best.shifts) if s not in solved]
+            solved |= {s: self._solve(s, prior) for s in others}
+            better = max(solved.values(), key=_logarithm)
+            if better is best:
                 break
             best = better
-        return self._disturbance(best, solved)
+        return self._disturbance(best, list(solved.values()))
 
     def _by_marker(self) -> tuple[Array, Array]:
         """(n, 2, 2) information about the shift of each marker, and (n, 2) times what is seen."""
@@ -294,7 +297,7 @@ class DisturbanceFit:
         x = np.zeros(self._J.shape[1])
         x[best.columns] = best.x
         rows, aspect, size, in_plane, out_of_plane = (x[self._columns[kind]] for kind in KINDS)
-        weight = np.exp((np.array([s.logarithm for s in solved]) - best.logarithm) / VAGUE)
+        weight = np.exp((np.array([s.logarithm for s in solved]) - best.logarithm) / TEMPER)
         weight /= weight.sum()
         steps = np.array([s.x[:6] for s in solved])
         step = weight @ steps
@@ -306,7 +309,7 @@ class DisturbanceFit:
             best.shifts,
             float(np.linalg.norm(self._modes[0] @ in_plane, axis=1).max()),
             float(np.abs(self._modes[1] @ out_of_plane).max()),
-            float(np.linalg.norm(rows)),
+            float(np.sqrt(2.0 * ((self._turning @ rows) ** 2).mean())),
             float(aspect[0]),
             float(size[0]),
         )

@@ -67,8 +67,9 @@ def view_edges(
     if not keep.all():
         which, q_S, p_CE = which[keep], q_S[keep], p_CE[keep]
     at, by_C = image_points(intrinsics, p_CE)
-    limit = [intrinsics.width - 1 - MARGIN, intrinsics.height - 1 - MARGIN]
-    keep = np.asarray(((at > MARGIN) & (at < limit)).all(axis=1))
+    margin = MARGIN + abs(bloom)
+    limit = np.array([intrinsics.width, intrinsics.height]) - 1 - margin
+    keep = np.asarray(((at > margin) & (at < limit)).all(axis=1))
     if not keep.all():
         which, q_S, at, by_C = which[keep], q_S[keep], at[keep], by_C[keep]
     by_S = by_C @ R_SC.T  # pixels per metre

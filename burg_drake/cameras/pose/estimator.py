@@ -20,8 +20,8 @@ from burg_drake.cameras.pose.detection import Detection, MarkerDetector, other_m
 from burg_drake.cameras.pose.edges import marker_edges
 from burg_drake.cameras.pose.estimate import BoardEstimate
 from burg_drake.cameras.pose.print_quality import (
-    ASPECT,
     LEAST_DEVIATION,
+    implausible,
     print_doubt,
     scale_by_depth,
     scale_by_height,
@@ -47,7 +47,7 @@ PLAUSIBLE = 0.3
 """Share of the edges of markers that were read which must be seen for a pose to be right."""
 DIFFERENT = 0.01
 """Angle between poses that are not the same [rad]."""
-VAGUE = 0.05
+KNOWN_SHARE = 0.05
 """Standard deviation of the camera's position, as a share of its distance from the board, from
 which on it counts as unknown."""
 USED_EDGES = 6
@@ -153,15 +153,17 @@ class BoardPose:
         if turn > DIFFERENT and not self._decided(rounds[0], rounds[1], found):
             if turn > NEARBY:
                 return None, (
-                    f"{_markers(len(found))} in sight fit two poses alike;"
+                    f"{_markers(len(found))} in sight: two poses fit alike;"
                     " come nearer or show more of the board"
                 )
             best = replace(best, covariance=_covariance_of_both(best, rounds[1]))
         known = np.sqrt(np.linalg.eigvalsh(best.covariance[3:, 3:])[-1])
-        if known > VAGUE * np.linalg.norm(best.X_SC[:3, 3] - self._p_SQ[found].mean(axis=(0, 1))):
+        if known > KNOWN_SHARE * np.linalg.norm(
+            best.X_SC[:3, 3] - self._p_SQ[found].mean(axis=(0, 1))
+        ):
             return None, (
-                f"{_markers(len(found))} in sight tell where the camera is to {1e3 * known:.0f} mm"
-                " only; come nearer or show more of the board"
+                f"{_markers(len(found))} in sight: the camera's place is known to"
+                f" {1e3 * known:.0f} mm only; come nearer or show more of the board"
             )
         own = np.isin(self._edges.marker[best.views.which], found)
         if (best.weight[own] > 0.0).mean() < PLAUSIBLE:
@@ -265,12 +267,7 @@ class BoardPose:
         marker_scale = wrong_print(refined.disturbance, _side(at[used]))
         if marker_scale != 1.0:
             return self._other_size_reason(marker_scale)
-        if abs(refined.disturbance.aspect) > ASPECT[1]:
-            return (
-                f"another board: {1.0 + refined.disturbance.aspect:.2f} times as long along y as"
-                " along x; or check the intrinsics"
-            )
-        return ""
+        return implausible(refined.disturbance)
 
     def _other_size_reason(self, marker_scale: float) -> str:
         markers = self.board.markers

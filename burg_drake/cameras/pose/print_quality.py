@@ -28,6 +28,9 @@ BLOOM = 0.5
 0.2 in pictures that are overexposed twice."""
 ROWS = 0.5
 """What the camera does between the first and the last row that is worth telling [pixels]."""
+MOST_ROWS, MOST_BESIDE, MOST_HEIGHT = 6.0, 3e-3, 8e-3
+"""What is no motion [pixels], page or bulge [m] that a pose can be taken from any more: five
+standard deviations of what is expected where there is any."""
 BESIDE, HEIGHT = 2e-4, 5e-4
 """Shifts of pages, and heights of a sheet, that are worth telling [m]."""
 LEAST_DEVIATION = 0.01
@@ -46,6 +49,21 @@ def wrong_print(found: Disturbance, side: float) -> float:
     """
     other = abs(found.size) > MARKER_SIZE[1] and abs(found.size) * side / 2.0 > BLOOM
     return 1.0 + found.size if other else 1.0
+
+
+def implausible(found: Disturbance) -> str:
+    """Why no print of a board looks like that; empty if one may."""
+    if abs(found.aspect) > ASPECT[1]:
+        return (
+            f"another board: {1.0 + found.aspect:.2f} times as long along y as along x; or check"
+            " the intrinsics"
+        )
+    if found.rows > MOST_ROWS or found.in_plane > MOST_BESIDE or found.out_of_plane > MOST_HEIGHT:
+        return (
+            "markers are not where a board that lies still and flat has them: check the intrinsics,"
+            " light, and that the board is one sheet"
+        )
+    return ""
 
 
 def print_doubt(found: Disturbance) -> str:

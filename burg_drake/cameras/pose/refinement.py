@@ -39,6 +39,8 @@ LEAST_BLUR, MOST_BLUR = 0.08, 16.0
 """Variances in any direction [pixels^2]."""
 BLOOM_SD = 1.0
 """White that is too large on all sides by so much is not unlikely [pixels]."""
+MOST_BLOOM = 4.0
+"""White that is larger by more than that leaves no cells to read [pixels]."""
 STILL = 0.05
 """Edges that a round moves by less are where they belong, root mean square [pixels]."""
 MORE = 3
@@ -48,7 +50,7 @@ LONG = 0.3
 where they are expected [pixels]."""
 UNBLURRED = 0.5
 """Variance of lens and pixel in a sharp image [pixels^2]."""
-LOPSIDED = 0.025
+LOPSIDED = 0.04
 """Shift of an image by the blur beyond that, as a share of its standard deviation: motion and
 defocus are not quite alike on both sides."""
 KNOWN = 0.5
@@ -247,7 +249,8 @@ class EdgeRefinement:
         step, weight = _robust_step(J, fits.offset, sd, good)
         residual = fits.offset - J @ step
         blur = _better_blur(spread.blur, views, fits.widening, weight > 0.5)
-        spread = Spread(blur, spread.bloom + float(step[6]))
+        bloom = float(np.clip(spread.bloom + step[6], -MOST_BLOOM, MOST_BLOOM))
+        spread = Spread(blur, bloom)
         return EdgeRound(
             perturbed_pose(X_SC, step[:6], self._edges.p_SE[views.which].mean(axis=0)),
             self._covariance(views, residual, sd, weight) * max(1.0, spread.variance),
