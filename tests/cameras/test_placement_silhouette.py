@@ -40,7 +40,7 @@ def test_a_plate_is_found_and_measured(look: ImageDegradation) -> None:
     assert found is not None
     assert np.abs(found.q - Q)[:2].max() < 2e-4
     assert abs(found.q[2] - Q[2]) < np.deg2rad(0.2)
-    assert found.agreement > 0.9
+    assert found.agreement > 0.8
     assert (np.abs(found.q - Q) < 4.0 * np.sqrt(np.diag(found.covariance))).all()
 
 
