@@ -229,9 +229,7 @@ def placement_summary(check: PlacementCheck) -> str:
     words += [f"{counts['not_seen']} not seen"] if counts["not_seen"] else []
     if check.extra:
         words += (
-            ["1 thing stands there that is none"]
-            if len(check.extra) == 1
-            else [f"{len(check.extra)} things stand there that are none"]
+            ["1 extra object"] if len(check.extra) == 1 else [f"{len(check.extra)} extra objects"]
         )
     return ", ".join(words) + (f"; {check.reason}" if check.reason else "")
 

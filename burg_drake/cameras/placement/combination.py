@@ -22,7 +22,8 @@ def combine_checks(checks: Sequence[PlacementCheck]) -> PlacementCheck:
 
     An object is where the photos that measured it say, weighted by their variances per coordinate;
     if these contradict each other, it is `uncertain`. One that no photo measured is as the photo
-    says that knows most. The camera, and the first image, are those of the first check.
+    says that knows most. Extra objects are those that half of the photos show. The camera, and the
+    first image, are those of the first check.
 
     Args:
         checks: at least one.
@@ -44,7 +45,7 @@ def combine_checks(checks: Sequence[PlacementCheck]) -> PlacementCheck:
         instances={
             name: _combined([c.instances[name] for c in checks]) for name in first.instances
         },
-        extra=_merged([extra for c in checks for extra in c.extra]),
+        extra=_merged([extra for c in checks for extra in c.extra], len(checks)),
     )
 
 
@@ -109,8 +110,8 @@ def _placed(placement: Placement, q: Array) -> Pose:
     return Pose.from_matrix(make_pose(R, p_SR - R @ p_OR), quaternion=True)
 
 
-def _merged(extra: list[ExtraObject]) -> tuple[ExtraObject, ...]:
-    """Extra objects of all photos, each once."""
+def _merged(extra: list[ExtraObject], photos: int) -> tuple[ExtraObject, ...]:
+    """Extra objects that half of the photos show, each once."""
     groups: list[list[ExtraObject]] = []
     for one in extra:
         near = (g for g in groups if np.hypot(*np.subtract(one.position, g[0].position)) < SAME)
@@ -119,7 +120,7 @@ def _merged(extra: list[ExtraObject]) -> tuple[ExtraObject, ...]:
             groups.append([one])
         else:
             group.append(one)
-    return tuple(_middle(group) for group in groups)
+    return tuple(_middle(group) for group in groups if 2 * len(group) >= photos)
 
 
 def _middle(group: list[ExtraObject]) -> ExtraObject:
