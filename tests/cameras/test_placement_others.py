@@ -143,6 +143,14 @@ def test_what_one_photo_measures_another_one_may_not_see() -> None:
     assert combine_checks([photos[0], photos[2]]).instances["mug"] == doubtful
 
 
+def test_a_photo_that_shows_that_an_object_is_gone_contradicts() -> None:
+    reason = "nothing like it was found within 50 mm of its target"
+    gone = Placement(object="mug", status="not_seen", reason=reason, target=Pose(), seen=0.9)
+    found = combine_checks([check(mug(1e-3, 1e-3)), check(gone)]).instances["mug"]
+    assert found.status == "uncertain"
+    assert found.reason == f"1 of 2 photos show that it is not there: {reason}"
+
+
 def test_extra_objects_of_all_photos_are_named_once() -> None:
     first = ExtraObject(position=(0.10, 0.10), width=0.05)
     again = ExtraObject(position=(0.12, 0.10), width=0.06)

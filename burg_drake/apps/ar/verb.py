@@ -83,7 +83,8 @@ def _add_view(parser: Any) -> None:
     view.add_argument(
         "--no-browser",
         action="store_true",
-        help="serve no page: process all frames, print the result, and end",
+        help="serve no page: process all frames, print the result, and end (a camera's frames end"
+        " with --frames, --seconds or Ctrl-C)",
     )
 
 
@@ -149,6 +150,7 @@ def _run(arguments: argparse.Namespace, live: LiveSession, actions: ViewActions)
             actions.start_recording(arguments.record)
         try:
             live.start(arguments.frames)
+            _say_how_it_ends(arguments, live)
             live.wait(seconds=arguments.seconds, to_end=arguments.no_browser)
         except KeyboardInterrupt:
             interrupted = True
@@ -161,6 +163,16 @@ def _run(arguments: argparse.Namespace, live: LiveSession, actions: ViewActions)
     if interrupted and (arguments.frames or arguments.seconds):
         raise KeyboardInterrupt
     return placement_exit_code(live) if scripted else 0
+
+
+def _say_how_it_ends(arguments: argparse.Namespace, live: LiveSession) -> None:
+    """Of a script that looks at a source without end, until somebody ends it."""
+    limited = arguments.frames or arguments.seconds
+    if arguments.no_browser and live.source.live and not limited:
+        print(
+            f"{live.source.name} does not end: Ctrl-C ends this, or --frames N, or --seconds N",
+            file=sys.stderr,
+        )
 
 
 def _is_scripted(arguments: argparse.Namespace) -> bool:

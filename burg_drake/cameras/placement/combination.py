@@ -13,6 +13,8 @@ from burg_drake.core.documents import Pose
 
 APART = 4.0
 """Standard deviations from the mean of all photos beyond which one of them contradicts."""
+IN_SIGHT = 0.5
+"""Share of an object that a photo would show for its absence to count."""
 SAME = 0.05
 """Extra objects nearer to each other than this are one [m]."""
 
@@ -21,9 +23,9 @@ def combine_checks(checks: Sequence[PlacementCheck]) -> PlacementCheck:
     """One check of several, of photos that show the same objects on the same places.
 
     An object is where the photos that measured it say, weighted by their variances per coordinate;
-    if these contradict each other, it is `uncertain`. One that no photo measured is as the photo
-    says that knows most. Extra objects are those that half of the photos show. The camera, and the
-    first image, are those of the first check.
+    if these contradict each other, or one shows that it is not there, it is `uncertain`. One that
+    no photo measured is as the photo says that knows most. Extra objects are those that half of the
+    photos show. The camera, and the first image, are those of the first check.
 
     Args:
         checks: at least one.
@@ -50,6 +52,17 @@ def combine_checks(checks: Sequence[PlacementCheck]) -> PlacementCheck:
 
 
 def _combined(placements: list[Placement]) -> Placement:
+    found = _mean(placements)
+    gone = [p for p in placements if p.status == "not_seen" and p.seen >= IN_SIGHT]
+    if found.status != "measured" or not gone:
+        return found
+    shown = f"{len(gone)} of {len(placements)} photos show"
+    return replace(
+        found, status="uncertain", reason=f"{shown} that it is not there: {gone[0].reason}"
+    )
+
+
+def _mean(placements: list[Placement]) -> Placement:
     measured = [p for p in placements if p.status == "measured"]
     if len(measured) < 2:
         return max(placements, key=_worth)
