@@ -33,8 +33,9 @@ from scipy.spatial.transform import Rotation
 
 import burg_drake as burg
 from burg_drake.cameras.calibration.estimation import calibrate_views
-from burg_drake.cameras.calibration.image_parts import PARTS, part_of
+from burg_drake.cameras.calibration.image_parts import part_of
 from burg_drake.cameras.calibration.target import find_target
+from burg_drake.cameras.optics.known_parts import PARTS
 
 Array = np.ndarray
 

@@ -80,9 +80,11 @@ def test_photos_of_the_target_give_the_intrinsics(
     assert page.count("<svg") == 4 + 14
     # The promise: the same figure in the document, its header, the page and the terminal.
     assert found.known_to is not None and 0.0 < found.known_to < 1.0
-    known = f"known to {found.known_to:.2f} pixels"
-    assert f"# In 19 of 20 cases {known}" in (tmp_path / "K.yaml").read_text()
-    assert f"In 19 of 20 cases {known}" in page and f"known to         {found.known_to:.2f}" in out
+    assert len(found.except_at) == 8  # the target was in the middle
+    known = f"in the middle only, to {found.known_to:.2f} pixels there"
+    assert f"# In 19 of 20 cases known {known}" in (tmp_path / "K.yaml").read_text()
+    assert f"In 19 of 20 cases known {known}" in page
+    assert f"known            {known}" in out
     assert "upper left corner " in out
 
 

@@ -14,28 +14,30 @@ from room.target import target_picture, view_at
 from room.views import look_at, seen_at
 
 from burg_drake.cameras.calibration.estimation import Calibration, calibrate_views
-from burg_drake.cameras.calibration.image_parts import PARTS, part_of
+from burg_drake.cameras.calibration.image_parts import part_of
 from burg_drake.cameras.calibration.lens_fit import fit_lens
 from burg_drake.cameras.calibration.target import find_target
+from burg_drake.cameras.optics.known_parts import PARTS
 
 RATIONAL = Camera((640, 480), (500.0, 502.0), (322.0, 236.0), (0.4, 0.1, 1e-3, -1e-3, 0.0, 0.6))
 EQUIDISTANT = Fisheye((1280, 960), (520.0, 521.0), (635.0, 485.0), projection="equidistant")
 
 
+@pytest.mark.parametrize("seed", [7, 8])
 @pytest.mark.parametrize(
     ("name", "where"),
     [*((name, "middle") for name in calibration.LENSES), ("barrel k3", "all over")],
 )
-def test_the_camera_is_as_good_as_promised(name: str, where: str) -> None:
+def test_the_camera_is_as_good_as_promised(name: str, where: str, seed: int) -> None:
     """In every part of the image, seen or not, within 1.5 times what 19 of 20 are within."""
     camera = calibration.LENSES[name]
-    rng = np.random.default_rng([7, list(calibration.LENSES).index(name)])
+    rng = np.random.default_rng([seed, list(calibration.LENSES).index(name)])
     views = calibration.made_views(camera, calibration.REACHES[where], 15, rng)
     found = calibration.judged(camera, views)
     assert found.off < 1.5 * found.promised
     assert found.ratio < 1.5
-    # It is no promise to know nothing.
-    assert found.promised < 1.5
+    # It is no promise to know nothing; of fisheyes the middle of the image tells less.
+    assert found.promised < (1.3 if isinstance(camera, Fisheye) else 0.6)
 
 
 def test_a_simpler_model_that_fits_as_well_is_known_to_be_off() -> None:

@@ -92,11 +92,15 @@ def largest_deviation(
 def test_exact_corners_give_the_exact_camera(model: str) -> None:
     views = views_of(LENSES[model], 12, 0.0)
     found = calibrate_views(views, TARGET, model=model)
-    assert largest_deviation(LENSES[model], found.intrinsics, views) < 5e-3
-    # These views do not show the edges of a fisheye's image; what they tell least of a rational
-    # lens is held by the prior.
-    most = {"fisheye": 5.0, "rational": 0.1}.get(model, 2e-3)
-    assert largest_deviation(LENSES[model], found.intrinsics) < most
+    seen_to = LENSES[model].rays(np.concatenate([view.corners for view in views]))[:, 2].min()
+    pixels = image_grid(LENSES[model])
+    rays = LENSES[model].rays(pixels)
+    off = np.linalg.norm(found.intrinsics.project(rays) - pixels, axis=1)
+    assert off[rays[:, 2] > seen_to].max() < (4e-3 if model == "rational" else 2e-3)
+    # Farther off the axis than any corner: these views end at 41 degrees of a fisheye's 89, and
+    # what they tell least of a rational lens is held by the prior.
+    most = {"fisheye": 2.0, "rational": 0.07}.get(model, 2e-3)
+    assert off.max() < most
     assert found.rms < 1e-3 and not found.rejected and found.model == model
     assert found.intrinsics.residual == found.rms
 
@@ -129,7 +133,7 @@ def test_standard_deviations_are_those_of_opencv(model: str) -> None:
     ours = np.sqrt(np.diag(covariance_of(fit)))
     # Some combinations of rational coefficients are held by the prior, which OpenCV does not have.
     compared = [0, 1, 2, 3, 6, 7] if model == "rational" else list(range(len(ours)))
-    assert np.allclose(ours[compared], np.ravel(deviations)[compared], rtol=0.05)
+    assert np.allclose(ours[compared], np.ravel(deviations)[compared], rtol=5e-3)
     theirs = replace(guess, focal=(K[0, 0], K[1, 1]), center=(K[0, 2], K[1, 2]))
     theirs = replace(theirs, distortion=tuple(np.ravel(k)[: len(guess.distortion)].tolist()))
     assert largest_deviation(theirs, guess, views) < 0.02
@@ -254,7 +258,7 @@ def test_advice_names_what_was_not_seen() -> None:
         kept.append(replace(view, ids=view.ids[inside], corners=view.corners[inside]))
     found = calibrate_views([v for v in kept if len(v.ids) > 15], TARGET)
     (line,) = (text for text in advice(found) if text.startswith("bring the target to the "))
-    assert all(f"right {part}" in line for part in ("edge",)) and "left" not in line
+    assert "right edge" in line and "left" not in line
     few = calibrate_views(views[:5], TARGET)
     assert "5 views are few: take 15 to 30" in advice(few)
 
@@ -338,7 +342,7 @@ def test_corners_of_the_image_are_asked_for_by_what_is_known_of_them() -> None:
     )
     assert all(f"{name} corner" in line for name in ("upper left", "lower left", "lower right"))
     assert found.intrinsics.except_at[0] == worst
-    assert f"but for the {worst} ({bounds[worst]:.2g})" in str(found.promise)
+    assert f"not in the {worst} ({bounds[worst]:.2g})" in str(found.promise)
 
 
 def test_coverage_counts_every_corner_in_its_part_of_the_image() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import cv2
@@ -12,7 +13,7 @@ from pydrake.systems.sensors import CameraInfo
 from burg_drake.cameras.optics.fisheye import fisheye_lens
 from burg_drake.cameras.optics.intrinsics import Intrinsics, camera_info, of_camera, of_camera_info
 from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import FieldError, InvalidInputError
 from burg_drake.station.document.station_document import Camera
 
 PINHOLE = Intrinsics(width=640, height=480, focal=(600.0, 610.0), center=(315.0, 241.0))
@@ -89,6 +90,9 @@ def test_a_fisheye_puts_nothing_into_its_image_that_it_does_not_see() -> None:
     rays = np.column_stack([np.sin(angle), 0.0 * angle, np.cos(angle)])
     u = lens.project(rays)[:, 0]
     assert (np.diff(u) > 0.0).all()
+    behind = lens.project(np.array([[0.0, 0.0, -1.0], [1e-9, 0.0, -1.0], [0.0, 0.0, 1.0]]))
+    assert np.allclose(behind[0], behind[1]) and behind[0, 0] > lens.width
+    assert behind[2] == pytest.approx(lens.center)
     assert np.allclose(lens.rays(lens.project(rays[:72])), rays[:72], atol=1e-6)
 
 
@@ -131,12 +135,35 @@ def test_images_of_another_size_are_refused() -> None:
         ({"distortion": (0.1, np.nan, 0.0, 0.0)}, "must be finite"),
         ({"width": 640.5}, "width 640.5 and height 480 of a camera must be whole pixels"),
         ({"model": "fisheye"}, "distortion has 0 coefficients; a fisheye has 4: k1, k2, k3, k4"),
+        ({"model": "fisheyes"}, "model 'fisheyes' does not exist; did you mean 'fisheye'?"),
+        ({"known_to": -3.0}, "known_to is -3; it must be above 0"),
+        ({"known_to": 0.0}, "known_to is 0; it must be above 0"),
+        ({"known_to": np.inf}, "known_to is inf; it must be above 0"),
+        ({"known_to": np.nan}, "known_to is nan; it must be above 0"),
+        (
+            {"except_at": ("middle", "nowhere")},
+            "except_at has 'nowhere', which is no part of the image; known: upper left corner",
+        ),
         ({"distortion": (0.1,)}, "distortion has 1 coefficients; OpenCV's model takes 0, 4, 5, 8"),
     ],
 )
 def test_what_no_camera_has(change: dict[str, object], message: str) -> None:
-    with pytest.raises(InvalidInputError, match=message):
+    with pytest.raises(InvalidInputError, match=re.escape(message)):
         replace(PINHOLE, **change)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("change", "place"),
+    [
+        ({"model": "fisheyes"}, ("model",)),
+        ({"known_to": -3.0}, ("known_to",)),
+        ({"except_at": ("middle", "nowhere")}, ("except_at", 1)),
+    ],
+)
+def test_errors_of_fields_say_which(change: dict[str, object], place: tuple[str | int]) -> None:
+    with pytest.raises(FieldError) as raised:
+        replace(PINHOLE, **change)  # type: ignore[arg-type]
+    assert raised.value.place == place
 
 
 def test_k_is_what_opencv_takes() -> None:

@@ -31,6 +31,7 @@ PINHOLE = replace(RADIAL, distortion=())
 FISHEYE = replace(RADIAL, model="fisheye", distortion=(0.03, -0.02, 0.006, -0.001))
 EQUIDISTANT = replace(FISHEYE, distortion=(0.0, 0.0, 0.0, 0.0))
 
+OURS = "version: 1\nwidth: 640\nheight: 480\nfocal: [1, 2]\ncenter: [1, 2]\n"
 # As camera_calibration of ROS writes it.
 CAMERA_INFO = """\
 image_width: 640
@@ -175,6 +176,9 @@ def test_a_camera_of_a_station() -> None:
         (MESSAGE_1.replace("height: 0, width: 0", "height: 9, width: 9"), "binning or roi"),
         ("version: 1\nwidth: 640\nheight: 480\nfocal: [1, 2]\ncentre: [1, 2]\n", "centre"),
         ("version: 1\nwidth: 640\nheight: 480\nfocal: [1, 2]\n", "center"),
+        (OURS + "known_to: 0\n", "known_to is 0; it must be above 0"),
+        (OURS + "except_at: [nowhere]\n", "except_at has 'nowhere', which is no part of the"),
+        (OURS + "model: fisheyes\n", "'fisheyes' is not valid; did you mean 'fisheye'?"),
         ("", "the document is empty"),
         ("- 1\n- 2\n", "K.yaml"),
         ("%YAML:1.0\n---\nimage_width: 640\n", "camera_matrix with 3 x 3 numbers is missing"),

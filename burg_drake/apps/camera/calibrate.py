@@ -196,7 +196,8 @@ def _take(
 
 def _print(calibration: Calibration) -> None:
     """Prints views, what was left out, parameters and where the image was covered."""
-    from burg_drake.cameras.calibration import PARTS, coverage
+    from burg_drake.cameras.calibration import coverage
+    from burg_drake.cameras.optics import PARTS
     from burg_drake.core.terminal import TextTable, format_number
 
     table = TextTable("views").names("image")

@@ -13,6 +13,8 @@ def print_intrinsics(intrinsics: Intrinsics) -> None:
     """Prints a camera's figures."""
     import numpy as np
 
+    from burg_drake.cameras.optics import known_words
+
     k = intrinsics
     title = f"{k.camera}: " if k.camera else ""
     print(f"{title}{k.width} x {k.height} pixels")
@@ -41,8 +43,7 @@ def print_intrinsics(intrinsics: Intrinsics) -> None:
     if k.residual is not None:
         print(f"residual         {k.residual:.3f} pixels")
     if k.known_to is not None:
-        but = f", but for the {', '.join(k.except_at)}" if k.except_at else " over the whole image"
-        print(f"known to         {k.known_to:.2f} pixels{but}")
+        print(f"known            {known_words(k.known_to, k.except_at)}")
 
 
 def field_of_view(intrinsics: Intrinsics) -> tuple[float, float, float]:

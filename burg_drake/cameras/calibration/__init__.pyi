@@ -4,7 +4,6 @@ from .estimation import (
 )
 from .image_parts import (
     CELLS as CELLS,
-    PARTS as PARTS,
     coverage as coverage,
 )
 from .lens_uncertainty import (

@@ -201,7 +201,8 @@ def calibrate_views(
         fit.bulge,
     )
     promise = calibration.promise
-    known_to = round(promise.known_to, 3) if np.isfinite(promise.known_to) else None
+    # Of exact corners it would be rounded to nothing.
+    known_to = max(round(promise.known_to, 3), 1e-3) if np.isfinite(promise.known_to) else None
     promised = replace(calibration.intrinsics, known_to=known_to, except_at=promise.except_at)
     return replace(calibration, intrinsics=promised)
 

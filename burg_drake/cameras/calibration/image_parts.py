@@ -8,16 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.cameras.calibration.target import CharucoView
+from burg_drake.cameras.optics import PARTS
 from burg_drake.core import Array, Indices
 
 CELLS = (6, 8)
 """Rows and columns of the grid on which coverage is counted. Its border has the image's edges and
 corners."""
-PARTS = (
-    *("upper left corner", "upper edge", "upper right corner"),
-    *("left edge", "middle", "right edge"),
-    *("lower left corner", "lower edge", "lower right corner"),
-)
 SEEN = 0.5
 """Share of the cells of an edge in which corners were seen, at least."""
 

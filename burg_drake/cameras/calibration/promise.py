@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.cameras.calibration.image_parts import PARTS, part_of
+from burg_drake.cameras.calibration.image_parts import part_of
 from burg_drake.cameras.calibration.lens_uncertainty import (
     BOUND,
     CalibratedCamera,
     image_grid,
     uncertainty,
 )
+from burg_drake.cameras.optics import LARGEST, PARTS, known_words
 
 GRID = (17, 13)
 """Columns and rows of places where it is computed."""
@@ -20,8 +21,6 @@ EXCEPTED = 2.0
 """A part that is known so many times worse than the middle is named by itself."""
 UNCERTAIN, UNKNOWN = 0.5, 3.0
 """Bounds of the error that deserve a word, and that are too much [pixels]."""
-LARGEST = 10.0
-"""Larger bounds say no more than that a part is unknown [pixels]."""
 FARTHEST = np.radians(85.0)
 """From the axis of a fisheye; what looks further aside is not promised anything."""
 
@@ -42,27 +41,31 @@ class Promise:
 
     @property
     def except_at(self) -> tuple[str, ...]:
-        """Parts that are known much worse than the middle, the worst first."""
-        limit = max(UNCERTAIN, EXCEPTED * self.parts["middle"])
-        worse = [name for name, bound in self.parts.items() if not bound <= limit]
-        return tuple(sorted(worse, key=lambda name: -self.parts[name]))
+        """Parts that nothing is promised of or that are known much worse than the middle, or than
+        the best part if the middle is one of those; the worst first."""
+        bounds = {name: self.parts.get(name, np.inf) for name in PARTS}
+        best = self.parts.get("middle", min(self.parts.values()))
+        limit = max(UNCERTAIN, EXCEPTED * best)
+        worse = [name for name, bound in bounds.items() if not bound <= limit]
+        return tuple(sorted(worse, key=lambda name: -bounds[name]))
 
     @property
     def known_to(self) -> float:
-        """The bound in all other parts [pixels]."""
+        """The bound in all other parts [pixels]; infinite if there are none."""
         excepted = self.except_at
-        return max(bound for name, bound in self.parts.items() if name not in excepted)
+        held = [bound for name, bound in self.parts.items() if name not in excepted]
+        return max(held, default=np.inf)
 
     def bound(self, name: str) -> str:
         """That of a part, as text."""
+        if name not in self.parts:
+            return f"beyond {np.degrees(FARTHEST):.0f} degrees"
         bound = self.parts[name]
         return f"{bound:.2g}" if bound < LARGEST else f"more than {LARGEST:g}"
 
     def __str__(self) -> str:
-        text = f"known to {self.known_to:.2f} pixels"
-        if not self.except_at:
-            return f"{text} over the whole image"
-        return f"{text}, but for the {', '.join(f'{n} ({self.bound(n)})' for n in self.except_at)}"
+        bounds = {name: self.bound(name) for name in self.except_at}
+        return f"known {known_words(self.known_to, self.except_at, bounds)}"
 
 
 def promise_of(calibrated: CalibratedCamera) -> Promise:
@@ -72,7 +75,7 @@ def promise_of(calibrated: CalibratedCamera) -> Promise:
     pixels = pixels[camera.rays(pixels)[:, 2] > np.cos(FARTHEST)]
     if not len(pixels):  # of views that tell nothing
         return Promise(dict.fromkeys(PARTS, np.inf), 1.0)
-    bound = BOUND * uncertainty(calibrated, pixels)
+    bound = np.nan_to_num(BOUND * uncertainty(calibrated, pixels), nan=np.inf)
     part = part_of(pixels, (camera.width, camera.height))
     parts = {
         name: float(bound[part == k].max()) for k, name in enumerate(PARTS) if (part == k).any()

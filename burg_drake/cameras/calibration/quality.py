@@ -5,11 +5,12 @@ from __future__ import annotations
 from burg_drake.cameras.calibration.estimation import Calibration
 from burg_drake.cameras.calibration.guidance import FEW_VIEWS, wanted_views
 from burg_drake.cameras.calibration.promise import UNCERTAIN, UNKNOWN
+from burg_drake.cameras.optics import is_local
 
 LARGE_RMS = 1.0
 """Sharp images of a flat target give 0.05 to 0.3 [pixels]."""
 UNKNOWN_SHARE = 0.5
-"""Of the image; a camera of which less is known is of little use."""
+"""Of the image, or of its parts; a camera of which less is known is of little use."""
 
 
 def advice(calibration: Calibration) -> list[str]:
@@ -23,7 +24,7 @@ def advice(calibration: Calibration) -> list[str]:
             f"residuals of {calibration.rms:.2f} pixels are large: is the target flat, are its"
             " squares and markers as given, was the focus fixed?"
         )
-    if not promise.known_to <= UNCERTAIN:
+    if not promise.known_to <= UNCERTAIN or is_local(promise.except_at):
         lines.append(f"the camera is {promise}")
     return lines
 
@@ -31,5 +32,7 @@ def advice(calibration: Calibration) -> list[str]:
 def is_useless(calibration: Calibration) -> bool:
     """Images that this camera model is used for would be misread by pixels."""
     promise = calibration.promise
-    known = promise.known_to <= UNKNOWN and promise.unknown < UNKNOWN_SHARE
+    bounds = promise.parts.values()
+    parts = sum(not bound <= UNKNOWN for bound in bounds) / len(bounds)
+    known = promise.known_to <= UNKNOWN and max(promise.unknown, parts) < UNKNOWN_SHARE
     return not known or calibration.rms > UNKNOWN

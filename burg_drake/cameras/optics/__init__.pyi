@@ -18,6 +18,12 @@ from .intrinsics_file import (
     save_camera_info as save_camera_info,
     save_intrinsics as save_intrinsics,
 )
+from .known_parts import (
+    LARGEST as LARGEST,
+    PARTS as PARTS,
+    is_local as is_local,
+    known_words as known_words,
+)
 from .sensors import (
     SENSORS as SENSORS,
     sensor as sensor,

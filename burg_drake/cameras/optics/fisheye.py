@@ -59,7 +59,7 @@ class FisheyeLens:
         return np.where(angle < self.turn, self._slope(np.minimum(angle, self.turn)), 1.0)
 
     def angle(self, radius: Array) -> Array:
-        """Angles off the axis [rad] that are seen at distances from the middle."""
+        """Angles off the axis [rad] that are seen at distances from the middle; pi beyond."""
         table = np.linspace(0.0, self.turn, STEPS)
         end = float(self._radius(self.turn))
         inner = np.minimum(radius, end)
@@ -67,14 +67,16 @@ class FisheyeLens:
         for _ in range(NEWTON_STEPS):
             slope = np.maximum(self._slope(angle), 1e-6)
             angle = np.clip(angle - (self._radius(angle) - inner) / slope, 0.0, self.turn)
-        return np.asarray(angle + (radius - inner))
+        return np.minimum(angle + (radius - inner), np.pi)
 
     def bent(self, p_CQ: Array) -> Array:
         """(..., 2) where points (..., 3) in the camera's frame are seen, in focal lengths."""
         aside = np.linalg.norm(p_CQ[..., :2], axis=-1)
         radius = self.radius(np.arctan2(aside, p_CQ[..., 2]))
-        # On the axis the direction is of no matter: the radius is 0.
-        return np.asarray(p_CQ[..., :2] * (radius / np.maximum(aside, 1e-300))[..., None])
+        # On the axis all directions are alike: ahead the radius is 0, behind any is outside.
+        toward = p_CQ[..., :2] / np.maximum(aside, 1e-300)[..., None]
+        toward = np.where((aside == 0.0)[..., None], [1.0, 0.0], toward)
+        return np.asarray(toward * radius[..., None])
 
     def rays(self, bent: Array) -> Array:
         """(..., 3) unit vectors of what is seen at (..., 2), in focal lengths from the middle."""

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from burg_drake.cameras.optics.fisheye import COEFFICIENTS, fisheye_lens
-from burg_drake.core import Array, FieldError, InvalidInputError
+from burg_drake.cameras.optics.known_parts import PARTS
+from burg_drake.core import Array, FieldError, InvalidInputError, nearest
 from burg_drake.station.document import HALF_PIXEL as HALF_PIXEL, Camera
 
 DISTORTION_SIZES = (0, 4, 5, 8, 12, 14)
@@ -38,7 +39,9 @@ class Intrinsics:
         residual: root mean square reprojection error of the calibration [pixels], if known.
         known_to: how far this camera and the true one show the same apart, at most, in 19 of 20
             cases [pixels], as the calibration promises.
-        except_at: parts of the image where it does not, such as `upper left corner`.
+        except_at: parts of the image where it does not, of `upper left corner`, `upper edge`,
+            `upper right corner`, `left edge`, `middle`, `right edge`, `lower left corner`, `lower
+            edge`, `lower right corner`.
     """
 
     version: int = 1
@@ -65,6 +68,10 @@ class Intrinsics:
             )
         if min(self.width, self.height, *self.focal) <= 0:
             raise InvalidInputError("width, height and focal of a camera must be positive")
+        if self.model not in get_args(LensModel):
+            known = nearest(str(self.model), get_args(LensModel))
+            raise FieldError(f"model {self.model!r} does not exist; {known}", "model")
+        self._check_promise()
         if self.is_fisheye and len(self.distortion) != COEFFICIENTS:
             raise FieldError(
                 f"distortion has {len(self.distortion)} coefficients; a fisheye has {COEFFICIENTS}:"
@@ -77,6 +84,17 @@ class Intrinsics:
                 f" {', '.join(map(str, DISTORTION_SIZES))}",
                 "distortion",
             )
+
+    def _check_promise(self) -> None:
+        if self.known_to is not None and not 0.0 < self.known_to < np.inf:
+            raise FieldError(f"known_to is {self.known_to:g}; it must be above 0", "known_to")
+        for k, name in enumerate(self.except_at):
+            if name not in PARTS:
+                raise FieldError(
+                    f"except_at has {name!r}, which is no part of the image;"
+                    f" {nearest(name, PARTS, ordered=True)}",
+                    *("except_at", k),
+                )
 
     @cached_property
     def K(self) -> Array:

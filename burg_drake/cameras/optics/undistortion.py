@@ -14,8 +14,9 @@ class Undistortion:
 
     Args:
         intrinsics: of the camera; those of the straightened images have the same `K`. They show
-            less than the camera sees where its edges look far aside: of a fisheye of 170 degrees
-            the middle 112, of any fisheye less than 174.
+            less than the camera sees where its edges look far aside: the width over the focal
+            length decides, and of any fisheye it is less than 180 degrees. One of 1280 pixels, 430
+            a radian, sees 170 degrees across and keeps the middle 112.
     """
 
     def __init__(self, intrinsics: Intrinsics) -> None:
