@@ -1,0 +1,33 @@
+"""Poses in pictures of the room, which shares no code with the estimator."""
+
+from __future__ import annotations
+
+import pytest
+from room_board import MOST_ERROR, negative, view
+
+from tests.thorough import thorough
+
+
+@pytest.mark.parametrize(
+    ("row", "mm"),
+    [
+        ("overexposed 2", 1.0),
+        thorough("room", 1.5),
+        thorough("motion 4 px", 1.0),
+        thorough("bulge 2 mm", 1.0),
+        thorough("55 % covered", 1.0),
+    ],
+)
+def test_poses_are_found_and_errors_are_what_the_covariance_says(row: str, mm: float) -> None:
+    for k in range(3):
+        ours, _ = view(row, "640x480", 3, k)
+        assert ours.valid, ours.reason
+        assert ours.position < mm
+        assert ours.most < MOST_ERROR
+
+
+@pytest.mark.thorough
+def test_another_board_gives_no_pose() -> None:
+    other = negative("ids shifted by 20", "640x480", 3, 0)
+    assert not other.valid
+    assert other.reason.startswith("another board")
