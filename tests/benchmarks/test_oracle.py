@@ -17,6 +17,9 @@ from oracle.solid import Solid, mass_properties
 from oracle.trial import Grip, Trial
 
 GRAVITY, FORCE = 9.81, 40.0
+pytestmark = pytest.mark.thorough
+"""It judges from `benchmarks`; to compile it takes longer than most of what it judges."""
+
 DOWN = np.diag((1.0, -1.0, -1.0))
 WIDTH, DEPTH, HEIGHT = 0.03, 0.024, 0.05
 LEVER = 0.05

@@ -36,6 +36,7 @@ def sums(folder: Path) -> dict[str, str]:
     }
 
 
+@pytest.mark.thorough  # the cluster's workers make the same bytes, too
 def test_the_same_bytes_by_two_workers_and_after_a_stop(folder: Path, tmp_path: Path) -> None:
     again = tmp_path / "set"
     burg.generate_dataset(SCENES, "panda_tabletop", again, RECIPE, workers=2)
