@@ -52,8 +52,6 @@ LEAST_SPREAD = 1e-3
 """Of that over what noise makes; keeps probabilities finite."""
 RARE = 6.0
 """By how much each kind of shift lowers the logarithm of the probability before it is seen."""
-
-
 TEMPER = 4.0
 """Logarithms of probabilities count by this part of them: patterns are not quite those of a real
 sheet."""
