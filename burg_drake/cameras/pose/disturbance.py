@@ -52,6 +52,9 @@ LEAST_SPREAD = 1e-3
 """Of that over what noise makes; keeps probabilities finite."""
 RARE = 6.0
 """By how much each kind of shift lowers the logarithm of the probability before it is seen."""
+TOLD = 8.0
+"""By how much the logarithm of the probability must exceed that without a kind of shift for it to
+be told; less may be chance, and only widens the covariance."""
 TEMPER = 4.0
 """Logarithms of probabilities count by this part of them: patterns are not quite those of a real
 sheet."""
@@ -86,7 +89,8 @@ class Disturbance:
         step: (6,) from the pose at which edges were looked for, see `perturbed_pose`.
         covariance: (6, 6) of it.
         shifts: how large they are.
-        in_plane: largest shift along the sheet of a marker that was seen [m].
+        in_plane: largest shift along the sheet of a marker that was seen [m]; this and what follows are
+            0 where the residuals tell no such kind of shift beyond chance.
         out_of_plane: largest height of one [m].
         rows: by what markers move in the time from the first row of the image to the last one,
             root mean square [pixels].
@@ -294,6 +298,10 @@ class DisturbanceFit:
         """What the best solution says, its step and covariance those of all, by probability."""
         x = np.zeros(self._J.shape[1])
         x[best.columns] = best.x
+        for kind in KINDS:
+            without = max(s.logarithm for s in solved if not getattr(s.shifts, kind))
+            if best.logarithm - without < TOLD:
+                x[self._columns[kind]] = 0.0
         rows, aspect, size, in_plane, out_of_plane = (x[self._columns[kind]] for kind in KINDS)
         weight = np.exp((np.array([s.logarithm for s in solved]) - best.logarithm) / TEMPER)
         weight /= weight.sum()
