@@ -89,8 +89,8 @@ class Disturbance:
         step: (6,) from the pose at which edges were looked for, see `perturbed_pose`.
         covariance: (6, 6) of it.
         shifts: how large they are.
-        in_plane: largest shift along the sheet of a marker that was seen [m]; this and what follows are
-            0 where the residuals tell no such kind of shift beyond chance.
+        in_plane: largest shift along the sheet of a marker that was seen [m]. This, and what
+            follows, is 0 where the residuals tell no such shift beyond chance.
         out_of_plane: largest height of one [m].
         rows: by what markers move in the time from the first row of the image to the last one,
             root mean square [pixels].
