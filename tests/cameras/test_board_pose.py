@@ -161,6 +161,16 @@ def test_rows_exposed_one_after_the_other_are_told() -> None:
     assert estimate.valid and "while its rows were exposed one after the other" in estimate.reason
     off = error(estimate.X_SC, NEAR)
     assert np.sqrt(off @ np.linalg.solve(estimate.covariance, off) / 6.0) < 3.0
+    # Corners are told where they are seen, not where a camera at rest would have them.
+    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_ARUCO_MIP_36h12)
+    parameters = cv2.aruco.DetectorParameters()
+    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+    found, ids, _ = cv2.aruco.ArucoDetector(dictionary, parameters).detectMarkers(image)
+    seen = {int(i): c.reshape(4, 2) for i, c in zip(ids.ravel(), found, strict=True)}
+    apart = [estimate.corners[k] - seen[i] for k, i in enumerate(estimate.ids) if i in seen]
+    assert len(apart) > 6
+    assert np.sqrt((np.mean(apart, axis=1) ** 2).mean()) < 0.12
+    assert estimate.reprojection_error > 0.2
 
 
 def test_markers_that_are_a_little_too_large_leave_the_scale_uncertain() -> None:

@@ -129,10 +129,11 @@ class EdgeRound:
 
 @dataclass(frozen=True, eq=False)
 class RefinedPose(EdgeRound):
-    """A pose by edges: the last round's, with what else moves the markers.
+    """A pose by edges, and what each is off from there: the last round's, less what else moves the
+    markers.
 
     Attributes:
-        disturbance: is that.
+        disturbance: what else that is.
     """
 
     disturbance: Disturbance
@@ -192,10 +193,12 @@ class EdgeRefinement:
         ).fit(_bloom_prior())
         covariance = found.covariance.copy()
         covariance[:3, :3] += self._shift_by_blur(last)
-        X_SC = perturbed_pose(last.X_SC, found.step)
-        return RefinedPose(
-            **(vars(last) | {"X_SC": X_SC, "covariance": covariance}), disturbance=found
-        )
+        changed = {
+            "X_SC": perturbed_pose(last.X_SC, found.step),
+            "covariance": covariance,
+            "residual": last.residual - last.views.motion @ found.step,
+        }
+        return RefinedPose(**(vars(last) | changed), disturbance=found)
 
     def _shift_by_blur(self, last: EdgeRound) -> Array:
         """(3, 3) covariance of the rotation that a blur makes which is not alike on both sides."""
