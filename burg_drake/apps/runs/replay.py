@@ -181,7 +181,9 @@ def _from_run(path: Path, arguments: argparse.Namespace) -> ReplaySource:
         id = arguments.grasp
     else:
         id = str(run.results["id"][_choose(run.results, path, arguments)])
-    trial, origin = run.trial(id), origin_of(run.document)
+    trial = run.trial(id)
+    judge = "" if trial.verdict is None else trial.verdict.judged_again
+    origin = origin_of(run.document).judged_by(judge)
     origin.settings(f"{path / RUN_FILE}: trial")
     if arguments.scene is None and arguments.station is None and not arguments.force:
         return ReplaySource(trial, origin, Inputs(run.scene(), run.station()))

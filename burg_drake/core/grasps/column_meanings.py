@@ -17,6 +17,7 @@ from burg_drake.core.grasps.verdict_field import (
     InstancesField,
     JointsField,
     MarginsField,
+    NumberField,
     StagesField,
     TextField,
     VerdictField,
@@ -48,7 +49,7 @@ def _meanings(kind: type[VerdictField]) -> dict[str, Column]:
     return {name: meaning for one in of_kind for name, meaning in one.meanings().items()}
 
 
-_VERDICT = _meanings(TextField)
+_VERDICT = {**_meanings(TextField), **_meanings(NumberField)}
 
 _MARGINS = {
     **_meanings(MarginsField),

@@ -18,6 +18,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+from burg_drake.core.grasps.column import PLAIN
 from burg_drake.core.grasps.mode import Mode
 from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.core.grasps.verdict_field import (
@@ -26,6 +27,7 @@ from burg_drake.core.grasps.verdict_field import (
     by_margin,
     by_stage,
     margin,
+    number,
     text,
 )
 
@@ -168,6 +170,9 @@ class TrialFindings:
             met is written as "panda_link5 vs shelf".
         reason: for people, where the outcome alone does not say enough: the message of what failed.
         margins: continuous slack.
+        confidence: probability that trials which differ by what nobody knows exactly find the same,
+            held or not held to the end; see `simulation.confidence`. None where no trial decided,
+            and with engines that it is not calibrated for.
         displacements: by instance, how far the centre of mass of every other free object was moved
             at most from where it stood at the start [m]; 0 of what nothing touched or stood close
             to. Empty if no trial started or it failed.
@@ -188,6 +193,12 @@ class TrialFindings:
     )
     margins: Margins | Mapping[str, float] = field(
         default_factory=dict, metadata=by_margin(Margins)
+    )
+    confidence: float | None = field(
+        default=None,
+        metadata=number(
+            PLAIN, "probability that the same grasp, slightly perturbed, is held or lost as here"
+        ),
     )
     displacements: Mapping[str, float] = field(
         default_factory=dict,
@@ -250,6 +261,10 @@ CPU_TIMES: Mapping[Stage, tuple[str, str, Mode]] = {
 """Column of each stage's CPU time, what it means, and the first mode whose tables have it."""
 
 
+CONTESTED = 0.9
+"""An executed verdict with less confidence is contested."""
+
+
 @dataclass(frozen=True)
 class Verdict(Findings):
     """What became of a grasp.
@@ -257,6 +272,9 @@ class Verdict(Findings):
     Attributes:
         outcome: the one outcome.
         stage: the stage that decided; for `simulation_failed` the stage that failed.
+        judged_again: preset of the engine that judged a contested grasp again, and gave this
+            verdict; empty where it is the run's own.
+        outcome_before: the outcome that the run's own engine gave, where another has judged again.
         cpu: CPU time by stage [s].
         interrupted: whether it failed because its worker process was ended from outside, so that
             another try may give an answer.
@@ -266,10 +284,26 @@ class Verdict(Findings):
     stage: Stage = field(
         metadata=text("the stage that decided the outcome", of=Stage, replayed=False)
     )
+    judged_again: str = field(
+        default="",
+        metadata=text("the engine that gave the verdict, if not the run's", replayed=False),
+        kw_only=True,
+    )
+    outcome_before: str = field(
+        default="",
+        metadata=text("the outcome by the run's engine, where another judged", replayed=False),
+        kw_only=True,
+    )
     cpu: Mapping[Stage, float] = field(
         default_factory=dict, metadata=by_stage(CPU_TIMES), kw_only=True
     )
     interrupted: bool = field(default=False, kw_only=True)
+
+    @property
+    def contested(self) -> bool:
+        """Whether other trials of the same grasp may well end differently, and none has settled
+        it."""
+        return self.confidence is not None and self.confidence < CONTESTED and not self.judged_again
 
     def is_open(self, *, retry_failed: bool = False) -> bool:
         """Whether a later call asks again.

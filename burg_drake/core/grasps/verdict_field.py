@@ -141,6 +141,37 @@ class TextField(VerdictField):
 
 
 @dataclass(frozen=True, kw_only=True)
+class NumberField(VerdictField):
+    """A number in a column of the field's own name; None where there is none.
+
+    It follows from what else was found, so that a replay need not compare it. Of several stages
+    the last one that has a number counts.
+    """
+
+    def columns(self, shape: TableShape) -> dict[str, Any]:
+        return {self.name: None}
+
+    def cell(self, value: Any, key: Any) -> Any:
+        return value
+
+    def from_row(self, row: Mapping[str, Any]) -> Any:
+        number = float(row.get(self.name, math.nan))
+        return number if math.isfinite(number) else None
+
+    def to_json(self, value: Any) -> Any:
+        return value
+
+    def from_json(self, data: Any) -> Any:
+        return None if data is None else _number(data)
+
+    def joined(self, values: Sequence[Any]) -> Any:
+        return next((value for value in reversed(values) if value is not None), None)
+
+    def meanings(self) -> dict[str, Column]:
+        return {self.name: self.column}
+
+
+@dataclass(frozen=True, kw_only=True)
 class MarginsField(VerdictField):
     """Numbers by the names of margins, each in a column of its own.
 
@@ -280,6 +311,11 @@ def text(
     """Metadata of a text; see `TextField`."""
     column = Column(TEXT, meaning)
     return {KIND: TextField(column=column, mode=mode, part=part, of=of, replayed=replayed)}
+
+
+def number(unit: str, meaning: str, *, part: VerdictPart = "decided") -> dict[str, VerdictField]:
+    """Metadata of a number; see `NumberField`."""
+    return {KIND: NumberField(column=Column(unit, meaning), part=part)}
 
 
 def by_margin(of: type[Any]) -> dict[str, VerdictField]:

@@ -15,7 +15,7 @@ from burg_drake.core import InvalidInputError, nearest, quoted
 from burg_drake.core.documents import Reader, parse_nodes
 from burg_drake.core.grasps import MODES, Mode
 from burg_drake.evaluation.records.motion_numbers import gathered, without_motion
-from burg_drake.station.document import ENGINES, Engine
+from burg_drake.station.document import ENGINES, Engine, as_engine
 
 if TYPE_CHECKING:
     from burg_drake.simulation.trials import TrialSettings
@@ -62,6 +62,14 @@ class TrialOrigin:
     versions: Mapping[str, str]
     seed: int = 0
     run: str = ""
+
+    def judged_by(self, engine: str) -> TrialOrigin:
+        """The same with another preset, which has judged a grasp again; itself if it has no name.
+
+        Raises:
+            UnknownNameError: no such preset.
+        """
+        return replace(self, engine=as_engine(engine)) if engine else self
 
     def settings(self, where: str = "trial settings") -> TrialSettings:
         """The trial's settings; those that were not recorded have their defaults, and so has the

@@ -118,11 +118,16 @@ def trial_columns(
         **columns_of_verdicts(rows, "posture", shape),
     }
     columns["seed"] = np.full(len(rows), origin.seed, dtype=np.int64)
-    columns["engine"] = _same(engine_label(origin.engine), len(rows))
+    judges = [verdict.judged_again for verdict in rows]
+    origins = {name: origin.judged_by(name) for name in {*judges, ""}}
+    labels = {name: engine_label(one.engine) for name, one in origins.items()}
+    columns["engine"] = _by_judge(labels, judges)
     columns["run"] = _same(origin.run, len(rows))
     columns |= columns_of_verdicts(rows, "cost", shape)
-    for name, text in origin.cells().items():
-        columns[name] = _same(text, len(rows))
+    cells = {name: one.cells() for name, one in origins.items()}
+    for name in ORIGIN_TEXT:
+        texts = {judge: cells[judge][name] for judge in cells}
+        columns[name] = _by_judge(texts, judges)
     columns["X_OG"] = _texts([pose_text(t.X_OG) for t in trials])
     return columns
 
@@ -155,6 +160,13 @@ def _texts(values: Sequence[str]) -> NDArray[Any]:
 def _same(text: str, count: int) -> NDArray[Any]:
     """A column of one text, at the price of one cell."""
     return np.broadcast_to(np.array(text, dtype=np.str_), count)
+
+
+def _by_judge(texts: Mapping[str, str], judges: Sequence[str]) -> NDArray[Any]:
+    """A column of the texts of judges, which are mostly the same."""
+    if len(set(texts.values())) == 1:
+        return _same(texts[""], len(judges))
+    return _texts([texts[judge] for judge in judges])
 
 
 def _numbers(values: Sequence[float | None]) -> NDArray[Any]:
