@@ -86,7 +86,10 @@ def test_record_and_show(sheet: Path, capsys: Capture) -> None:
         (("2", "--outcome", "lifted", "--intrinsics", "K"), "--intrinsics is for photos"),
         (("abc", "--outcome", "lifted"), "'abc': give the number of a trial, 1 to 4, or next"),
         (("2", "--note", "  "), "nothing to record"),
-        (("2", "--outcome", "xyzzy"), "known: lifted, lifted_disturbed, slipped, dropped, closed"),
+        (
+            ("2", "--outcome", "xyzzy"),
+            "known: lifted, lifted_disturbed, lifted_turned, slipped, dropped, clos",
+        ),
         (("2", "--photo", "none.png"), "cannot read none.png"),
     ):
         assert trials("record", sheet, *words) == 2

@@ -30,6 +30,7 @@ def test_stored_values_never_change():
         "dropped",
         "lifted",
         "lifted_disturbed",
+        "lifted_turned",
         "simulation_failed",
         "reachable",
     }

@@ -35,6 +35,8 @@ def test_every_field_is_in_the_journal_and_comes_back() -> None:
         reason="b",
         margins={name: k / 3 for k, name in enumerate(MARGINS)},
         displacements={"c": 0.1},
+        turned={"c": 0.3},
+        toppled="c",
         pushed={"d": 0.2},
         touched="e",
         confidence=0.75,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import pytest
 
@@ -55,7 +56,19 @@ def test_cells_give_back_the_origin(engine: Engine) -> None:
 def test_settings_are_those_of_the_trial_and_defaults_where_none_were_recorded() -> None:
     settings = origin(CUSTOM).settings()
     motion = GraspMotion(lift_height=0.1 + 0.2)
-    assert settings == TrialSettings(motion=motion, disturbance=1e-7)
+    assert settings == TrialSettings(
+        motion=motion, disturbance=1e-7, tilt_limit=math.pi, slip_limit=math.inf
+    )
+
+
+@pytest.mark.parametrize("approach", [True, False])
+def test_limits_and_approach_come_back_bit_for_bit(approach: bool) -> None:
+    asked = TrialSettings(
+        motion=GraspMotion(), tilt_limit=math.radians(7), slip_limit=1 / 300, approach=approach
+    )
+    for settings in (asked, dataclasses.replace(asked, tilt_limit=math.pi, slip_limit=math.inf)):
+        there = dataclasses.replace(origin(CUSTOM), trial=numbers(settings))
+        assert read_origin(row(there), "here").settings() == settings
 
 
 def test_the_motion_comes_back_bit_for_bit() -> None:

@@ -73,6 +73,10 @@ class Outcome(StrEnum):
         "lifted_disturbed",
         "the object is held to the end, but another one was moved",
     )
+    LIFTED_TURNED = (
+        "lifted_turned",
+        "the object is held to the end, but turned or slid in the hand beyond the limits",
+    )
     SIMULATION_FAILED = (
         "simulation_failed",
         "the trial could not be simulated; the results have the reason",
@@ -81,8 +85,9 @@ class Outcome(StrEnum):
 
     @property
     def held(self) -> bool:
-        """The target was lifted and is held, whatever happened to the others."""
-        return self in (Outcome.LIFTED, Outcome.LIFTED_DISTURBED)
+        """The target was lifted and is held, however it lies in the hand, and whatever happened to
+        the others."""
+        return self in (Outcome.LIFTED, Outcome.LIFTED_DISTURBED, Outcome.LIFTED_TURNED)
 
     @property
     def stage(self) -> Stage:
@@ -126,6 +131,7 @@ class RealOutcome(StrEnum):
 
     LIFTED = "lifted"
     LIFTED_DISTURBED = "lifted_disturbed"
+    LIFTED_TURNED = "lifted_turned"
     SLIPPED = "slipped"
     DROPPED = "dropped"
     CLOSED_EMPTY = "closed_empty"
@@ -160,5 +166,6 @@ class RealOutcome(StrEnum):
 
     @property
     def held(self) -> bool:
-        """The target was lifted and is held, whatever happened to the others."""
-        return self in (RealOutcome.LIFTED, RealOutcome.LIFTED_DISTURBED)
+        """The target was lifted and is held, however it lies in the hand, and whatever happened to
+        the others."""
+        return self.value in (one.value for one in Outcome if one.held)

@@ -87,9 +87,15 @@ class Margins:
     )
     others_moved: float = margin(
         "m",
-        "largest displacement of any other object's centre of mass",
+        "largest displacement of any point of another object, its farthest",
         smaller_is_better=True,
         axis="movement of other objects",
+    )
+    others_turned: float = margin(
+        "rad",
+        "largest rotation of any other object from how it stood",
+        smaller_is_better=True,
+        axis="rotation of other objects",
     )
     end_time: float = margin(
         "s",
@@ -135,8 +141,8 @@ class Margins:
     )
     pushed: float = margin(
         "m",
-        "largest displacement of any free object before the hand closed; for one that hovers,"
-        " its fall once it is touched",
+        "largest displacement of any point of a free object before the hand closed; for one that"
+        " hovers, its fall once it is touched",
         mode="arm",
         smaller_is_better=True,
         title="pushed before closing",
@@ -173,9 +179,12 @@ class TrialFindings:
         confidence: probability that trials which differ by what nobody knows exactly find the same,
             held or not held to the end; see `simulation.confidence`. None where no trial decided,
             and with engines that it is not calibrated for.
-        displacements: by instance, how far the centre of mass of every other free object was moved
+        displacements: by instance, how far the farthest point of every other free object was moved
             at most from where it stood at the start [m]; 0 of what nothing touched or stood close
             to. Empty if no trial started or it failed.
+        turned: the same of its rotation [rad].
+        toppled: names of the instances among them whose axis that was upright is tilted by more
+            than 45 degrees at the end, separated by commas.
         pushed: the same when the hand began to close, and of the target, too: what the approach
             moved [m]. Empty without an arm.
         touched: the first touch that was not planned, as "panda_link5 vs can": of the robot with
@@ -203,13 +212,26 @@ class TrialFindings:
     displacements: Mapping[str, float] = field(
         default_factory=dict,
         metadata=by_instance(
-            "moved_", "m", "largest displacement of the centre of mass of an object"
+            "moved_", "m", "largest displacement of an object, of the point that moved farthest"
+        ),
+    )
+    turned: Mapping[str, float] = field(
+        default_factory=dict,
+        metadata=by_instance("turned_", "rad", "largest rotation of an object from how it stood"),
+    )
+    toppled: str = field(
+        default="",
+        metadata=text(
+            "the other objects that lie at the end and stood before, as NAME, NAME", part="measured"
         ),
     )
     pushed: Mapping[str, float] = field(
         default_factory=dict,
         metadata=by_instance(
-            "pushed_", "m", "displacement of an object before the hand closed", mode="arm"
+            "pushed_",
+            "m",
+            "displacement of an object before the hand closed, of the point that moved farthest",
+            mode="arm",
         ),
     )
     touched: str = field(

@@ -67,7 +67,8 @@ def grasp_scores(grasps: LabelledGrasps) -> Array:
     There they are 1.1 less the friction coefficient that a grasp needs, and grasps from 0.7 on are
     loaded unless asked otherwise. Here a grasp that lifts its object gets 1, less up to 0.3 in
     proportion to how far the object slips in the hand (`slip`, up to 20 mm); if others were
-    disturbed, 0.7, less the same. A grasp that was tried and failed gets 0.
+    disturbed, or the object turned in the hand, 0.7, less the same. A grasp that was tried and
+    failed gets 0.
 
     Returns:
         (N,) scores; nan where nothing is known: grasps that were not judged, that are reachable
@@ -81,6 +82,7 @@ def grasp_scores(grasps: LabelledGrasps) -> Array:
     for outcome, best in (
         (Outcome.LIFTED, BEST_SCORE),
         (Outcome.LIFTED_DISTURBED, DISTURBED_SCORE),
+        (Outcome.LIFTED_TURNED, DISTURBED_SCORE),
     ):
         held = grasps.outcome == outcome.value
         scores[held] = best - cost[held]

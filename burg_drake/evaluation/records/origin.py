@@ -73,7 +73,7 @@ class TrialOrigin:
 
     def settings(self, where: str = "trial settings") -> TrialSettings:
         """The trial's settings; those that were not recorded have their defaults, and so has the
-        motion, whatever the station says.
+        motion, whatever the station says. Limits that were not recorded are none.
 
         Args:
             where: names them in messages.
@@ -81,13 +81,19 @@ class TrialOrigin:
         Raises:
             InvalidInputError: one of them is unknown or cannot be used.
         """
-        from burg_drake.simulation.trials import TrialSettings
+        from burg_drake.simulation.trials import NO_LIMITS, TrialSettings
         from burg_drake.station.document import GraspMotion
 
         others, values = without_motion(self.trial), gathered(self.trial)
         motion = {name: value for name, value in values.items() if name not in others}
-        settings = _typed(others, TrialSettings, where)
-        return replace(settings, motion=_typed(motion, GraspMotion, where))
+        settings = _typed(_truths(others, TrialSettings), TrialSettings, where)
+        limits = {name: others.get(name, none) for name, none in NO_LIMITS.items()}
+        return replace(
+            settings,
+            motion=_typed(motion, GraspMotion, where),
+            tilt_limit=limits["tilt_limit"],
+            slip_limit=limits["slip_limit"],
+        )
 
     def cells(self) -> dict[str, str]:
         """The texts `ORIGIN_TEXT` by column."""
@@ -191,6 +197,12 @@ def _pairs(text: str, where: str) -> dict[str, str]:
     if bad:
         raise InvalidInputError(f"{where}: {quoted(bad[0])} is not name=value")
     return {name: value for name, _, value in pairs}
+
+
+def _truths(values: Mapping[str, float], schema: type[Any]) -> dict[str, object]:
+    """Recorded numbers with those of fields that are true or false as such."""
+    of_truth = {field.name for field in fields(schema) if field.type in (bool, "bool")}
+    return {k: str(bool(v)).lower() if k in of_truth else v for k, v in values.items()}
 
 
 def _yaml(value: object) -> str:

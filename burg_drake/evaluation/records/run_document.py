@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, is_dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -273,13 +274,13 @@ def input_of(document: Scene | Station, kind: str) -> Input:
 
 def numbers(settings: object) -> dict[str, float]:
     """The numbers of a settings dataclass by name; those of a tuple are counted from 1, those of
-    settings within settings have their own names, and what is None is left out."""
+    settings within settings have their own names, and what is None or infinite is left out."""
     found: dict[str, float] = {}
     for name, value in vars(settings).items():
         if isinstance(value, tuple):
             found |= {f"{name}_{k}": float(item) for k, item in enumerate(value, 1)}
         elif is_dataclass(value):
             found |= numbers(value)
-        elif value is not None:
+        elif value is not None and math.isfinite(value):
             found[name] = float(value)
     return found

@@ -66,7 +66,9 @@ def _stage_table(summary: Summary) -> TextTable:
         table.row(
             group.name, *(format_count(group.funnel[name]) for name in names), share, interval
         )
-    table.caption = "held: to the end; lifted: held, and no other object disturbed\n"
+    table.caption = (
+        "held: to the end; lifted: held, not turned in the hand, and no other object disturbed\n"
+    )
     if summary.mode != "hand":
         table.caption += (
             "reach, plan: the arm reaches the grasp; it has a path there, for the approach and"

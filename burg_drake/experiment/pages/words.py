@@ -13,6 +13,10 @@ SHORT_LIST: dict[RealOutcome, tuple[str, str]] = {
         "lifted, others moved",
         "held at the end of the lift, but another object was moved",
     ),
+    RealOutcome.LIFTED_TURNED: (
+        "lifted, turned",
+        "held at the end of the lift, but turned or slid in the hand",
+    ),
     RealOutcome.SLIPPED: ("slipped", "gripped, and lost during the lift"),
     RealOutcome.DROPPED: ("dropped", "lifted, and lost while it was held"),
     RealOutcome.CLOSED_EMPTY: ("closed empty", "the fingers closed without the object"),
@@ -27,8 +31,8 @@ SHORT_LIST: dict[RealOutcome, tuple[str, str]] = {
     ),
     RealOutcome.NOT_ATTEMPTED: ("not attempted", "nobody tried; says nothing of the grasp"),
 }
-"""Outcomes that an operator tells apart at a glance, in the order of their keys 1 to 9: what is
-written, and what it means."""
+"""Outcomes that an operator tells apart at a glance, in the order of their keys 1 to 9 and 0: what
+is written, and what it means."""
 STRAIGHT = math.radians(8.0)
 """Approaches within it of straight down have no side [rad]."""
 LEVEL = math.radians(75.0)

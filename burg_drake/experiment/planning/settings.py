@@ -26,7 +26,8 @@ class SelectionSettings:
         among: what is chosen from: `executed`, grasps that were tried in simulation, which in mode
             `hand` all are at which the hand is clear; `reachable`, those that the arm can be at;
             `clear`, all those at which the hand is clear, though no arm may come there.
-        success: what counts: `lifted`, or `held`, also where another object was moved.
+        success: what counts: `lifted`, or `held`, also where it turned in the hand or another
+            object was moved.
         scenes: how many scenes to draw at random; 0 for all.
         blocks: in how many blocks the trials of a scene come; each scene has one block before any
             has its second one.
@@ -57,7 +58,8 @@ class SelectionSettings:
     )
     success: Success = setting(
         "lifted",
-        "what counts as success: lifted, or held even if another object was moved",
+        "what counts as success: lifted, or held even if it turned in the hand or another object"
+        " was moved",
         choices=get_args(Success),
     )
     scenes: int = setting(0, "draw N scenes (default: all)", low=1)

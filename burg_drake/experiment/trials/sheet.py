@@ -20,7 +20,8 @@ from burg_drake.experiment.trials.checks import require_known, require_least, re
 SHEET_HEADER = """Trials on the robot, in the order of their numbers. Fill in outcome, note and the
 rest by hand, or with burg-drake trials record and burg-drake trials serve."""
 Success = Literal["lifted", "held"]
-"""What counts: `lifted` alone, or also where another object was disturbed (`lifted_disturbed`)."""
+"""What counts: `lifted` alone, or also where another object was disturbed (`lifted_disturbed`)
+or the object turned in the hand (`lifted_turned`)."""
 Balance = Literal["outcome", "stage", "margin", "probability", "none"]
 Among = Literal["clear", "reachable", "executed"]
 """What was chosen from: grasps at which the hand is clear, those of them that the arm can be at,

@@ -7,5 +7,6 @@ from .execution import (
 from .hand_trial import HandTrial as HandTrial
 from .result import TrialResult as TrialResult
 from .trial_settings import (
+    NO_LIMITS as NO_LIMITS,
     TrialSettings as TrialSettings,
 )

@@ -22,6 +22,8 @@ RANGES = {
     "settled_time": (0.0, LONGEST),
     "close_timeout": (0.0, LONGEST),
     "disturbance": (0.0, 10.0),
+    "tilt_limit": (0.0, math.pi),
+    "slip_limit": (0.0, math.inf),
 }
 """Values with which a trial ends, within minutes at the shortest steps, and is a trial."""
 USUAL_LIFT = 0.30
@@ -47,6 +49,10 @@ class TrialSettings:
         close_timeout: closing ends after this time in any case [s]; for a slow hand, after twice
             the time that it takes to close.
         disturbance: others that are moved by more than this count as disturbed [m].
+        tilt_limit: a target that has turned in the hand by more than this since the grip does not
+            count as lifted, though it is held [rad]; pi: it may turn as it likes.
+        slip_limit: likewise of one that has slid [m]; infinite: it may slide as it likes.
+        approach: whether the hand alone begins at the pregrasp, and not at the grasp.
     """
 
     motion: GraspMotion | None = None
@@ -60,6 +66,9 @@ class TrialSettings:
     settled_time: float = 0.03
     close_timeout: float = 2.0
     disturbance: float = 0.01
+    tilt_limit: float = math.radians(30)
+    slip_limit: float = 0.02
+    approach: bool = False
 
     def __post_init__(self) -> None:
         require_ranges(self, RANGES, "a trial")
@@ -79,5 +88,7 @@ class TrialSettings:
         return max(1, round(self.steady_time / self.poll))
 
 
+NO_LIMITS = {"tilt_limit": math.pi, "slip_limit": math.inf}
+"""What is held counts as lifted, however it lies in the hand."""
 DEFAULT_TRIAL = TrialSettings()
 """The phases that `evaluate` and `replay` use."""

@@ -34,6 +34,7 @@ class OutcomeGroup:
 GROUPS = (
     OutcomeGroup("lifted", (0.0, 0.62, 0.45, 1.0), (Outcome.LIFTED,)),
     OutcomeGroup("lifted, others disturbed", (0.94, 0.89, 0.26, 1.0), (Outcome.LIFTED_DISTURBED,)),
+    OutcomeGroup("held, turned in the hand", (0.84, 0.37, 0.0, 1.0), (Outcome.LIFTED_TURNED,)),
     OutcomeGroup(
         "lost during lift or hold",
         (0.90, 0.62, 0.0, 1.0),

@@ -6,6 +6,7 @@ const seen = () => (document.hidden
   ? new Promise((done) => document.addEventListener("visibilitychange", done, { once: true }))
   : Promise.resolve());
 const SETTLE = 600;  // after a trial comes up, clicks on outcomes are ignored for so long [ms]
+const KEYS = [..."1234567890"];  // of the outcomes
 const WIDEST = 10000;  // of widths [mm]
 const QUICK = 5;     // checks that take longer are not made one after the other [s]
 
@@ -148,7 +149,7 @@ function step(by) {
 
 function buildOutcomes() {
   plan.outcomes.forEach(({ value, label, meaning }, index) => {
-    const button = make("button", "", label), key = make("kbd", "", String(index + 1));
+    const button = make("button", "", label), key = make("kbd", "", KEYS[index]);
     button.prepend(key);
     button.append(make("small", "", meaning));
     button.dataset.outcome = value;
@@ -299,7 +300,7 @@ document.addEventListener("keydown", (event) => {
     if (event.key === "Escape") event.target.blur();
     return;
   }
-  const digit = plan.outcomes[Number(event.key) - 1];
+  const digit = plan.outcomes[KEYS.indexOf(event.key)];
   if (digit) enter(digit.value);
   else if (event.key === "ArrowLeft") step(-1);
   else if (event.key === "ArrowRight") step(1);

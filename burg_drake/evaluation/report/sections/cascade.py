@@ -15,7 +15,7 @@ MEANING = {
     "planned": "the arm has a path there and for the lift",
     "executed": "the trial was simulated to its end",
     "held": "both fingers hold the object to the end",
-    "lifted": "and nothing else was disturbed",
+    "lifted": "as it was gripped, and nothing else was disturbed",
 }
 
 

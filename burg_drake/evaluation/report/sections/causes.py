@@ -25,6 +25,7 @@ TYPICAL_BY = (
     ("joint_excess", ("joint_limit",)),
     ("arm_clearance", ("arm_collision", "hand_collision_")),
     ("others_moved", ("lifted_disturbed",)),
+    ("tilt", ("lifted_turned",)),
     ("slip", ("slipped", "dropped")),
     ("lift", ("blocked",)),
 )

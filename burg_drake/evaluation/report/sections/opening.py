@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from burg_drake.core import clustered_interval
+from burg_drake.core.grasps import Outcome
 from burg_drake.core.terminal import format_count, format_percent
 from burg_drake.evaluation.report.elements import Child, Html, element, tiles
 from burg_drake.evaluation.report.sections.outcomes import STOPPED
@@ -129,8 +130,11 @@ def _spread(groups: Sequence[OutcomeCounts], what: str) -> str:
 def _tiles(summary: Summary) -> list[tuple[str, Child, str]]:
     total = summary.total
     screened = "the open hand is clear" if summary.mode == "hand" else "hand and arm find a path"
-    disturbed = total.held - total.lifted
-    extra = f"; {format_count(disturbed)} more disturbed others" if disturbed else ""
+    besides = (
+        ("disturbed others", total.outcomes[Outcome.LIFTED_DISTURBED]),
+        ("turned in the hand", total.outcomes[Outcome.LIFTED_TURNED]),
+    )
+    extra = "".join(f"; {format_count(n)} more {what}" for what, n in besides if n)
     scenes = f" in {format_count(len(summary.scenes))} scenes" if summary.scenes else ""
     objects = f"on {len(summary.objects)} object{'' if len(summary.objects) == 1 else 's'}"
     return [

@@ -36,7 +36,7 @@ STOPPED = {
     "planned": LOST[Stage.PLANNED],
     "executed": (FAILED,),
     "held": tuple(o for o in LOST[Stage.EXECUTED] if not o.held),
-    "lifted": (Outcome.LIFTED_DISTURBED,),
+    "lifted": (Outcome.LIFTED_DISTURBED, Outcome.LIFTED_TURNED),
 }
 """What stops a grasp on its way to each step of the funnel."""
 

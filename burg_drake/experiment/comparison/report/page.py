@@ -89,7 +89,7 @@ def _style() -> str:
 
 def _about(c: Comparison) -> str:
     what = "grasps" if c.kind == "runs" else "trials"
-    counts = "also where others were disturbed" if c.success == "held" else "nothing else disturbed"
+    counts = "as long as the object is held" if c.success == "held" else "nothing else disturbed"
     sides = [c.first, *([c.second] if c.second else []), c.reference]
     who = " against ".join(side.label for side in (sides[0], sides[-1]))
     if c.second:
