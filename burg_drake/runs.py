@@ -9,6 +9,7 @@ from burg_drake.core.terminal import (
     Progress as Progress,
 )
 from burg_drake.core.workers import TimeLimit as TimeLimit
+from burg_drake.evaluation import judge_again as judge_again
 from burg_drake.evaluation.candidates import (
     Candidate as Candidate,
     Candidates as Candidates,

@@ -13,3 +13,4 @@ from .replay import (
     motion_figures as motion_figures,
     rerun as rerun,
 )
+from .second_opinion import judge_again as judge_again

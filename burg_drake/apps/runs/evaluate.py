@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +30,13 @@ from burg_drake.apps.options import (
     scene_names,
 )
 from burg_drake.apps.runs.campaign import evaluate_many
+from burg_drake.apps.runs.second_opinion import (
+    add_rejudge_contested,
+    first_engine,
+    require_one_scene,
+    settle,
+    settled_line,
+)
 from burg_drake.apps.runs.settings import requested_settings
 
 if TYPE_CHECKING:
@@ -58,6 +66,7 @@ def add_to(verbs: Any) -> None:
         "burg-drake evaluate my_scene.yaml --grasps network.npy --camera-pose camera.yaml",
         "burg-drake evaluate scenes/*.yaml -n 100 -o runs/many",
         "burg-drake evaluate scenes/ -n 100 --shard 2/8 -o runs/shard2",
+        "burg-drake evaluate tabletop_six -o runs/first --rejudge contested --engine reference",
         "",
         "The same command continues where an interrupted one stopped.",
         options=_add_options,
@@ -87,6 +96,7 @@ def _add_options(parser: Parser) -> None:
     add_sampling(parser, DEFAULT_GRASPS, which)
     add_given(parser, which)
     add_options(parser, EvaluationSettings, "engine")
+    add_rejudge_contested(parser)
     who = parser.add_mutually_exclusive_group()
     add_workers(who)
     add_cluster(who)
@@ -110,6 +120,7 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
     require_sampled(arguments)
     references = scene_references(arguments.scenes)
     if len(references) > 1 or Path(arguments.scenes[0]).is_dir():
+        require_one_scene(arguments)
         with chosen_cluster(arguments) as executor:
             return evaluate_many(arguments, references, executor=executor)
     return _evaluate_one(arguments, references[0])
@@ -136,18 +147,22 @@ def _evaluate_one(arguments: argparse.Namespace, reference: str) -> int:
         require_valid_scene(scene, station)
         for warning in require_usable_arm(scene, station):
             print(f"burg-drake: warning: {warning}", file=sys.stderr)
+    folder = arguments.output or f"{DEFAULT_OUTPUT}/{scene.name}"
+    settings = requested_settings(arguments, mode, motion)
+    settings = replace(settings, engine=first_engine(arguments, folder))
     with chosen_cluster(arguments) as executor:
         run = evaluate(
             scene,
             station,
-            arguments.output or f"{DEFAULT_OUTPUT}/{scene.name}",
-            settings=requested_settings(arguments, mode, motion),
+            folder,
+            settings=settings,
             grasps=given.by_instance if given else None,
             executor=executor,
             workers=arguments.workers,
             retry_failed=arguments.retry_failed,
             progress=not arguments.quiet,
         )
+        run = settle(run, arguments, executor)
     _print_run(run, motion)
     return 1 if run.failures else 0
 
@@ -162,6 +177,8 @@ def _print_run(run: Run, motion: GraspMotion) -> None:
         print(f"shard   {run.document.shard}; merge all of them with burg-drake merge")
     if motion != GraspMotion():
         print(f"motion  {motion_text(motion)}")
+    if line := settled_line(run):
+        print(line)
     print(f"table   {run.table_path}")
     print(f"report  {run.report_path}")
     if run.failures:

@@ -34,6 +34,7 @@ from .storage import (
     FORMAT as FORMAT,
 )
 from .verdict import (
+    CONTESTED as CONTESTED,
     Findings as Findings,
     Margins as Margins,
     TrialFindings as TrialFindings,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from burg_drake.core import listing
 from burg_drake.core.grasps import CPU_COLUMNS, LIFT_HEIGHT, PUSHED, Outcome, Stage
 from burg_drake.evaluation.records import motion_in
+from burg_drake.evaluation.results.contested import NEEDED, contested_rows
 from burg_drake.evaluation.results.counts import (
     STAGES,
     OutcomeCounts,
@@ -35,14 +37,14 @@ def summarize_campaign(campaign: Campaign) -> Summary:
     """Counts what a run over many scenes has found so far."""
     document = campaign.document
     stages = [stage for stage in Stage if stage in STAGES[document.mode]]
-    names = ["object", "outcome", "stage", LIFT_HEIGHT, *(CPU_COLUMNS[s] for s in stages)]
+    names = ["object", "outcome", "stage", *NEEDED, LIFT_HEIGHT, *(CPU_COLUMNS[s] for s in stages)]
     if document.mode == "arm":
         names += ["pushed", "instance", *(PUSHED + name for name in document.instances)]
     rows = campaign.rows(names)
     object, objects = rows.codes("object")
-    by_object = dict(zip(objects, _counts(rows, object, len(objects)), strict=True))
-    by_scene = _counts(rows, rows.run, len(rows.counts))
-    none = np.zeros((len(OUTCOMES), len(ALL_STAGES)), dtype=np.int64)
+    by_object = dict(zip(objects, _groups(rows, object, objects), strict=True))
+    by_scene = _groups(rows, rows.run, campaign.names)
+    none = OutcomeCounts("", 0, Counter(), Counter(), Counter())
     costs = [stage_cost(rows.columns([CPU_COLUMNS[stage]]), stage) for stage in stages]
     sampled = [s for s in campaign.states.values() if s.sampling > 0.0]
     if sampled:
@@ -50,30 +52,42 @@ def summarize_campaign(campaign: Campaign) -> Summary:
         costs.insert(0, StageCost("sampling", grasps, seconds, math.nan))
     known = dict.fromkeys(o for entry in document.mine for o in entry.instances.values())
     return Summary(
-        objects=tuple(_group(name, by_object.get(name, none)) for name in known),
-        total=_group("all", by_scene.sum(axis=0)),
+        objects=tuple(replace(by_object.get(name, none), name=name) for name in known),
+        total=_groups(rows, np.zeros_like(rows.run), ["all"])[0],
         costs=tuple(costs),
         mode=document.mode,
         pushes=pushes(rows.columns(rows.table.column_names)) if document.mode == "arm" else None,
         lifts=short_lifts(rows.column(LIFT_HEIGHT), motion_in(document.trial).lift_height),
         notes=_notes(campaign),
-        scenes=tuple(map(_group, campaign.names, by_scene)),
+        scenes=tuple(by_scene),
+        knows_confidence=bool(np.isfinite(rows.column("confidence")).any()),
     )
 
 
-def _counts(rows: StoredRows, keys: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """How many grasps there are by key, outcome and stage.
+def _groups(rows: StoredRows, keys: NDArray[np.int64], names: Sequence[str]) -> list[OutcomeCounts]:
+    """Grasps by object, by scene, or all.
 
     Args:
         rows: the grasps.
-        keys: (N,) from 0 to `count`.
-        count: of the keys.
+        keys: (N,) the place of each in `names`.
+        names: of the groups.
     """
     outcome = _member_codes(rows, "outcome", OUTCOMES)
     stage = _member_codes(rows, "stage", ALL_STAGES)
-    shape = (count, len(OUTCOMES), len(ALL_STAGES))
+    shape = (len(names), len(OUTCOMES), len(ALL_STAGES))
     flat = (keys * shape[1] + outcome) * shape[2] + stage
-    return np.bincount(flat, minlength=math.prod(shape)).reshape(shape)
+    counts = np.bincount(flat, minlength=math.prod(shape)).reshape(shape)
+    codes, texts = rows.codes("judged_again")
+    settled = np.array([text != "" for text in texts], dtype=bool)[codes]
+    contested = contested_rows(rows.column("confidence"), settled)
+    lifted = contested & (outcome == OUTCOMES.index(Outcome.LIFTED))
+    doubts = [
+        np.bincount(keys[chosen], minlength=len(names)) for chosen in (contested, lifted, settled)
+    ]
+    return [
+        _group(name, counts[k], *(int(number[k]) for number in doubts))
+        for k, name in enumerate(names)
+    ]
 
 
 def _member_codes(rows: StoredRows, name: str, members: Sequence[str]) -> NDArray[np.int64]:
@@ -81,12 +95,15 @@ def _member_codes(rows: StoredRows, name: str, members: Sequence[str]) -> NDArra
     return np.array([list(members).index(text) for text in texts], dtype=np.int64)[codes]
 
 
-def _group(name: str, counts: NDArray[np.int64]) -> OutcomeCounts:
+def _group(
+    name: str, counts: NDArray[np.int64], contested: int, contested_lifts: int, settled: int
+) -> OutcomeCounts:
     """Grasps of an object or a scene.
 
     Args:
         name: of it.
         counts: (outcomes, stages) how many there are.
+        contested, contested_lifts, settled: see `OutcomeCounts`.
     """
     failed = counts[OUTCOMES.index(Outcome.SIMULATION_FAILED)]
     return OutcomeCounts(
@@ -95,6 +112,9 @@ def _group(name: str, counts: NDArray[np.int64]) -> OutcomeCounts:
         _counter(OUTCOMES, counts.sum(axis=1)),
         _counter(ALL_STAGES, counts.sum(axis=0)),
         _counter(ALL_STAGES, failed),
+        contested=contested,
+        contested_lifts=contested_lifts,
+        settled=settled,
     )
 
 

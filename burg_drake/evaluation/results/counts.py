@@ -36,6 +36,9 @@ class OutcomeCounts:
         outcomes: number of grasps by outcome.
         decided: number of grasps by the stage that decided.
         failed: number of `simulation_failed` by the stage that failed.
+        contested: number of executed grasps whose verdict is contested ...
+        contested_lifts: ... and how many of these are lifted so far.
+        settled: number of grasps that another engine has judged again.
     """
 
     name: str
@@ -43,6 +46,9 @@ class OutcomeCounts:
     outcomes: Counter[Outcome]
     decided: Counter[Stage]
     failed: Counter[Stage]
+    contested: int = 0
+    contested_lifts: int = 0
+    settled: int = 0
 
     @property
     def clear(self) -> int:
@@ -73,6 +79,16 @@ class OutcomeCounts:
     def lifted(self) -> int:
         """Those that succeeded: held, and nothing else was disturbed."""
         return self.outcomes[Outcome.LIFTED]
+
+    @property
+    def surely_lifted(self) -> int:
+        """Those that succeeded, and are not contested."""
+        return self.lifted - self.contested_lifts
+
+    @property
+    def surely_lost(self) -> int:
+        """Executed grasps that did not succeed, and are not contested."""
+        return self.executed - self.lifted - (self.contested - self.contested_lifts)
 
     @property
     def funnel(self) -> dict[str, int]:
@@ -156,6 +172,8 @@ class Summary:
         lifts: where there is no room for the whole lift; None if there is wherever there is any.
         notes: what is missing, and why, one sentence each; see `notes`.
         scenes: by scene, in a run over many, in their order.
+        knows_confidence: whether verdicts have a confidence; those of earlier releases, and of
+            engines with settings of their own, have none.
     """
 
     objects: tuple[OutcomeCounts, ...]
@@ -166,6 +184,7 @@ class Summary:
     lifts: ShortLifts | None = None
     notes: tuple[str, ...] = ()
     scenes: tuple[OutcomeCounts, ...] = ()
+    knows_confidence: bool = False
 
     @property
     def steps(self) -> list[str]:

@@ -11,6 +11,7 @@ import numpy as np
 from burg_drake.core.grasps import LIFT_HEIGHT, Outcome, Stage
 from burg_drake.evaluation.records import motion_in
 from burg_drake.evaluation.results.campaign_summary import summarize_campaign
+from burg_drake.evaluation.results.contested import contested_rows, settled_rows
 from burg_drake.evaluation.results.counts import (
     STAGES,
     OutcomeCounts,
@@ -33,24 +34,31 @@ def summarize(run: Run | Campaign) -> Summary:
     columns, document = run.results, run.document
     outcome = member_codes(columns["outcome"], OUTCOMES)
     stage = member_codes(columns["stage"], ALL_STAGES)
+    settled = settled_rows(columns["judged_again"])
+    doubts = np.stack([contested_rows(columns["confidence"], settled), settled], axis=1)
     mine = {name: columns["object"] == name for name in document.grasps.objects}
     sampling = document.grasps
     costs = [stage_cost(columns, stage) for stage in Stage if stage in STAGES[document.mode]]
     if sampling.origin == "sampled" and sampling.count:
         costs.insert(0, StageCost("sampling", sampling.count, sampling.cpu, math.nan))
     return Summary(
-        objects=tuple(_group(name, outcome[own], stage[own]) for name, own in mine.items()),
-        total=_group("all", outcome, stage),
+        objects=tuple(
+            _group(name, outcome[own], stage[own], doubts[own]) for name, own in mine.items()
+        ),
+        total=_group("all", outcome, stage, doubts),
         costs=tuple(costs),
         mode=document.mode,
         pushes=pushes(columns),
         lifts=short_lifts(columns[LIFT_HEIGHT], motion_in(document.trial).lift_height),
         notes=run_notes(run),
+        knows_confidence=bool(np.isfinite(columns["confidence"]).any()),
     )
 
 
-def _group(name: str, outcome: np.ndarray, stage: np.ndarray) -> OutcomeCounts:
-    """Counts grasps by the places (N,) of their outcomes in `Outcome` and stages in `Stage`."""
+def _group(name: str, outcome: np.ndarray, stage: np.ndarray, doubts: np.ndarray) -> OutcomeCounts:
+    """Counts grasps by the places (N,) of their outcomes in `Outcome` and stages in `Stage`, and
+    whether they are contested, and settled (N, 2)."""
+    contested, settled = doubts.T
     failed = stage[outcome == OUTCOMES.index(Outcome.SIMULATION_FAILED)]
     return OutcomeCounts(
         name,
@@ -58,6 +66,9 @@ def _group(name: str, outcome: np.ndarray, stage: np.ndarray) -> OutcomeCounts:
         _counter(OUTCOMES, outcome),
         _counter(ALL_STAGES, stage),
         _counter(ALL_STAGES, failed),
+        contested=int(contested.sum()),
+        contested_lifts=int((contested & (outcome == OUTCOMES.index(Outcome.LIFTED))).sum()),
+        settled=int(settled.sum()),
     )
 
 

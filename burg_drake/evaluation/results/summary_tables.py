@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from burg_drake.core.grasps import Outcome
+from burg_drake.core.grasps import CONTESTED, Outcome
 from burg_drake.core.terminal import (
     TextTable,
     format_count,
@@ -35,6 +35,9 @@ class SummaryView:
         fits = matrix.width <= options.max_width
         yield _stage_table(self.summary)
         yield ""
+        if self.summary.knows_confidence:
+            yield _certainty_table(self.summary)
+            yield ""
         if self.summary.notes:
             yield Text("\n".join(f"note: {note}" for note in self.summary.notes) + "\n")
         yield matrix if fits else _outcome_list(self.summary)
@@ -75,6 +78,24 @@ def _stage_table(summary: Summary) -> TextTable:
             " the lift\n"
         )
     table.caption += "success: lifted of executed; CI: Wilson's interval"
+    return table
+
+
+def _certainty_table(summary: Summary) -> TextTable:
+    table = TextTable("How sure the verdicts of executed grasps are").names("object")
+    settled = summary.total.settled > 0
+    table.numbers("executed", "lifted", "failed", "contested", *(["settled"] if settled else []))
+    for group in _rows(summary):
+        if group is summary.total and len(summary.objects) > 1:
+            table.gap()
+        numbers = [group.executed, group.surely_lifted, group.surely_lost, group.contested]
+        table.row(group.name, *map(format_count, [*numbers, *([group.settled] * settled)]))
+    table.caption = (
+        f"contested: lifted or failed with a confidence below {CONTESTED:g}; another engine can"
+        " settle them"
+    )
+    if settled:
+        table.caption += "\nsettled: judged again by another engine, lifted or failed"
     return table
 
 

@@ -150,6 +150,12 @@ class Run:
         """Ids of those whose worker process was ended from outside; `evaluate` tries them again."""
         return [id for id in self.failures if self.verdicts[id].interrupted]
 
+    @property
+    def contested(self) -> list[str]:
+        """Ids of the executed grasps whose verdict is contested, see `Verdict.contested`."""
+        verdicts = self.verdicts
+        return [id for id in self.mine if id in verdicts and verdicts[id].contested]
+
     def row(self, id: str) -> dict[str, Any]:
         """One row of the results.
 

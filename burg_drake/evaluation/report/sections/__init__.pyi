@@ -14,6 +14,7 @@ from .causes import (
     causes_section as causes_section,
     rows_of_run as rows_of_run,
 )
+from .certainty import certainty_section as certainty_section
 from .margins import (
     CHOSEN as CHOSEN,
     FURTHER as FURTHER,

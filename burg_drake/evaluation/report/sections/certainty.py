@@ -1,0 +1,64 @@
+"""How sure the verdicts are: lifted, failed and contested grasps of each object."""
+
+from __future__ import annotations
+
+from burg_drake.core.grasps import CONTESTED
+from burg_drake.core.terminal import format_count as number
+from burg_drake.evaluation.report.elements import (
+    STYLES,
+    BarPart,
+    Html,
+    element,
+    legend,
+    section,
+    stacked_bar,
+    table,
+)
+from burg_drake.evaluation.results import OutcomeCounts, Summary
+
+LIFTED, LOST, OPEN = STYLES["lifted"], STYLES["lost during lift or hold"], "contested"
+"""CSS classes."""
+
+
+def certainty_section(summary: Summary) -> Html | None:
+    """A bar an object of its executed grasps; nothing where no verdict has a confidence."""
+    if not summary.knows_confidence or not summary.total.executed:
+        return None
+    settled = summary.total.settled
+    head = ["object", "executed", "verdicts", "contested", *(["settled"] if settled else [])]
+    width = len(head)
+    tried = [group for group in summary.objects if group.executed]
+    rows = [_row(group, bool(settled)) for group in tried]
+    if len(tried) > 1:
+        rows.append(_row(summary.total, bool(settled), "total"))
+    text = (
+        "Executed grasps. Contested are those, lifted or failed, whose verdict has a confidence"
+        f" below {CONTESTED:g}: where friction, place, shape or the speed of the lift are slightly"
+        " other, many of them end the other way."
+    )
+    if settled:
+        text += f" {number(settled)} were judged again by another engine, whose verdict counts."
+    keys = [(LIFTED, "lifted"), (OPEN, "contested"), (LOST, "failed")]
+    return section(
+        "How sure the verdicts are",
+        text,
+        table(head, rows, numbers=(1, *range(3, width)), style="stacking"),
+        legend(keys),
+    )
+
+
+def _row(group: OutcomeCounts, settled: bool, style: str = "") -> Html:
+    lifts, losses = group.contested_lifts, group.contested - group.contested_lifts
+    parts = [
+        BarPart(group.surely_lifted, LIFTED, f"lifted: {group.surely_lifted}"),
+        BarPart(group.contested, OPEN, f"contested: {lifts} lifted, {losses} failed"),
+        BarPart(group.surely_lost, LOST, f"failed: {group.surely_lost}"),
+    ]
+    cells = [
+        element("td", number(group.executed), class_="number"),
+        element("td", stacked_bar(parts, group.executed), class_="wide"),
+        element("td", number(group.contested), class_="number"),
+    ]
+    if settled:
+        cells.append(element("td", number(group.settled), class_="number"))
+    return element("tr", element("th", group.name, scope="row"), *cells, class_=style or None)
