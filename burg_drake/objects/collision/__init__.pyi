@@ -19,4 +19,8 @@ from .fit import (
     deviation_warning as deviation_warning,
     measure_fit as measure_fit,
 )
+from .object_hull import (
+    hull_corners as hull_corners,
+    support_corners as support_corners,
+)
 from .primitive import primitive_mesh as primitive_mesh

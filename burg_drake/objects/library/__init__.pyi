@@ -30,4 +30,5 @@ from .sdf import (
     DEFAULT_CONTACT as DEFAULT_CONTACT,
     LINK as LINK,
     model_sdf as model_sdf,
+    resolution_hint as resolution_hint,
 )

@@ -27,15 +27,18 @@ from .scene import (
     save_scene as save_scene,
 )
 from .validation import (
+    GROUND_TOLERANCE as GROUND_TOLERANCE,
     IN_BOUNDS_TOLERANCE as IN_BOUNDS_TOLERANCE,
     SINK_TOLERANCE as SINK_TOLERANCE,
     TOUCH_TOLERANCE as TOUCH_TOLERANCE,
     Extent as Extent,
     SceneIssue as SceneIssue,
+    is_below as is_below,
     length_text as length_text,
     placed_vertices as placed_vertices,
     read_vertices as read_vertices,
     require_no_errors as require_no_errors,
+    support_vertices as support_vertices,
     surface_vertices as surface_vertices,
     validate_scene as validate_scene,
 )

@@ -1,7 +1,10 @@
 """Whether a scene can be built as its document says: bounds of the board, contact with the ground.
 
-Only geometry is looked at here. Overlaps of bodies depend on the contact geometry that the station
-diagram holds; `station.checks.scene_issues` finds those.
+Only geometry is looked at here. What an object rests with (its primitive, or the hull of its
+pieces) may reach beyond its surface, or not as far. In a stable pose of its library it stands with
+what it rests with, so that says how deep it is in the board; nothing is in it whose surface is not.
+Overlaps of bodies depend on the contact geometry that the station diagram holds;
+`station.checks.scene_issues` finds those.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from typing import Literal
 import numpy as np
 
 from burg_drake.core import Array, InvalidInputError, transform_points
+from burg_drake.objects.collision import support_corners
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.document.scene import Scene, SceneLike, as_scene
 
@@ -22,10 +26,14 @@ IN_BOUNDS_TOLERANCE = 1e-4
 """How far an object may stick out over the board's edge [m]: rounding of documents."""
 TOUCH_TOLERANCE = 1e-3
 """How deep an object may start in another one [m]: it settles within a step."""
+GROUND_TOLERANCE = 1.5e-3
+"""How deep an object may be in the ground [m]: the table yields in simulation. What stands on a
+tip sinks in deeper, which a station's table can bear."""
 SINK_TOLERANCE = 2.5e-3
-"""How deep an object may be in table, ground or a box of the station [m]: they yield in simulation,
-and what stands on an edge or a tip, as a toy airplane of 570 g on its wing, sinks in by up to 2
-mm."""
+"""How deep an object may be in a box of the station [m]: they yield as the table does, and what
+leans on them with an edge or a tip sinks in by up to 2 mm."""
+STANDING_TOLERANCE = 1e-4
+"""How far a surface that stands on the ground may be below it [m]: rounding of documents."""
 HOVER_TOLERANCE = 1e-3
 """How far an object may start above the board [m] before that is worth a word: trials count its
 fall among what was moved."""
@@ -68,15 +76,17 @@ class Extent:
 
     Attributes:
         low, high: (3,) its corners in the scene frame [m].
+        support: height of the lowest point of what it rests with, in the scene frame [m].
     """
 
     low: Array
     high: Array
+    support: float
 
     @classmethod
-    def of(cls, p_SV: Array) -> Extent:
-        """The box around points (N, 3)."""
-        return cls(p_SV.min(axis=0), p_SV.max(axis=0))
+    def of(cls, p_SV: Array, p_SC: Array) -> Extent:
+        """The box around points (N, 3) of an object that rests with points (M, 3)."""
+        return cls(p_SV.min(axis=0), p_SV.max(axis=0), float(p_SC[:, 2].min()))
 
 
 def validate_scene(
@@ -95,7 +105,7 @@ def validate_scene(
     scene = as_scene(scene)
     if extents is None:
         names = (*scene.instances, *scene.background)
-        extents = {name: Extent.of(placed_vertices(scene, name)) for name in names}
+        extents = {name: _placed_extent(scene, name) for name in names}
     issues: list[SceneIssue] = []
     for name in scene.instances:
         others = [extent for other, extent in extents.items() if other != name]
@@ -124,6 +134,25 @@ def placed_vertices(scene: Scene, instance: str) -> Array:
     """(N, 3) vertices of an instance's surface in the scene frame [m]."""
     p_OV = surface_vertices(scene.library, scene.instance(instance).object)
     return transform_points(scene.X_SO(instance), p_OV)
+
+
+def _placed_extent(scene: Scene, instance: str) -> Extent:
+    p_OC = support_vertices(scene.library, scene.instance(instance).object)
+    return Extent.of(placed_vertices(scene, instance), transform_points(scene.X_SO(instance), p_OC))
+
+
+def support_vertices(library: ObjectLibrary, name: str) -> Array:
+    """(N, 3) points of an object with which it rests on a plane, in the object frame [m]: of its
+    primitive, else of its pieces; of its surface if it has none.
+
+    Raises:
+        UnknownNameError: there is no such object, or one of its files is missing.
+        MeshError: one is damaged.
+    """
+    entry = library.entry(name)
+    if entry.contact.primitive is None and not entry.pieces:
+        return surface_vertices(library, name)
+    return support_corners(library, entry)
 
 
 def surface_vertices(library: ObjectLibrary, name: str) -> Array:
@@ -190,15 +219,16 @@ def _bounds_issue(scene: Scene, name: str, extent: Extent) -> SceneIssue | None:
 def _ground_issue(
     scene: Scene, name: str, extent: Extent, others: Iterable[Extent]
 ) -> SceneIssue | None:
-    lowest = float(extent.low[2])
-    if lowest < -SINK_TOLERANCE - _contact_error(scene, name):
-        height = round(scene.instance(name).X_SO.translation[2] - lowest, 4) + 0.0
+    surface, support = float(extent.low[2]), extent.support
+    lowest = min(surface, support)
+    if support < -GROUND_TOLERANCE and is_below(surface):
+        height = round(scene.instance(name).X_SO.translation[2] - support, 4) + 0.0
         return SceneIssue(
             instance=name,
             kind="in_ground",
-            amount=-lowest,
-            message=f"{name!r} is in the ground: it reaches {length_text(-lowest)} below the board;"
-            f" z = {height:.4f} would put it on top",
+            amount=-support,
+            message=f"{name!r} is in the ground: it reaches {length_text(-support)} below the"
+            f" board; z = {height:.4f} would put it on top",
         )
     if lowest > HOVER_TOLERANCE and not any(_can_support(other, extent) for other in others):
         return SceneIssue(
@@ -211,11 +241,10 @@ def _ground_issue(
     return None
 
 
-def _contact_error(scene: Scene, name: str) -> float:
-    """How much further than what touches the ground in simulation the surface may reach [m]."""
-    entry = scene.entry(name)
-    fit = entry.contact.fit or entry.fit
-    return fit.hausdorff if fit is not None else 0.0
+def is_below(surface: float) -> bool:
+    """Whether a surface whose lowest point is at this height over the ground [m] reaches into it:
+    if not, the object stands there, however far what it rests with in simulation reaches."""
+    return surface < -STANDING_TOLERANCE
 
 
 def _can_support(below: Extent, above: Extent) -> bool:

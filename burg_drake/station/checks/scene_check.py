@@ -18,6 +18,7 @@ from pydrake.math import RigidTransform
 from burg_drake.core import Array, InvalidInputError, check_pose, transform_points
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.document import (
+    GROUND_TOLERANCE,
     SINK_TOLERANCE,
     TOUCH_TOLERANCE,
     Extent,
@@ -27,7 +28,9 @@ from burg_drake.scene.document import (
     SceneIssue,
     SceneLike,
     as_scene,
+    is_below,
     length_text,
+    support_vertices,
     surface_vertices,
     validate_scene,
 )
@@ -43,6 +46,8 @@ GRAVITY = 9.81
 """[m/s^2]."""
 DEEPEST = 0.006
 """A tip may be so deep in the table [m], if the table bears it there."""
+PUSH_ERROR = 1.05
+"""What lies still was pushed up by its weight; the table's force is known to 2 %."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,11 +58,15 @@ class _PlacedInstance:
         instance: of the document.
         X_WO: pose in the world.
         extent: the box around its surface, along the axes of the board.
+        surface, support: heights over the table's top of the lowest point of its surface, and of
+            what it rests with [m].
     """
 
     instance: Instance
     X_WO: RigidTransform
     extent: Extent
+    surface: float
+    support: float
 
 
 class SceneCheck:
@@ -85,7 +94,7 @@ class SceneCheck:
         shapes = partial(object_shapes, library, packages=station.packages)
         self._world = CollisionWorld(fixed, shapes)
         self._travel: Travel | None = None
-        self._surfaces: dict[str, Array] = {}
+        self._vertices: dict[str, tuple[Array, Array]] = {}
         self._placed: dict[str, _PlacedInstance] = {}
 
     def issues(self, scene: SceneLike) -> tuple[SceneIssue, ...]:
@@ -169,16 +178,26 @@ class SceneCheck:
         among, fixed = self._world.overlaps()
         rank = {name: i for i, name in enumerate(self._world.bodies)}
         of_fixed = {name: len(rank) + i for i, name in enumerate(self._world.fixed)}
-        yielding = {"table", *self._station.document.background}
+        limits = dict.fromkeys(self._station.document.background, SINK_TOLERANCE)
+        limits["table"] = GROUND_TOLERANCE
+        for name in {name for name, other in fixed if other == "table"}:
+            sunk = -self._placed[name].support  # Drake's depths are off by up to a millimetre
+            fixed[name, "table"] = min(fixed[name, "table"], sunk)
         found = [(rank[a], rank[b], a, b, depth) for (a, b), depth in among.items()]
         found += [(rank[a], of_fixed[b], a, b, depth) for (a, b), depth in fixed.items()]
         return [
             (a, b, depth)
             for _, _, a, b, depth in sorted(found)
-            if depth > (SINK_TOLERANCE if b in yielding else TOUCH_TOLERANCE)
+            if depth > limits.get(b, TOUCH_TOLERANCE)
             and a in scene.instances
-            and not (b == "table" and depth < DEEPEST and self._is_supported(a, scene))
+            and not (b == "table" and self._may_touch_table(a, depth, scene))
         ]
+
+    def _may_touch_table(self, name: str, depth: float, scene: Scene) -> bool:
+        """Whether what an instance rests with may be so deep in the table [m]: its surface stands
+        on it, or the table bears it there."""
+        stands = not is_below(self._placed[name].surface)
+        return stands or (depth < DEEPEST and self._is_supported(name, scene))
 
     def _may_sink(self, issue: SceneIssue, scene: Scene) -> bool:
         return issue.amount < DEEPEST and self._is_supported(issue.instance, scene)
@@ -189,7 +208,8 @@ class SceneCheck:
         weight = GRAVITY * sum(scene.entry(n).mass_properties.mass for n in scene.instances)
         _, X_WO = self._world.bodies[name]
         thickness = self._station.document.table.size[2]
-        return 0.0 < push_up(self._world.shapes(name), X_WO, thickness) <= weight
+        push = push_up(self._world.shapes(name), X_WO, thickness)
+        return 0.0 < push <= PUSH_ERROR * weight
 
     def _place(self, scene: Scene) -> None:
         """Takes over where the instances of a scene stand."""
@@ -213,10 +233,16 @@ class SceneCheck:
 
     def _placed_instance(self, scene: Scene, name: str, instance: Instance) -> _PlacedInstance:
         X_SO = check_pose(instance.X_SO.matrix(), f"{scene.path}: X_SO of {name!r}")
-        if instance.object not in self._surfaces:
-            self._surfaces[instance.object] = surface_vertices(self._library, instance.object)
-        extent = Extent.of(transform_points(X_SO, self._surfaces[instance.object]))
-        return _PlacedInstance(instance, RigidTransform(self._X_WS @ X_SO), extent)
+        if instance.object not in self._vertices:
+            self._vertices[instance.object] = (
+                surface_vertices(self._library, instance.object),
+                support_vertices(self._library, instance.object),
+            )
+        surface, support = self._vertices[instance.object]
+        extent = Extent.of(transform_points(X_SO, surface), transform_points(X_SO, support))
+        X_WO = self._X_WS @ X_SO
+        heights = (float((p_OV @ X_WO[2, :3]).min() + X_WO[2, 3]) for p_OV in (surface, support))
+        return _PlacedInstance(instance, RigidTransform(X_WO), extent, *heights)
 
     def _require_free_names(self, scene: Scene) -> None:
         for name in (*scene.instances, *scene.background):

@@ -29,11 +29,15 @@ from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 
 from burg_drake.core import Array, make_pose, transform_points
-from burg_drake.objects.collision import FLAT, carrying_corners, support_feet
+from burg_drake.objects.collision import (
+    FLAT,
+    carrying_corners,
+    support_corners,
+    support_feet,
+)
 from burg_drake.objects.library import DEFAULT_CONTACT, ObjectEntry
 from burg_drake.scene.document import Scene
 from burg_drake.station.document import Station
-from burg_drake.station.world.object_hull import support_corners
 from burg_drake.station.world.rolling import is_ball
 from burg_drake.station.world.standing import add_hull
 

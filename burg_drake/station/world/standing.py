@@ -19,10 +19,10 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody, SpatialInertia
 
 from burg_drake.core import Array
+from burg_drake.objects.collision import hull_corners
 from burg_drake.objects.library import LINK
 from burg_drake.scene.document import Scene
 from burg_drake.station.world.instances import name_taken_error
-from burg_drake.station.world.object_hull import hull_corners
 from burg_drake.station.world.robot import ROBOT_MODELS
 
 

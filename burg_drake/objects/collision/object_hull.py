@@ -9,7 +9,7 @@ import numpy as np
 
 from burg_drake.core import Array
 from burg_drake.geometry import convex_hull
-from burg_drake.objects.collision import primitive_mesh
+from burg_drake.objects.collision.primitive import primitive_mesh
 from burg_drake.objects.library import ObjectEntry, ObjectLibrary
 
 KEPT = 1000
@@ -20,12 +20,15 @@ _READ: dict[tuple[tuple[Path, int], ...], Array] = {}
 
 
 def support_corners(library: ObjectLibrary, entry: ObjectEntry) -> Array:
-    """(N, 3) corners of the hull of an object's pieces, with which it rests on a plane, in O [m].
+    """(N, 3) corners of the hull with which an object rests on a plane, in O [m]: of its primitive,
+    else of its pieces. Its stable poses, its feet and its fall in simulation go by it.
 
     Raises:
         UnknownNameError: a file of the library is missing.
         MeshError: one is damaged.
     """
+    if entry.contact.primitive is not None:
+        return np.asarray(primitive_mesh(entry.contact.primitive).vertices)
     return _corners(library, entry.pieces)
 
 
