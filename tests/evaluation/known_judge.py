@@ -41,6 +41,32 @@ def expected(id: str) -> Outcome:
     return Outcome.LIFTED if n < 90 else Outcome.LIFTED_DISTURBED
 
 
+def confidence(id: str) -> float:
+    """The confidence that `KnownJudge` gives: every fifth verdict is contested."""
+    return 0.6 if number(id) % 5 == 0 else 0.97
+
+
+@dataclass(frozen=True)
+class SecondJudge:
+    """Judges again, otherwise than `KnownJudge`: each grasp is lifted, but for those that are told
+    to fail."""
+
+    failing: str = ""
+
+    @property
+    def screens(self) -> Sequence[Screen]:
+        return ()
+
+    @property
+    def stages(self) -> Sequence[tuple[Stage, Decide]]:
+        return ((Stage.EXECUTED, lambda grasp, motion: self.execute(grasp)),)
+
+    def execute(self, grasp: Candidate) -> Decision:
+        if grasp.id == self.failing:
+            return Decision(Outcome.SIMULATION_FAILED, reason="not finite")
+        return Decision(Outcome.LIFTED, margins={"slip": 1e-4, "tilt": 1e-3}, confidence=0.7)
+
+
 def _all(one: Callable[[Candidate], Decision], grasps: Sequence[Candidate]) -> list[Decision]:
     return [one(grasp) for grasp in grasps]
 
@@ -93,7 +119,12 @@ class KnownJudge:
         margins = {"slip": n / 7e4, "tilt": n / 900, "pad_force": 40 - n / 30}
         margins |= {"patch_area": n / 1e6, "others_moved": moved}
         others = {"left", "right", "bar"} - {grasp.instance}
-        return Decision(outcome, margins=margins, displacements={min(others): moved})
+        return Decision(
+            outcome,
+            margins=margins,
+            displacements={min(others): moved},
+            confidence=confidence(grasp.id),
+        )
 
 
 @dataclass(frozen=True)
