@@ -32,6 +32,7 @@ from burg_drake.core.statistics import wilson_interval
 from burg_drake.experiment.comparison.comparing import compare
 from burg_drake.experiment.comparison.judge_assessment import judgement
 from burg_drake.experiment.comparison.of_runs import pairs_of_runs
+from burg_drake.experiment.comparison.run_agreement import run_agreement
 from burg_drake.experiment.pairing.matching import match_rows
 from burg_drake.experiment.pairing.pairs import NAMES, REFERENCE_NAMES
 from burg_drake.experiment.pairing.result_table import ResultTable
@@ -179,9 +180,11 @@ def speed(arguments: argparse.Namespace) -> None:
         with _timed("  matching"):
             found = match_rows(*tables)
         with _timed("  pairs"):
-            pairs, _ = pairs_of_runs(tables, found, "lifted")
+            pairs, second, _ = pairs_of_runs(tables, found, "lifted")
         with _timed("  figures"):
             judgement(pairs, scenes={})
+        with _timed("  agreement"):
+            run_agreement(pairs, second)
     if len(arguments.runs) == 2:
         with _timed("runs on the disk"):
             c = compare(*arguments.runs)

@@ -9,7 +9,9 @@ from burg_drake.experiment.comparison import (
     Disagreement as Disagreement,
     FactorGroup as FactorGroup,
     Judgement as Judgement,
+    MarginDifference as MarginDifference,
     PlacementAgreement as PlacementAgreement,
+    RunAgreement as RunAgreement,
     Stopped as Stopped,
     compare as compare,
 )

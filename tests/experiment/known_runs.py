@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -58,6 +60,7 @@ def make_run(
     mode: Mode = "hand",
     seed: int = 0,
     poses: Mapping[str, Array] | None = None,
+    **recorded: Any,
 ) -> Run:
     """A run in a folder.
 
@@ -68,6 +71,7 @@ def make_run(
         mode: what was asked.
         seed: of the poses.
         poses: by instance, in place of random ones.
+        recorded: other fields of its document.
     """
     station = load_station("panda_tabletop")
     sets = [
@@ -97,7 +101,8 @@ def make_run(
         seed=seed,
         versions=software_versions(),
     )
-    document = RunDocument(**{**vars(document), "hash": run_hash(document)})
+    document = replace(document, **recorded)
+    document = replace(document, hash=run_hash(document))
     run = create_run(folder, document, scene, station, candidates)
     told = [verdict for own in verdicts.values() for verdict in own]
     with Journal(run.path / JOURNAL_FILE) as journal:

@@ -36,11 +36,9 @@ def add_to(verbs: Any) -> None:
         "burg-drake compare runs/screening runs/standard",
         "burg-drake compare runs/screening runs/standard trials.yaml",
         "",
-        (
-            "Of two runs, the second is the reference for the first. With trials, both are"
-            " compared with"
-        ),
-        "them, and McNemar's test says whether one is right more often.",
+        "Of two runs, the second is the reference for the first; runs with other phases, limits",
+        "or stations are refused. With trials, both are compared with them, and McNemar's test",
+        "says whether one is right more often.",
         options=_add_options,
     )
 

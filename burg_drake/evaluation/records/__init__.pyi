@@ -35,6 +35,7 @@ from .origin import (
     engine_label as engine_label,
     pairs_text as pairs_text,
     read_origin as read_origin,
+    read_trial_settings as read_trial_settings,
 )
 from .rows import (
     best_rows as best_rows,

@@ -72,28 +72,8 @@ class TrialOrigin:
         return replace(self, engine=as_engine(engine)) if engine else self
 
     def settings(self, where: str = "trial settings") -> TrialSettings:
-        """The trial's settings; those that were not recorded have their defaults, and so has the
-        motion, whatever the station says. Limits that were not recorded are none.
-
-        Args:
-            where: names them in messages.
-
-        Raises:
-            InvalidInputError: one of them is unknown or cannot be used.
-        """
-        from burg_drake.simulation.trials import NO_LIMITS, TrialSettings
-        from burg_drake.station.document import GraspMotion
-
-        others, values = without_motion(self.trial), gathered(self.trial)
-        motion = {name: value for name, value in values.items() if name not in others}
-        settings = _typed(_truths(others, TrialSettings), TrialSettings, where)
-        limits = {name: others.get(name, none) for name, none in NO_LIMITS.items()}
-        return replace(
-            settings,
-            motion=_typed(motion, GraspMotion, where),
-            tilt_limit=limits["tilt_limit"],
-            slip_limit=limits["slip_limit"],
-        )
+        """The trial's settings; see `read_trial_settings`."""
+        return read_trial_settings(self.trial, where)
 
     def cells(self) -> dict[str, str]:
         """The texts `ORIGIN_TEXT` by column."""
@@ -135,6 +115,33 @@ def read_origin(row: Mapping[str, Any], where: str) -> TrialOrigin:
     )
     origin.settings(f"{where}, trial_settings")
     return origin
+
+
+def read_trial_settings(trial: Mapping[str, float], where: str) -> TrialSettings:
+    """Settings of trials from their recorded numbers; those that were not recorded have their
+    defaults, and so has the motion, whatever the station says. Limits that were not recorded are
+    none.
+
+    Args:
+        trial: as documents of runs have it.
+        where: names them in messages.
+
+    Raises:
+        InvalidInputError: one of them is unknown or cannot be used.
+    """
+    from burg_drake.simulation.trials import NO_LIMITS, TrialSettings
+    from burg_drake.station.document import GraspMotion
+
+    others, values = without_motion(trial), gathered(trial)
+    motion = {name: value for name, value in values.items() if name not in others}
+    settings = _typed(_truths(others, TrialSettings), TrialSettings, where)
+    limits = {name: others.get(name, none) for name, none in NO_LIMITS.items()}
+    return replace(
+        settings,
+        motion=_typed(motion, GraspMotion, where),
+        tilt_limit=limits["tilt_limit"],
+        slip_limit=limits["slip_limit"],
+    )
 
 
 def engine_label(engine: Engine) -> str:

@@ -20,5 +20,9 @@ from .record import (
     comparison_json as comparison_json,
     plain as plain,
 )
+from .run_agreement import (
+    MarginDifference as MarginDifference,
+    RunAgreement as RunAgreement,
+)
 from .tables import comparison_tables as comparison_tables
 from .wording import interval as interval

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from burg_drake.experiment.comparison.judge_assessment import Judgement
+from burg_drake.experiment.comparison.run_agreement import RunAgreement
 from burg_drake.experiment.pairing import Side
 from burg_drake.experiment.statistics import Paired
 from burg_drake.experiment.trials import Success
@@ -45,6 +46,7 @@ class Comparison:
         judgement: figures of the first run.
         other: figures of the second run of `simulators`.
         difference: how often either of them was right about the same trial.
+        agreement: of the two `runs`, where neither is taken for the truth.
         settings: in what two runs differ, in words.
         notes: what people should know before they trust the figures.
         seed: of the intervals' resampling.
@@ -60,6 +62,7 @@ class Comparison:
     judgement: Judgement
     other: Judgement | None = None
     difference: Paired | None = None
+    agreement: RunAgreement | None = None
     settings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     seed: int = 0

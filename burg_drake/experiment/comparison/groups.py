@@ -90,15 +90,19 @@ def stopped(pairs: VerdictPairs) -> tuple[Stopped, ...]:
 
 def outcome_table(pairs: VerdictPairs) -> dict[str, dict[str, int]]:
     """How many trials ended how, by verdict; only what occurs."""
-    rows, columns = pairs.simulated, pairs.ended
-    counts = _crossed(rows, columns)
+    return crossed(pairs.simulated, pairs.ended)
+
+
+def crossed(rows: Factor, columns: Factor) -> dict[str, dict[str, int]]:
+    """How many trials have which text of one column and which of another; only what occurs."""
+    counts = _counts(rows, columns)
     return {
         rows.names[r]: {columns.names[c]: int(counts[r, c]) for c in np.flatnonzero(counts[r])}
         for r in np.flatnonzero(counts.sum(axis=1))
     }
 
 
-def _crossed(rows: Factor, columns: Factor) -> Values:
+def _counts(rows: Factor, columns: Factor) -> Values:
     width = len(columns.names)
     flat = np.bincount(rows.index * width + columns.index, minlength=len(rows.names) * width)
     return flat.reshape(len(rows.names), width)

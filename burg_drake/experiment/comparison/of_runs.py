@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -12,7 +13,13 @@ from burg_drake.evaluation.store import Campaign, Run
 from burg_drake.experiment.comparison.comparison import Comparison, Coverage
 from burg_drake.experiment.comparison.disagreement import disagreements
 from burg_drake.experiment.comparison.judge_assessment import judgement
+from burg_drake.experiment.comparison.run_agreement import (
+    SecondVerdicts,
+    both_executed,
+    run_agreement,
+)
 from burg_drake.experiment.pairing import (
+    MEASURED,
     NAMES,
     REFERENCE_NAMES,
     JudgedRuns,
@@ -23,12 +30,16 @@ from burg_drake.experiment.pairing import (
     match_rows,
     predicted_probability,
     require_common_scene,
+    require_same_phases,
     settings_apart,
     successes,
     undecided,
 )
-from burg_drake.experiment.statistics import PREDICTORS, PROBABILITY
+from burg_drake.experiment.statistics import PREDICTORS, PROBABILITY, Flags
 from burg_drake.experiment.trials import Success
+
+NOT_EXECUTED = "not executed in both runs, whose modes differ"
+"""Why grasps are left out of runs that asked different questions before the grip."""
 
 
 def compare_runs(
@@ -39,16 +50,24 @@ def compare_runs(
     robustness: str | Path | None = None,
     seed: int = 0,
 ) -> Comparison:
-    """Compares the verdicts of two runs; see `compare`."""
+    """Compares the verdicts of two runs; see `compare`.
+
+    Of runs in different modes only grasps count that both executed: what else they say answers
+    different questions.
+    """
     sides = JudgedRuns.load(first), JudgedRuns.load(second)
     require_common_scene(*sides)
+    require_same_phases(*sides)
     with ThreadPoolExecutor() as pool:  # reading and unpacking leave Python alone
         one, other = pool.map(JudgedRuns.table, sides, (NAMES, REFERENCE_NAMES))
     tables = one, other
     found = match_rows(*tables)
     if not len(found.first):
         raise InvalidInputError(_nothing_in_common(sides, found))
-    pairs, left_out = pairs_of_runs(tables, found, success)
+    modes = [side.found.document.mode for side in sides]
+    pairs, others, left_out = pairs_of_runs(tables, found, success, modes[0] == modes[1])
+    if not len(pairs) and modes[0] != modes[1]:
+        raise InvalidInputError(_nothing_executed(sides, modes))
     probability = predicted_probability(sides[0], pairs, robustness)
     if probability is not None:
         pairs = pairs.with_margin(PROBABILITY, probability)
@@ -68,6 +87,7 @@ def compare_runs(
             left_out=left_out,
         ),
         judgement=judgement(pairs, scenes=scenes, disagreements=wrong, seed=seed),
+        agreement=run_agreement(pairs, others, seed=seed),
         settings=apart,
         notes=() if apart else ("the runs have the same settings",),
         seed=seed,
@@ -75,21 +95,41 @@ def compare_runs(
 
 
 def pairs_of_runs(
-    tables: tuple[ResultTable, ResultTable], found: Match, success: Success
-) -> tuple[VerdictPairs, dict[str, int]]:
-    """Pairs of verdicts of the grasps in common, and what is left out by reason."""
-    ended = tables[1].texts["outcome"].take(found.second)
+    tables: tuple[ResultTable, ResultTable],
+    found: Match,
+    success: Success,
+    same_mode: bool = True,
+) -> tuple[VerdictPairs, SecondVerdicts, dict[str, int]]:
+    """Pairs of verdicts of the grasps in common, what else the second run found of them, and what
+    is left out by reason: of different modes all that not both executed."""
+    others = tables[1].take(found.second, MEASURED)
+    ended, stage = others.texts["outcome"], others.texts["stage"]
     pairs = make_pairs(
         tables[0].take(found.first, PREDICTORS), ended, successes(ended, success), success
     )
+    second = SecondVerdicts(stage, {name: others.numbers[name] for name in MEASURED})
+    reasons: dict[str, Flags] = {}
+    for where, verdicts in (("first", pairs.simulated), ("second", pairs.ended)):
+        reasons |= {f"{k} in the {where}": rows for k, rows in undecided(verdicts).items()}
+    if not same_mode:
+        reasons[NOT_EXECUTED] = ~both_executed(pairs.stage, stage)
     keep = np.ones(len(pairs), dtype=bool)
     left_out = {}
-    for where, verdicts in (("first", pairs.simulated), ("second", pairs.ended)):
-        for outcome, rows in undecided(verdicts).items():
-            if rows.any():
-                left_out[f"{outcome} in the {where}"] = int((rows & keep).sum())
-                keep &= ~rows
-    return pairs if keep.all() else pairs.take(keep), left_out
+    for reason, rows in reasons.items():
+        if rows.any():
+            left_out[reason] = int((rows & keep).sum())
+            keep &= ~rows
+    if keep.all():
+        return pairs, second, left_out
+    return pairs.take(keep), second.take(keep), left_out
+
+
+def _nothing_executed(sides: tuple[JudgedRuns, JudgedRuns], modes: Sequence[str]) -> str:
+    return (
+        f"{sides[0].path} and {sides[1].path} were made in different modes, {modes[0]} and"
+        f" {modes[1]}, and have no grasp in common that both executed; what else they say answers"
+        " different questions"
+    )
 
 
 def _nothing_in_common(sides: tuple[JudgedRuns, JudgedRuns], found: Match) -> str:

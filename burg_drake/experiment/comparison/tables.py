@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from burg_drake.core.terminal import TextTable, format_count, format_number
+from burg_drake.experiment.comparison.agreement_tables import agreement_tables
 from burg_drake.experiment.comparison.comparison import Comparison
 from burg_drake.experiment.comparison.groups import FactorGroup
 from burg_drake.experiment.comparison.judge_assessment import Judgement
 from burg_drake.experiment.comparison.wording import (
     SHARES,
+    alike_words,
     bias_words,
     headline,
     interval,
@@ -26,6 +28,9 @@ def comparison_tables(comparison: Comparison) -> Iterator[TextTable | str]:
     """Tables and sentences, the most important first."""
     c = comparison
     yield headline(c)
+    if c.agreement is not None:
+        yield alike_words(c)
+        yield from agreement_tables(c.agreement)
     for name, judged in _judgements(c):
         of = of_selected(c) + name
         yield matrix_table(c, judged, name)

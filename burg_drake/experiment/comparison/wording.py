@@ -79,6 +79,20 @@ def headline(comparison: Comparison) -> str:
     return f"{right}; {true}, {foreseen}."
 
 
+def alike_words(comparison: Comparison) -> str:
+    """How often two runs hold the same grasps, and which engine each is; nothing of others."""
+    c, found = comparison, comparison.agreement
+    if found is None:
+        return ""
+    kappa = "undefined" if found.kappa.value is None else number(found.kappa, percent=False)
+    bounds = interval(found.kappa, percent=False)
+    return (
+        f"Held in both or in neither: {brief(found.alike)}; Cohen's kappa"
+        f" {f'{kappa} {bounds}'.rstrip()}. First: engine {c.first.engine}; second: engine"
+        f" {c.reference.engine}."
+    )
+
+
 def difference_words(comparison: Comparison) -> str:
     """Which of two simulators was right where the other was wrong."""
     d = comparison.difference

@@ -3,6 +3,7 @@ from .matching import (
     match_rows as match_rows,
 )
 from .pairs import (
+    MEASURED as MEASURED,
     NAMES as NAMES,
     REFERENCE_NAMES as REFERENCE_NAMES,
     VerdictPairs as VerdictPairs,
@@ -10,6 +11,7 @@ from .pairs import (
     successes as successes,
     undecided as undecided,
 )
+from .phases import require_same_phases as require_same_phases
 from .probability import predicted_probability as predicted_probability
 from .result_table import ResultTable as ResultTable
 from .side import (

@@ -15,7 +15,9 @@ from burg_drake.experiment.trials import Success, succeeded
 
 NAMES = (*KEY, *CONTENT, "object", "outcome", "stage", "blocker", "run", *PREDICTORS)
 """Columns of the run whose verdicts are predictions."""
-REFERENCE_NAMES = (*KEY, *CONTENT, "outcome")
+MEASURED = tuple(name for name in PREDICTORS if name != "score")
+"""Margins that two runs may measure differently: a score belongs to the grasp."""
+REFERENCE_NAMES = (*KEY, *CONTENT, "outcome", "stage", *MEASURED)
 """Columns of a run whose verdicts say what is true."""
 UNDECIDED = (Outcome.SIMULATION_FAILED, Outcome.REACHABLE)
 """Verdicts that predict nothing: no simulation came to an end."""

@@ -21,6 +21,7 @@ from burg_drake.evaluation.report.elements import (
 )
 from burg_drake.experiment.comparison.comparison import Comparison
 from burg_drake.experiment.comparison.judge_assessment import Judgement
+from burg_drake.experiment.comparison.report.agreement import agreement_sections
 from burg_drake.experiment.comparison.report.cases import (
     case_section,
     outcome_section,
@@ -141,7 +142,8 @@ def _sections(c: Comparison, photos: Path | None) -> list[Html | None]:
     judged = [("", c.judgement)]
     if c.other is not None:
         judged = [("first", c.judgement), ("second", c.other)]
-    parts: list[Html | None] = [matrix_section(c, judged), _difference(c), figure_section(judged)]
+    parts = [*agreement_sections(c), matrix_section(c, judged), _difference(c)]
+    parts.append(figure_section(judged))
     for name, judgement in judged:
         parts += [_named(part, name) for part in _of_one(c, judgement, photos)]
     return parts

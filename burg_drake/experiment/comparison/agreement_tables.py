@@ -1,0 +1,90 @@
+"""Tables of what two runs have in common, for a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from burg_drake.core.grasps import Stage
+from burg_drake.core.terminal import MISSING, TextTable, format_count, format_number
+from burg_drake.experiment.comparison.groups import FactorGroup
+from burg_drake.experiment.comparison.run_agreement import MarginDifference, RunAgreement
+from burg_drake.experiment.comparison.wording import interval, margin_title, number
+from burg_drake.experiment.statistics import MarginCalibration
+
+MOST_ROWS = 20
+
+
+def agreement_tables(found: RunAgreement) -> Iterator[TextTable]:
+    """What is alike by object, where the runs part by stage, and how far apart margins are; what
+    there is nothing of is left out."""
+    if len(found.objects) > 1:
+        yield object_table(found.objects)
+    if found.apart:
+        yield stage_table(found.apart)
+    if found.margins:
+        yield bin_table(found.margins)
+    if found.differences:
+        yield difference_table(found.differences)
+
+
+def object_table(groups: Sequence[FactorGroup]) -> TextTable:
+    """Held alike by object."""
+    table = TextTable("Held or not held alike, by object").names("object")
+    table.numbers("grasps", "alike", "95 % CI", "kappa")
+    for group in groups[:MOST_ROWS]:
+        a = group.agreement
+        table.row(
+            group.name,
+            format_count(a.trials),
+            number(a.accuracy, percent=True),
+            interval(a.accuracy, percent=True) or MISSING,
+            number(a.kappa, percent=False),
+        )
+    if len(groups) > MOST_ROWS:
+        table.caption = f"the first {MOST_ROWS} of {len(groups)}; the JSON has all"
+    return table
+
+
+def stage_table(apart: Mapping[str, Mapping[str, int]]) -> TextTable:
+    """Grasps that only one run holds, by the stages that decided."""
+    columns = stage_columns(apart)
+    table = TextTable("Where they part: stages that decided grasps which only one of them holds")
+    table.texts("first run").numbers(*(f"{name} in the second" for name in columns))
+    for stage, row in apart.items():
+        table.row(stage, *(format_count(row.get(name, 0)) for name in columns))
+    return table
+
+
+def stage_columns(counts: Mapping[str, Mapping[str, int]]) -> list[str]:
+    """The stages of the second run that occur, in their order."""
+    return [stage.value for stage in Stage if any(stage.value in row for row in counts.values())]
+
+
+def bin_table(margins: Sequence[MarginCalibration]) -> TextTable:
+    """Share of alike grasps along the first run's margins."""
+    table = TextTable("Held or not held alike along the first run's margins").texts("margin")
+    table.numbers("grasps").texts("from", "alike in each bin [%]", "to")
+    for c in margins:
+        title, unit, size = margin_title(c.name)
+        low, high = (
+            f"{format_number(size * end)} {unit}".rstrip()
+            for end in (c.bins[0].low, c.bins[-1].high)
+        )
+        shares = " ".join(f"{100 * (one.share.value or 0.0):.0f}" for one in c.bins)
+        table.row(title, format_count(c.trials), low, shares, high)
+    table.caption = (
+        "bins of about equally many grasps, from the smallest margin to the largest; the JSON and"
+        " the page have their bounds and intervals"
+    )
+    return table
+
+
+def difference_table(differences: Sequence[MarginDifference]) -> TextTable:
+    """How far apart margins are where both executed."""
+    table = TextTable("Margins of grasps that both executed, second run less first").texts("margin")
+    table.numbers("grasps", "median", "median size", "90 % within").texts("unit")
+    for one in differences:
+        title, unit, size = margin_title(one.name)
+        values = (one.median, one.median_size, one.within)
+        table.row(title, format_count(one.grasps), *(format_number(size * v) for v in values), unit)
+    return table

@@ -1,0 +1,115 @@
+"""Sections about two runs as two opinions: what they hold alike, where they part, and by how
+much."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from burg_drake.core.terminal import format_count, format_number
+from burg_drake.evaluation.report.elements import Html, element, section, table
+from burg_drake.experiment.comparison.agreement_tables import stage_columns
+from burg_drake.experiment.comparison.comparison import Comparison
+from burg_drake.experiment.comparison.groups import FactorGroup
+from burg_drake.experiment.comparison.report.figures import share_mark
+from burg_drake.experiment.comparison.report.plots import reliability_plot
+from burg_drake.experiment.comparison.run_agreement import MarginDifference
+from burg_drake.experiment.comparison.wording import alike_words, margin_title, number
+from burg_drake.experiment.statistics import MarginCalibration
+
+MOST_ROWS = 60
+
+
+def agreement_sections(comparison: Comparison) -> list[Html | None]:
+    """All that is known of two runs beside each other; nothing of other comparisons."""
+    found = comparison.agreement
+    if found is None:
+        return []
+    return [
+        section("Held or not held alike", alike_words(comparison), _objects(found.objects)),
+        _stages(found.stages, found.apart),
+        _margins(found.margins),
+        _differences(found.differences),
+    ]
+
+
+def _objects(groups: Sequence[FactorGroup]) -> Html:
+    rows = [
+        element(
+            "tr",
+            element("th", group.name, scope="row"),
+            element(
+                "td", format_count(group.agreement.trials), class_="number", data_label="grasps"
+            ),
+            element(
+                "td", share_mark(group.agreement.accuracy), class_="estimate", data_label="alike"
+            ),
+            element(
+                "td",
+                number(group.agreement.kappa, percent=False),
+                class_="number",
+                data_label="kappa",
+            ),
+        )
+        for group in groups[:MOST_ROWS]
+    ]
+    head = ["object", "grasps", "alike, 95 % interval", "Cohen's kappa"]
+    return table(head, rows, numbers=(1, 3), style="groups")
+
+
+def _stages(
+    stages: Mapping[str, Mapping[str, int]], apart: Mapping[str, Mapping[str, int]]
+) -> Html:
+    """All grasps by stage and stage, with those that only one run holds in brackets."""
+    columns, rows = stage_columns(stages), []
+    for stage, row in stages.items():
+        cells = []
+        for name in columns:
+            count, parted = row.get(name, 0), apart.get(stage, {}).get(name, 0)
+            text = f"{format_count(count)} ({format_count(parted)})" if parted else count or "·"
+            cells.append(element("td", text, class_="number" if count else "number zero"))
+        rows.append(element("tr", element("th", stage, scope="row"), *cells))
+    text = (
+        "Rows: the stage that decided in the first run. Columns: in the second. In brackets:"
+        " grasps that only one of them holds."
+    )
+    head = ["first run", *(f"{name} in the second" for name in columns)]
+    return section("At which stage they part", text, table(head, rows, numbers=range(1, len(head))))
+
+
+def _margins(margins: Sequence[MarginCalibration]) -> Html | None:
+    if not margins:
+        return None
+    text = (
+        "Share of grasps that both hold, or both do not, in bins of about equally many grasps by"
+        " the first run's margin, with Wilson's intervals; of grasps of which both runs measured"
+        " it. Where it falls, verdicts hang on the engine. Line: the monotone curve that fits best;"
+        " dashes: all of them."
+    )
+    plots = (reliability_plot(c, "held or not held alike") for c in margins)
+    return section(
+        "Do they part at small margins?", text, element("div", *plots, class_="charts plots")
+    )
+
+
+def _differences(differences: Sequence[MarginDifference]) -> Html | None:
+    if not differences:
+        return None
+    rows = []
+    for one in differences:
+        title, unit, size = margin_title(one.name)
+        values = (one.median, one.median_size, one.within)
+        cells = (f"{format_number(size * value)} {unit}".rstrip() for value in values)
+        rows.append(
+            element(
+                "tr",
+                element("th", title, scope="row"),
+                element("td", format_count(one.grasps), class_="number"),
+                *(element("td", cell, class_="number") for cell in cells),
+            )
+        )
+    head = ["margin", "grasps", "median difference", "median size", "90 % within"]
+    return section(
+        "How far apart margins are",
+        "Second run less first, of grasps that both executed; sizes are without sign.",
+        table(head, rows, numbers=range(1, len(head)), style="figures"),
+    )

@@ -1,0 +1,160 @@
+"""Two runs as two opinions, neither of which is the truth: on which grasps they agree, at which
+stage they part, and how far apart their margins are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from burg_drake.core import Array
+from burg_drake.core.grasps import Stage
+from burg_drake.experiment.comparison.groups import FactorGroup, by_factor, crossed
+from burg_drake.experiment.pairing import MEASURED, Factor, VerdictPairs, successes
+from burg_drake.experiment.statistics import (
+    Estimate,
+    Flags,
+    MarginCalibration,
+    Values,
+    agreement,
+    calibrations,
+    matrix_of,
+)
+
+COVERED = 0.9
+"""Share of the differences of a margin that are within `MarginDifference.within`."""
+
+
+@dataclass(frozen=True, eq=False)
+class SecondVerdicts:
+    """What the second run found of N grasps.
+
+    Attributes:
+        stage: (N,) that decided.
+        margins: (N,) numbers by name; NaN where there is none.
+    """
+
+    stage: Factor
+    margins: Mapping[str, Array]
+
+    def take(self, rows: Values) -> SecondVerdicts:
+        """Some grasps, as indices or truth values."""
+        margins = {name: values[rows] for name, values in self.margins.items()}
+        return SecondVerdicts(self.stage.take(rows), margins)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MarginDifference:
+    """How far apart two runs measure a margin of grasps that both executed; in the unit of its
+    column.
+
+    Attributes:
+        name: of the margin.
+        grasps: that both executed and measured.
+        median: of the second run's less the first's: whether one sees more of it.
+        median_size: of the absolute differences.
+        within: what nine of ten absolute differences are within.
+    """
+
+    name: str
+    grasps: int
+    median: float
+    median_size: float
+    within: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunAgreement:
+    """Agreement of two runs on what is held: `lifted`, `lifted_disturbed` and `lifted_turned` are,
+    whatever counts as success elsewhere.
+
+    Attributes:
+        alike: share of the grasps that both hold, or both do not, with Wilson's interval.
+        kappa: Cohen's, of the same.
+        objects: the same by object; their accuracy is the share that is alike.
+        stages: grasps by the stage that decided in the first run, and in the second.
+        apart: the same of the grasps that are not alike.
+        margins: share of alike grasps in quantile bins of the first run's margins, of grasps of
+            which both runs measured it; `successes` are the alike ones.
+        differences: of the margins, where both executed.
+    """
+
+    alike: Estimate
+    kappa: Estimate
+    objects: tuple[FactorGroup, ...]
+    stages: dict[str, dict[str, int]]
+    apart: dict[str, dict[str, int]]
+    margins: tuple[MarginCalibration, ...]
+    differences: tuple[MarginDifference, ...]
+
+
+def run_agreement(pairs: VerdictPairs, second: SecondVerdicts, *, seed: int = 0) -> RunAgreement:
+    """Compares two runs with each other.
+
+    Args:
+        pairs: N grasps with the verdicts of the first run, and how they ended in the second.
+        second: what the second run found of them besides.
+        seed: of the intervals' resampling.
+    """
+    held = replace(
+        pairs,
+        predicted=successes(pairs.simulated, "held"),
+        actual=successes(pairs.ended, "held"),
+    )
+    alike = held.predicted == held.actual
+    found = agreement(matrix_of(held.predicted, held.actual), seed=seed)
+    measured = {
+        name: np.where(np.isfinite(second.margins[name]), pairs.margins[name], np.nan)
+        for name in MEASURED
+    }
+    return RunAgreement(
+        alike=found.accuracy,
+        kappa=found.kappa,
+        objects=by_factor(held, held.object, seed=seed),
+        stages=_by_stage(pairs.stage, second.stage),
+        apart=_by_stage(pairs.stage.take(~alike), second.stage.take(~alike)),
+        margins=calibrations(measured, alike),
+        differences=margin_differences(pairs, second),
+    )
+
+
+def both_executed(first: Factor, second: Factor) -> Flags:
+    """(N,) whether the trials of both runs came to the grip, by the stages that decided."""
+    one, other = (
+        stage.where([name == Stage.EXECUTED.value for name in stage.names])
+        for stage in (first, second)
+    )
+    return one & other
+
+
+def margin_differences(pairs: VerdictPairs, second: SecondVerdicts) -> tuple[MarginDifference, ...]:
+    """How far apart two runs measure what both executed; margins that they never have in common are
+    left out."""
+    executed = both_executed(pairs.stage, second.stage)
+    found = []
+    for name in MEASURED:
+        apart = second.margins[name][executed] - pairs.margins[name][executed]
+        apart = apart[np.isfinite(apart)]
+        if len(apart):
+            size = np.abs(apart)
+            found.append(
+                MarginDifference(
+                    name=name,
+                    grasps=len(apart),
+                    median=float(np.median(apart)),
+                    median_size=float(np.median(size)),
+                    within=float(np.quantile(size, COVERED)),
+                )
+            )
+    return tuple(found)
+
+
+def _by_stage(first: Factor, second: Factor) -> dict[str, dict[str, int]]:
+    """Grasps by stage and stage in the order of the stages; only what occurs."""
+    counts, order = crossed(first, second), [stage.value for stage in Stage]
+    return {
+        row: {column: counts[row][column] for column in order if column in counts[row]}
+        for row in order
+        if row in counts
+    }

@@ -1,0 +1,326 @@
+"""Two runs as two opinions: real runs by two engines, and made-up ones whose figures are known."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sklearn.metrics import cohen_kappa_score
+from statsmodels.stats.proportion import proportion_confint
+
+import burg_drake as burg
+from burg_drake.apps.cli import main
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.frames import grasp_from_axes, make_pose
+from burg_drake.core.grasps import Verdict
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.records.run_document import Input, numbers
+from burg_drake.evaluation.records.settings import EvaluationSettings
+from burg_drake.evaluation.store.run_folder import Run
+from burg_drake.experiment.comparison.comparing import compare
+from burg_drake.experiment.comparison.report.page import comparison_page
+from burg_drake.experiment.comparison.run_agreement import RunAgreement
+from burg_drake.experiment.pairing.phases import UNITS
+from burg_drake.simulation.trials.trial_settings import NO_LIMITS, TrialSettings
+from burg_drake.station.document.engine import ENGINES
+from burg_drake.station.document.grasp_motion import GraspMotion
+from tests.evaluation.inline_executor import Inline
+from tests.experiment import known_runs
+from tests.experiment.test_comparison import Page
+
+ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
+"""Across the narrow side of the household box, from above."""
+HELD = ("lifted", "lifted_disturbed", "lifted_turned")
+MEASURED = ("clearance", "slip", "tilt", "pad_force", "patch_area", "lift")
+
+
+@pytest.fixture(scope="module")
+def engines(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Run]:
+    """The same grasps by `screening` and by `standard`: along the box's upper edge, up to where
+    nothing is gripped any more; within it; above it."""
+    folder = tmp_path_factory.mktemp("engines")
+    scene = known_runs.make_scene(folder)
+    along = np.stack([ABOVE @ make_pose(p_AB=(0.0, y, 0.0)) for y in np.linspace(-0.09, 0.09, 19)])
+    high, low = (ABOVE @ make_pose(p_AB=(0.0, 0.0, z)) for z in (-0.1, 0.1))
+    grasps = GraspSet.create(np.concatenate([along, [high, low]]), object="box", width=0.06)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("burg_drake.evaluation.run.preparation.write_report", lambda run: None)
+        found = [
+            evaluate(
+                scene,
+                "panda_tabletop",
+                folder / engine,
+                settings=EvaluationSettings(engine=engine, mode="hand"),
+                grasps={"box": grasps},
+                executor=Inline(),
+                progress=False,
+            )
+            for engine in ("screening", "standard")
+        ]
+    return found[0], found[1]
+
+
+def agreement_of(first: Run, second: Run) -> RunAgreement:
+    found = compare(first, second).agreement
+    assert found is not None
+    return found
+
+
+def test_two_engines_on_the_same_grasps(engines: tuple[Run, Run]) -> None:
+    one, other = (run.results for run in engines)
+    assert one["id"].tolist() == other["id"].tolist()
+    held = [np.isin(rows["outcome"], HELD) for rows in (one, other)]
+    assert 0 < held[0].sum() < len(held[0])
+    found = agreement_of(*engines)
+    alike = held[0] == held[1]
+    assert found.alike.value == pytest.approx(alike.mean())
+    bounds = proportion_confint(alike.sum(), len(alike), method="wilson")
+    assert (found.alike.low, found.alike.high) == pytest.approx(bounds)
+    assert found.kappa.value == pytest.approx(cohen_kappa_score(*held))
+    assert sum(n for row in found.stages.values() for n in row.values()) == len(alike)
+    assert sum(n for row in found.apart.values() for n in row.values()) == (~alike).sum()
+    both = (one["stage"] == "executed") & (other["stage"] == "executed")
+    assert found.stages["executed"]["executed"] == both.sum() > 10
+    assert set(MEASURED) <= {d.name for d in found.differences}
+    for d in found.differences:
+        apart = other[d.name][both] - one[d.name][both]
+        apart = apart[np.isfinite(apart)]
+        assert d.grasps == len(apart)
+        expected = np.median(apart), np.median(abs(apart)), np.quantile(abs(apart), 0.9)
+        assert (d.median, d.median_size, d.within) == pytest.approx(expected)
+    by_name = {d.name: d for d in found.differences}
+    assert by_name["clearance"].within == 0.0  # no engine has a part in it
+    assert by_name["slip"].within > 0.0
+
+
+def test_a_run_agrees_with_itself(engines: tuple[Run, Run]) -> None:
+    found = agreement_of(engines[0], engines[0])
+    assert found.alike.value == found.kappa.value == 1.0 and found.apart == {}
+    assert {(d.median, d.within) for d in found.differences} == {(0.0, 0.0)}
+    assert all(b.share.value == 1.0 for c in found.margins for b in c.bins)
+
+
+def test_the_order_of_two_runs_turns_the_table_and_the_signs(engines: tuple[Run, Run]) -> None:
+    one, other = agreement_of(*engines), agreement_of(*reversed(engines))
+    assert one.alike == other.alike
+    turned = {(b, a): n for a, row in other.stages.items() for b, n in row.items()}
+    assert {(a, b): n for a, row in one.stages.items() for b, n in row.items()} == turned
+    for d, back in zip(one.differences, other.differences, strict=True):
+        assert (d.name, d.within) == (back.name, back.within)
+        assert d.median == pytest.approx(-back.median, abs=1e-15)
+
+
+def test_all_of_it_is_told(
+    engines: tuple[Run, Run], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["compare", *(str(run.path) for run in engines)]
+    page = tmp_path / "compare.html"
+    assert main([*words, "--html", str(page)]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert "Held in both or in neither: " in out
+    assert "First: engine screening; second: engine standard." in out
+    assert "along the first run's margins" in out and "second run less first" in out
+    text = page.read_text(encoding="utf-8")
+    assert Page(text).open == []
+    assert "First: engine screening; second: engine standard." in text
+    for title in ("Held or not held alike", "At which stage they part", "How far apart margins"):
+        assert f"<h2>{title}" in text
+    assert main([*words, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["agreement"]["stages"] == agreement_of(*engines).stages
+    assert {d["name"] for d in told["agreement"]["differences"]} >= set(MEASURED)
+    assert (told["first"]["engine"], told["reference"]["engine"]) == ("screening", "standard")
+
+
+def made_up(folder: Path, *outcomes: list[Verdict | None], **fields: object) -> tuple[Run, Run]:
+    """Two runs of the mug by verdicts, of which the second has other fields in its document."""
+    scene = known_runs.make_scene(folder)
+    made = [
+        known_runs.make_run(folder / name, scene, {"mug": list(told)}, **more)  # type: ignore[arg-type]
+        for name, told, more in zip(("a", "b"), outcomes, ({}, fields), strict=True)
+    ]
+    return made[0], made[1]
+
+
+def test_disagreement_at_small_margins_is_seen_there(tmp_path: Path) -> None:
+    """Of forty grasps the ten with the least pad force are dropped by the second run."""
+    force = np.random.default_rng(1).permutation(np.arange(1.0, 41.0))
+    first = [known_runs.ended("lifted", pad_force=f, slip=0.001) for f in force]
+    second = [
+        known_runs.ended("slipped" if f <= 10 else "lifted", pad_force=f + (1 if f > 38 else 0.25))
+        for f in force
+    ]
+    found = agreement_of(*made_up(tmp_path, first, second))
+    (margin,) = found.margins  # the second run has no slip
+    assert margin.name == "pad_force"
+    assert [(b.low, b.high, b.share.value) for b in margin.bins] == [
+        (1.0, 10.0, 0.0),
+        (11.0, 20.0, 1.0),
+        (21.0, 30.0, 1.0),
+        (31.0, 40.0, 1.0),
+    ]
+    (difference,) = found.differences
+    assert (difference.grasps, difference.median, difference.within) == (40, 0.25, 0.25)
+    assert found.apart == {"executed": {"executed": 10}} and found.alike.value == 0.75
+    page = comparison_page(compare(tmp_path / "a", tmp_path / "b"))
+    assert "10 of 10 trials, 11 to 20" in page and "0 of 10 trials, 1 to 10" in page
+
+
+def test_stages_and_objects(tmp_path: Path) -> None:
+    scene = known_runs.make_scene(tmp_path)
+    told = {
+        "first": {"mug": ["lifted", "collision_target", "slipped"], "box": ["lifted", "lifted"]},
+        "second": {"mug": ["lifted_turned", "lifted", "slipped"], "box": ["no_ik", "dropped"]},
+    }
+    runs = [
+        known_runs.make_run(
+            tmp_path / name,
+            scene,
+            {o: [known_runs.ended(v) for v in outcomes] for o, outcomes in by_object.items()},
+        )
+        for name, by_object in told.items()
+    ]
+    found = agreement_of(*runs)
+    assert found.stages == {"clear": {"executed": 1}, "executed": {"reachable": 1, "executed": 3}}
+    assert found.apart == {"clear": {"executed": 1}, "executed": {"reachable": 1, "executed": 1}}
+    assert {g.name: g.agreement.accuracy.value for g in found.objects} == {
+        "mug": pytest.approx(2 / 3),
+        "box": 0.0,
+    }
+    assert found.alike.value == pytest.approx(2 / 5) and found.margins == found.differences == ()
+    # what counts as success elsewhere says nothing of what is held
+    assert compare(*runs, success="held").agreement == found
+
+
+LIFTED: list[Verdict | None] = [known_runs.ended("lifted"), known_runs.ended("slipped")]
+
+
+USUAL = GraspMotion()
+
+
+def recorded(motion: GraspMotion = USUAL, **changes: float) -> dict[str, float]:
+    """What a run of today records of its trials."""
+    return numbers(TrialSettings(motion=motion, **changes))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("trial", "told"),
+    [
+        (recorded(GraspMotion(lift_height=0.2)), "lift 0.3 m and 0.2 m"),
+        (recorded(GraspMotion(standoff=0.05)), "standoff 0.1 m and 0.05 m"),
+        (recorded(GraspMotion(retreat=0.05)), "retreat 0 m and 0.05 m"),
+        (recorded(GraspMotion(least_lift=0.1)), "least lift none and 0.1 m"),
+        (
+            recorded(GraspMotion(lift_direction=(0.0, 3.0, 4.0))),
+            "lift direction [0, 0, 1] and [0, 0.6, 0.8]",
+        ),
+        (recorded(tilt_limit=math.radians(15)), "tilt limit 30 degrees and 15 degrees"),
+        (recorded(slip_limit=0.01), "slip limit 0.02 m and 0.01 m"),
+        (recorded(approach=True), "approach no and yes"),
+        (recorded(hold_time=1.0), "hold time 0.5 s and 1 s"),
+        (recorded(tilt_limit=math.pi, slip_limit=math.inf), "slip limit 0.02 m and none"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_other_phases_are_refused(trial: dict[str, float], told: str, tmp_path: Path) -> None:
+    scene = known_runs.make_scene(tmp_path)
+    runs = [
+        known_runs.make_run(tmp_path / name, scene, {"mug": LIFTED}, trial=values)
+        for name, values in (("a", recorded()), ("b", trial))
+    ]
+    with pytest.raises(InvalidInputError) as refused:
+        compare(*runs)
+    start = f"{tmp_path / 'a'} and {tmp_path / 'b'} were made with different phases: "
+    assert str(refused.value).startswith(start)
+    assert told in str(refused.value)
+    assert compare(runs[1], runs[1]).coverage.compared == 2
+
+
+def test_every_setting_of_a_trial_is_compared(tmp_path: Path) -> None:
+    """Also those that will be added; and those that are lengths have a unit in messages."""
+    scene = known_runs.make_scene(tmp_path)
+    default = TrialSettings(motion=GraspMotion())
+    run = known_runs.make_run(tmp_path / "a", scene, {"mug": LIFTED}, trial=recorded())
+    names = [f.name for f in dataclasses.fields(TrialSettings) if f.name != "motion"]
+    for name in names:
+        value = getattr(default, name)
+        other = numbers(
+            dataclasses.replace(
+                default, **{name: not value if isinstance(value, bool) else 0.9 * value}
+            )
+        )
+        made = known_runs.make_run(tmp_path / name, scene, {"mug": LIFTED}, trial=other)
+        with pytest.raises(InvalidInputError, match=f"different phases: {name.replace('_', ' ')} "):
+            compare(run, made)
+        assert name in UNITS or isinstance(value, bool)
+
+
+def test_all_that_differs_is_named_at_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first, second = made_up(
+        tmp_path,
+        LIFTED,
+        LIFTED,
+        trial=recorded(GraspMotion(lift_height=0.2), disturbance=0.02),
+        station=Input(name="other", path="other.yaml", content="f" * 64),
+    )
+    own = first.document.station
+    assert main(["compare", str(first.path), str(second.path)]) == 2
+    assert capsys.readouterr().err == (
+        f"burg-drake: error: {first.path} and {second.path} were made with different phases:"
+        " lift 0.3 m and 0.2 m; disturbance 0.01 m and 0.02 m; tilt limit none and 30 degrees;"
+        " slip limit none and 0.02 m; and on different stations:"
+        f" panda_tabletop ({own.content[:12]}) and other ({'f' * 12}); evaluate the grasps of one,"
+        f" {first.path / 'grasps.npz'}, again as those of the other\n"
+    )
+
+
+def test_what_was_not_recorded_is_what_it_was(tmp_path: Path) -> None:
+    """Runs of before there were limits, and directions of another length."""
+    first, second = made_up(tmp_path, LIFTED, LIFTED, trial=recorded(**NO_LIMITS))
+    assert first.document.trial == {}
+    assert compare(first, second).coverage.compared == 2
+    scene = known_runs.make_scene(tmp_path)
+    up = recorded(GraspMotion(lift_direction=(0.0, 0.0, 2.5)), **NO_LIMITS)
+    longer = known_runs.make_run(tmp_path / "c", scene, {"mug": LIFTED}, trial=up)
+    assert compare(first, longer).coverage.compared == 2
+
+
+def test_engines_may_differ_and_are_named(tmp_path: Path) -> None:
+    found = compare(*made_up(tmp_path, LIFTED, LIFTED, engine=ENGINES["screening"]))
+    assert (found.first.engine, found.reference.engine) == ("standard", "screening")
+    assert found.settings == ("engine is standard in the first, screening in the second",)
+
+
+def test_of_two_modes_only_what_both_executed_is_compared(tmp_path: Path) -> None:
+    outcomes = ["lifted", "slipped", "lifted", "collision_target"]
+    by_hand: list[Verdict | None] = [known_runs.ended(v) for v in outcomes]
+    with_arm: list[Verdict | None] = [
+        known_runs.ended(v) for v in ("lifted", "lifted", "no_ik", "collision_target")
+    ]
+    found = compare(*made_up(tmp_path, by_hand, with_arm, mode="reach"))
+    assert found.coverage.compared == 2
+    assert found.coverage.left_out == {"not executed in both runs, whose modes differ": 2}
+    assert found.agreement is not None and found.agreement.alike.value == 0.5
+    scene = known_runs.make_scene(tmp_path)
+    nothing: list[Verdict | None] = [known_runs.ended("no_ik")] * 4
+    out_of_reach = known_runs.make_run(tmp_path / "c", scene, {"mug": nothing}, mode="arm")
+    with pytest.raises(InvalidInputError, match="different modes, hand and arm, and have no grasp"):
+        compare(tmp_path / "a", out_of_reach)
+
+
+def test_against_trials_phases_may_differ(tmp_path: Path) -> None:
+    """There reality says what is right, and one run may lift higher than the other."""
+    first, second = made_up(tmp_path, LIFTED, LIFTED, trial=recorded(GraspMotion(lift_height=0.2)))
+    sheet = burg.trials.plan_trials(first, out=tmp_path / "trials.yaml")
+    for trial in sheet.trials:
+        burg.trials.TrialBook(tmp_path / "trials.yaml").record(trial.number, outcome="lifted")
+    found = compare(first, second, tmp_path / "trials.yaml")
+    assert found.agreement is None and found.coverage.compared == 2
+    assert any(text.startswith("motion is ") for text in found.settings)
