@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from burg_drake.core import InvalidInputError, UnknownNameError, nearest
-from burg_drake.core.grasps import Outcome, Verdict
+from burg_drake.core.grasps import Mode, Outcome, Verdict
 from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.records import Journal, begun_now, origin_of
@@ -80,7 +80,7 @@ def _judge(
     journal: Journal,
     reporter: Reporter,
 ) -> Run:
-    mode = "arm" if run.document.mode == "arm" else "hand"
+    mode: Mode = "arm" if run.document.mode == "arm" else "hand"
     settings = origin_of(run.document).settings()
     factory = StationJudgeFactory(
         run.scene(), run.station(), ENGINES[engine], mode, settings.motion
@@ -113,7 +113,7 @@ def settled(before: Verdict, verdict: Verdict, engine: str) -> Verdict:
     """
     cpu = {
         stage: before.cpu.get(stage, 0.0) + verdict.cpu.get(stage, 0.0)
-        for stage in before.cpu | verdict.cpu
+        for stage in {**before.cpu, **verdict.cpu}
     }
     return replace(
         verdict,
