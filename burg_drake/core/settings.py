@@ -54,6 +54,7 @@ class Setting:
         metavar: what stands for the value in a help text; chosen by type and unit if empty.
         choices: the values there are; any if empty.
         low, above, high: bounds of the value as people give it: from, more than, at most.
+        infinite: whether `inf` may be given.
         noun: what a value is called in a message.
     """
 
@@ -66,6 +67,7 @@ class Setting:
     low: float | None = None
     above: float | None = None
     high: float | None = None
+    infinite: bool = False
     noun: str = "number"
 
     def option(self, field: str) -> str:

@@ -161,7 +161,7 @@ def _evaluate_one(
     writable_folder(folder)
     with Reporter(progress) as reporter, Journal(folder / JOURNAL_FILE) as journal:
         run = open_run(folder, scene, request, given, lambda: reporter.show(Progress("sampling")))
-        make_judge = StationJudgeFactory(scene, station, request.engine, mode, request.motion)
+        make_judge = StationJudgeFactory(scene, station, request.engine, mode, request.phases)
         remove_unfinished(folder)
         left = open_grasps(run, retry_failed=request.retry_failed)
         if left:

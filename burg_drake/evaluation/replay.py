@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from burg_drake.core import (
@@ -13,6 +13,7 @@ from burg_drake.core.grasps import (
     ARM_SCREEN_MARGINS,
     LIFT_HEIGHT,
     MARGINS,
+    PREFIXES,
     TRIAL_MARGINS,
     VERDICT_FIELDS,
     Margins,
@@ -99,6 +100,8 @@ def differences(recorded: Verdict, now: Verdict) -> list[Difference]:
         here.pop("clearance", None)
     if math.isnan(recorded.margins.get(LIFT_HEIGHT, math.nan)):  # likewise, or of a trial alone
         here.pop(LIFT_HEIGHT, None)
+    if math.isnan(recorded.margins.get("others_turned", math.nan)):  # it watched centres of mass
+        there, here = (_but_motions_of_others(found) for found in (there, here))
     # The arm may have passed a grasp on, and is not asked again.
     for name in ARM_SCREEN_MARGINS:
         if name not in here:
@@ -139,6 +142,13 @@ def _results(verdict: Verdict) -> dict[str, float | str]:
     if found.get("end_time") == 0.0:  # a trial that never began has an end at 0, or none
         del found["end_time"]
     return dict(sorted(found.items(), key=lambda one: not isinstance(one[1], str)))
+
+
+def _but_motions_of_others(found: Mapping[str, float | str]) -> dict[str, float | str]:
+    """Results without what tells how far objects were moved and turned."""
+    names = {"others_moved", "others_turned", "toppled", "pushed"}
+    of_each = tuple(prefix.replace("_", " ") for prefix in PREFIXES.values())
+    return {k: v for k, v in found.items() if k not in names and not k.startswith(of_each)}
 
 
 def _bits(value: float | str) -> str:

@@ -25,8 +25,8 @@ from burg_drake.evaluation.stages.station_judge import StationJudgeFactory
 from burg_drake.evaluation.workers import Job, JobFailed
 from burg_drake.evaluation.workers.limits import WorkerLimits
 from burg_drake.scene.document.scene import Scene
+from burg_drake.simulation.trials.trial_settings import TrialSettings
 from burg_drake.station.document.engine import ENGINES
-from burg_drake.station.document.grasp_motion import GraspMotion
 from burg_drake.station.document.station_document import Station
 
 distributed = pytest.importorskip("distributed", reason="the cluster needs burg-drake[dask]")
@@ -266,7 +266,7 @@ def test_a_scheduler_that_dies_is_said_in_one_line(
 ) -> None:
     nodes = cluster.nodes
     job = Job("job", Make(KnownJudge(pause=0.05)), grasps(200))
-    factory = StationJudgeFactory(scene, station, ENGINES["standard"], "hand", GraspMotion())
+    factory = StationJudgeFactory(scene, station, ENGINES["standard"], "hand", TrialSettings())
     answers = []
     lost = r"^the scheduler at tcp://127\S+ does not answer any more; what is done is kept"
     with connect_cluster(nodes.address) as executor, connect_cluster(nodes.address) as other:

@@ -22,8 +22,8 @@ from burg_drake.evaluation.stages.station_judge import StationJudgeFactory
 from burg_drake.evaluation.workers import Job
 from burg_drake.evaluation.workers.limits import WorkerLimits
 from burg_drake.scene.document.scene import Scene
+from burg_drake.simulation.trials.trial_settings import TrialSettings
 from burg_drake.station.document.engine import ENGINES
-from burg_drake.station.document.grasp_motion import GraspMotion
 from burg_drake.station.document.station_document import Station
 
 distributed = pytest.importorskip("distributed", reason="the cluster needs burg-drake[dask]")
@@ -168,7 +168,7 @@ def test_a_scene_that_does_not_arrive_is_told_of(
             raise error
 
     monkeypatch.setattr("burg_drake.evaluation.cluster.remote.unpack", unpack_nothing)
-    factory = StationJudgeFactory(scene, station, ENGINES["standard"], "hand", GraspMotion())
+    factory = StationJudgeFactory(scene, station, ENGINES["standard"], "hand", TrialSettings())
     with cluster(1) as (_, client):
         told = rf"^worker inproc://\S+ did not receive the scene 'job': {why}$"
         with pytest.raises(ClusterError, match=told):

@@ -19,8 +19,9 @@ from burg_drake.station.document.engine import ENGINES
 VERDICT = Verdict(
     Outcome.LIFTED,
     Stage.EXECUTED,
-    margins={"overlap": 0.0, "slip": 0.1 + 0.2, "tilt": math.nan},
+    margins={"overlap": 0.0, "slip": 0.1 + 0.2, "tilt": math.nan, "others_turned": 0.1},
     displacements={"mug": 0.0, "bowl": 1 / 3},
+    turned={"mug": 0.0, "bowl": 0.1},
     q_grasp=(1.0,),
     cpu={Stage.CLEAR: 1.0},
 )
@@ -53,6 +54,23 @@ def test_a_margin_that_was_not_measured_then_is_no_difference() -> None:
     found = differences(changed(clearance=0.002), changed(clearance=0.003))
     assert [d.name for d in found] == ["clearance"]
     assert [d.name for d in differences(changed(clearance=0.002), VERDICT)] == ["clearance"]
+
+
+def test_motions_of_centres_of_mass_are_not_held_against_those_of_farthest_points() -> None:
+    """As releases recorded them that did not measure rotations."""
+    old = dataclasses.replace(
+        changed(others_moved=1 / 3, pushed=0.1, others_turned=math.nan), turned={}
+    )
+    now = dataclasses.replace(
+        changed(others_moved=0.4, others_turned=0.2, pushed=0.2),
+        displacements={"mug": 0.1, "bowl": 0.4},
+        toppled="bowl",
+    )
+    assert differences(old, now) == []
+    (found,) = differences(old, dataclasses.replace(now, blocker="mug"))
+    assert found.name == "blocker"
+    names = {difference.name for difference in differences(VERDICT, now)}
+    assert names >= {"toppled", "others_moved", "others_turned", "pushed", "moved mug"}
 
 
 def test_the_last_bit_counts() -> None:

@@ -16,6 +16,7 @@ from burg_drake.scene.document.scene import Instance
 from burg_drake.simulation.trials.execution import Execution
 from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.simulation.trials.result import TrialResult
+from burg_drake.simulation.trials.trial_settings import NO_LIMITS
 from burg_drake.station.document.station_document import Obstacle
 
 
@@ -83,7 +84,7 @@ def test_half_of_the_lift_is_lifted(make_scene, share: float, outcome: str) -> N
     height, time, mass = 0.1, 0.35, 0.3
     A = 4 * height / time**2
     a = share * A / (2 - share)
-    settings = lifting(height, time)
+    settings = lifting(height, time, **NO_LIMITS)
     trial = HandTrial(
         make_scene(("post", 0.3, 0.2, 0.0)), make_station(), settings=settings, engine=QUICK
     )

@@ -123,12 +123,12 @@ def _parser_of(field: Field[Any], declaration: Setting) -> Callable[[str], Any]:
 
 
 def in_range(text: str, declaration: Setting) -> float:
-    """A finite number within the bounds of a setting.
+    """A number within the bounds of a setting; finite, unless that may be infinite.
 
     Raises:
         argparse.ArgumentTypeError: it is something else.
     """
-    value = number(text)
+    value = math.inf if declaration.infinite and text.lower() == "inf" else number(text)
     low, above, high = declaration.low, declaration.above, declaration.high
     above_low = (above is None or value > above) and (low is None or value >= low)
     if above_low and (high is None or value <= high):

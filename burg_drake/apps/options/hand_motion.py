@@ -60,8 +60,9 @@ def require_standoff_of_arm(arguments: argparse.Namespace, mode: str) -> None:
     Raises:
         InvalidInputError: it is given, and the hand begins at the grasp.
     """
-    if mode == "hand" and arguments.standoff_mm is not None:
+    approaches = mode != "hand" or getattr(arguments, "approach", False)
+    if not approaches and arguments.standoff_mm is not None:
         raise InvalidInputError(
             "--standoff-mm is the length of the approach; in mode 'hand' the trial begins at the"
-            " grasp: leave it out, or give --mode reach or arm"
+            " grasp: leave it out, or give --approach, or --mode reach or arm"
         )

@@ -101,6 +101,7 @@ def _add_options(parser: Parser) -> None:
     add_workers(who)
     add_cluster(who)
     add_options(parser, EvaluationSettings, "table", "mode", "shard")
+    add_options(parser, EvaluationSettings, "tilt_limit_deg", "slip_limit_mm", "approach")
     add_motion(parser)
     add_retry_failed(parser, "grasps")
     parser.add_argument(

@@ -11,6 +11,7 @@ from typing import Literal, Protocol
 from burg_drake.core import InvalidInputError, content_hash
 from burg_drake.core.grasps import Mode
 from burg_drake.core.paths import data_root
+from burg_drake.evaluation.records.limit_numbers import APPROACH, limits_text, without_limits
 from burg_drake.evaluation.records.motion_numbers import motion_in, motion_text, without_motion
 from burg_drake.evaluation.records.origin import TrialOrigin, engine_label
 from burg_drake.scene.document import Scene
@@ -176,20 +177,23 @@ def identity(document: RunDocument) -> dict[str, str]:
 def request_identity(document: RunRequestFields) -> dict[str, str]:
     """The same of all scenes that it is asked about, in words, by topic."""
     grasps, engine = document.grasps, document.engine
-    others = [without_motion(values) for values in (document.trial, document.arm)]
+    others = [without_limits(without_motion(values)) for values in (document.trial, document.arm)]
     settings = content_hash(vars(engine), *others)[:HASH_DIGITS]
     sampled = grasps.origin == "sampled"
-    approach = {"approach angle": f"{grasps.approach_angle_deg} degrees"} if sampled else {}
+    angle = {"approach angle": f"{grasps.approach_angle_deg} degrees"} if sampled else {}
+    simulated = "simulated" if document.trial.get(APPROACH) else "not simulated"
     return {
         "station": f"content {document.station.content[:HASH_DIGITS]}",
         "engine": engine_label(engine),
         SETTINGS: settings,
         "motion": motion_text(motion_in(document.trial)),
+        "limit in the hand": limits_text(document.trial),
+        **({} if document.mode == "arm" else {"approach of the hand": simulated}),
         "mode": document.mode,
         "grasps": (
             _sampled(grasps) if sampled else f"given, content {grasps.content[:HASH_DIGITS]}"
         ),
-        **approach,
+        **angle,
         "seed": str(document.seed),
         "burg_drake": document.versions.get("burg_drake", ""),
         "drake": document.versions.get("drake", ""),

@@ -36,6 +36,11 @@ class EvaluationSettings:
             execute, too, with a path, a straight approach and a straight lift. `arm`: those, and
             the whole arm executes them. None is `reach` if the station has an arm, else `hand`.
         engine: how trials are stepped; an engine or the name of a preset.
+        tilt_limit_deg: a target that turns in the hand by more than this since the grip, and is
+            held, ends as `lifted_turned`, above 0; 180 is no limit.
+        slip_limit_mm: likewise of one that slides; infinite is no limit.
+        approach: whether the hand alone begins at the pregrasp and goes straight to the grasp in
+            simulation, too. Otherwise it begins at the grasp, open. The whole arm does so anyway.
         motion: how the hand goes to a grasp and away from it; as the station says if None.
         seed: of the sampling.
         shard: a share of the work, such as `2/8`: of at least as many scenes every eighth one, of
@@ -45,7 +50,7 @@ class EvaluationSettings:
             most a hundred, as one takes some tenths of a second. `write_report` makes it later.
 
     Raises:
-        InvalidInputError: no grasps are asked for.
+        InvalidInputError: no grasps are asked for, or a limit is not one.
     """
 
     grasps_per_object: int = setting(
@@ -72,15 +77,38 @@ class EvaluationSettings:
     only: Iterable[str] | None = None
     mode: Mode | None = setting(
         None,
-        "hand: simulate all grasps with the hand alone; reach: with the hand alone, those that"
-        " the arm can execute; arm: those, with the whole arm from the pregrasp on (default:"
-        " reach, or hand if there is no arm)",
+        "hand: simulate all grasps with the hand alone, which begins at the grasp, open: its"
+        " approach is not simulated (see --approach); reach: likewise those that the arm can"
+        " execute; arm: those, with the whole arm from the pregrasp on (default: reach, or hand if"
+        " there is no arm)",
         choices=MODES,
     )
     engine: Engine | str = setting(
         DEFAULT_ENGINE,
         "engine preset: for reference values, for results, for a first look",
         choices=tuple(ENGINES),
+    )
+    tilt_limit_deg: float = setting(
+        30.0,
+        "what is held, but turned in the hand by more than this, ends as lifted_turned and not as"
+        " lifted (180: no limit)",
+        name="tilt_limit",
+        metavar="DEG",
+        above=0,
+        high=180,
+        noun="an angle in degrees",
+    )
+    slip_limit_mm: float = setting(
+        20.0,
+        "likewise what slid in the hand by more than this (inf: no limit)",
+        metavar="MM",
+        above=0,
+        infinite=True,
+    )
+    approach: bool = setting(
+        False,
+        "with the hand alone, simulate its approach, too: straight from the pregrasp, open;"
+        " otherwise it begins at the grasp. The whole arm (mode arm) does so anyway",
     )
     motion: GraspMotion | None = None
     seed: int = setting(0, "seed of the sampling", high=LARGEST_SEED)
@@ -101,4 +129,12 @@ class EvaluationSettings:
         if self.grasps_per_object < 1:
             raise InvalidInputError(
                 f"grasps_per_object is {self.grasps_per_object}; give 1 or more"
+            )
+        if not 0.0 < self.tilt_limit_deg <= 180.0:
+            raise InvalidInputError(
+                f"tilt_limit_deg is {self.tilt_limit_deg:g}; give more than 0, and 180 for no limit"
+            )
+        if not self.slip_limit_mm > 0.0:
+            raise InvalidInputError(
+                f"slip_limit_mm is {self.slip_limit_mm:g}; give more than 0, and inf for no limit"
             )

@@ -227,7 +227,7 @@ class _Call:
             self.pace.skip(judging.known, note=self._note())
         request = self.request
         factory = StationJudgeFactory(
-            scene, request.station, request.engine, request.mode, request.motion
+            scene, request.station, request.engine, request.mode, request.phases
         )
         return Job(item.name, factory, judging.left)
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from burg_drake.core import (
+    InvalidInputError,
     content_hash,
     software_versions,
 )
@@ -31,6 +34,9 @@ from burg_drake.evaluation.records import (
 from burg_drake.evaluation.stages import arm_settings, mode_for
 from burg_drake.scene.document import Scene
 from burg_drake.station.document import Engine, GraspMotion, Station, as_engine
+
+if TYPE_CHECKING:
+    from burg_drake.simulation.trials import TrialSettings
 
 ByInstance = Mapping[str, GraspSet]
 GraspsLike = GraspSet | ByInstance | Callable[[Scene], ByInstance]
@@ -73,14 +79,20 @@ class Request:
 
         Raises:
             UnknownNameError: there is no engine of this name.
-            InvalidInputError: there is no such mode or share, or the station lacks the arm.
+            InvalidInputError: there is no such mode or share, the station lacks the arm, or the
+            approach is asked for of the whole arm.
         """
-        engine = settings.engine
+        engine, mode = settings.engine, mode_for(station, settings.mode)
+        if settings.approach and mode == "arm":
+            raise InvalidInputError(
+                "the approach of the hand alone is asked for with mode arm, in which the whole arm"
+                " approaches anyway; leave approach out, or give mode hand or reach"
+            ).about("approach")
         return cls(
             station=station,
             settings=settings,
             engine=as_engine(engine),
-            mode=mode_for(station, settings.mode),
+            mode=mode,
             motion=settings.motion or station.document.motion,
             shard=as_shard(settings.shard),
             only=tuple(settings.only or ()),
@@ -189,9 +201,19 @@ class Request:
     @property
     def trial(self) -> dict[str, float]:
         """Settings of the trial's phases, by name."""
+        return numbers(self.phases)
+
+    @property
+    def phases(self) -> TrialSettings:
+        """Settings of the trial's phases."""
         from burg_drake.simulation.trials import TrialSettings
 
-        return numbers(TrialSettings(motion=self.motion))
+        return TrialSettings(
+            motion=self.motion,
+            tilt_limit=math.radians(self.settings.tilt_limit_deg),
+            slip_limit=self.settings.slip_limit_mm / 1000.0,
+            approach=self.settings.approach,
+        )
 
     @property
     def arm(self) -> dict[str, float]:

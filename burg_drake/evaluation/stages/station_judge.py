@@ -137,21 +137,19 @@ def _room(scene: Scene, station: Station, motion: GraspMotion) -> LiftRoom | Non
 
 @dataclass(frozen=True)
 class StationJudgeFactory:
-    """What a worker process needs to build its `StationJudge`."""
+    """What a worker process needs to build its `StationJudge`; see `build_judge`."""
 
     scene: Scene
     station: Station
     engine: Engine
     mode: Mode
-    motion: GraspMotion | None = None
+    settings: TrialSettings | None = None
 
     def __call__(self) -> StationJudge:
-        from burg_drake.simulation.trials import TrialSettings
-
         return build_judge(
             self.scene,
             self.station,
             engine=self.engine,
             mode=self.mode,
-            settings=TrialSettings(motion=self.motion),
+            settings=self.settings,
         )

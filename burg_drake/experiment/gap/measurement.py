@@ -39,6 +39,7 @@ from burg_drake.evaluation.records import (
     Grasps,
     Journal,
     Lock,
+    limit_settings,
     motion_in,
     numbers,
     read_journal,
@@ -217,13 +218,16 @@ def _same(run: Run) -> dict[str, Any]:
         seed=run.document.seed,
         motion=motion_in(run.document.trial),
         table=run.document.table,
+        **limit_settings(run.document.trial),
     )
     return {"grasps": by_instance(run.candidates), "settings": settings}
 
 
 def _in_mode(asked: dict[str, Any], mode: Mode) -> dict[str, Any]:
-    """The same arguments of `evaluate` in another mode."""
-    return {**asked, "settings": replace(asked["settings"], mode=mode)}
+    """The same arguments of `evaluate` in another mode; the whole arm approaches anyway."""
+    settings = asked["settings"]
+    approach = settings.approach and mode != "arm"
+    return {**asked, "settings": replace(settings, mode=mode, approach=approach)}
 
 
 def by_instance(candidates: Candidates) -> dict[str, GraspSet]:

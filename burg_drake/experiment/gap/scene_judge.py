@@ -42,13 +42,8 @@ class SceneJudgeFactory:
 
     @property
     def plain(self) -> Callable[[], StationJudge]:
-        """The usual factory where it does the same: clusters know how to send that one."""
-        from burg_drake.simulation.trials import TrialSettings
-
-        if self.settings != TrialSettings(motion=self.settings.motion):
-            return self
-        motion = self.settings.motion
-        return StationJudgeFactory(self.scene, self.station, self.engine, self.mode, motion)
+        """The usual factory, which does the same: clusters know how to send that one."""
+        return StationJudgeFactory(self.scene, self.station, self.engine, self.mode, self.settings)
 
     @property
     def content(self) -> str:

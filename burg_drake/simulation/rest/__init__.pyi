@@ -1,3 +1,7 @@
+from .body_motions import (
+    MotionTracker as MotionTracker,
+    center_of_mass as center_of_mass,
+)
 from .criterion import (
     BodySpeed as BodySpeed,
     settle as settle,

@@ -1,6 +1,6 @@
 from .arm_trial import ArmTrial as ArmTrial
 from .contacts import finger_contact as finger_contact
-from .execution import (
+from .grip_motion import (
     LEVER as LEVER,
     motion_in_hand as motion_in_hand,
 )

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.multibody.tree import BodyIndex
 
-from burg_drake.core import Array, inverse, rotation_angle
+from burg_drake.core import Array, inverse
 from burg_drake.core.grasps import Margins, Outcome
+from burg_drake.simulation.rest import MotionTracker, center_of_mass
 from burg_drake.simulation.trials.carrier import Carrier, HandSegment
 from burg_drake.simulation.trials.contacts import (
     NO_CONTACT,
@@ -19,7 +20,7 @@ from burg_drake.simulation.trials.contacts import (
     reached,
     touched_from_outside,
 )
-from burg_drake.simulation.trials.mass_centers import MassCenterTracker, center_of_mass
+from burg_drake.simulation.trials.grip_motion import GripMotion
 from burg_drake.simulation.trials.result import TrialResult
 
 if TYPE_CHECKING:
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
 
 MINIMUM_LIFT = 0.5
 """Share of the hand's way that the target must go with it to count as lifted."""
-LEVER = 0.01
-"""Turning counts as the motion of a point so far from the grasp [m], which is at a pad's rim."""
 
 
 class OtherTouched(Exception):
@@ -74,13 +73,11 @@ class Execution:
         self._moved = self._displacements(self._others.values())
         self._pushed: dict[str, float] = {}
         self.contact = NO_CONTACT
-        self._X_GO_last = self.X_GO()
-        self._X_GO_grip: Array | None = None
+        self._in_hand = GripMotion(self._settings, self.X_GO())
         self._touched = False
         self._blocker = ""
         self._steps = 0
         self._steps_per_check = max(1, round(self._settings.poll / diagram.engine.time_step))
-        self._motions_in_hand: list[float] = []
         self._in_free_air = 0.0
         self._path_is_blocked = False
         self._left_to_go = 0.0
@@ -110,7 +107,9 @@ class Execution:
             target.update(self._still)
             if self._blocker:
                 break
-        self._pushed = self._displaced() | target.by_name(self._itself)
+        self._pushed = self._of_others(self._moved.farthest) | _by_name(
+            self._itself, target.farthest
+        )
         return Outcome.BLOCKED if self._blocker else None
 
     def close(self) -> Outcome | None:
@@ -129,7 +128,7 @@ class Execution:
                 if now - slow_since >= settings.settled_time - 1e-9:
                     break
         if self.contact.both:
-            self._X_GO_grip = self.X_GO()
+            self._in_hand.grip()
             return None
         if self.contact.any:
             return Outcome.ONE_FINGER
@@ -166,20 +165,24 @@ class Execution:
         Unless the whole trial is asked for, the end is early when the grip is steady.
         """
         settings = self._settings
-        self._motions_in_hand.clear()
+        self._in_hand.begin_again()
         for _ in range(max(1, round(settings.hold_time / settings.poll))):
             self.advance()
             if self._blocker:
                 return Outcome.BLOCKED
             if not self.contact.any:
                 return Outcome.DROPPED
-            if self._is_held_steadily() and not self._world.diagram.engine.whole_trial:
+            if self._world.diagram.engine.whole_trial:
+                continue
+            if self._in_hand.is_steady and self._in_hand.stays_on_one_side(settings.hold_time):
                 break
         return None if self.contact.both else Outcome.DROPPED
 
     def held(self) -> Outcome:
         """The outcome of a target that is held to the end."""
-        disturbed = self._moved.largest > self._settings.disturbance
+        if self._in_hand.is_beyond_limits:
+            return Outcome.LIFTED_TURNED
+        disturbed = _largest(self._moved.farthest) > self._settings.disturbance
         return Outcome.LIFTED_DISTURBED if disturbed else Outcome.LIFTED
 
     def _turn(self, segment: HandSegment) -> None:
@@ -197,37 +200,21 @@ class Execution:
         """
         if self._world.diagram.engine.whole_trial or self._path_is_blocked:
             return False
-        if not self.contact.both or not (self._is_held_steadily() or self._is_coming_to_rest()):
+        time = self._carrier.lift_time + self._settings.hold_time
+        in_hand = self._in_hand
+        if not self.contact.both or not (in_hand.is_steady or in_hand.is_coming_to_rest(time)):
             return False
         if self._in_free_air < self._settings.steady_time - 1e-9:
             return False
         left = last.length - self._carrier.travelled()
         if self.followed() + left < MINIMUM_LIFT * self._path_length:
             return False
+        if not in_hand.stays_on_one_side(time):
+            return False
         self._path_is_blocked = not self._carrier.is_free_ahead()
         if not self._path_is_blocked:
             self._left_to_go = left
         return not self._path_is_blocked
-
-    def _is_held_steadily(self) -> bool:
-        """Whether the grip has been steady for `steady_time`."""
-        settings = self._settings
-        recent = self._motions_in_hand[-settings.steady_polls :]
-        enough = len(recent) == settings.steady_polls
-        return enough and max(recent) <= settings.creep_speed * settings.poll
-
-    def _is_coming_to_rest(self) -> bool:
-        """Whether the target moves in the hand no faster than before, and not far any more.
-
-        Drake's friction is slightly viscous: below its limit a load does not slide but creeps, at a
-        constant speed that is the higher, the larger the time step.
-        """
-        settings = self._settings
-        n = settings.steady_polls
-        before, now = sum(self._motions_in_hand[-2 * n : -n]), sum(self._motions_in_hand[-n:])
-        ahead = (self._carrier.lift_time + settings.hold_time) / settings.poll
-        enough = len(self._motions_in_hand) >= 2 * n
-        return enough and now <= before and now / n * ahead <= settings.creep_distance
 
     def advance(self, steps: int | None = None) -> float:
         """Steps to the next look at the contacts; returns the time [s].
@@ -272,13 +259,8 @@ class Execution:
         settings, target = self._settings, self._target.index()
         self.contact = finger_contact(contacts, self._world.hand.fingers, target)
         self._touched = self._touched or self.contact.any
-        X_GO = self.X_GO()
-        distance, angle = motion_in_hand(self._X_GO_last, X_GO)
-        self._X_GO_last = X_GO
-        if self._moved.update(self._still) <= settings.settled_speed * settings.poll:
-            self._motions_in_hand.append(max(distance, angle * LEVER))
-        else:
-            self._motions_in_hand.clear()
+        others_rest = self._moved.update(self._still) <= settings.settled_speed * settings.poll
+        self._in_hand.look(self.X_GO(), others_rest=others_rest)
         self._blocker = self._carrier.watch(contacts)
         free = not touched_from_outside(contacts, self._robot | {target})
         self._in_free_air = self._in_free_air + settings.poll if free else 0.0
@@ -298,20 +280,20 @@ class Execution:
         """The target's centre of mass (3,) in the world [m]."""
         return center_of_mass(self._plant, self._plant_context, self._target)
 
-    def _displacements(self, bodies: Iterable[BodyIndex]) -> MassCenterTracker:
+    def _displacements(self, bodies: Iterable[BodyIndex]) -> MotionTracker:
         """Of bodies, from where they are now."""
-        return MassCenterTracker(self._plant, self._plant_context, bodies)
+        return MotionTracker(self._plant, self._plant_context, bodies, self._world.corners)
 
-    def _displaced(self) -> dict[str, float]:
-        """Largest displacements of the others by name [m]; what can only stand has none."""
+    def _of_others(self, values: Mapping[BodyIndex, float]) -> dict[str, float]:
+        """Motions of the others by name; what can only stand has none."""
         standing = dict.fromkeys(self._world.diagram.standing, 0.0)
-        return standing | self._moved.by_name(self._others)
+        return standing | _by_name(self._others, values)
 
     def result(self, outcome: Outcome) -> TrialResult:
         """The outcome with the margins at this moment."""
-        slip = tilt = force = area = math.nan
-        if self._X_GO_grip is not None:
-            slip, tilt = motion_in_hand(self._X_GO_grip, self.X_GO())
+        force = area = math.nan
+        slip, tilt = self._in_hand.since_grip
+        if not math.isnan(slip):
             closing = self._world.hand.X_WG(self._plant_context)[:3, 0]
             force = float(np.abs(self.contact.force @ closing).min())
             area = float(self.contact.area.min())
@@ -322,7 +304,8 @@ class Execution:
             pad_force=force,
             patch_area=area,
             lift=self.followed() + self._left_to_go,
-            others_moved=self._moved.largest,
+            others_moved=_largest(self._moved.farthest),
+            others_turned=_largest(self._moved.turned),
             end_time=self._context.get_time(),
             tracking_error=self._carrier.tracking_error,
             tracking_distance=self._carrier.tracking_distance,
@@ -332,13 +315,19 @@ class Execution:
             outcome=outcome,
             margins=margins,
             blocker=self._blocker if outcome is Outcome.BLOCKED else "",
-            displacements=self._displaced(),
+            displacements=self._of_others(self._moved.farthest),
+            turned=self._of_others(self._moved.turned),
+            toppled=", ".join(self._moved.toppled(self._others)),
             pushed=self._pushed,
             touched=self._carrier.touched,
         )
 
 
-def motion_in_hand(X_GO: Array, X_GO_later: Array) -> tuple[float, float]:
-    """How a target has moved in the hand: of the point at the grasp [m], and its angle [rad]."""
-    X_GG = X_GO_later @ inverse(X_GO)
-    return float(np.linalg.norm(X_GG[:3, 3])), float(rotation_angle(X_GG[:3, :3]))
+def _by_name(
+    bodies: Mapping[str, BodyIndex], values: Mapping[BodyIndex, float]
+) -> dict[str, float]:
+    return {name: values[index] for name, index in bodies.items()}
+
+
+def _largest(values: Mapping[BodyIndex, float]) -> float:
+    return max(values.values(), default=0.0)

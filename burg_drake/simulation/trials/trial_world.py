@@ -25,6 +25,7 @@ from burg_drake.simulation.rest import Neighbours
 from burg_drake.simulation.trials.contacts import ContactReader
 from burg_drake.simulation.trials.trial_settings import TrialSettings
 from burg_drake.station.diagram import HandHandle, StationDiagram, separate_contact
+from burg_drake.station.world import hull_corners
 
 TOUCHING = 0.001
 """A target whose hull is closer to another thing than this may lean on it [m]."""
@@ -66,6 +67,7 @@ class TrialWorld:
         )
         self._default = diagram.diagram.CreateDefaultContext()
         self.simulator = Simulator(diagram.diagram, self._default.Clone())
+        self._corners: dict[BodyIndex, Array] = {}
         self._prepared: tuple[str, float | None, float | None] | None = None
         """Target, friction and mass that the Context is prepared for; None if for nothing."""
 
@@ -73,6 +75,14 @@ class TrialWorld:
     def context(self) -> Context:
         """Context of the trial that runs or ran last."""
         return self.simulator.get_mutable_context()
+
+    def corners(self, index: BodyIndex) -> Array:
+        """(N, 3) corners of the convex hull of a free object in its frame O [m]; read once."""
+        if index not in self._corners:
+            name = next(name for name, free in self.diagram.free.items() if free == index)
+            scene = self.diagram.scene
+            self._corners[index] = hull_corners(scene.library, scene.entry(name))
+        return self._corners[index]
 
     def is_usable(self) -> bool:
         """Whether trials can begin in it. In a world of a target alone that is so if there is

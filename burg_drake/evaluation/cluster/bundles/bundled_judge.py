@@ -7,7 +7,7 @@ import pickle
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from burg_drake.core.grasps import Mode
 from burg_drake.evaluation.cluster.bundles.bundle import (
@@ -18,7 +18,10 @@ from burg_drake.evaluation.cluster.bundles.bundle import (
 )
 from burg_drake.evaluation.cluster.bundles.judge_recipe import JudgeRecipe
 from burg_drake.evaluation.stages import Judge, StationJudge, StationJudgeFactory
-from burg_drake.station.document import Engine, GraspMotion
+from burg_drake.station.document import Engine
+
+if TYPE_CHECKING:
+    from burg_drake.simulation.trials import TrialSettings
 
 
 @dataclass(frozen=True)
@@ -27,21 +30,21 @@ class BundledJudgeFactory:
 
     Attributes:
         bundle: its name and hashes, without data.
-        engine, mode, motion: as in `StationJudgeFactory`.
+        engine, mode, settings: as in `StationJudgeFactory`.
         folder: where it is unpacked; the worker says so.
     """
 
     bundle: Bundle
     engine: Engine
     mode: Mode
-    motion: GraspMotion | None
+    settings: TrialSettings | None
     folder: Path | None = None
 
     def __call__(self) -> StationJudge:
         assert self.folder is not None
         scene, station = load_bundle(self.folder)
         require_content(self.bundle, scene, station)
-        return StationJudgeFactory(scene, station, self.engine, self.mode, self.motion)()
+        return StationJudgeFactory(scene, station, self.engine, self.mode, self.settings)()
 
 
 def recipe_of(make_judge: Callable[[], Judge]) -> tuple[JudgeRecipe, Bundle | None]:
@@ -74,4 +77,4 @@ class _Packer(pickle.Pickler):
             return None
         self.bundle = make_bundle(value.scene, value.station)
         hashes = replace(self.bundle, data=b"")
-        return BundledJudgeFactory(hashes, value.engine, value.mode, value.motion)
+        return BundledJudgeFactory(hashes, value.engine, value.mode, value.settings)

@@ -14,6 +14,7 @@ from burg_drake.evaluation.records import (
     CampaignDocument,
     EvaluationSettings,
     RunDocument,
+    limit_options,
     motion_in,
     motion_options,
 )
@@ -77,9 +78,10 @@ def _settings(document: RunDocument | CampaignDocument, station: Path | None) ->
     words: list[str] = []
     if station is not None:
         usual = load_document(station, StationDocument).motion
-        if document.mode == "hand":  # which does not begin before the grasp
+        if document.mode == "hand" and not document.trial.get("approach"):  # begins at the grasp
             motion = replace(motion, standoff=usual.standoff)
         words += motion_options(motion, usual)
+    words += limit_options(document.trial)
     words += _words(engine=document.engine.name, seed=document.seed)
     if document.table != EvaluationSettings.table:
         words += _words(table=document.table)

@@ -1,0 +1,63 @@
+"""What counts as lifted, and whether the hand's approach was simulated: as numbers of a recorded
+run, as text, as settings of `evaluate`, and as options of its command."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from burg_drake.core import option_of
+from burg_drake.evaluation.records.settings import EvaluationSettings
+
+TILT, SLIP, APPROACH = "tilt_limit", "slip_limit", "approach"
+"""Names in a record, see `simulation.trials.trial_settings.TrialSettings`."""
+
+
+def limit_settings(values: Mapping[str, float]) -> dict[str, Any]:
+    """Fields of `EvaluationSettings` that recorded numbers ask for. What is not recorded, as in
+    runs of releases before there were limits, is no limit.
+
+    Args:
+        values: settings of the trial's phases.
+    """
+    return {
+        "tilt_limit_deg": _degrees(values.get(TILT, math.pi)),
+        "slip_limit_mm": _millimetres(values.get(SLIP, math.inf)),
+        "approach": bool(values.get(APPROACH, False)),
+    }
+
+
+def without_limits(values: Mapping[str, float]) -> dict[str, float]:
+    """Recorded numbers of other settings."""
+    return {k: v for k, v in values.items() if k not in (TILT, SLIP, APPROACH)}
+
+
+def limits_text(values: Mapping[str, float]) -> str:
+    """The limits for people."""
+    asked = limit_settings(values)
+    tilt, slip = asked["tilt_limit_deg"], asked["slip_limit_mm"]
+    parts = [f"tilt {tilt:.12g} degrees"] if tilt < 180.0 else []
+    parts += [f"slip {slip:.12g} mm"] if math.isfinite(slip) else []
+    return ", ".join(parts) or "none"
+
+
+def limit_options(values: Mapping[str, float]) -> list[str]:
+    """Words of a command line that ask for the same where that is not the usual."""
+    words: list[str] = []
+    for name, value in limit_settings(values).items():
+        if value != getattr(EvaluationSettings, name):
+            shown = [] if value is True else [f"{value:.17g}"]
+            words += [option_of(EvaluationSettings, name), *shown]
+    return words
+
+
+def _degrees(angle: float) -> float:
+    """An angle [rad] in few digits, if they are the same angle."""
+    short = float(f"{math.degrees(angle):.12g}")
+    return short if math.radians(short) == angle else math.degrees(angle)
+
+
+def _millimetres(length: float) -> float:
+    short = float(f"{1e3 * length:.12g}")
+    return short if short / 1000.0 == length else 1e3 * length
