@@ -82,9 +82,7 @@ def _judge(
 ) -> Run:
     mode: Mode = "arm" if run.document.mode == "arm" else "hand"
     settings = origin_of(run.document).settings()
-    factory = StationJudgeFactory(
-        run.scene(), run.station(), ENGINES[engine], mode, settings.motion
-    )
+    factory = StationJudgeFactory(run.scene(), run.station(), ENGINES[engine], mode, settings)
     pace = ProgressMeter(reporter.show, Progress(STARTING, 0, len(left)), "judging again")
     session, begun, judged = begun_now(executor.workers, len(run.verdicts)), time.monotonic(), 0
     job = Job(run.document.scene.name, factory, left)

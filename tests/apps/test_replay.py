@@ -58,7 +58,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
         folder / "stack.yaml",
         "panda_tabletop",
         folder / "run",
-        settings=EvaluationSettings(engine=ENGINE, mode="hand", motion=LOW),
+        settings=EvaluationSettings(engine=ENGINE, mode="hand", motion=LOW, tilt_limit_deg=180),
         grasps={"box": GraspSet.create(grasps, object="box", width=0.06)},
         workers=1,
         progress=False,

@@ -78,7 +78,7 @@ class EvaluationSettings:
     mode: Mode | None = setting(
         None,
         "hand: simulate all grasps with the hand alone, which begins at the grasp, open: its"
-        " approach is not simulated (see --approach); reach: likewise those that the arm can"
+        " approach is not simulated (see {approach}); reach: likewise those that the arm can"
         " execute; arm: those, with the whole arm from the pregrasp on (default: reach, or hand if"
         " there is no arm)",
         choices=MODES,

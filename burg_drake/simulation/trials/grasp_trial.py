@@ -12,7 +12,8 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
 from burg_drake.core import Array, InvalidInputError, check_pose
-from burg_drake.grasping.clearance import HandClearance
+from burg_drake.core.grasps import Outcome
+from burg_drake.grasping.clearance import Clearance, HandClearance
 from burg_drake.scene.document import Scene
 from burg_drake.simulation.rest import Neighbours
 from burg_drake.simulation.trials.contacts import ContactReader
@@ -140,7 +141,7 @@ class GraspTrial(ABC):
         *,
         without_hull: bool = False,
     ) -> TrialResult:
-        """Executes a grasp, if the open hand is clear at it.
+        """Executes a grasp, if the open hand is clear at it, and where its approach begins.
 
         Args:
             instance: the target.
@@ -154,6 +155,9 @@ class GraspTrial(ABC):
         screen = self.clearance.check(instance, X_WG)
         if screen.outcome is not None:
             return collision(screen)
+        start = self._screen_of_start(instance, X_WG)
+        if start is not None and start.outcome is not None:
+            return collision(replace(start, outcome=Outcome.HAND_COLLISION_APPROACH))
         world = self._world_of(instance)
         if without_hull and world.robot_meets_hull:
             world = self.complete_world
@@ -167,6 +171,11 @@ class GraspTrial(ABC):
         except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
             world.invalidate()
             return failure(error, screen, world.context.get_time())
+
+    def _screen_of_start(self, instance: str, X_WG: Array) -> Clearance | None:
+        """The screen of the open hand where a trial begins; None if that is at the grasp, or the
+        plan of an arm tells."""
+        return None
 
     def closed_before_contact(self, instance: str, X_WG: Array) -> float:
         """How far the fingers can close, from 0 (open) to 1, before they touch anything: the

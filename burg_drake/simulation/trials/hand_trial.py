@@ -1,5 +1,8 @@
 """The floating-hand trial: the open hand stands at the grasp, closes, lifts and holds.
 
+How it came there is not simulated, unless `TrialSettings.approach` asks for it: then the open hand
+begins at the pregrasp, and goes straight in before it closes.
+
 After Rudorfer et al., "BURG-Toolkit" (2022): a grasp that collides is rejected before any step; the
 fingers close with a limited force until the grip settles; the hand rises by 0.30 m along world z,
 unless another motion is asked for, and holds; success means that both fingers still hold the
@@ -15,8 +18,8 @@ from functools import lru_cache, partial
 import numpy as np
 from pydrake.geometry import Meshcat
 
-from burg_drake.core import Array, InvalidInputError
-from burg_drake.grasping.clearance import HandClearance
+from burg_drake.core import Array, InvalidInputError, make_pose
+from burg_drake.grasping.clearance import Clearance, HandClearance
 from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.simulation.trials.execution import Execution
 from burg_drake.simulation.trials.grasp_trial import KEPT_WORLDS, GraspTrial
@@ -39,13 +42,18 @@ from burg_drake.station.document import (
 class HandTrial(GraspTrial):
     """Executes grasps of one scene with the hand alone.
 
+    The approach is not simulated: the open hand begins at the grasp, and what is in its way there
+    is a collision. With `TrialSettings.approach` it begins at the pregrasp, the standoff back along
+    the approach, and goes straight in with open fingers, as fast as it lifts. What it meets on the
+    way is pushed, or stops it, as in the trial of the whole arm.
+
     Args:
         scene: the scene.
         station: table, board pose and hand.
         engine: time step and contact settings, or the name of a preset.
         settings: phases of a trial.
-        motion: where the hand goes, if not as the settings or else the station say; the way to the
-            grasp does not count, as the hand begins there.
+        motion: where the hand goes, if not as the settings or else the station say; the standoff
+            counts only if the approach is simulated.
         lock: keep objects locked until something moving touches them. Without it all free objects
             are simulated from the start, which costs more and gives the same verdicts.
         meshcat: where to show the trials; recording is the caller's.
@@ -140,7 +148,8 @@ class HandTrial(GraspTrial):
         The fingers start where they would touch something first: until then nothing happens. Only
         the target, and what stands so close that it may lean on it, is free to move; others are
         released when something moving touches them. What nothing touches stays at rest, so that
-        the result is the one with all objects free, at the cost of those that matter.
+        the result is the one with all objects free, at the cost of those that matter. With an
+        approach the fingers start open, and the target is locked like the others.
 
         Args:
             instance: the target.
@@ -152,18 +161,41 @@ class HandTrial(GraspTrial):
         world = self._enter(world)
         target = world.diagram.free[instance]
         everything = set(world.diagram.free.values())
-        moving = world.neighbours.close_to({target}) if self._lock else everything
+        approach = self._approach(X_WG)
+        beside_hand = set() if approach else world.neighbours.close_to({target})
+        moving = beside_hand if self._lock else everything
         world.prepare(instance, moving, friction, mass)
         paths = self.lift_paths(X_WG) if paths is None else paths
         plant_context = world.diagram.plant.GetMyMutableContextFromRoot(world.context)
         assert isinstance(world.hand, FloatingHand)
-        closed = self.closed_before_contact(instance, X_WG)
-        world.hand.place(plant_context, X_WG, closed, direction_W=paths[0].direction_W)
+        if approach is None:
+            closed = self.closed_before_contact(instance, X_WG)
+            world.hand.place(plant_context, X_WG, closed, direction_W=paths[0].direction_W)
+            world.command("hand", world.hand.closing_command())
+        else:
+            X_WP = self._pregrasp(X_WG)
+            world.hand.place(plant_context, X_WP, direction_W=approach.direction_W)
+            world.command("hand", world.hand.opening_command())
         world.command("lift", np.zeros(2))
-        world.command("hand", world.hand.closing_command())
         world.simulator.Initialize()
         lift_clearance = partial(self._lift_clearance, instance)
-        return Execution(world, target, moving, LiftCarrier(world, paths, lift_clearance))
+        carrier = LiftCarrier(world, paths, lift_clearance, approach, target)
+        return Execution(world, target, moving, carrier)
+
+    def _screen_of_start(self, instance: str, X_WG: Array) -> Clearance | None:
+        if self._approach(X_WG) is None:
+            return None
+        return self.clearance.check(instance, self._pregrasp(X_WG))
+
+    def _approach(self, X_WG: Array) -> LiftPath | None:
+        """The path of the hand to a grasp (4, 4) in the world; None if it begins there."""
+        if not self.settings.approach or self.motion.standoff <= 0.0:
+            return None
+        return LiftPath(X_WG[:3, 2], self.motion.standoff)
+
+    def _pregrasp(self, X_WG: Array) -> Array:
+        """(4, 4) pregrasp of a grasp in the world."""
+        return make_pose(X_WG[:3, :3], X_WG[:3, 3] - self.motion.standoff * X_WG[:3, 2])
 
     def _handle(self, diagram: StationDiagram) -> FloatingHand:
         return FloatingHand(diagram)

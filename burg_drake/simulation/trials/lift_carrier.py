@@ -7,15 +7,19 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.core import Array
 from burg_drake.simulation.trials.carrier import HandSegment
 from burg_drake.simulation.trials.contacts import BodyContact, reached
 from burg_drake.simulation.trials.lift_clearance import HandLiftClearance
+from burg_drake.simulation.trials.robot_contacts import RobotContactWatch
 from burg_drake.simulation.trials.trial_settings import TrialSettings
 from burg_drake.simulation.trials.trial_world import TrialWorld
 from burg_drake.station.diagram import FloatingHand
 
+REST_CHECKS = 1
+"""Looks between arrival and closing, in which the hand comes to rest."""
 DOWN = -1e-6
 """Upward part of a direction (unit vector) that goes down by more than rounding."""
 
@@ -33,27 +37,29 @@ class LiftPath(NamedTuple):
 
 
 class LiftCarrier:
-    """Takes the floating hand away from the grasp; see `Carrier`.
+    """Takes the floating hand away from the grasp, and to it if that is asked for; see `Carrier`.
 
     Where one segment ends and the next begins, the hand comes to rest, and its joint is laid along
     the new direction.
 
     Args:
-        world: that of a trial which has been brought to its start, with the floating hand at the
-            grasp and the joint along the first of the paths.
-        paths: of the hand, straight, at least one.
+        world: that of a trial which has been brought to its start, with the joint along the first
+            of all paths: the floating hand is at the grasp, or where the approach begins.
+        paths: of the hand from the grasp on, straight, at least one.
         lift_clearance: gives the check of the path ahead with the target in the hand.
+        approach: the path to the grasp; None if the hand is there.
+        target: the body to be grasped, which the hand may touch once it has come to the grasp.
     """
 
-    approach_checks = approach_steps = 0
     tracking_error = tracking_distance = math.nan
-    touched = ""
 
     def __init__(
         self,
         world: TrialWorld,
         paths: Sequence[LiftPath],
         lift_clearance: Callable[[], HandLiftClearance],
+        approach: LiftPath | None = None,
+        target: BodyIndex | None = None,
     ) -> None:
         assert isinstance(world.hand, FloatingHand)
         settings = world.settings
@@ -69,30 +75,44 @@ class LiftCarrier:
             for number, path in enumerate(paths)
         )
         self.lift_time = sum(settings.time_of(path.length) for path in paths)
-        self._number = 0
-        self._is_lifting = False
+        self._approach = approach
+        self.approach_steps = round(settings.poll / world.diagram.engine.time_step)
+        self.approach_checks = 0
+        self._touches: RobotContactWatch | None = None
+        if approach is not None and target is not None:
+            self.approach_checks = _check_count(approach.length, settings) + REST_CHECKS
+            self._touches = RobotContactWatch(world.diagram, (), target)
+        self._number = 0 if approach is None else -1
+        self._is_approaching = self._is_lifting = False
         self._X_WG_start = self._floating.X_WG(self._plant_context)
 
+    @property
+    def touched(self) -> str:
+        """The first touch that was not planned; "" without an approach."""
+        return "" if self._touches is None else self._touches.first
+
     def approach(self) -> None:
-        """The hand stands at the grasp."""
+        """Begins the way to the grasp; the speed is commanded from look to look."""
+        self._is_approaching = True
 
     def close(self) -> None:
-        """The fingers have been closing from the start."""
+        """Closes the fingers; without an approach they have been closing from the start."""
+        if self._approach is not None:
+            self._is_approaching = False
+            self._world.command("lift", np.zeros(2))
+            self._world.command("hand", self._floating.closing_command())
 
     def lift(self, number: int, check: int) -> None:
         """Commands the speed of the middle of the interval; in one interval more, where another
         segment follows, the hand comes to rest."""
-        segment, settings = self.segments[number], self._world.settings
+        segment = self.segments[number]
         self._is_lifting = True
         if number != self._number:
             self._number = number
             self._X_WG_start = self._floating.X_WG(self._plant_context)
             self._floating.set_lift_direction(self._plant_context, segment.direction_W)
             self._world.simulator.Initialize()
-        checks = _check_count(segment.length, settings)
-        top_speed = 2 * segment.length / (checks * settings.poll)
-        speed = top_speed * max(0.0, 1 - abs(2 * check + 1 - checks) / checks)
-        self._world.command("lift", np.array([0.0, speed]))
+        self._command_speed(segment.length, check)
 
     def stop(self) -> None:
         """Stands still."""
@@ -100,11 +120,19 @@ class LiftCarrier:
 
     def advance_to(self, time: float) -> None:
         """Steps; commands change only from look to look."""
+        if self._is_approaching and self._approach is not None:
+            interval = self.approach_steps * self._world.diagram.engine.time_step
+            check = round(self._world.context.get_time() / interval)
+            self._command_speed(self._approach.length, check)
         self._world.simulator.AdvanceTo(time)
 
     def watch(self, contacts: list[BodyContact]) -> str:
         """Looks for fixed bodies that the hand touches; the table is none of them, unless the hand
-        goes down."""
+        goes down with the target, or presses on it on its way to the grasp."""
+        if self._touches is not None:
+            stop = self._touches.update(contacts, arrived=not self._is_approaching)
+            if self._is_approaching:
+                return stop
         fixed = set(self._world.diagram.fixed.values())
         if self._is_lifting and self.segments[self._number].direction_W[2] < DOWN:
             fixed.add(self._world.diagram.table)
@@ -130,6 +158,14 @@ class LiftCarrier:
         return self._lift_clearance().is_free(
             self._world, self._X_WG_start, last.length - self.travelled(), last.direction_W
         )
+
+    def _command_speed(self, length: float, check: int) -> None:
+        """Commands the speed of the middle of an interval of a path of a length [m]."""
+        settings = self._world.settings
+        checks = _check_count(length, settings)
+        top_speed = 2 * length / (checks * settings.poll)
+        speed = top_speed * max(0.0, 1 - abs(2 * check + 1 - checks) / checks)
+        self._world.command("lift", np.array([0.0, speed]))
 
 
 def _check_count(length: float, settings: TrialSettings) -> int:

@@ -22,7 +22,8 @@ class TrialResult(TrialFindings):
 
 
 def collision(screen: Clearance) -> TrialResult:
-    """The result of a trial that did not start, as the open hand is not clear at the grasp."""
+    """The result of a trial that did not start, as the open hand is not clear at the grasp,
+    or where its approach begins."""
     assert screen.outcome is not None
     margins = Margins(overlap=screen.overlap, clearance=screen.clearance, end_time=0.0)
     return TrialResult(outcome=screen.outcome, margins=margins, blocker=screen.blocker)

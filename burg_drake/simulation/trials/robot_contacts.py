@@ -20,8 +20,8 @@ class RobotContactWatch:
     """Watches a robot.
 
     Args:
-        diagram: built with `robot="arm"`.
-        links: the arm's bodies, without the hand's.
+        diagram: built with a robot.
+        links: the arm's bodies, without the hand's; none of the hand alone.
         target: the body to be grasped.
 
     Attributes:

@@ -21,11 +21,11 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
 from burg_drake.core import Array, InvalidInputError
+from burg_drake.objects.collision import hull_corners
 from burg_drake.simulation.rest import Neighbours
 from burg_drake.simulation.trials.contacts import ContactReader
 from burg_drake.simulation.trials.trial_settings import TrialSettings
 from burg_drake.station.diagram import HandHandle, StationDiagram, separate_contact
-from burg_drake.station.world import hull_corners
 
 TOUCHING = 0.001
 """A target whose hull is closer to another thing than this may lean on it [m]."""

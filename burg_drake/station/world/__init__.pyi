@@ -39,7 +39,6 @@ from .model_file import (
     buffered_remarks as buffered_remarks,
     set_packages as set_packages,
 )
-from .object_hull import hull_corners as hull_corners
 from .robot import (
     ROBOT_MODELS as ROBOT_MODELS,
     Robot as Robot,
