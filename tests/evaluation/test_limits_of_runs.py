@@ -15,7 +15,7 @@ from burg_drake.core.frames import grasp_from_axes
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.limit_numbers import limit_options, limit_settings, limits_text
+from burg_drake.evaluation.records.limit_numbers import limit_settings, limits_text
 from burg_drake.evaluation.records.origin import read_origin
 from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.records.table import table_row
@@ -108,15 +108,13 @@ def test_a_run_of_a_release_without_limits_has_none(unlimited: Run, tmp_path: Pa
         judged(tmp_path)
 
 
-def test_options_read_back_to_the_same_numbers() -> None:
+def test_numbers_read_back_to_the_same_numbers() -> None:
     for tilt, slip in ((30.0, 20.0), (1 / 3, 1e-3), (12.3456789012, 7.7), (180.0, math.inf)):
         recorded = {"tilt_limit": math.radians(tilt), "approach": 1.0}
         recorded |= {"slip_limit": slip / 1000.0} if math.isfinite(slip) else {}
         found = limit_settings(recorded)
         assert math.radians(found["tilt_limit_deg"]) == math.radians(tilt)
         assert found["slip_limit_mm"] / 1000.0 == slip / 1000.0 and found["approach"] is True
-        assert limit_options(recorded)[-1] == "--approach"
-    assert limit_options({"tilt_limit": math.radians(30), "slip_limit": 0.02}) == []
 
 
 @pytest.mark.parametrize(

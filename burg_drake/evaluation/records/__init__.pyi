@@ -24,11 +24,7 @@ from .ledger import (
     SceneState as SceneState,
     ledger_text as ledger_text,
 )
-from .limit_numbers import (
-    limit_options as limit_options,
-    limit_settings as limit_settings,
-    limits_text as limits_text,
-)
+from .limit_numbers import limit_settings as limit_settings
 from .motion_numbers import (
     motion_in as motion_in,
     motion_options as motion_options,

@@ -1,14 +1,11 @@
 """What counts as lifted, and whether the hand's approach was simulated: as numbers of a recorded
-run, as text, as settings of `evaluate`, and as options of its command."""
+run, as text, and as settings of `evaluate`."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from typing import Any
-
-from burg_drake.core import option_of
-from burg_drake.evaluation.records.settings import EvaluationSettings
 
 TILT, SLIP, APPROACH = "tilt_limit", "slip_limit", "approach"
 """Names in a record, see `simulation.trials.trial_settings.TrialSettings`."""
@@ -40,16 +37,6 @@ def limits_text(values: Mapping[str, float]) -> str:
     parts = [f"tilt {tilt:.12g} degrees"] if tilt < 180.0 else []
     parts += [f"slip {slip:.12g} mm"] if math.isfinite(slip) else []
     return ", ".join(parts) or "none"
-
-
-def limit_options(values: Mapping[str, float]) -> list[str]:
-    """Words of a command line that ask for the same where that is not the usual."""
-    words: list[str] = []
-    for name, value in limit_settings(values).items():
-        if value != getattr(EvaluationSettings, name):
-            shown = [] if value is True else [f"{value:.17g}"]
-            words += [option_of(EvaluationSettings, name), *shown]
-    return words
 
 
 def _degrees(angle: float) -> float:

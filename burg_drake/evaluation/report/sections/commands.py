@@ -14,7 +14,7 @@ from burg_drake.evaluation.records import (
     CampaignDocument,
     EvaluationSettings,
     RunDocument,
-    limit_options,
+    limit_settings,
     motion_in,
     motion_options,
 )
@@ -81,11 +81,17 @@ def _settings(document: RunDocument | CampaignDocument, station: Path | None) ->
         if document.mode == "hand" and not document.trial.get("approach"):  # begins at the grasp
             motion = replace(motion, standoff=usual.standoff)
         words += motion_options(motion, usual)
-    words += limit_options(document.trial)
+    words += _unusual(limit_settings(document.trial))
     words += _words(engine=document.engine.name, seed=document.seed)
     if document.table != EvaluationSettings.table:
         words += _words(table=document.table)
     return words + (_words(shard=document.shard) if document.shard else [])
+
+
+def _unusual(asked: dict[str, Any]) -> list[str]:
+    """The options of fields of `EvaluationSettings` whose values are not the usual ones."""
+    unusual = {k: v for k, v in asked.items() if v != getattr(EvaluationSettings, k)}
+    return _words(**unusual)
 
 
 def _words(**values: Any) -> list[str]:
