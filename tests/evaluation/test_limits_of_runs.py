@@ -81,7 +81,7 @@ def test_other_limits_are_another_run(limited: Run) -> None:
 def test_the_report_says_how_to_ask_for_it_again(unlimited: Run, limited: Run) -> None:
     words = shlex.split(reproduce_command(unlimited))
     at = words.index("--tilt-limit")
-    assert words[at : at + 4] == ["--tilt-limit", "180", "--slip-limit-mm", "inf"]
+    assert words[at : at + 4] == ["--tilt-limit", "180.0", "--slip-limit-mm", "inf"]
     words = shlex.split(reproduce_command(limited))
     tilt = float(words[words.index("--tilt-limit") + 1])
     assert math.radians(tilt) == limited.document.trial["tilt_limit"]
