@@ -143,7 +143,7 @@ class Margins:
         "m",
         "largest displacement of any point of a free object before the hand closed; for one that"
         " hovers, its fall once it is touched",
-        mode="arm",
+        mode="approach",
         smaller_is_better=True,
         title="pushed before closing",
         axis="push before the hand closed",
@@ -186,11 +186,11 @@ class TrialFindings:
         toppled: names of the instances among them whose axis that was upright is tilted by more
             than 45 degrees at the end, separated by commas.
         pushed: the same when the hand began to close, and of the target, too: what the approach
-            moved [m]. Empty without an arm.
+            moved [m]. Empty where the trial began at the grasp.
         touched: the first touch that was not planned, as "panda_link5 vs can": of the robot with
             anything before the hand began to close; from then on of a link of the arm with
             anything, and of the hand with anything but target and table. Empty if there was none,
-            or without an arm.
+            or where the trial began at the grasp.
     """
 
     blocker: str = field(default="", metadata=text("the body that was in the way"))
@@ -231,14 +231,14 @@ class TrialFindings:
             "pushed_",
             "m",
             "displacement of an object before the hand closed, of the point that moved farthest",
-            mode="arm",
+            mode="approach",
         ),
     )
     touched: str = field(
         default="",
         metadata=text(
-            "what the arm touched first against its plan, as LINK vs BODY",
-            mode="arm",
+            "what arm or hand touched first that was not planned, as LINK vs BODY",
+            mode="approach",
             part="measured",
         ),
     )

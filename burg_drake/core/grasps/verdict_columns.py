@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any
 
-from burg_drake.core.grasps.mode import Mode, asks
 from burg_drake.core.grasps.outcome import Stage
 from burg_drake.core.grasps.verdict import CPU_TIMES, Findings, Margins, TrialFindings, Verdict
 from burg_drake.core.grasps.verdict_field import (
     InstancesField,
+    TableShape,
     VerdictField,
     VerdictPart,
     verdict_fields,
@@ -47,9 +47,9 @@ PREFIXES = {one.name: one.prefix for one in VERDICT_FIELDS if isinstance(one, In
 MOVED, PUSHED = PREFIXES["displacements"], PREFIXES["pushed"]
 
 
-def fields_in(mode: Mode, part: VerdictPart) -> list[VerdictField]:
-    """The fields that a part of a row has in tables of a mode."""
-    return [one for one in VERDICT_FIELDS if one.part == part and asks(mode, one.mode)]
+def fields_in(shape: TableShape, part: VerdictPart) -> list[VerdictField]:
+    """The fields that a part of a row has in tables of a shape."""
+    return [one for one in VERDICT_FIELDS if one.part == part and shape.has(one.mode)]
 
 
 def shown_order(first: Sequence[str], names: Sequence[str], *, without: Sequence[str]) -> list[str]:

@@ -14,7 +14,7 @@ from typing import Any, Final, Literal
 
 from burg_drake.core.errors import quoted
 from burg_drake.core.grasps.column import TEXT, Column
-from burg_drake.core.grasps.mode import Mode, asks
+from burg_drake.core.grasps.mode import Least, Mode, asks
 from burg_drake.core.grasps.outcome import Stage
 
 KIND: Final = "kind"
@@ -32,11 +32,17 @@ class TableShape:
         mode: of the run.
         instances: names of the scene's free objects.
         joints: number of the arm's joints; 0 where no arm is asked.
+        approach: whether the approach of the hand alone is simulated.
     """
 
     mode: Mode
     instances: Sequence[str] = ()
     joints: int = 0
+    approach: bool = False
+
+    def has(self, least: Least) -> bool:
+        """Whether the table has what is found out from a mode on."""
+        return asks(self.mode, least, approach=self.approach)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +58,7 @@ class VerdictField(ABC):
 
     name: str = ""
     column: Column
-    mode: Mode = "hand"
+    mode: Least = "hand"
     part: VerdictPart = "measured"
 
     @property
@@ -181,7 +187,7 @@ class MarginsField(VerdictField):
     of: type[Any]
 
     def columns(self, shape: TableShape) -> dict[str, Any]:
-        return {f.name: f.name for f in fields(self.of) if asks(shape.mode, f.metadata["mode"])}
+        return {f.name: f.name for f in fields(self.of) if shape.has(f.metadata["mode"])}
 
     def from_row(self, row: Mapping[str, Any]) -> Any:
         return {f.name: row[f.name] for f in fields(self.of) if f.name in row}
@@ -259,7 +265,7 @@ class StagesField(VerdictField):
     times: Mapping[Stage, tuple[str, str, Mode]]
 
     def columns(self, shape: TableShape) -> dict[str, Any]:
-        return {n: stage for stage, (n, _, mode) in self.times.items() if asks(shape.mode, mode)}
+        return {n: stage for stage, (n, _, mode) in self.times.items() if shape.has(mode)}
 
     def to_json(self, value: Any) -> Any:
         return {stage.value: round(seconds, 6) for stage, seconds in value.items()}
@@ -275,7 +281,7 @@ def margin(
     unit: str,
     meaning: str,
     *,
-    mode: Mode = "hand",
+    mode: Least = "hand",
     stage: Stage = Stage.EXECUTED,
     smaller_is_better: bool = False,
     own_unit: tuple[str, float] | None = None,
@@ -304,7 +310,7 @@ def text(
     meaning: str,
     *,
     of: type[str] = str,
-    mode: Mode = "hand",
+    mode: Least = "hand",
     part: VerdictPart = "decided",
     replayed: bool = True,
 ) -> dict[str, VerdictField]:
@@ -324,7 +330,7 @@ def by_margin(of: type[Any]) -> dict[str, VerdictField]:
 
 
 def by_instance(
-    prefix: str, unit: str, meaning: str, *, mode: Mode = "hand"
+    prefix: str, unit: str, meaning: str, *, mode: Least = "hand"
 ) -> dict[str, VerdictField]:
     """Metadata of numbers by instance; see `InstancesField`."""
     return {KIND: InstancesField(column=Column(unit, meaning), prefix=prefix, mode=mode)}

@@ -39,6 +39,7 @@ from burg_drake.core.grasps import (
     fields_in,
 )
 from burg_drake.evaluation.candidates import Candidates
+from burg_drake.evaluation.records.limit_numbers import APPROACH
 from burg_drake.evaluation.records.origin import ORIGIN_TEXT, TrialOrigin, engine_label
 from burg_drake.evaluation.records.trial import RecordedTrial, pose_text
 
@@ -100,7 +101,8 @@ def trial_columns(
     rows = [t.verdict for t in trials if t.verdict is not None]
     if len(rows) != len(trials):
         raise ValueError("a table is made of judged trials only")
-    shape = TableShape(origin.mode, instances, joints)
+    approach = bool(origin.trial.get(APPROACH))
+    shape = TableShape(origin.mode, instances, joints, approach)
     X_OG = np.array([t.X_OG for t in trials]).reshape(-1, 4, 4)
     wxyz = quaternion_from_rotation(X_OG[:, :3, :3]) if rows else np.empty((0, 4))
     columns: Columns = {
@@ -135,7 +137,7 @@ def trial_columns(
 def columns_of_verdicts(rows: Sequence[Verdict], part: VerdictPart, shape: TableShape) -> Columns:
     """The columns of verdicts that lie in a part of a row, see `core.grasps.verdict_field`."""
     columns: Columns = {}
-    for one in fields_in(shape.mode, part):
+    for one in fields_in(shape, part):
         values = [getattr(verdict, one.name) for verdict in rows]
         make = _texts if one.is_text else _numbers
         for name, key in one.columns(shape).items():

@@ -38,7 +38,8 @@ def summarize_campaign(campaign: Campaign) -> Summary:
     document = campaign.document
     stages = [stage for stage in Stage if stage in STAGES[document.mode]]
     names = ["object", "outcome", "stage", *NEEDED, LIFT_HEIGHT, *(CPU_COLUMNS[s] for s in stages)]
-    if document.mode == "arm":
+    approached = document.mode == "arm" or bool(document.trial.get("approach"))
+    if approached:
         names += ["pushed", "instance", *(PUSHED + name for name in document.instances)]
     rows = campaign.rows(names)
     object, objects = rows.codes("object")
@@ -56,7 +57,7 @@ def summarize_campaign(campaign: Campaign) -> Summary:
         total=_groups(rows, np.zeros_like(rows.run), ["all"])[0],
         costs=tuple(costs),
         mode=document.mode,
-        pushes=pushes(rows.columns(rows.table.column_names)) if document.mode == "arm" else None,
+        pushes=pushes(rows.columns(rows.table.column_names)) if approached else None,
         lifts=short_lifts(rows.column(LIFT_HEIGHT), motion_in(document.trial).lift_height),
         notes=_notes(campaign),
         scenes=tuple(by_scene),

@@ -133,10 +133,10 @@ class StageCost:
 
 @dataclass(frozen=True)
 class Pushes:
-    """What the arm moved before the hand closed.
+    """What arm or hand moved before the hand closed.
 
     Attributes:
-        trials: in which the arm went to the grasp.
+        trials: in which it went to the grasp.
         pushed: those in which it moved any free object, the target too, by more than `PUSH`.
         largest: displacement of any of them [m].
         target_pushed, target_largest: the same of the target alone.
@@ -168,7 +168,7 @@ class Summary:
         total: all together.
         costs: by stage, sampling first.
         mode: what was asked about each grasp.
-        pushes: what the arm's approaches pushed; None where no arm executed anything.
+        pushes: what the approaches pushed; None where none were simulated.
         lifts: where there is no room for the whole lift; None if there is wherever there is any.
         notes: what is missing, and why, one sentence each; see `notes`.
         scenes: by scene, in a run over many, in their order.
@@ -188,12 +188,16 @@ class Summary:
 
     @property
     def steps(self) -> list[str]:
-        """Names of the funnel's counts that the mode has, first to last."""
-        return [n for n in self.total.funnel if self.mode != "hand" or n not in ARM_STAGES]
+        """Names of the funnel's counts that the mode has, first to last. With the hand alone, the
+        pregrasp is the part of what can be reached that may be in a collision."""
+        absent = set() if self.mode != "hand" else set(ARM_STAGES)
+        if self.total.reachable < self.total.clear:
+            absent.discard(Stage.REACHABLE.value)
+        return [name for name in self.total.funnel if name not in absent]
 
 
 def pushes(columns: Columns) -> Pushes | None:
-    """What the arm pushed in the trials of a table; None if it executed nothing."""
+    """What approaches pushed in the trials of a table; None if none were simulated."""
     if "pushed" not in columns:
         return None
     went = np.isfinite(columns["pushed"])

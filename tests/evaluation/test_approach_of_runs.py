@@ -1,0 +1,104 @@
+"""A run in which the hand alone approaches: what it records, and that a row alone repeats it."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from burg_drake.core.frames import grasp_from_axes
+from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core.grasps.outcome import Outcome, Stage
+from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.records.origin import read_origin
+from burg_drake.evaluation.records.settings import EvaluationSettings
+from burg_drake.evaluation.records.table import table_row
+from burg_drake.evaluation.records.table_file import read_table
+from burg_drake.evaluation.records.trial import read_trial
+from burg_drake.evaluation.replay import differences, rerun
+from burg_drake.evaluation.report.sections.reproduction import reproduce_command
+from burg_drake.evaluation.results.summary import summarize
+from burg_drake.evaluation.store.run_folder import Run
+from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.station.document.station_document import load_station
+from tests.evaluation.composed import tabletop
+
+pytestmark = pytest.mark.usefixtures("judged_here")
+
+BOX = tabletop("box")
+GRASPS = GraspSet.create(
+    np.array(
+        [
+            grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18)),
+            # from below: clear at the grasp, and below the table where the approach begins
+            grasp_from_axes((1, 0, 0), (0, 0.8, 0.6), (0.0, -0.07, 0.13)),
+        ]
+    ),
+    object="box",
+    width=0.06,
+)
+MOTION = GraspMotion(standoff=0.14)
+
+
+@pytest.fixture(scope="module", params=["csv", "parquet"])
+def run(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Run:
+    if request.param == "parquet":
+        pytest.importorskip("pyarrow")
+    settings = EvaluationSettings(
+        mode="hand", engine="screening", approach=True, motion=MOTION, table=request.param
+    )
+    return evaluate(
+        BOX,
+        "panda_tabletop",
+        tmp_path_factory.mktemp("approach") / "run",
+        settings=settings,
+        grasps=GRASPS,
+        workers=1,
+        progress=False,
+    )
+
+
+def test_rows_tell_the_approach_and_repeat_the_trials(run: Run) -> None:
+    columns = read_table(run.table_path)
+    assert {"pushed", "pushed_box", "touched"} <= columns.keys()
+    assert columns["outcome"].tolist() == [Outcome.LIFTED, Outcome.HAND_COLLISION_APPROACH]
+    assert columns["stage"].tolist() == [Stage.EXECUTED, Stage.REACHABLE]
+    assert columns["blocker"].tolist() == ["", "table"]
+    assert columns["pushed_box"][0] == columns["pushed"][0] == 0.0
+    for k in range(2):
+        row = table_row(columns, k)
+        trial, origin = read_trial(row, "row"), read_origin(row, "row")
+        assert origin.settings().approach and origin.settings().motion == MOTION
+        verdict, _ = rerun(BOX, load_station("panda_tabletop"), trial, origin)
+        assert trial.verdict is not None and not differences(trial.verdict, verdict)
+
+
+def test_the_summary_tells_where_grasps_were_lost(run: Run) -> None:
+    summary = summarize(run)
+    assert summary.steps == ["candidates", "clear", "reachable", "executed", "held", "lifted"]
+    assert [summary.total.funnel[step] for step in summary.steps] == [2, 2, 1, 1, 1, 1]
+    assert (
+        str(summary.pushes) == "The approach pushed something by more than 1 mm in 0 of 1 trials."
+    )
+    page = run.report_path.read_text("utf-8")
+    assert "hand collision approach" in page
+
+
+def test_the_report_says_how_to_ask_for_it_again(run: Run) -> None:
+    words = shlex.split(reproduce_command(run))
+    assert "--approach" in words
+    assert words[words.index("--standoff-mm") + 1] == "140"
+
+
+def test_without_an_approach_there_are_no_such_columns(tmp_path: Path) -> None:
+    settings = EvaluationSettings(mode="hand", engine="screening")
+    run = evaluate(
+        BOX, "panda_tabletop", tmp_path / "run", settings=settings, grasps=GRASPS, workers=1,
+        progress=False,
+    )  # fmt: skip
+    assert not {"pushed", "pushed_box", "touched"} & run.results.keys()
+    assert run.results["outcome"].tolist() == [Outcome.LIFTED] * 2
+    assert summarize(run).steps == ["candidates", "clear", "executed", "held", "lifted"]
+    assert "--approach" not in reproduce_command(run)
