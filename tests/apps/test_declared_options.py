@@ -32,6 +32,7 @@ class Made:
     depth: float = setting(0.005, "how deep", unit=MILLIMETRES, low=0, high=50, noun="a length")
     turn: float = setting(math.radians(2.0), "how far round", unit=DEGREES, low=0)
     share: float = setting(0.1, "of all", unit=PERCENT, above=0)
+    way: float = setting(0.02, "as far as it goes", unit=MILLIMETRES, above=0, infinite=True)
     fast: bool = setting(False, "hurry")
     level: bool = setting(True, "leave it as it stands", name="no_level")
     size: tuple[int, int] = setting((8, 11), "columns and rows", metavar="CxR")
@@ -56,6 +57,7 @@ def test_values_come_back_in_si() -> None:
     assert parsed(*words.split()) == Made(
         count=5, depth=1e-3 * 9, turn=math.radians(90), share=0.5, fast=True, kind="square"
     )
+    assert parsed("--way-mm", "inf").way == math.inf and parsed("--way-mm", "7").way == 1e-3 * 7
     words = f"--no-level --size 3x4 --number {(1 << 64) - 1}"
     assert parsed(*words.split()) == Made(level=False, size=(3, 4), number=(1 << 64) - 1)
 
@@ -87,6 +89,9 @@ def test_the_help_has_units_and_defaults() -> None:
         ("--depth-mm 51", "51 is not a length from 0 to 50 mm"),
         ("--depth-mm deep", "'deep' is not a finite number"),
         ("--turn-deg -1", "-1 is below 0"),
+        ("--turn-deg inf", "'inf' is not a finite number"),
+        ("--way-mm=-inf", "'-inf' is not a finite number"),
+        ("--way-mm 0", "0 is not above 0"),
         ("--share-percent 0", "0 is not above 0"),
     ],
 )

@@ -39,6 +39,10 @@ def test_an_option_counts_more_than_the_station_and_that_more_than_the_usual() -
         ("evaluate --lift-mm 9000", "--lift-mm: 9000 is not a length from 0 to 2000 mm"),
         ("evaluate --lift-direction 0 0", "--lift-direction: expected 3 arguments"),
         ("evaluate --mode hand --standoff-mm 50", "--standoff-mm is the length of the approach;"),
+        ("evaluate --mode arm --approach", "approaches anyway; leave approach out, or give mode"),
+        ("evaluate --tilt-limit 0", "--tilt-limit: 0 is not an angle in degrees above 0, at most"),
+        ("evaluate --tilt-limit inf", "--tilt-limit: 'inf' is not a finite number"),
+        ("evaluate --slip-limit-mm 0", "--slip-limit-mm: 0 is not above 0"),
     ],
 )
 def test_what_no_hand_can_do_is_one_line(words: str, message: str, capsys) -> None:

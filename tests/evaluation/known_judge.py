@@ -23,6 +23,9 @@ from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.evaluation.candidates.candidates import Candidate
 from burg_drake.evaluation.stages.judge import Decide, Decision, Screen
 
+TOPPLED = 0.0185
+"""What is moved by more than this lies afterwards [m]."""
+
 
 def number(id: str) -> int:
     """A number in [0, 100) that follows from an id."""
@@ -117,12 +120,14 @@ class KnownJudge:
         outcome = expected(grasp.id)
         moved = n / 5e3 if outcome is Outcome.LIFTED_DISTURBED else 0.0
         margins = {"slip": n / 7e4, "tilt": n / 900, "pad_force": 40 - n / 30}
-        margins |= {"patch_area": n / 1e6, "others_moved": moved}
+        margins |= {"patch_area": n / 1e6, "others_moved": moved, "others_turned": 50.0 * moved}
         others = {"left", "right", "bar"} - {grasp.instance}
         return Decision(
             outcome,
             margins=margins,
             displacements={min(others): moved},
+            turned={min(others): 50.0 * moved},
+            toppled=min(others) if moved > TOPPLED else "",
             confidence=confidence(grasp.id),
         )
 

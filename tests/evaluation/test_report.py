@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from known_judge import CrashingJudge, Make
+from known_judge import TOPPLED, CrashingJudge, Make
 from page_reading import part, read_page
 
 from burg_drake.core.grasps.outcome import Outcome
@@ -117,6 +117,8 @@ def test_what_was_disturbed_is_told(run: Run) -> None:
             count,
             f"{np.median(far[pushed & of_others]):.1f} mm",
             f"{far[pushed & of_others].max():.1f} mm",
+            f"{np.degrees(50.0 * far[pushed & of_others].max() / 1e3):.1f}°",
+            str((far[pushed & of_others] > TOPPLED * 1e3).sum() or "·"),
             f"on {by} ({times})",
         ]
 

@@ -133,15 +133,18 @@ def test_describe() -> None:
             patch_area=1.234e-4,
             lift=0.2996,
             others_moved=0.0123,
+            others_turned=np.deg2rad(50.0),
             end_time=2.5,
         ),
         displacements={"bowl": 0.0004, "can": 0.0123, "box": 0.0},
+        toppled="can",
     )
     assert describe(lifted) == [
         "lifted disturbed",
         "lift 300 mm, slip 1.2 mm, tilt 2.0 deg, pad force 40.0 N, patch 123 mm²,"
-        " others moved 12.3 mm",
+        " others moved 12.3 mm, others turned 50.0 deg",
         "moved can 12.3 mm, bowl 0.4 mm",
+        "toppled can",
     ]
     blocked = TrialResult(
         outcome=Outcome.COLLISION_CLUTTER, margins=Margins(overlap=0.0034), blocker="mug"

@@ -51,6 +51,7 @@ from .verdict_columns import (
     SMALLER_IS_BETTER as SMALLER_IS_BETTER,
     TRIAL_FINDINGS as TRIAL_FINDINGS,
     TRIAL_MARGINS as TRIAL_MARGINS,
+    TURNED as TURNED,
     VERDICT_FIELDS as VERDICT_FIELDS,
     fields_in as fields_in,
     joined_findings as joined_findings,

@@ -44,7 +44,7 @@ CPU_COLUMNS = {stage: name for stage, (name, _, _) in CPU_TIMES.items()}
 """Columns of the CPU time of each stage."""
 PREFIXES = {one.name: one.prefix for one in VERDICT_FIELDS if isinstance(one, InstancesField)}
 """What columns of displacements begin with; the instance's name follows."""
-MOVED, PUSHED = PREFIXES["displacements"], PREFIXES["pushed"]
+MOVED, TURNED, PUSHED = (PREFIXES[name] for name in ("displacements", "turned", "pushed"))
 
 
 def fields_in(shape: TableShape, part: VerdictPart) -> list[VerdictField]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import shlex
 from collections.abc import Mapping
 from functools import partial
@@ -93,7 +92,7 @@ def campaign_page(campaign: Campaign) -> str:
         certainty_section(summary),
         object_pictures(campaign, stored, groups),
         causes_section(_rows(campaign, stored, outcomes)),
-        margin_section(tried, own, document.trial.get("disturbance", math.inf)),
+        margin_section(tried, own, document.trial),
         repeat_campaign(campaign),
         closing_section(
             count_section(summary),

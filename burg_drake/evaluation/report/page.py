@@ -76,7 +76,7 @@ def report_page(run: Run) -> str:
         certainty_section(summary),
         grasp_section(pictures),
         causes_section(rows_of_run(columns, str(run.path))),
-        margin_section(*tried, disturbance),
+        margin_section(*tried, run.document.trial),
         reachability_section(run),
         execution_section(summary, columns),
         repeat_section(run),

@@ -26,7 +26,10 @@ CLEAR_VIEW = 0.10
 
 
 FIGURES = shown_order(
-    ("lift", "slip", "tilt", "pad_force", "patch_area", "others_moved", "pushed", "tracking_error"),
+    (
+        *("lift", "slip", "tilt", "pad_force", "patch_area", "others_moved", "others_turned"),
+        *("pushed", "tracking_error"),
+    ),
     TRIAL_MARGINS,
     without=(
         "overlap",  # with what the hand is in
@@ -132,7 +135,8 @@ def describe(result: TrialResult) -> list[str]:
     pushed = [f"{name} {far * 1e3:.1f} mm" for name, far in moved if far >= SHOWN]
     lines += [figures] if figures else []
     lines += [f"touched against the plan: {result.touched}"] if result.touched else []
-    return lines + ([f"moved {', '.join(pushed)}"] if pushed else [])
+    lines += [f"moved {', '.join(pushed)}"] if pushed else []
+    return lines + ([f"toppled {result.toppled}"] if result.toppled else [])
 
 
 def _show_start(trial: HandTrial, X_WG: Array) -> Array:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 
 import numpy as np
+from numpy.typing import NDArray
 
-from burg_drake.core.grasps import MOVED, Outcome
+from burg_drake.core import Array
+from burg_drake.core.grasps import MOVED, TURNED, Outcome
 from burg_drake.evaluation.records import Columns
 from burg_drake.evaluation.report.elements import Html, element, folded, table
 
@@ -44,7 +47,8 @@ def collision_section(columns: Columns) -> Html | None:
 
 
 def disturbed_section(columns: Columns, disturbance: float) -> Html | None:
-    """Which objects were moved in trials on others; nothing if all stayed where they were.
+    """Which objects were moved, turned and toppled in trials on others; nothing if all stayed where
+    they were.
 
     Args:
         columns: the results.
@@ -64,8 +68,11 @@ def disturbed_section(columns: Columns, disturbance: float) -> Html | None:
         limit,
         "median",
         "farthest",
+        "turned by at most",
+        "toppled",
         ("main causes: trials"),
     ]
+    toppled = _toppled(columns)
     rows = []
     for name in names:
         far = moved[name]
@@ -77,6 +84,8 @@ def disturbed_section(columns: Columns, disturbance: float) -> Html | None:
             int((far > disturbance).sum()) or "·",
             f"{np.median(far[mask]) * 1e3:.1f} mm",
             f"{far[mask].max() * 1e3:.1f} mm",
+            _largest_turn(columns.get(TURNED + name), mask),
+            toppled[name] or "·",
         ]
         numbers = [element("td", c, class_="number zero" if c == "·" else "number") for c in cells]
         cause = element("td", f"on {by} ({times})")
@@ -84,6 +93,19 @@ def disturbed_section(columns: Columns, disturbance: float) -> Html | None:
     return folded(
         "What was disturbed",
         f"Objects that trials on other objects moved by {NOTICEABLE * 1e3:g} mm or more, whatever"
-        " the outcome: in how many of the executed trials, and how far at most in each.",
-        table(head, rows, numbers=(1, 2, 3, 4, 5)),
+        " the outcome: in how many of the executed trials, and how far at most in each, at the"
+        " point of the object that moved farthest. Toppled ones stood before and lie at the end.",
+        table(head, rows, numbers=(1, 2, 3, 4, 5, 6, 7)),
     )
+
+
+def _toppled(columns: Columns) -> Counter[str]:
+    """In how many trials each object was toppled."""
+    texts = columns.get("toppled", np.empty(0, dtype=np.str_))
+    return Counter(name for text in texts[texts != ""].tolist() for name in text.split(", "))
+
+
+def _largest_turn(angle: Array | None, mask: NDArray[np.bool_]) -> str:
+    """The largest of the angles [rad] that are chosen, for people."""
+    known = np.empty(0) if angle is None else angle[mask & np.isfinite(angle)]
+    return f"{math.degrees(known.max()):.1f}°" if len(known) else "·"

@@ -34,6 +34,8 @@ from burg_drake.evaluation.report.elements import (
 from burg_drake.visualization.style import GROUPS
 
 DISTURBED = "others_moved"
+LIMITS = {DISTURBED: "disturbance", "slip": "slip_limit", "tilt": "tilt_limit"}
+"""Settings that say from which value of a margin on what is held does not count as lifted."""
 CHOSEN = ("clearance", "slip", "tilt", DISTURBED)
 """What tells most about a grasp: how exact it must be met, how firmly it holds, what it moves."""
 FURTHER = shown_order(
@@ -50,16 +52,20 @@ FURTHER = shown_order(
 
 
 def margin_section(
-    columns: Mapping[str, Array], groups: NDArray[np.int8], disturbance: float
+    columns: Mapping[str, Array], groups: NDArray[np.int8], trial: Mapping[str, float]
 ) -> Html | None:
     """The chosen margins; nothing where nothing was executed.
 
     Args:
         columns: (N,) by name, of grasps that came to a trial.
         groups: (N,) of each, see `outcome_groups`.
-        disturbance: displacement from which on a lifted grasp counts as disturbing [m].
+        trial: settings of the trial's phases, with the limits of what counts as lifted.
     """
-    limits = {DISTURBED: Limit(disturbance * 1e3, "limit")} if math.isfinite(disturbance) else {}
+    limits = {
+        name: Limit(trial[limit] * shown_unit(name)[1], "limit")
+        for name, limit in LIMITS.items()
+        if trial.get(limit, math.inf) < math.pi  # an angle or a length that limits nothing
+    }
     charts = _charts(CHOSEN, columns, groups, limits)
     if not charts:
         return None
