@@ -87,6 +87,25 @@ def test_the_hand_stands_at_the_grasp_before_it_closes_from_all_open(
     assert time == pytest.approx(APPROACH.time_of(GraspMotion().standoff), abs=0.03)
 
 
+@pytest.mark.parametrize("time_step", [0.001, 0.003, 0.004])
+def test_the_hand_comes_to_the_grasp_whatever_the_time_step(
+    make_scene: Callable[..., Scene], monkeypatch: pytest.MonkeyPatch, time_step: float
+) -> None:
+    """Also where looks are no whole number of steps apart."""
+    scene, engine = make_scene(("box", 0.3, 0.2, 0.0)), replace(QUICK, time_step=time_step)
+    stepped = HandTrial(scene, make_station(), engine=engine, settings=APPROACH)
+    seen: list[Array] = []
+
+    def look(execution: Execution) -> Outcome:
+        plant = stepped.diagram.plant
+        seen.append(stepped.hand.X_WG(plant.GetMyContextFromRoot(stepped.context)))
+        return Outcome.NO_CONTACT
+
+    monkeypatch.setattr(Execution, "close", look)
+    stepped.run("box", CENTRE)
+    np.testing.assert_allclose(seen[0], stepped.X_WG("box", CENTRE), atol=1e-5)
+
+
 @pytest.mark.parametrize("lift_direction", [(0.0, 0.0, 1.0), (0.0, -0.6, 0.8)])
 def test_retreat_and_lift_go_on_from_the_grasp(
     make_scene: Callable[..., Scene], lift_direction: tuple[float, float, float]

@@ -76,7 +76,7 @@ class LiftCarrier:
         )
         self.lift_time = sum(settings.time_of(path.length) for path in paths)
         self._approach = approach
-        self.approach_steps = round(settings.poll / world.diagram.engine.time_step)
+        self.approach_steps = max(1, round(settings.poll / world.diagram.engine.time_step))
         self.approach_checks = 0
         self._touches: RobotContactWatch | None = None
         if approach is not None and target is not None:
@@ -112,7 +112,7 @@ class LiftCarrier:
             self._X_WG_start = self._floating.X_WG(self._plant_context)
             self._floating.set_lift_direction(self._plant_context, segment.direction_W)
             self._world.simulator.Initialize()
-        self._command_speed(segment.length, check)
+        self._command_speed(segment.length, check, self._world.settings.poll)
 
     def stop(self) -> None:
         """Stands still."""
@@ -123,7 +123,7 @@ class LiftCarrier:
         if self._is_approaching and self._approach is not None:
             interval = self.approach_steps * self._world.diagram.engine.time_step
             check = round(self._world.context.get_time() / interval)
-            self._command_speed(self._approach.length, check)
+            self._command_speed(self._approach.length, check, interval)
         self._world.simulator.AdvanceTo(time)
 
     def watch(self, contacts: list[BodyContact]) -> str:
@@ -159,11 +159,10 @@ class LiftCarrier:
             self._world, self._X_WG_start, last.length - self.travelled(), last.direction_W
         )
 
-    def _command_speed(self, length: float, check: int) -> None:
-        """Commands the speed of the middle of an interval of a path of a length [m]."""
-        settings = self._world.settings
-        checks = _check_count(length, settings)
-        top_speed = 2 * length / (checks * settings.poll)
+    def _command_speed(self, length: float, check: int, interval: float) -> None:
+        """Commands the speed of the middle of an interval [s] of a path of a length [m]."""
+        checks = _check_count(length, self._world.settings)
+        top_speed = 2 * length / (checks * interval)
         speed = top_speed * max(0.0, 1 - abs(2 * check + 1 - checks) / checks)
         self._world.command("lift", np.array([0.0, speed]))
 

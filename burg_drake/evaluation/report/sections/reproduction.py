@@ -103,9 +103,10 @@ def campaign_facts(campaign: Campaign) -> Html:
 
 def _common(document: RunDocument | CampaignDocument) -> list[tuple[str, str]]:
     """Settings that people ask for first."""
+    approach = "; its approach is simulated" if document.trial.get("approach") else ""
     return [
         ("station", f"{document.station.path}, content {document.station.content[:HASH_DIGITS]}"),
-        ("mode", f"{document.mode}: {ASKED[document.mode]}"),
+        ("mode", f"{document.mode}: {ASKED[document.mode]}{approach}"),
         ("motion", motion_text(motion_in(document.trial))),
         ("engine", engine_label(document.engine)),
         ("seed", str(document.seed)),
