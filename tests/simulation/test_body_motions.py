@@ -30,7 +30,7 @@ class Moved:
         self.context = self.plant.GetMyMutableContextFromRoot(self.world.context)
         self.index = self.world.diagram.free[name]
         self.bodies = {name: self.index}
-        self.tracker = MotionTracker(self.plant, self.context, [self.index], self.world.corners)
+        self.tracker = MotionTracker(self.world, [self.index])
 
     def turn(self, R_W: RotationMatrix, p_WQ: tuple[float, float, float]) -> float:
         """Turns it about a point, and measures."""

@@ -1,7 +1,4 @@
-from .body_motions import (
-    MotionTracker as MotionTracker,
-    center_of_mass as center_of_mass,
-)
+from .body_motions import MotionTracker as MotionTracker
 from .criterion import (
     BodySpeed as BodySpeed,
     settle as settle,

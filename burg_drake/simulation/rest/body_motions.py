@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
+from typing import Protocol
 
 import numpy as np
-from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import BodyIndex, RigidBody
-from pydrake.systems.framework import Context
+from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.core import Array, rotation_angle
 
@@ -16,32 +15,38 @@ TOPPLED = math.radians(45.0)
 """An object whose axis that was upright is tilted by more than this lies [rad]."""
 
 
+class PlacedBodies(Protocol):
+    """What a tracker has to know of a world."""
+
+    def X_WB(self, body: BodyIndex) -> Array:
+        """(4, 4) of a body."""
+        ...
+
+    def center(self, body: BodyIndex) -> Array:
+        """Centre of mass (3,) of a body in the world [m]."""
+        ...
+
+    def corners(self, body: BodyIndex) -> Array:
+        """(N, 3) corners of a body's convex hull in its frame [m]."""
+        ...
+
+
 class MotionTracker:
     """Watches bodies: the point of each that has moved farthest, how far it has turned, and how its
     centre of mass moves.
 
     Args:
-        plant: the plant.
-        plant_context: its Context, with the bodies where they stand.
+        world: with the bodies where they stand. No point of a body moves farther than the corner
+            of its hull that moves farthest.
         bodies: which to watch.
-        corners: gives the corners (N, 3) of a body's convex hull in its frame [m]. No point of a
-            body moves farther than the one of them that moves farthest.
 
     Attributes:
         farthest: largest displacement of each body's farthest point since the start [m].
         turned: largest rotation of each body since the start [rad].
     """
 
-    def __init__(
-        self,
-        plant: MultibodyPlant,
-        plant_context: Context,
-        bodies: Iterable[BodyIndex],
-        corners: Callable[[BodyIndex], Array],
-    ) -> None:
-        self._plant = plant
-        self._plant_context = plant_context
-        self._corners = corners
+    def __init__(self, world: PlacedBodies, bodies: Iterable[BodyIndex]) -> None:
+        self._world = world
         self._start = {index: self._pose(index) for index in bodies}
         self._last = {index: self._center(index) for index in self._start}
         self.farthest = dict.fromkeys(self._start, 0.0)
@@ -76,21 +81,14 @@ class MotionTracker:
         within the hull has gone farther than every corner.
         """
         (R_WB, p_WB), (R_WB_start, p_WB_start) = self._pose(index), self._start[index]
-        p_PP_W = self._corners(index) @ (R_WB - R_WB_start).T + (p_WB - p_WB_start)
+        p_PP_W = self._world.corners(index) @ (R_WB - R_WB_start).T + (p_WB - p_WB_start)
         farthest = math.sqrt((p_PP_W * p_PP_W).sum(axis=1).max())
         return farthest, float(rotation_angle(R_WB @ R_WB_start.T))
 
     def _pose(self, index: BodyIndex) -> tuple[Array, Array]:
         """Rotation (3, 3) and position (3,) of a body in the world [m]."""
-        X_WB = self._plant.EvalBodyPoseInWorld(self._plant_context, self._plant.get_body(index))
-        return np.array(X_WB.rotation().matrix()), np.array(X_WB.translation())
+        X_WB = self._world.X_WB(index)
+        return X_WB[:3, :3], X_WB[:3, 3]
 
     def _center(self, index: BodyIndex) -> Array:
-        return center_of_mass(self._plant, self._plant_context, self._plant.get_body(index))
-
-
-def center_of_mass(plant: MultibodyPlant, plant_context: Context, body: RigidBody) -> Array:
-    """Centre of mass (3,) of a body in the world [m]."""
-    X_WB = plant.EvalBodyPoseInWorld(plant_context, body)
-    p_WCm: Array = X_WB.multiply(body.default_com())
-    return p_WCm
+        return self._world.center(index)

@@ -23,13 +23,13 @@ from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.simulation.trials.arm_carrier import ArmCarrier
 from burg_drake.simulation.trials.command_sequence import CommandSequence
 from burg_drake.simulation.trials.execution import Execution
-from burg_drake.simulation.trials.grasp_trial import KEPT_WORLDS, GraspTrial
+from burg_drake.simulation.trials.grasp_trial import KEPT_WORLDS, DrakeTrial
 from burg_drake.simulation.trials.lift_clearance import ArmLiftClearance
 from burg_drake.simulation.trials.result import TrialResult
 from burg_drake.simulation.trials.trial_settings import DEFAULT_TRIAL, TrialSettings
 from burg_drake.simulation.trials.trial_world import TrialWorld, check_overrides
 from burg_drake.station.diagram import MountedHand, StationDiagram, build_station_diagram
-from burg_drake.station.document import ENGINES, Engine, StationLike, as_engine, as_station
+from burg_drake.station.document import ENGINES, Engine, StationLike, as_drake_engine, as_station
 
 REST = 0.05
 """Time between arrival and closing, in which the arm comes to rest [s]."""
@@ -39,7 +39,7 @@ APART = 1e-6
 """Ends of trajectories that are meant to meet [rad]."""
 
 
-class ArmTrial(GraspTrial):
+class ArmTrial(DrakeTrial):
     """Executes plans in one scene with the whole robot.
 
     Args:
@@ -79,7 +79,7 @@ class ArmTrial(GraspTrial):
             scene,
             station,
             "arm",
-            as_engine(engine),
+            as_drake_engine(engine),
             settings=settings,
             clearance=clearance,
             meshcat=meshcat,

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping, Set as AbstractSet
+from typing import Any, Protocol
 
 import numpy as np
 from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.core import Array, inverse
 from burg_drake.core.grasps import Margins, Outcome
-from burg_drake.simulation.rest import MotionTracker, center_of_mass
+from burg_drake.simulation.rest import MotionTracker
 from burg_drake.simulation.trials.carrier import Carrier, HandSegment
 from burg_drake.simulation.trials.contacts import (
     NO_CONTACT,
@@ -22,9 +22,8 @@ from burg_drake.simulation.trials.contacts import (
 )
 from burg_drake.simulation.trials.grip_motion import GripMotion
 from burg_drake.simulation.trials.result import TrialResult
-
-if TYPE_CHECKING:
-    from burg_drake.simulation.trials.trial_world import TrialWorld
+from burg_drake.simulation.trials.trial_settings import TrialSettings
+from burg_drake.station.document import Engine, Hand
 
 MINIMUM_LIFT = 0.5
 """Share of the hand's way that the target must go with it to count as lifted."""
@@ -34,8 +33,85 @@ class OtherTouched(Exception):
     """In a world of the target alone, target or robot meet something else that could move."""
 
 
+class SteppedWorld(Protocol):
+    """A world that is stepped, by whatever engine, as far as the phases have to know it.
+
+    Attributes:
+        settings: phases of a trial.
+        engine: how it is stepped.
+        free, standing: bodies by name: what can move, and what could in another world.
+        robot: all bodies of the robot.
+        fingers: of these the fingers.
+        hand_document: the hand.
+    """
+
+    settings: TrialSettings
+
+    @property
+    def engine(self) -> Engine: ...
+    @property
+    def free(self) -> Mapping[str, BodyIndex]: ...
+    @property
+    def standing(self) -> Mapping[str, BodyIndex]: ...
+    @property
+    def robot(self) -> AbstractSet[BodyIndex]: ...
+    @property
+    def fingers(self) -> tuple[BodyIndex, BodyIndex]: ...
+    @property
+    def hand_document(self) -> Hand: ...
+
+    @property
+    def time(self) -> float:
+        """Since the start of the trial [s]."""
+        ...
+
+    def finger_speed(self) -> float:
+        """Speed of the faster finger [m/s]."""
+        ...
+
+    def X_WG(self) -> Array:
+        """(4, 4) grasp frame."""
+        ...
+
+    def X_WB(self, body: BodyIndex) -> Array:
+        """(4, 4) of a body."""
+        ...
+
+    def center(self, body: BodyIndex) -> Array:
+        """Centre of mass (3,) of a body in the world [m]."""
+        ...
+
+    def corners(self, body: BodyIndex) -> Array:
+        """(N, 3) corners of the convex hull of a free object in its frame [m]."""
+        ...
+
+    def look(self) -> list[BodyContact]:
+        """All that touch.
+
+        Raises:
+            OtherTouched: what happens now is for the complete world to say.
+        """
+        ...
+
+    def state(self) -> Any:
+        """What `go_back` goes back to."""
+        ...
+
+    def go_back(self, time: float, state: Any) -> None:
+        """Is again as at a time [s]."""
+        ...
+
+    def close_to(self, bodies: Iterable[BodyIndex]) -> set[BodyIndex]:
+        """The bodies, and all that stand so close to one of them that they may lean on it."""
+        ...
+
+    def release(self, released: set[BodyIndex], still: set[BodyIndex]) -> None:
+        """Lets locked objects move; those in `still` stay locked."""
+        ...
+
+
 class Execution:
-    """Runs a trial from a Context that has been brought to its start.
+    """Runs a trial in a world that has been brought to its start.
 
     Locked objects are released when something moving touches them, and with them those close to
     them: the trial goes back to the look before, where they were apart, and goes on from there.
@@ -51,21 +127,15 @@ class Execution:
     """
 
     def __init__(
-        self, world: TrialWorld, target: BodyIndex, moving: set[BodyIndex], carrier: Carrier
+        self, world: SteppedWorld, target: BodyIndex, moving: set[BodyIndex], carrier: Carrier
     ) -> None:
-        diagram = world.diagram
         self._world = world
         self._carrier = carrier
         self._settings = world.settings
-        self._context = world.context
-        self._plant = diagram.plant
-        self._plant_context = self._plant.GetMyContextFromRoot(self._context)
-        self._results_port = self._plant.get_contact_results_output_port()
-        self._target = self._plant.get_body(target)
-        self._itself = {name: index for name, index in diagram.free.items() if index == target}
-        self._others = {name: index for name, index in diagram.free.items() if index != target}
-        self._still = set(diagram.free.values()) - moving
-        self._robot = set(diagram.robot_bodies)
+        self._target = target
+        self._itself = {name: index for name, index in world.free.items() if index == target}
+        self._others = {name: index for name, index in world.free.items() if index != target}
+        self._still = set(world.free.values()) - moving
         self._path_length = sum(segment.length for segment in carrier.segments)
         self._direction = carrier.segments[0].direction_W
         self._center_start = self._center()
@@ -77,7 +147,7 @@ class Execution:
         self._touched = False
         self._blocker = ""
         self._steps = 0
-        self._steps_per_check = max(1, round(self._settings.poll / diagram.engine.time_step))
+        self._steps_per_check = max(1, round(self._settings.poll / world.engine.time_step))
         self._in_free_air = 0.0
         self._path_is_blocked = False
         self._left_to_go = 0.0
@@ -117,11 +187,11 @@ class Execution:
         settings = self._settings
         self._carrier.close()
         slow_since = math.inf
-        timeout = max(settings.close_timeout, 2.0 * self._world.hand.document.closing_time)
-        timeout += self._context.get_time()
-        while self._context.get_time() < timeout:
+        timeout = max(settings.close_timeout, 2.0 * self._world.hand_document.closing_time)
+        timeout += self._world.time
+        while self._world.time < timeout:
             now = self.advance()
-            if self._world.hand.finger_speed(self._plant_context) > settings.settled_speed:
+            if self._world.finger_speed() > settings.settled_speed:
                 slow_since = math.inf
             else:
                 slow_since = min(slow_since, now)
@@ -172,7 +242,7 @@ class Execution:
                 return Outcome.BLOCKED
             if not self.contact.any:
                 return Outcome.DROPPED
-            if self._world.diagram.engine.whole_trial:
+            if self._world.engine.whole_trial:
                 continue
             if self._in_hand.is_steady and self._in_hand.stays_on_one_side(settings.hold_time):
                 break
@@ -198,7 +268,7 @@ class Execution:
         carry it lets the target go ever faster; so what sticks to the pads then, or creeps and does
         not get faster, in free air and with all others at rest, is held to the end, too.
         """
-        if self._world.diagram.engine.whole_trial or self._path_is_blocked:
+        if self._world.engine.whole_trial or self._path_is_blocked:
             return False
         time = self._carrier.lift_time + self._settings.hold_time
         in_hand = self._in_hand
@@ -230,21 +300,17 @@ class Execution:
         self._steps += self._steps_per_check if steps is None else steps
         time = self._time()
         while True:
-            state = self._context.get_discrete_state().Clone() if self._still else None
+            state = self._world.state() if self._still else None
             self._carrier.advance_to(time)
             if not math.isfinite(self._center()[2]):
                 raise RuntimeError(f"the state is not finite at {time:.3f} s")
-            results = self._results_port.Eval(self._plant_context)
-            if self._world.meets_another(results):
-                raise OtherTouched
-            contacts = self._world.contacts.read(results)
-            moving = self._robot | (set(self._world.diagram.free.values()) - self._still)
+            contacts = self._world.look()
+            moving = self._world.robot | (set(self._world.free.values()) - self._still)
             found = reached(contacts, moving, self._still)
             if not found:
                 break
-            self._context.SetTime(before)
-            self._context.SetDiscreteState(state)
-            found = self._world.neighbours.close_to(found) & self._still
+            self._world.go_back(before, state)
+            found = self._world.close_to(found) & self._still
             self._still -= found
             self._world.release(found, self._still)
         self._record_contacts(contacts)
@@ -252,17 +318,17 @@ class Execution:
 
     def _time(self) -> float:
         """Time of the last look [s]: a whole number of steps, rounded as Drake's own steps are."""
-        return self._steps * self._world.diagram.engine.time_step
+        return self._steps * self._world.engine.time_step
 
     def _record_contacts(self, contacts: list[BodyContact]) -> None:
         """Takes down what the contacts and poses say."""
-        settings, target = self._settings, self._target.index()
-        self.contact = finger_contact(contacts, self._world.hand.fingers, target)
+        settings, target = self._settings, self._target
+        self.contact = finger_contact(contacts, self._world.fingers, target)
         self._touched = self._touched or self.contact.any
         others_rest = self._moved.update(self._still) <= settings.settled_speed * settings.poll
         self._in_hand.look(self.X_GO(), others_rest=others_rest)
         self._blocker = self._carrier.watch(contacts)
-        free = not touched_from_outside(contacts, self._robot | {target})
+        free = not touched_from_outside(contacts, self._world.robot | {target})
         self._in_free_air = self._in_free_air + settings.poll if free else 0.0
 
     def followed(self) -> float:
@@ -272,21 +338,20 @@ class Execution:
 
     def X_GO(self) -> Array:
         """(4, 4) target in the grasp frame."""
-        X_WO = self._plant.EvalBodyPoseInWorld(self._plant_context, self._target)
-        X_GO: Array = inverse(self._world.hand.X_WG(self._plant_context)) @ X_WO.GetAsMatrix4()
+        X_GO: Array = inverse(self._world.X_WG()) @ self._world.X_WB(self._target)
         return X_GO
 
     def _center(self) -> Array:
         """The target's centre of mass (3,) in the world [m]."""
-        return center_of_mass(self._plant, self._plant_context, self._target)
+        return self._world.center(self._target)
 
     def _displacements(self, bodies: Iterable[BodyIndex]) -> MotionTracker:
         """Of bodies, from where they are now."""
-        return MotionTracker(self._plant, self._plant_context, bodies, self._world.corners)
+        return MotionTracker(self._world, bodies)
 
     def _of_others(self, values: Mapping[BodyIndex, float]) -> dict[str, float]:
         """Motions of the others by name; what can only stand has none."""
-        standing = dict.fromkeys(self._world.diagram.standing, 0.0)
+        standing = dict.fromkeys(self._world.standing, 0.0)
         return standing | _by_name(self._others, values)
 
     def result(self, outcome: Outcome) -> TrialResult:
@@ -294,7 +359,7 @@ class Execution:
         force = area = math.nan
         slip, tilt = self._in_hand.since_grip
         if not math.isnan(slip):
-            closing = self._world.hand.X_WG(self._plant_context)[:3, 0]
+            closing = self._world.X_WG()[:3, 0]
             force = float(np.abs(self.contact.force @ closing).min())
             area = float(self.contact.area.min())
         margins = Margins(
@@ -306,7 +371,7 @@ class Execution:
             lift=self.followed() + self._left_to_go,
             others_moved=_largest(self._moved.farthest),
             others_turned=_largest(self._moved.turned),
-            end_time=self._context.get_time(),
+            end_time=self._world.time,
             tracking_error=self._carrier.tracking_error,
             tracking_distance=self._carrier.tracking_distance,
             pushed=max(self._pushed.values(), default=math.nan),

@@ -6,6 +6,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Generic, Protocol, TypeVar
 
 from pydrake.geometry import Meshcat
 from pydrake.systems.analysis import Simulator
@@ -34,7 +35,32 @@ KEPT_WORLDS = 16
 """Worlds of a target alone that are kept; each takes some 20 MB, and 0.1 s to build."""
 
 
-class GraspTrial(ABC):
+class KeptWorld(Protocol):
+    """A world in which trials begin."""
+
+    @property
+    def time(self) -> float:
+        """Since the start of the trial [s]."""
+        ...
+
+    @property
+    def robot_meets_hull(self) -> bool:
+        """Whether, in a world of a target alone, parts of the robot meet a hull in its place."""
+        ...
+
+    def is_usable(self) -> bool:
+        """Whether trials can begin in it."""
+        ...
+
+    def invalidate(self) -> None:
+        """Has the next trial prepare it from scratch."""
+        ...
+
+
+W = TypeVar("W", bound=KeptWorld)
+
+
+class GraspTrial(ABC, Generic[W]):
     """Executes grasps in one scene.
 
     A trial runs in a world in which the target alone can move, which costs less. If it meets
@@ -43,18 +69,147 @@ class GraspTrial(ABC):
     Args:
         scene: the scene.
         station: the station.
-        robot: what of it moves.
-        engine: time step and contact settings.
+        engine: how trials are stepped.
         settings: phases of a trial.
         clearance: the screen of the open hand in the scene.
         motion: where the hand goes, if not as the settings or else the station say.
         lock: keep objects locked until something moving touches them, and run in worlds of the
             target alone.
-        meshcat: where to show the trials.
 
     Attributes:
         scene, station, engine, settings, clearance: as given.
         motion: where the hand goes.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        station: Station,
+        engine: Engine,
+        *,
+        settings: TrialSettings,
+        clearance: HandClearance,
+        motion: GraspMotion | None = None,
+        lock: bool = True,
+    ) -> None:
+        self.scene, self.station, self.engine = scene, station, engine
+        self.settings, self.clearance = settings, clearance
+        self.motion = motion or settings.motion or station.document.motion
+        self._lock = lock
+        self._alone: dict[str, W | None] = {}
+        self._complete: W | None = None
+        self._world: W | None = None
+
+    @property
+    def world(self) -> W:
+        """That of the last trial; before the first one the complete world."""
+        return self._world or self.complete_world
+
+    @property
+    def complete_world(self) -> W:
+        """The one in which all objects can move."""
+        if self._complete is None:
+            self._complete = self._build(None)
+        return self._complete
+
+    def X_WG(self, instance: str, X_OG: Array) -> Array:
+        """A grasp (4, 4) of an instance in the world.
+
+        Raises:
+            InvalidInputError: `X_OG` is not a pose, or `instance` cannot be grasped.
+        """
+        if instance not in self.scene.instances:
+            free = ", ".join(self.scene.instances) or "(none)"
+            raise InvalidInputError(
+                f"{instance!r} is not a free object of scene {self.scene.name!r}; free are: {free}"
+            )
+        return instance_pose(self.scene, self.station, instance) @ check_pose(X_OG, "X_OG")
+
+    def execute(
+        self,
+        instance: str,
+        X_WG: Array,
+        begin: Callable[[W], Execution],
+        *,
+        without_hull: bool = False,
+    ) -> TrialResult:
+        """Executes a grasp, if the open hand is clear at it, and where its approach begins.
+
+        Args:
+            instance: the target.
+            X_WG: (4, 4) grasp in the world.
+            begin: brings a world to the start of the trial.
+            without_hull: not in a world in which parts of the robot meet the target's hull.
+
+        Returns:
+            The outcome with its margins. A failure of the simulator is an outcome, too.
+        """
+        screen = self.clearance.check(instance, X_WG)
+        if screen.outcome is not None:
+            return collision(screen)
+        start = self._screen_of_start(instance, X_WG)
+        if start is not None and start.outcome is not None:
+            return collision(replace(start, outcome=Outcome.HAND_COLLISION_APPROACH))
+        world = self._world_of(instance)
+        if without_hull and world.robot_meets_hull:
+            world = self.complete_world
+        try:
+            try:
+                found = begin(world).run()
+            except OtherTouched:
+                world = self.complete_world
+                found = begin(world).run()
+            return replace(found, margins=replace(found.margins, clearance=screen.clearance))
+        except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
+            world.invalidate()
+            return failure(error, screen, world.time)
+
+    def _screen_of_start(self, instance: str, X_WG: Array) -> Clearance | None:
+        """The screen of the open hand where a trial begins; None if that is at the grasp, or the
+        plan of an arm tells."""
+        return None
+
+    def closed_before_contact(self, instance: str, X_WG: Array) -> float:
+        """How far the fingers can close, from 0 (open) to 1, before they touch anything: the
+        clearance knows pieces, out of which the target's surface stands a little.
+
+        Args:
+            instance: the target.
+            X_WG: (4, 4) grasp in the world at which the open hand is clear.
+        """
+        travel = min(abs(f.closed - f.open) for f in self.station.hand.fingers)
+        excess = self.scene.entry(instance).contact.excess / travel
+        return max(0.0, self.clearance.free_travel(X_WG) - excess)
+
+    def _enter(self, world: W | None) -> W:
+        """Makes a world, the complete one if None, the present one."""
+        self._world = self.complete_world if world is None else world
+        return self._world
+
+    def _world_of(self, instance: str) -> W:
+        """The cheapest in which a trial of an instance can begin."""
+        if not self._lock:
+            return self.complete_world
+        if instance not in self._alone:
+            world = self._build(instance)
+            self._alone[instance] = world if world.is_usable() else None
+        self._alone[instance] = found = self._alone.pop(instance)  # used last comes last
+        if len(self._alone) > KEPT_WORLDS:
+            del self._alone[next(iter(self._alone))]
+        return found or self.complete_world
+
+    @abstractmethod
+    def _build(self, alone: str | None) -> W:
+        """A world in which one object alone can move, or the complete one."""
+
+
+class DrakeTrial(GraspTrial[TrialWorld]):
+    """A trial in Drake.
+
+    Args:
+        scene, station, engine, settings, clearance, motion, lock: see `GraspTrial`.
+        robot: what of the station moves.
+        meshcat: where to show the trials.
     """
 
     def __init__(
@@ -70,25 +225,10 @@ class GraspTrial(ABC):
         lock: bool = True,
         meshcat: Meshcat | None = None,
     ) -> None:
-        self.scene, self.station, self.engine = scene, station, engine
-        self.settings, self.clearance = settings, clearance
-        self.motion = motion or settings.motion or station.document.motion
-        self._robot, self._lock, self._meshcat = robot, lock, meshcat
-        self._alone: dict[str, TrialWorld | None] = {}
-        self._complete: TrialWorld | None = None
-        self._world: TrialWorld | None = None
-
-    @property
-    def world(self) -> TrialWorld:
-        """That of the last trial; before the first one the complete world."""
-        return self._world or self.complete_world
-
-    @property
-    def complete_world(self) -> TrialWorld:
-        """The one in which all objects can move."""
-        if self._complete is None:
-            self._complete = self._build(None)
-        return self._complete
+        super().__init__(
+            scene, station, engine, settings=settings, clearance=clearance, motion=motion, lock=lock
+        )
+        self._robot, self._meshcat = robot, meshcat
 
     @property
     def diagram(self) -> StationDiagram:
@@ -119,92 +259,6 @@ class GraspTrial(ABC):
     def context(self) -> Context:
         """Of the trial that runs or ran last."""
         return self.world.context
-
-    def X_WG(self, instance: str, X_OG: Array) -> Array:
-        """A grasp (4, 4) of an instance in the world.
-
-        Raises:
-            InvalidInputError: `X_OG` is not a pose, or `instance` cannot be grasped.
-        """
-        if instance not in self.scene.instances:
-            free = ", ".join(self.scene.instances) or "(none)"
-            raise InvalidInputError(
-                f"{instance!r} is not a free object of scene {self.scene.name!r}; free are: {free}"
-            )
-        return instance_pose(self.scene, self.station, instance) @ check_pose(X_OG, "X_OG")
-
-    def execute(
-        self,
-        instance: str,
-        X_WG: Array,
-        begin: Callable[[TrialWorld], Execution],
-        *,
-        without_hull: bool = False,
-    ) -> TrialResult:
-        """Executes a grasp, if the open hand is clear at it, and where its approach begins.
-
-        Args:
-            instance: the target.
-            X_WG: (4, 4) grasp in the world.
-            begin: brings the Context of a world to the start of the trial.
-            without_hull: not in a world in which parts of the robot meet the target's hull.
-
-        Returns:
-            The outcome with its margins. A failure of the simulator is an outcome, too.
-        """
-        screen = self.clearance.check(instance, X_WG)
-        if screen.outcome is not None:
-            return collision(screen)
-        start = self._screen_of_start(instance, X_WG)
-        if start is not None and start.outcome is not None:
-            return collision(replace(start, outcome=Outcome.HAND_COLLISION_APPROACH))
-        world = self._world_of(instance)
-        if without_hull and world.robot_meets_hull:
-            world = self.complete_world
-        try:
-            try:
-                found = begin(world).run()
-            except OtherTouched:
-                world = self.complete_world
-                found = begin(world).run()
-            return replace(found, margins=replace(found.margins, clearance=screen.clearance))
-        except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
-            world.invalidate()
-            return failure(error, screen, world.context.get_time())
-
-    def _screen_of_start(self, instance: str, X_WG: Array) -> Clearance | None:
-        """The screen of the open hand where a trial begins; None if that is at the grasp, or the
-        plan of an arm tells."""
-        return None
-
-    def closed_before_contact(self, instance: str, X_WG: Array) -> float:
-        """How far the fingers can close, from 0 (open) to 1, before they touch anything: the
-        clearance knows pieces, out of which the target's surface stands a little.
-
-        Args:
-            instance: the target.
-            X_WG: (4, 4) grasp in the world at which the open hand is clear.
-        """
-        travel = min(abs(f.closed - f.open) for f in self.station.hand.fingers)
-        excess = self.scene.entry(instance).contact.excess / travel
-        return max(0.0, self.clearance.free_travel(X_WG) - excess)
-
-    def _enter(self, world: TrialWorld | None) -> TrialWorld:
-        """Makes a world, the complete one if None, the present one."""
-        self._world = self.complete_world if world is None else world
-        return self._world
-
-    def _world_of(self, instance: str) -> TrialWorld:
-        """The cheapest in which a trial of an instance can begin."""
-        if not self._lock:
-            return self.complete_world
-        if instance not in self._alone:
-            world = self._build(instance)
-            self._alone[instance] = world if world.is_usable() else None
-        self._alone[instance] = found = self._alone.pop(instance)  # used last comes last
-        if len(self._alone) > KEPT_WORLDS:
-            del self._alone[next(iter(self._alone))]
-        return found or self.complete_world
 
     def _build(self, alone: str | None) -> TrialWorld:
         diagram = build_station_diagram(

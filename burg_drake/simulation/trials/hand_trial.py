@@ -11,19 +11,18 @@ target.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from functools import lru_cache, partial
 
 import numpy as np
 from pydrake.geometry import Meshcat
 
-from burg_drake.core import Array, InvalidInputError, make_pose
+from burg_drake.core import Array, make_pose
 from burg_drake.grasping.clearance import Clearance, HandClearance
 from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.simulation.trials.execution import Execution
-from burg_drake.simulation.trials.grasp_trial import KEPT_WORLDS, GraspTrial
-from burg_drake.simulation.trials.lift_carrier import LiftCarrier, LiftPath
+from burg_drake.simulation.trials.grasp_trial import KEPT_WORLDS, DrakeTrial, GraspTrial, W
+from burg_drake.simulation.trials.lift_carrier import LiftCarrier, LiftPath, lift_paths
 from burg_drake.simulation.trials.lift_clearance import HandLiftClearance
 from burg_drake.simulation.trials.result import TrialResult
 from burg_drake.simulation.trials.trial_settings import DEFAULT_TRIAL, TrialSettings
@@ -34,12 +33,46 @@ from burg_drake.station.document import (
     Engine,
     GraspMotion,
     StationLike,
-    as_engine,
+    as_drake_engine,
     as_station,
 )
 
 
-class HandTrial(GraspTrial):
+class HandAloneTrial(GraspTrial[W]):
+    """Where the hand alone goes, of whatever engine."""
+
+    def lift_paths(self, X_WG: Array, lift: float | None = None) -> tuple[LiftPath, ...]:
+        """Straight paths of the hand with the target: the retreat, if there is one, and the lift.
+
+        Args:
+            X_WG: (4, 4) grasp in the world.
+            lift: length of the lift [m], in place of the motion's.
+
+        Returns:
+            One or two, each longer than 0.
+
+        Raises:
+            InvalidInputError: the hand would not move, or a length is not one.
+        """
+        return lift_paths(self.motion, X_WG, lift)
+
+    def _screen_of_start(self, instance: str, X_WG: Array) -> Clearance | None:
+        if self._approach(X_WG) is None:
+            return None
+        return self.clearance.check(instance, self._pregrasp(X_WG))
+
+    def _approach(self, X_WG: Array) -> LiftPath | None:
+        """The path of the hand to a grasp (4, 4) in the world; None if it begins there."""
+        if not self.settings.approach or self.motion.standoff <= 0.0:
+            return None
+        return LiftPath(X_WG[:3, 2], self.motion.standoff)
+
+    def _pregrasp(self, X_WG: Array) -> Array:
+        """(4, 4) pregrasp of a grasp in the world."""
+        return make_pose(X_WG[:3, :3], X_WG[:3, 3] - self.motion.standoff * X_WG[:3, 2])
+
+
+class HandTrial(HandAloneTrial[TrialWorld], DrakeTrial):
     """Executes grasps of one scene with the hand alone.
 
     The approach is not simulated: the open hand begins at the grasp, and what is in its way there
@@ -79,7 +112,7 @@ class HandTrial(GraspTrial):
             scene,
             station,
             "hand",
-            as_engine(engine),
+            as_drake_engine(engine),
             settings=settings,
             clearance=HandClearance(self._plain),
             motion=motion,
@@ -182,45 +215,5 @@ class HandTrial(GraspTrial):
         carrier = LiftCarrier(world, paths, lift_clearance, approach, target)
         return Execution(world, target, moving, carrier)
 
-    def _screen_of_start(self, instance: str, X_WG: Array) -> Clearance | None:
-        if self._approach(X_WG) is None:
-            return None
-        return self.clearance.check(instance, self._pregrasp(X_WG))
-
-    def _approach(self, X_WG: Array) -> LiftPath | None:
-        """The path of the hand to a grasp (4, 4) in the world; None if it begins there."""
-        if not self.settings.approach or self.motion.standoff <= 0.0:
-            return None
-        return LiftPath(X_WG[:3, 2], self.motion.standoff)
-
-    def _pregrasp(self, X_WG: Array) -> Array:
-        """(4, 4) pregrasp of a grasp in the world."""
-        return make_pose(X_WG[:3, :3], X_WG[:3, 3] - self.motion.standoff * X_WG[:3, 2])
-
     def _handle(self, diagram: StationDiagram) -> FloatingHand:
         return FloatingHand(diagram)
-
-    def lift_paths(self, X_WG: Array, lift: float | None = None) -> tuple[LiftPath, ...]:
-        """Straight paths of the hand with the target: the retreat, if there is one, and the lift.
-
-        Args:
-            X_WG: (4, 4) grasp in the world.
-            lift: length of the lift [m], in place of the motion's.
-
-        Returns:
-            One or two, each longer than 0.
-
-        Raises:
-            InvalidInputError: the hand would not move, or a length is not one.
-        """
-        height = self.motion.lift_height if lift is None else lift
-        if not 0.0 <= height < math.inf or self.motion.retreat + height <= 0.0:
-            raise InvalidInputError(
-                f"lift is {height:g} m; with a retreat of {self.motion.retreat:g} m it must be"
-                " finite, from 0 on, and move the hand"
-            )
-        paths = (
-            LiftPath(-X_WG[:3, 2], self.motion.retreat),
-            LiftPath(self.motion.direction_W, height),
-        )
-        return tuple(path for path in paths if path.length > 0.0)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from pydrake.multibody.tree import BodyIndex
 
-from burg_drake.core import Array
+from burg_drake.core import Array, InvalidInputError
 from burg_drake.simulation.trials.carrier import HandSegment
 from burg_drake.simulation.trials.contacts import BodyContact, reached
 from burg_drake.simulation.trials.lift_clearance import HandLiftClearance
@@ -17,6 +17,7 @@ from burg_drake.simulation.trials.robot_contacts import RobotContactWatch
 from burg_drake.simulation.trials.trial_settings import TrialSettings
 from burg_drake.simulation.trials.trial_world import TrialWorld
 from burg_drake.station.diagram import FloatingHand
+from burg_drake.station.document import GraspMotion
 
 REST_CHECKS = 1
 """Looks between arrival and closing, in which the hand comes to rest."""
@@ -71,7 +72,7 @@ class LiftCarrier:
         self._names = world.diagram.body_names
         self._hand = set(world.diagram.robot_bodies)
         self.segments = tuple(
-            HandSegment(*path, _check_count(path.length, settings) + (number + 1 < len(paths)))
+            HandSegment(*path, check_count(path.length, settings) + (number + 1 < len(paths)))
             for number, path in enumerate(paths)
         )
         self.lift_time = sum(settings.time_of(path.length) for path in paths)
@@ -80,7 +81,7 @@ class LiftCarrier:
         self.approach_checks = 0
         self._touches: RobotContactWatch | None = None
         if approach is not None and target is not None:
-            self.approach_checks = _check_count(approach.length, settings) + REST_CHECKS
+            self.approach_checks = check_count(approach.length, settings) + REST_CHECKS
             self._touches = RobotContactWatch(world.diagram, (), target)
         self._number = 0 if approach is None else -1
         self._is_approaching = self._is_lifting = False
@@ -144,13 +145,8 @@ class LiftCarrier:
         return self._floating.travelled(self._plant_context)
 
     def carries_full_load(self, check: int) -> bool:
-        """The hand accelerates in the first half of a segment and brakes in the second. Straight
-        up, the first adds to the weight and the second takes away from it. Otherwise both count,
-        and standing still is in between."""
-        half = _check_count(self.segments[-1].length, self._world.settings) // 2
-        if self.segments[-1].is_straight_up:
-            return check < half
-        return check >= half + self._world.settings.steady_polls
+        """See `bears_full_load`."""
+        return bears_full_load(self.segments[-1], check, self._world.settings)
 
     def is_free_ahead(self) -> bool:
         """Looks along the joint's axis."""
@@ -161,12 +157,53 @@ class LiftCarrier:
 
     def _command_speed(self, length: float, check: int, interval: float) -> None:
         """Commands the speed of the middle of an interval [s] of a path of a length [m]."""
-        checks = _check_count(length, self._world.settings)
+        checks = check_count(length, self._world.settings)
         top_speed = 2 * length / (checks * interval)
         speed = top_speed * max(0.0, 1 - abs(2 * check + 1 - checks) / checks)
         self._world.command("lift", np.array([0.0, speed]))
 
 
-def _check_count(length: float, settings: TrialSettings) -> int:
+def bears_full_load(last: HandSegment, check: int, settings: TrialSettings) -> bool:
+    """Whether the load on a grip was as large as it will ever be, up to an interval of the last
+    segment.
+
+    The hand accelerates in the first half of a segment and brakes in the second. Straight up, the
+    first adds to the weight and the second takes away from it. Otherwise both count, and standing
+    still is in between.
+    """
+    half = check_count(last.length, settings) // 2
+    if last.is_straight_up:
+        return check < half
+    return check >= half + settings.steady_polls
+
+
+def check_count(length: float, settings: TrialSettings) -> int:
     """Looks on a path of a length [m]: as many to speed up as to brake."""
     return 2 * max(1, round(settings.time_of(length) / settings.poll / 2))
+
+
+def lift_paths(motion: GraspMotion, X_WG: Array, lift: float | None = None) -> tuple[LiftPath, ...]:
+    """Straight paths of the hand with the target: the retreat, if there is one, and the lift.
+
+    Args:
+        motion: where the hand goes.
+        X_WG: (4, 4) grasp in the world.
+        lift: length of the lift [m], in place of the motion's.
+
+    Returns:
+        One or two, each longer than 0.
+
+    Raises:
+        InvalidInputError: the hand would not move, or a length is not one.
+    """
+    height = motion.lift_height if lift is None else lift
+    if not 0.0 <= height < math.inf or motion.retreat + height <= 0.0:
+        raise InvalidInputError(
+            f"lift is {height:g} m; with a retreat of {motion.retreat:g} m it must be"
+            " finite, from 0 on, and move the hand"
+        )
+    paths = (
+        LiftPath(-X_WG[:3, 2], motion.retreat),
+        LiftPath(motion.direction_W, height),
+    )
+    return tuple(path for path in paths if path.length > 0.0)

@@ -3,6 +3,9 @@ steps."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Protocol
+
 import numpy as np
 from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, QueryObject
 from pydrake.math import RigidTransform
@@ -10,7 +13,7 @@ from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import Context
 
 from burg_drake.core import Array, inverse
-from burg_drake.simulation.trials.trial_world import TrialWorld, collision_geometries
+from burg_drake.simulation.trials.trial_world import collision_geometries
 from burg_drake.station.diagram import FloatingHand, MountedHand, StationDiagram, mesh_by_pieces
 from burg_drake.station.world import ROBOT_MODELS
 
@@ -18,6 +21,23 @@ STEP = 0.01
 """Way between two looks [m]; a hand and what it meets are thicker, taken together."""
 GAP = 0.002
 """Boxes that come no closer than this are apart [m]."""
+
+
+class PlacedRobot(Protocol):
+    """A world in its present state, of whatever engine."""
+
+    @property
+    def free(self) -> Mapping[str, BodyIndex]:
+        """What can move, by name."""
+        ...
+
+    def X_WB(self, body: BodyIndex) -> Array:
+        """(4, 4) of a body."""
+        ...
+
+    def robot_positions(self, model: str) -> Array | None:
+        """Of one of `ROBOT_MODELS`, in the order of a station diagram; None if there is none."""
+        ...
 
 
 class HandLiftClearance:
@@ -51,7 +71,7 @@ class HandLiftClearance:
         start = plant.get_body(target).floating_positions_start() + 4
         self._places = [start, start + 1, start + 2, self._hand.lift.position_start()]
 
-    def is_free(self, world: TrialWorld, X_WG: Array, length: float, direction_W: Array) -> bool:
+    def is_free(self, world: PlacedRobot, X_WG: Array, length: float, direction_W: Array) -> bool:
         """Whether nothing is met on the way.
 
         Args:
@@ -128,7 +148,7 @@ class ArmLiftClearance:
             geometries = GeometrySet(collision_geometries(plant, side))
             manager.Apply(CollisionFilterDeclaration().ExcludeWithin(geometries))
 
-    def is_free(self, world: TrialWorld, q: Array) -> bool:
+    def is_free(self, world: PlacedRobot, q: Array) -> bool:
         """Whether nothing is met.
 
         Args:
@@ -152,21 +172,18 @@ class ArmLiftClearance:
         return True
 
 
-def _take_positions(diagram: StationDiagram, plant_context: Context, world: TrialWorld) -> None:
+def _take_positions(diagram: StationDiagram, plant_context: Context, world: PlacedRobot) -> None:
     """Puts robot and objects where they are in a world; what cannot move there is in its place."""
-    plant, other = diagram.plant, world.diagram.plant
-    other_context = other.GetMyContextFromRoot(world.context)
+    plant = diagram.plant
     for model in ROBOT_MODELS:
-        if other.HasModelInstanceNamed(model):
-            q = other.GetPositions(other_context, other.GetModelInstanceByName(model))
+        q = world.robot_positions(model)
+        if q is not None:
             plant.SetPositions(plant_context, plant.GetModelInstanceByName(model), q)
     for name, index in diagram.free.items():
-        if name in world.diagram.free:
-            moved = other.get_body(world.diagram.free[name])
-            X_WO = other.EvalBodyPoseInWorld(other_context, moved)
-        else:
-            X_WO = RigidTransform(diagram.X_WO(name))
-        plant.SetFloatingBaseBodyPoseInWorldFrame(plant_context, plant.get_body(index), X_WO)
+        moved = world.free.get(name)
+        X_WO = diagram.X_WO(name) if moved is None else world.X_WB(moved)
+        body = plant.get_body(index)
+        plant.SetFloatingBaseBodyPoseInWorldFrame(plant_context, body, RigidTransform(X_WO))
 
 
 def _bounds(

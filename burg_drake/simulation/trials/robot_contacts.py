@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from typing import Protocol
 
 import numpy as np
 from pydrake.multibody.tree import BodyIndex
 
 from burg_drake.simulation.trials.contacts import BodyContact
-from burg_drake.station.diagram import StationDiagram
 
 STOP_FORCE = 20.0
 """Force of the table on the hand at which the robot stops on its way to the grasp [N]: the nominal
@@ -16,11 +16,24 @@ threshold of a Panda's reflex in libfranka's examples (`setCollisionBehavior` in
 generate_joint_velocity_motion.cpp)."""
 
 
+class NamedBodies(Protocol):
+    """A world with a robot, and what people call its bodies; see `StationDiagram`."""
+
+    @property
+    def body_names(self) -> Mapping[BodyIndex, str]: ...
+    @property
+    def robot_bodies(self) -> Collection[BodyIndex]: ...
+    @property
+    def free(self) -> Mapping[str, BodyIndex]: ...
+    @property
+    def table(self) -> BodyIndex: ...
+
+
 class RobotContactWatch:
     """Watches a robot.
 
     Args:
-        diagram: built with a robot.
+        world: with a robot.
         links: the arm's bodies, without the hand's; none of the hand alone.
         target: the body to be grasped.
 
@@ -28,15 +41,13 @@ class RobotContactWatch:
         first: the first such touch, "panda_link5 vs can"; "" if there was none.
     """
 
-    def __init__(
-        self, diagram: StationDiagram, links: Collection[BodyIndex], target: BodyIndex
-    ) -> None:
-        self._names = diagram.body_names
-        self._robot = frozenset(diagram.robot_bodies)
+    def __init__(self, world: NamedBodies, links: Collection[BodyIndex], target: BodyIndex) -> None:
+        self._names = world.body_names
+        self._robot = frozenset(world.robot_bodies)
         self._links = frozenset(links)
-        self._free = frozenset(diagram.free.values())
-        self._table = diagram.table
-        self._planned = (target, diagram.table)
+        self._free = frozenset(world.free.values())
+        self._table = world.table
+        self._planned = (target, world.table)
         self.first = ""
 
     def update(self, contacts: Collection[BodyContact], arrived: bool) -> str:

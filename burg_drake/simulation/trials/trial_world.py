@@ -18,14 +18,16 @@ from pydrake.geometry import (
 from pydrake.multibody.plant import ContactResults, CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, SpatialInertia
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import Context
+from pydrake.systems.framework import Context, DiscreteValues
 
 from burg_drake.core import Array, InvalidInputError
 from burg_drake.objects.collision import hull_corners
 from burg_drake.simulation.rest import Neighbours
-from burg_drake.simulation.trials.contacts import ContactReader
+from burg_drake.simulation.trials.contacts import BodyContact, ContactReader
+from burg_drake.simulation.trials.execution import OtherTouched
 from burg_drake.simulation.trials.trial_settings import TrialSettings
 from burg_drake.station.diagram import HandHandle, StationDiagram, separate_contact
+from burg_drake.station.document import Engine, Hand
 
 TOUCHING = 0.001
 """A target whose hull is closer to another thing than this may lean on it [m]."""
@@ -67,6 +69,9 @@ class TrialWorld:
         )
         self._default = diagram.diagram.CreateDefaultContext()
         self.simulator = Simulator(diagram.diagram, self._default.Clone())
+        self._plant_context = diagram.plant.GetMyContextFromRoot(self.context)
+        self._results_port = diagram.plant.get_contact_results_output_port()
+        self._robot = frozenset(diagram.robot_bodies)
         self._corners: dict[BodyIndex, Array] = {}
         self._prepared: tuple[str, float | None, float | None] | None = None
         """Target, friction and mass that the Context is prepared for; None if for nothing."""
@@ -75,6 +80,94 @@ class TrialWorld:
     def context(self) -> Context:
         """Context of the trial that runs or ran last."""
         return self.simulator.get_mutable_context()
+
+    @property
+    def engine(self) -> Engine:
+        """How it is stepped."""
+        return self.diagram.engine
+
+    @property
+    def free(self) -> dict[str, BodyIndex]:
+        """What can move, by name."""
+        return self.diagram.free
+
+    @property
+    def standing(self) -> dict[str, BodyIndex]:
+        """What could move in the complete world, by name."""
+        return self.diagram.standing
+
+    @property
+    def robot(self) -> frozenset[BodyIndex]:
+        """Bodies of the robot."""
+        return self._robot
+
+    @property
+    def fingers(self) -> tuple[BodyIndex, BodyIndex]:
+        """Of the robot."""
+        return self.hand.fingers
+
+    @property
+    def hand_document(self) -> Hand:
+        """The hand."""
+        return self.hand.document
+
+    @property
+    def time(self) -> float:
+        """Since the start of the trial [s]."""
+        return float(self.context.get_time())
+
+    def robot_positions(self, model: str) -> Array | None:
+        """Of one of `ROBOT_MODELS`; None if there is none."""
+        plant = self.diagram.plant
+        if not plant.HasModelInstanceNamed(model):
+            return None
+        return np.asarray(
+            plant.GetPositions(self._plant_context, plant.GetModelInstanceByName(model))
+        )
+
+    def finger_speed(self) -> float:
+        """Speed of the faster finger [m/s]."""
+        return self.hand.finger_speed(self._plant_context)
+
+    def X_WG(self) -> Array:
+        """(4, 4) grasp frame."""
+        return self.hand.X_WG(self._plant_context)
+
+    def X_WB(self, body: BodyIndex) -> Array:
+        """(4, 4) of a body."""
+        plant = self.diagram.plant
+        X_WB = plant.EvalBodyPoseInWorld(self._plant_context, plant.get_body(body))
+        return np.asarray(X_WB.GetAsMatrix4())
+
+    def center(self, body: BodyIndex) -> Array:
+        """Centre of mass (3,) of a body in the world [m]."""
+        found = self.diagram.plant.get_body(body)
+        X_WB = self.diagram.plant.EvalBodyPoseInWorld(self._plant_context, found)
+        return np.asarray(X_WB.multiply(found.default_com()))
+
+    def look(self) -> list[BodyContact]:
+        """All that touch.
+
+        Raises:
+            OtherTouched: what happens now is for the complete world to say.
+        """
+        results = self._results_port.Eval(self._plant_context)
+        if self.meets_another(results):
+            raise OtherTouched
+        return self.contacts.read(results)
+
+    def state(self) -> DiscreteValues:
+        """What `go_back` goes back to."""
+        return self.context.get_discrete_state().Clone()
+
+    def go_back(self, time: float, state: DiscreteValues) -> None:
+        """Is again as at a time [s]."""
+        self.context.SetTime(time)
+        self.context.SetDiscreteState(state)
+
+    def close_to(self, bodies: Iterable[BodyIndex]) -> set[BodyIndex]:
+        """The bodies, and all that stand so close to one of them that they may lean on it."""
+        return self.neighbours.close_to(bodies)
 
     def corners(self, index: BodyIndex) -> Array:
         """(N, 3) corners of the convex hull of a free object in its frame O [m]; read once."""
