@@ -12,9 +12,15 @@ from burg_drake.motion.workspace import (
     inspect_station as inspect_station,
 )
 from burg_drake.station.diagram import (
+    FingerLink as FingerLink,
     FloatingHand as FloatingHand,
+    HandDescription as HandDescription,
     HandHandle as HandHandle,
+    HandLink as HandLink,
+    HandShape as HandShape,
     MountedHand as MountedHand,
+    PadFront as PadFront,
+    read_hand as read_hand,
 )
 from burg_drake.station.document import (
     Arm as Arm,

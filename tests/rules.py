@@ -20,6 +20,7 @@ EXTRAS = {
     "pandas": (),
     "pyarrow": (),
     "h5py": (),
+    "mujoco": (),
     "distributed": ("evaluation.cluster",),
     "pxr": ("export",),
     "viser": ("ui",),

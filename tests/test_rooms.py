@@ -36,13 +36,13 @@ ROOMS = {
     "scene": "document arrangement",
     "printout": "guide",
     "station": "document world control diagram checks",
-    "export": "",
+    "export": "mjcf",
     "cameras": "optics sources calibration pose rectification projection placement overlay noise"
     " systems live",
     "ros": "",
     "grasping": "similarity sampling quality comparison clearance",
     "motion": "ik proximity collision sweep lines transit reach plans timing workspace",
-    "simulation": "rest settling trials robustness",
+    "simulation": "rest settling trials mujoco robustness",
     "pipeline": "",
     "visualization": "style meshcat pictures grasps gallery scenes",
     "evaluation": "candidates stages workers cluster records store results grasp_sets robustness"

@@ -6,11 +6,12 @@ import importlib
 import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import burg_drake
-from burg_drake.core import MissingDependencyError, UnknownNameError, nearest
+from burg_drake.core import InvalidInputError, MissingDependencyError, UnknownNameError, nearest
 from burg_drake.export.folder import (
     ExportRecord,
     replaced_folder,
@@ -34,6 +35,7 @@ class Format:
         main: the file to open.
         about: what it is, and for whom.
         hydroelastic: whether it has Drake's contact properties.
+        with_hand: whether the station's hand can be above the scene.
         package: that it needs beside those of burg_drake, as pip and as Python know it.
     """
 
@@ -42,6 +44,7 @@ class Format:
     main: str
     about: str
     hydroelastic: bool = False
+    with_hand: bool = False
     package: tuple[str, str] | None = None
 
 
@@ -60,7 +63,13 @@ FORMATS = {
         about="Drake's model directives",
         hydroelastic=True,
     ),
-    "mjcf": Format(module="mjcf", writer="write_mjcf", main="scene.xml", about="MuJoCo's XML"),
+    "mjcf": Format(
+        module="mjcf.writer",
+        writer="write_mjcf",
+        main="scene.xml",
+        about="MuJoCo's XML",
+        with_hand=True,
+    ),
     "usd": Format(
         module="usd",
         writer="write_usd",
@@ -88,7 +97,12 @@ class Exported:
 
 
 def export_scene(
-    scene: SceneLike, folder: str | Path, to: str, station: StationLike | None = None
+    scene: SceneLike,
+    folder: str | Path,
+    to: str,
+    station: StationLike | None = None,
+    *,
+    hand: bool = False,
 ) -> Exported:
     """Writes a scene for another program: a folder that can be moved or zipped as it is.
 
@@ -99,11 +113,13 @@ def export_scene(
         to: one of `FORMATS`.
         station: its table and obstacles are exported, too, and the world is the station's. Without
             one the world is the scene frame S, and nothing is under the objects.
+        hand: `mjcf` alone: with the station's hand floating above the scene, as in grasp trials of
+            the engine `mujoco`. A note tells how it is moved.
 
     Raises:
         UnknownNameError: no such format, or a file of the library is missing.
         InvalidInputError: the folder holds something else or cannot be written to; an instance and
-            a part of the station share a name; an object's model cannot be exported.
+            a part of the station share a name; an object's model or the hand cannot be exported.
         MeshError: a mesh of the library is damaged.
         MissingDependencyError: `usd` without the package usd-core.
     """
@@ -114,9 +130,21 @@ def export_scene(
     if to not in FORMATS:
         raise UnknownNameError(f"format {to!r} does not exist; {nearest(to, FORMATS)}")
     chosen = FORMATS[to]
+    if hand and (station is None or not chosen.with_hand):
+        able = ", ".join(name for name, format in FORMATS.items() if format.with_hand)
+        raise InvalidInputError(
+            f"a hand is exported to {able} alone, not to {to}"
+            if not chosen.with_hand
+            else "a hand is a station's; name the station, too"
+        )
     write = _writer(to)
     path = require_own_folder(folder)
     layout = lay_out(scene, station)
+    if hand and station is not None:
+        from burg_drake.station.diagram import build_station_diagram, read_hand
+
+        parts = read_hand(build_station_diagram(scene, station, robot="hand"))
+        write = partial(write, hand=parts)
     with replaced_folder(path) as fresh:
         notes = write(layout, fresh)
         write_record(
@@ -135,14 +163,14 @@ def export_scene(
     return Exported(path / chosen.main, layout, notes)
 
 
-def _writer(to: str) -> Callable[[Layout, Path], tuple[str, ...]]:
+def _writer(to: str) -> Callable[..., tuple[str, ...]]:
     chosen = FORMATS[to]
     if chosen.package is not None and importlib.util.find_spec(chosen.package[1]) is None:
         raise MissingDependencyError(
             f"exports to {to} need the package {chosen.package[0]}; install it with"
             f" pip install 'burg-drake[{to}]'"
         )
-    writer: Callable[[Layout, Path], tuple[str, ...]] = getattr(
+    writer: Callable[..., tuple[str, ...]] = getattr(
         importlib.import_module(f"burg_drake.export.{chosen.module}"), chosen.writer
     )
     return writer

@@ -18,6 +18,7 @@ def add_to(group: Any) -> None:
         "write a scene for another program",
         "burg-drake scene export tabletop_six --to sdf -o tabletop_sdf",
         "burg-drake scene export my_scene.yaml --station my_station.yaml --to mjcf -o my_mjcf",
+        "burg-drake scene export tabletop_six --station panda_tabletop --to mjcf --hand -o hand",
         "",
         "The folder has all that it needs, and can be moved or zipped.",
         options=_add_options,
@@ -44,6 +45,12 @@ def _add_options(parser: Parser) -> None:
         " (default: the objects alone, in the frame of the board)",
         default=None,
     )
+    parser.add_argument(
+        "--hand",
+        action="store_true",
+        help="with --to mjcf and --station: the station's hand floats above the scene, with its"
+        " actuators, as in trials of the engine mujoco",
+    )
 
 
 def run_export(arguments: argparse.Namespace) -> int:
@@ -57,12 +64,13 @@ def run_export(arguments: argparse.Namespace) -> int:
     station = load_station(arguments.station) if arguments.station is not None else None
     for issue in validate_scene(scene) if station is None else check_scene(scene, station):
         print(f"burg-drake: warning: {scene.path}: {issue.message}", file=sys.stderr)
-    exported = export_scene(scene, arguments.output, arguments.to, station)
+    exported = export_scene(scene, arguments.output, arguments.to, station, hand=arguments.hand)
     for note in exported.notes:
         print(note)
     fixed = len(scene.background)
     parts = [f"{len(scene.instances)} objects"]
     parts += [f"{fixed} fixed"] if fixed else []
     parts += list(exported.layout.boxes)
+    parts += [station.hand.name] if station is not None and arguments.hand else []
     print(f"wrote {exported.main}: {', '.join(parts)}")
     return 0

@@ -83,7 +83,7 @@ def _add_settle(group: Any) -> None:
 
 def _add_settle_options(settle: Parser) -> None:
     from burg_drake.simulation.settling import SETTLING_ENGINE, SETTLING_TIME
-    from burg_drake.station.document import ENGINES
+    from burg_drake.station.document import DRAKE_ENGINES
 
     add_scene(settle)
     add_station(settle)
@@ -104,7 +104,7 @@ def _add_settle_options(settle: Parser) -> None:
     )
     settle.add_argument(
         "--engine",
-        choices=tuple(ENGINES),
+        choices=DRAKE_ENGINES,
         default=SETTLING_ENGINE,
         help="engine preset while objects fall (default: %(default)s)",
     )

@@ -1,6 +1,13 @@
 from .builder import build_station_diagram as build_station_diagram
 from .contact_pairs import separate_contact as separate_contact
 from .floating_hand import FloatingHand as FloatingHand
+from .hand_description import (
+    FingerLink as FingerLink,
+    HandDescription as HandDescription,
+    HandLink as HandLink,
+    HandShape as HandShape,
+    read_hand as read_hand,
+)
 from .hand_handle import HandHandle as HandHandle
 from .leaning import (
     soften as soften,
@@ -8,6 +15,7 @@ from .leaning import (
 )
 from .mesh_replacement import mesh_by_pieces as mesh_by_pieces
 from .mounted_hand import MountedHand as MountedHand
+from .pad_front import PadFront as PadFront
 from .station_diagram import (
     StationDiagram as StationDiagram,
     instance_pose as instance_pose,

@@ -48,7 +48,7 @@ from burg_drake.station.control import export_driven_ports, export_ports
 from burg_drake.station.diagram.contact_pairs import separate_contact
 from burg_drake.station.diagram.leaning import soften_touching
 from burg_drake.station.diagram.station_diagram import StationDiagram, instance_pose
-from burg_drake.station.document import ENGINES, Engine, StationLike, as_engine, as_station
+from burg_drake.station.document import ENGINES, Engine, StationLike, as_drake_engine, as_station
 from burg_drake.station.world import (
     ContactParts,
     Robot,
@@ -115,12 +115,12 @@ def build_station_diagram(
 
     Raises:
         UnknownNameError: no such `robot`, engine, camera, or instance that is to be alone.
-        InvalidInputError: options that contradict each other; an object's model cannot be loaded,
-            `arm` without an arm in the station, a home posture that does not fit the arm, or two
-            things of the same name.
+        InvalidInputError: options that contradict each other; an engine that is not Drake; an
+            object's model cannot be loaded, `arm` without an arm in the station, a home posture
+            that does not fit the arm, or two things of the same name.
         MissingDependencyError: cameras without the renderer's system libraries.
     """
-    scene, station, engine = as_scene(scene), as_station(station), as_engine(engine)
+    scene, station, engine = as_scene(scene), as_station(station), as_drake_engine(engine)
     if drivers and (robot != "arm" or weld_objects):
         raise InvalidInputError("drivers need robot='arm', and objects that are not welded")
     if for_trials and weld_objects:

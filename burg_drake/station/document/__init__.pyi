@@ -7,8 +7,10 @@ from .boxes import boxes_in_scene as boxes_in_scene
 from .content import world_content as world_content
 from .engine import (
     DEFAULT_ENGINE as DEFAULT_ENGINE,
+    DRAKE_ENGINES as DRAKE_ENGINES,
     ENGINES as ENGINES,
     Engine as Engine,
+    as_drake_engine as as_drake_engine,
     as_engine as as_engine,
 )
 from .grasp_motion import GraspMotion as GraspMotion

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from burg_drake.core import UnknownNameError, nearest, quoted
+from burg_drake.core import InvalidInputError, UnknownNameError, nearest, quoted
 from burg_drake.core.documents import require_ranges
 
 RANGES = {"time_step": (1e-4, 0.02), "stiction_tolerance": (1e-9, 1.0)}
@@ -14,11 +14,14 @@ RANGES = {"time_step": (1e-4, 0.02), "stiction_tolerance": (1e-9, 1.0)}
 
 @dataclass(frozen=True, kw_only=True)
 class Engine:
-    """Settings of Drake's discrete contact solver.
+    """What steps trials, and how.
 
     Attributes:
         name: name of the preset.
-        time_step: discrete step of the plant [s].
+        simulator: Drake, or MuJoCo with the hand alone. To MuJoCo the settings of Drake's solver
+            (`contact_approximation`, `contact_model`, `stiction_tolerance`, `contact_surface`) mean
+            nothing; its own are those that its pads and servos are laid out for.
+        time_step: discrete step [s].
         contact_approximation: Drake's approximation of the contact problem. With `lagged`
             the pads hold up to Coulomb's limit, within a few per cent, at every step from 1 to 10
             ms; `sap` is wrong on marginal grasps. What slides over the table is braked 2 % too
@@ -37,6 +40,7 @@ class Engine:
 
     name: str
     time_step: float
+    simulator: Literal["drake", "mujoco"] = "drake"
     contact_approximation: Literal["lagged", "similar", "sap"] = "lagged"
     contact_model: Literal["hydroelastic_with_fallback", "point"] = "hydroelastic_with_fallback"
     contact_surface: Literal["polygon", "triangle"] = "polygon"
@@ -46,6 +50,12 @@ class Engine:
     def __post_init__(self) -> None:
         require_ranges(self, RANGES, f"engine {quoted(self.name)}")
 
+    @property
+    def packages(self) -> dict[str, str]:
+        """Packages that decide about its results beside those that always do, as they are called in
+        files and installed."""
+        return {} if self.simulator == "drake" else {self.simulator: self.simulator}
+
 
 ENGINES = {
     engine.name: engine
@@ -53,12 +63,32 @@ ENGINES = {
         Engine(name="reference", time_step=0.001, whole_trial=True),
         Engine(name="standard", time_step=0.002),
         Engine(name="screening", time_step=0.005),
+        Engine(name="mujoco", simulator="mujoco", time_step=0.001),
     )
 }
-"""Presets by name: `reference` for truth, `standard` for results, `screening` for a first look."""
+"""Presets by name: `reference` for truth, `standard` for results, `screening` for a first look,
+`mujoco` for a second opinion by an engine that shares no physics with them."""
+DRAKE_ENGINES = tuple(name for name, engine in ENGINES.items() if engine.simulator == "drake")
+"""Names of the presets that step Drake diagrams."""
 
 
 DEFAULT_ENGINE = "standard"
+
+
+def as_drake_engine(engine: Engine | str) -> Engine:
+    """As `as_engine`, for what only Drake can step.
+
+    Raises:
+        UnknownNameError: no such preset.
+        InvalidInputError: the engine is not Drake.
+    """
+    found = as_engine(engine)
+    if found.simulator != "drake":
+        raise InvalidInputError(
+            f"engine {quoted(found.name)} is {found.simulator}, which only evaluates grasps with"
+            f" the hand alone; what is asked for needs Drake: {', '.join(DRAKE_ENGINES)}"
+        )
+    return found
 
 
 def as_engine(engine: Engine | str) -> Engine:

@@ -11,6 +11,7 @@ from .camera_sensors import (
 from .contact_parts import (
     ContactParts as ContactParts,
     add_contact_parts as add_contact_parts,
+    is_on_table as is_on_table,
     needs_no_pieces as needs_no_pieces,
 )
 from .gripper import (

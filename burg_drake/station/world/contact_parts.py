@@ -118,7 +118,7 @@ def add_contact_parts(
 
 def needs_no_pieces(scene: Scene, station: Station, name: str) -> bool:
     """Whether surface, feet and hull of an object leave nothing for its pieces to meet."""
-    return scene.entry(name).contact.kind == "surface" and _is_on_table(scene, station, name)
+    return scene.entry(name).contact.kind == "surface" and is_on_table(scene, station, name)
 
 
 def _add_surface(plant: MultibodyPlant, scene: Scene, name: str, body: RigidBody) -> GeometryId:
@@ -132,7 +132,7 @@ def _add_surface(plant: MultibodyPlant, scene: Scene, name: str, body: RigidBody
 def _add_feet(
     plant: MultibodyPlant, scene: Scene, station: Station, name: str, body: RigidBody
 ) -> list[GeometryId]:
-    if not _is_on_table(scene, station, name):
+    if not is_on_table(scene, station, name):
         return []
     X_WO = station.document.X_WS.matrix() @ scene.X_SO(name)
     properties = _material(scene.entry(name), FOOT_DISSIPATION, FOOT_STIFFNESS)
@@ -142,8 +142,8 @@ def _add_feet(
     ]
 
 
-def _is_on_table(scene: Scene, station: Station, name: str) -> bool:
-    """Whether an object stands well within the table's edge."""
+def is_on_table(scene: Scene, station: Station, name: str) -> bool:
+    """Whether an object is placed well within the table's edge."""
     X_WO = station.document.X_WS.matrix() @ scene.X_SO(name)
     table, entry = station.document.table, scene.entry(name)
     corners = np.array(np.meshgrid(*zip(entry.lower, entry.upper, strict=True))).reshape(3, -1).T

@@ -23,12 +23,13 @@ class MjcfAssets:
     Names of assets are `OBJECT:visual_0`, `OBJECT:piece_000`, which no two objects share.
     """
 
-    def __init__(self, asset: Element, library: ObjectLibrary, folder: Path) -> None:
+    def __init__(self, asset: Element, library: ObjectLibrary, folder: Path | None) -> None:
         """
         Args:
             asset: element that the assets are declared in.
             library: has the objects.
-            folder: of the MJCF file.
+            folder: of the MJCF file; if None nothing is written, pieces are read where they are,
+                and there is nothing to look at.
         """
         self._asset = asset
         self._library = library
@@ -52,6 +53,7 @@ class MjcfAssets:
         return self._pieces[name]
 
     def _visual(self, name: str, i: int, part: VisualPart) -> tuple[str, str]:
+        assert self._folder is not None
         mesh, file = f"{name}:visual_{i}", f"{OBJECTS}/{name}/visual_{i}.obj"
         atomic_write(self._folder / file, obj_text(part))
         # The walls of what is looked at may be open: no volume is needed, a surface is.
@@ -69,9 +71,12 @@ class MjcfAssets:
 
     def _piece(self, name: str, i: int, piece: str) -> str:
         mesh, file = f"{name}:piece_{i:03d}", f"{OBJECTS}/{name}/pieces/{i:03d}.obj"
-        target = self._folder / file
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(self._library.path(piece), target)
+        if self._folder is None:
+            file = str(self._library.path(piece).resolve())
+        else:
+            target = self._folder / file
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(self._library.path(piece), target)
         SubElement(self._asset, "mesh", {"name": mesh, "file": file, "inertia": "convex"})
         return mesh
 
