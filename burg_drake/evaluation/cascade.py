@@ -95,7 +95,7 @@ def evaluate(
     """Judges grasps and writes a run, or a run over many scenes.
 
     Results do not depend on the number of workers or on the order in which they finish. A grasp
-    that Drake cannot simulate ends as `simulation_failed`, and the others go on. An interrupted
+    that cannot be simulated ends as `simulation_failed`, and the others go on. An interrupted
     call loses nothing that was judged; the same call goes on from there, and returns at once when
     nothing is left to do. It tries those grasps again whose worker process was ended from outside,
     for example because the memory ran out.
@@ -122,10 +122,12 @@ def evaluate(
 
     Raises:
         InvalidInputError: bad argument, unsound scene, a mode that needs an arm where there is
-            none, or one that stands in something, collides in its home posture or does not reach
-            the board, unwritable folder, or a folder that holds another run or is being written.
+            none or an engine without arms, an arm that stands in something, collides in its home
+            posture or does not reach the board, unwritable folder, or a folder that holds another
+            run or is being written.
         UnknownNameError: a reference to something that does not exist.
-        MissingDependencyError: Parquet, or several scenes, without pyarrow.
+        MissingDependencyError: Parquet, or several scenes, without pyarrow; engine mujoco without
+            mujoco.
         SimulationError: the simulation of the scene cannot be built, or an executor ends before
             all is judged.
     """
@@ -155,7 +157,7 @@ def _evaluate_one(
     given = request.given(scene)
     require_run_folder(folder)
     if not (folder / RUN_FILE).exists():
-        require_sound(scene, station, mode)
+        require_sound(scene, station, mode, request.engine)
     if given is not None:
         given_candidates(scene, given)  # refuses what does not fit before the folder is made
     writable_folder(folder)

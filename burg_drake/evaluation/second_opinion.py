@@ -13,7 +13,11 @@ from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.records import Journal, begun_now, origin_of
 from burg_drake.evaluation.run import finish_run
-from burg_drake.evaluation.stages import StationJudgeFactory
+from burg_drake.evaluation.stages import (
+    StationJudgeFactory,
+    require_engine_for,
+    require_scene_for,
+)
 from burg_drake.evaluation.store import JOURNAL_FILE, Run, keep_parts, load_run, save_run
 from burg_drake.evaluation.workers import Executor, Job, LocalExecutor
 from burg_drake.station.document import ENGINES
@@ -45,9 +49,10 @@ def judge_again(
         The run with the new verdicts. Grasps that the engine cannot simulate keep their old one.
 
     Raises:
-        InvalidInputError: the run is not complete, the engine is its own, documents have changed
-            since, or another process is writing the folder.
+        InvalidInputError: the run is not complete, the engine is its own or cannot have the arm or
+            an object, documents have changed since, or another process is writing the folder.
         UnknownNameError: no such engine.
+        MissingDependencyError: it is not installed.
         SimulationError: the worker processes die.
     """
     run = run if isinstance(run, Run) else load_run(run)
@@ -66,6 +71,8 @@ def judge_again(
     with Reporter(progress) as reporter, Journal(run.path / JOURNAL_FILE) as journal:
         left = [run.trial(id).candidate for id in run.contested]
         if left:
+            require_engine_for(ENGINES[engine], run.document.mode)
+            require_scene_for(ENGINES[engine], run.scene(), run.station())
             run = _judge(run, left, engine, executor, journal, reporter)
         run = finish_run(run, run.document.table)
         keep_parts(run)

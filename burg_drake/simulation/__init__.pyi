@@ -1,3 +1,6 @@
+from .mujoco.mujoco_trial import MujocoTrial as MujocoTrial
+from .mujoco.mujoco_world import MujocoWorld as MujocoWorld
+from .mujoco.trial_of_engine import hand_trial_of as hand_trial_of
 from .rest.neighbours import Neighbours as Neighbours
 from .robustness.friction_search import (
     friction_limit as friction_limit,
@@ -28,11 +31,15 @@ from .trials.contacts import (
     BodyContact as BodyContact,
     ContactReader as ContactReader,
 )
-from .trials.execution import Execution as Execution
+from .trials.execution import (
+    Execution as Execution,
+    SteppedWorld as SteppedWorld,
+)
 from .trials.lift_carrier import LiftPath as LiftPath
 from .trials.lift_clearance import (
     ArmLiftClearance as ArmLiftClearance,
     HandLiftClearance as HandLiftClearance,
+    PlacedRobot as PlacedRobot,
 )
 from .trials.result import Margins as Margins
 from .trials.trial_world import TrialWorld as TrialWorld

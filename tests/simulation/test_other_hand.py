@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from trial_world import BOX_MASS, GRAVITY, QUICK, SLOW, WIDE, from_above
+from trial_world import BOX_MASS, GRAVITY, SLOW, WIDE, from_above
 
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import swap_fingers
@@ -16,6 +16,8 @@ from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.core.paths.resources import resolve
 from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal
 from burg_drake.scene.document.scene import Board, Instance, SceneDocument, load_scene, save_scene
+from burg_drake.simulation.mujoco.mujoco_trial import MujocoTrial
+from burg_drake.simulation.mujoco.trial_of_engine import hand_trial_of
 from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.simulation.trials.trial_settings import TrialSettings
 from burg_drake.station.document.gripper_document import load_hand
@@ -96,16 +98,20 @@ def case(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     return Case(str(folder / "pincer.yaml"), 25.0, (0.02, 0.02), 0.084)
 
 
-@pytest.fixture(scope="module")
-def make_trial(library: Path, tmp_path_factory: pytest.TempPathFactory):
-    """Makes the trial of one object under a hand."""
+@pytest.fixture(scope="module", params=["screening", "mujoco"])
+def make_trial(
+    request: pytest.FixtureRequest, library: Path, tmp_path_factory: pytest.TempPathFactory
+):
+    """Makes the trial of one object under a hand, with Drake or MuJoCo."""
+    if request.param == "mujoco":
+        pytest.importorskip("mujoco")
 
     def make(
         hand: str,
         name: str = "box",
         X_WS: Pose = Pose(),
         settings: TrialSettings = NORMAL,
-    ) -> HandTrial:
+    ) -> HandTrial | MujocoTrial:
         path = tmp_path_factory.mktemp("scene") / "scene.yaml"
         instance = Instance(object=name, X_SO=Pose((0.3, 0.2, 0.0)))
         save_scene(
@@ -117,8 +123,8 @@ def make_trial(library: Path, tmp_path_factory: pytest.TempPathFactory):
             ),
             path,
         )
-        return HandTrial(
-            load_scene(path), make_station(hand, X_WS), engine=QUICK, settings=settings
+        return hand_trial_of(
+            load_scene(path), make_station(hand, X_WS), request.param, settings=settings
         )
 
     return make
@@ -142,12 +148,12 @@ GRASPS = [
 
 
 @pytest.fixture(scope="module")
-def trial(case: Case, make_trial) -> HandTrial:
+def trial(case: Case, make_trial) -> HandTrial | MujocoTrial:
     return make_trial(case.reference)
 
 
 def test_pads_press_with_the_commanded_force_and_their_whole_faces(
-    case: Case, trial: HandTrial
+    case: Case, trial: HandTrial | MujocoTrial
 ) -> None:
     result = trial.run("box", CENTRE, friction=0.5)
     assert result.outcome is Outcome.LIFTED
@@ -165,7 +171,7 @@ def test_coulomb_limit(case: Case, make_trial) -> None:
 
 
 def test_same_verdict_with_fingers_swapped_and_world_turned(
-    case: Case, trial: HandTrial, make_trial
+    case: Case, trial: HandTrial | MujocoTrial, make_trial
 ) -> None:
     turned = make_trial(case.reference, X_WS=Pose((0.4, -0.1, 0.0), rpy_deg=(0.0, 0.0, 37.0)))
     for X_OG in GRASPS:

@@ -26,6 +26,7 @@ from trial_world import (
 
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.scene.document.scene import Scene
+from burg_drake.simulation.mujoco.trial_of_engine import hand_trial_of
 from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.station.document.engine import ENGINES
 from tests.thorough import thorough
@@ -52,7 +53,7 @@ def slow_trials(make_scene: Callable[..., Scene]) -> dict[str, HandTrial]:
     """The box, lifted slowly, by engine."""
     scene = make_scene(("box", 0.3, 0.2, 0.0))
     return {
-        name: HandTrial(scene, make_station(), engine=engine, settings=SLOW)
+        name: hand_trial_of(scene, make_station(), engine, settings=SLOW)
         for name, engine in ENGINES.items()
     }
 
@@ -101,7 +102,7 @@ def box_grasp(trial: HandTrial) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("engine", "tolerance"),
-    [("reference", 0.02), ("standard", 0.01), thorough("screening", 0.01)],
+    [("reference", 0.02), ("standard", 0.01), ("mujoco", 0.01), thorough("screening", 0.01)],
 )
 def test_smallest_friction_that_holds(slow_trials, engine: str, tolerance: float) -> None:
     """2 mu N = m g, with the commanded force."""
@@ -113,7 +114,7 @@ def test_smallest_friction_that_holds(slow_trials, engine: str, tolerance: float
     assert held.margins.pad_force == pytest.approx(FORCE, rel=0.01)
 
 
-@pytest.mark.parametrize("engine", ["standard", thorough("screening")])
+@pytest.mark.parametrize("engine", ["standard", "mujoco", thorough("screening")])
 def test_largest_mass_that_is_held(slow_trials, engine: str) -> None:
     """2 mu N = m g."""
     lost, held = (
@@ -162,7 +163,7 @@ def bar_trials(make_scene: Callable[..., Scene]) -> dict[str, HandTrial]:
     """The bar, lifted slowly, by engine."""
     scene = make_scene(("bar", 0.3, 0.2, 0.0))
     return {
-        name: HandTrial(scene, make_station(), engine=engine, settings=STEEP)
+        name: hand_trial_of(scene, make_station(), engine, settings=STEEP)
         for name, engine in ENGINES.items()
     }
 
@@ -170,7 +171,9 @@ def bar_trials(make_scene: Callable[..., Scene]) -> dict[str, HandTrial]:
 BAR_FRICTION = limit_friction(*PAD, LEVER) * BAR_MASS * GRAVITY / (2 * FORCE)
 
 
-@pytest.mark.parametrize(("engine", "tolerance"), [("standard", 0.06), thorough("screening", 0.12)])
+@pytest.mark.parametrize(
+    ("engine", "tolerance"), [("standard", 0.06), ("mujoco", 0.06), thorough("screening", 0.12)]
+)
 def test_smallest_friction_that_keeps_a_bar_level(bar_trials, engine, tolerance) -> None:
     """Of what is above 1, the pad's eight triangles make 0.03, as they stand for the whole patch
     with their middles; the rest is creep, as Drake's friction is slightly viscous."""

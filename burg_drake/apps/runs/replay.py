@@ -134,12 +134,12 @@ def _execute(source: ReplaySource, meshcat: Any) -> tuple[Verdict, TrialResult, 
 
 def _show_hand(source: ReplaySource, meshcat: Any) -> TrialResult:
     """The whole trial of the hand alone, recorded."""
-    from burg_drake.simulation.trials import HandTrial
+    from burg_drake.simulation.mujoco import hand_trial_of
     from burg_drake.visualization.scenes import record_trial
 
     trial = source.trial
     return record_trial(
-        HandTrial(source.inputs.scene, source.inputs.station, **_whole(source, meshcat)),
+        hand_trial_of(source.inputs.scene, source.inputs.station, **_whole(source, meshcat)),
         trial.instance,
         trial.X_OG,
         meshcat,

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from burg_drake.core import (
+    JUDGING,
     InvalidInputError,
     software_versions,
 )
@@ -34,8 +35,14 @@ from burg_drake.evaluation.robustness.probes import (
     known_answers,
     make_probes,
 )
-from burg_drake.evaluation.robustness.settings import DEFAULT_BEST, RobustnessSettings
+from burg_drake.evaluation.robustness.settings import (
+    DEFAULT_BEST,
+    LOADED_TESTS,
+    TESTS,
+    RobustnessSettings,
+)
 from burg_drake.evaluation.robustness.table import GraspRobustness, gathered, robustness_columns
+from burg_drake.evaluation.stages import require_engine_for
 from burg_drake.evaluation.store import JOURNAL_FILE, RUN_FILE, Run, load_run
 from burg_drake.evaluation.workers import judge_all
 
@@ -108,8 +115,18 @@ def assess_robustness(
         origin_of(run.document).settings(f"{run.path / RUN_FILE}: trial"),
         settings,
     )
-    versions = software_versions()
+    engine = factory.engine
+    loaded = [test for test in settings.tests if test in LOADED_TESTS]
+    if engine.simulator != "drake" and loaded:
+        raise InvalidInputError(
+            f"{' and '.join(loaded)} are simulated by Drake alone; of a run with engine"
+            f" {engine.name} give the tests"
+            f" {','.join(test for test in TESTS if test not in LOADED_TESTS)}"
+        ).about("tests")
+    require_engine_for(engine, "hand")
+    versions = software_versions({**JUDGING, **engine.packages})
     context = [*factory.content(), versions["burg_drake"], versions["drake"]]
+    context += [versions[name] for name in engine.packages]
     probes = [p for grasp in chosen for p in make_probes(grasp, factory.scene, settings, context)]
     writable_folder(table.parent)
     with Reporter(progress) as reporter, Journal(journal_path) as journal:

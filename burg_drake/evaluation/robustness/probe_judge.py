@@ -15,7 +15,7 @@ from burg_drake.evaluation.robustness.settings import (
 from burg_drake.evaluation.stages import Decide, Decision, Screen, trial_decision
 from burg_drake.scene.document import Scene
 from burg_drake.simulation.robustness import friction_limit, shake, take_grip, tug
-from burg_drake.simulation.trials import TrialResult
+from burg_drake.simulation.trials import HandTrial, TrialResult
 from burg_drake.station.document import Engine, Station
 
 if TYPE_CHECKING:
@@ -28,12 +28,12 @@ class ProbeJudge:
     screens: tuple[Screen, ...] = ()
 
     def __init__(self, factory: ProbeJudgeFactory) -> None:
-        from burg_drake.simulation.trials import HandTrial
+        from burg_drake.simulation.mujoco import hand_trial_of
 
         self._settings = factory.settings
         self._tests = factory.tests
-        self._trial = HandTrial(
-            factory.scene, factory.station, engine=factory.engine, settings=factory.trial
+        self._trial = hand_trial_of(
+            factory.scene, factory.station, factory.engine, settings=factory.trial
         )
         self.stages: list[tuple[Stage, Decide]] = [(Stage.EXECUTED, self._decide)]
 
@@ -58,6 +58,7 @@ class ProbeJudge:
         if test == "friction":
             limit = friction_limit(trial, *what, lift=lift, settings=settings.friction)
             return ProbeAnswer(test, friction=limit)
+        assert isinstance(trial, HandTrial)  # else `assess_robustness` refuses the test
         grip = take_grip(trial, *what, lift=lift)
         if isinstance(grip, TrialResult):
             return grip

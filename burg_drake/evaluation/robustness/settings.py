@@ -8,6 +8,8 @@ from burg_drake.core import InvalidInputError, UnknownNameError, nearest, settin
 from burg_drake.simulation.robustness import FrictionSettings, LoadSettings, Noise
 
 TESTS = ("tug", "shake", "friction", "noise")
+LOADED_TESTS = ("tug", "shake")
+"""Those that put loads on a grip, which needs Drake."""
 DEFAULT_BEST = 3
 """So many of the best grasps of each object are asked about if none are named."""
 

@@ -17,6 +17,7 @@ from typing import cast
 import numpy as np
 
 from burg_drake.core import (
+    JUDGING,
     BurgError,
     software_versions,
 )
@@ -114,7 +115,7 @@ def _document(scenes: Scenes, request: Request) -> CampaignDocument:
         joints=0 if arm is None else len(arm.home),
         scenes=scenes.entries,
         libraries=scenes.libraries,
-        versions=software_versions(),
+        versions=software_versions({**JUDGING, **request.engine.packages}),
     )
     return replace(document, hash=campaign_hash(document))
 

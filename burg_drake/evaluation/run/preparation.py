@@ -25,6 +25,7 @@ from burg_drake.evaluation.records import (
 )
 from burg_drake.evaluation.report import write_report
 from burg_drake.evaluation.run.request import ByInstance, Request
+from burg_drake.evaluation.stages import require_scene_for
 from burg_drake.evaluation.store import (
     JOURNAL_FILE,
     RUN_FILE,
@@ -35,14 +36,15 @@ from burg_drake.evaluation.store import (
     write_copies,
 )
 from burg_drake.scene.document import Scene
-from burg_drake.station.document import Station
+from burg_drake.station.document import Engine, Station
 
 
-def require_sound(scene: Scene, station: Station, mode: Mode) -> None:
+def require_sound(scene: Scene, station: Station, mode: Mode, engine: Engine) -> None:
     """Refuses a scene that cannot be judged, before any work is spent on it.
 
     Raises:
-        InvalidInputError: unsound scene, or an arm that stands in something or does not reach.
+        InvalidInputError: unsound scene, an arm that stands in something or does not reach, or
+            objects or a hand that the engine cannot have.
     """
     from burg_drake.motion.workspace import require_usable_arm
     from burg_drake.station.checks import require_valid_scene
@@ -50,6 +52,7 @@ def require_sound(scene: Scene, station: Station, mode: Mode) -> None:
     require_valid_scene(scene, station)
     if mode != "hand":
         require_usable_arm(scene, station)
+    require_scene_for(engine, scene, station)
 
 
 def open_run(

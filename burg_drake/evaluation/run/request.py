@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from burg_drake.core import (
+    JUDGING,
     InvalidInputError,
     content_hash,
     software_versions,
@@ -31,7 +32,7 @@ from burg_drake.evaluation.records import (
     input_of,
     numbers,
 )
-from burg_drake.evaluation.stages import arm_settings, mode_for
+from burg_drake.evaluation.stages import arm_settings, mode_for, require_engine_for
 from burg_drake.scene.document import Scene
 from burg_drake.station.document import Engine, GraspMotion, Station, as_engine
 
@@ -80,18 +81,20 @@ class Request:
         Raises:
             UnknownNameError: there is no engine of this name.
             InvalidInputError: there is no such mode or share, the station lacks the arm, or the
-            approach is asked for of the whole arm.
+                approach is asked for of the whole arm, or the engine has none.
+            MissingDependencyError: the engine is not installed.
         """
-        engine, mode = settings.engine, mode_for(station, settings.mode)
+        engine, mode = as_engine(settings.engine), mode_for(station, settings.mode)
         if settings.approach and mode == "arm":
             raise InvalidInputError(
                 "the approach of the hand alone is asked for with mode arm, in which the whole arm"
                 " approaches anyway; leave approach out, or give mode hand or reach"
             ).about("approach")
+        require_engine_for(engine, mode)
         return cls(
             station=station,
             settings=settings,
-            engine=as_engine(engine),
+            engine=engine,
             mode=mode,
             motion=settings.motion or station.document.motion,
             shard=as_shard(settings.shard),
@@ -195,7 +198,7 @@ class Request:
             seed=self.settings.seed,
             shard="" if self.shard is None else str(self.shard),
             table=self.settings.table,
-            versions=software_versions(),
+            versions=software_versions({**JUDGING, **self.engine.packages}),
         )
 
     @property

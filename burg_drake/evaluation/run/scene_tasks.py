@@ -76,7 +76,7 @@ class Preparer:
             return None
         require_run_folder(work.folder)
         if not (work.folder / RUN_FILE).exists():
-            require_sound(scene, request.station, request.mode)
+            require_sound(scene, request.station, request.mode, request.engine)
         given = request.given(scene)
         remove_unfinished(writable_folder(work.folder))
         with Journal(work.folder / JOURNAL_FILE):

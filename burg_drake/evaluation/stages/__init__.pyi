@@ -14,7 +14,11 @@ from .judge import (
     trial_decision as trial_decision,
     trial_verdict as trial_verdict,
 )
-from .mode import mode_for as mode_for
+from .mode import (
+    mode_for as mode_for,
+    require_engine_for as require_engine_for,
+    require_scene_for as require_scene_for,
+)
 from .scene_acceptance import (
     clear_grasp_counts as clear_grasp_counts,
     within_reach as within_reach,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from burg_drake.core import InvalidInputError
 from burg_drake.core.grasps import MODES, Mode
-from burg_drake.station.document import Station
+from burg_drake.scene.document import Scene
+from burg_drake.station.document import DRAKE_ENGINES, Engine, Station
 
 
 def mode_for(station: Station, asked: Mode | None = None) -> Mode:
@@ -27,3 +28,35 @@ def mode_for(station: Station, asked: Mode | None = None) -> Mode:
             f"mode {asked!r} needs an arm, which station {station.name!r} lacks; give mode 'hand'"
         )
     return asked
+
+
+def require_engine_for(engine: Engine, mode: Mode) -> None:
+    """Refuses an engine that cannot run the trials of a mode.
+
+    Raises:
+        InvalidInputError: it has no arm.
+        MissingDependencyError: it is not installed.
+    """
+    if engine.simulator == "drake":
+        return
+    if mode == "arm":
+        raise InvalidInputError(
+            f"mode arm is simulated by Drake ({', '.join(DRAKE_ENGINES)}); use mode reach with"
+            f" engine {engine.name}, which has the hand alone execute what the arm can"
+        ).about("mode")
+    from burg_drake.simulation.mujoco import require_mujoco
+
+    require_mujoco()
+
+
+def require_scene_for(engine: Engine, scene: Scene, station: Station) -> None:
+    """Refuses objects and hands that an engine cannot have.
+
+    Raises:
+        InvalidInputError: an object has no convex pieces, or the hand's pads are not flat; see
+            `simulation.mujoco`.
+    """
+    if engine.simulator != "drake":
+        from burg_drake.simulation.mujoco import MujocoTrial
+
+        _ = MujocoTrial(scene, station, engine=engine).complete_world

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 from burg_drake.core.grasps import LIFT_HEIGHT, Mode, Stage
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.stages.judge import Decide, Decision, Screen, trial_decision
+from burg_drake.evaluation.stages.mode import require_engine_for
 from burg_drake.evaluation.stages.screening import arm_reach, arm_screen, hand_alone, hand_screen
 from burg_drake.motion.plans import Plan
 from burg_drake.motion.reach import Witness
@@ -47,10 +48,10 @@ class HandJudge(StationJudge):
         settings: TrialSettings,
     ) -> None:
         """Builds the diagrams that all grasps share; see `build_judge`."""
-        from burg_drake.simulation.trials import HandTrial
+        from burg_drake.simulation.mujoco import hand_trial_of
         from burg_drake.station.diagram import instance_pose
 
-        self._trial = HandTrial(scene, station, engine=engine, settings=settings)
+        self._trial = hand_trial_of(scene, station, engine, settings=settings)
         motion = self._trial.motion
         X_WO = {name: instance_pose(scene, station, name) for name in scene.instances}
         room = _room(scene, station, motion) if mode == "hand" else None
@@ -119,9 +120,14 @@ def build_judge(
         mode: what to ask; but for `hand` the station needs an arm.
         settings: phases of the trial, if not the usual ones; where they have no motion, it is the
             station's.
+
+    Raises:
+        InvalidInputError: the engine has no arm, or cannot have an object or the hand.
+        MissingDependencyError: it is not installed.
     """
     from burg_drake.simulation.trials import TrialSettings
 
+    require_engine_for(engine, mode)
     settings = TrialSettings() if settings is None else settings
     if mode == "arm":
         return ArmJudge(scene, station, engine=engine, settings=settings)

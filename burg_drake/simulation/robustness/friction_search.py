@@ -6,6 +6,7 @@ from pydrake.multibody.tree import UniformGravityFieldElement
 
 from burg_drake.core import Array
 from burg_drake.core.grasps import Outcome
+from burg_drake.simulation.mujoco import MujocoTrial
 from burg_drake.simulation.robustness.bisection import largest_passing
 from burg_drake.simulation.robustness.settings import FrictionSettings
 from burg_drake.simulation.trials import HandTrial
@@ -15,7 +16,7 @@ LEVERAGE = 1.25
 
 
 def friction_limit(
-    trial: HandTrial,
+    trial: HandTrial | MujocoTrial,
     instance: str,
     X_OG: Array,
     *,
@@ -58,7 +59,9 @@ def friction_limit(
     return float("inf") if largest_inverse == 0.0 else 1.0 / largest_inverse
 
 
-def friction_to_carry(trial: HandTrial, instance: str, mass: float | None = None) -> float:
+def friction_to_carry(
+    trial: HandTrial | MujocoTrial, instance: str, mass: float | None = None
+) -> float:
     """Coefficient with which two pads carry the target as fast as the hand speeds up, if they grip
     it at its centre: m (g + a) / (2 N)."""
     settings = trial.settings

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from burg_drake.core import Array, InvalidInputError, make_pose, rng_from, wilson_interval
 from burg_drake.core.grasps import Outcome
+from burg_drake.simulation.mujoco import MujocoTrial
 from burg_drake.simulation.robustness.settings import Noise
 from burg_drake.simulation.trials import HandTrial
 
@@ -92,7 +93,7 @@ def perturb(
 
 
 def success_rate(
-    trial: HandTrial,
+    trial: HandTrial | MujocoTrial,
     instance: str,
     X_OG: Array,
     noise: Noise = Noise(),

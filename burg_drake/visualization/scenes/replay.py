@@ -7,6 +7,7 @@ from pydrake.geometry import Meshcat, MeshcatAnimation
 
 from burg_drake.core import Array
 from burg_drake.core.grasps import TRIAL_MARGINS, shown_figures, shown_order
+from burg_drake.simulation.mujoco import MujocoTrial
 from burg_drake.simulation.trials import HandTrial, TrialResult
 from burg_drake.station.diagram import FloatingHand
 from burg_drake.visualization.meshcat import aim_at
@@ -42,7 +43,7 @@ FIGURES = shown_order(
 
 
 def record_trial(
-    trial: HandTrial,
+    trial: HandTrial | MujocoTrial,
     instance: str,
     X_OG: Array,
     meshcat: Meshcat,
@@ -139,7 +140,7 @@ def describe(result: TrialResult) -> list[str]:
     return lines + ([f"toppled {result.toppled}"] if result.toppled else [])
 
 
-def _show_start(trial: HandTrial, X_WG: Array) -> Array:
+def _show_start(trial: HandTrial | MujocoTrial, X_WG: Array) -> Array:
     """Shows the hand at the grasp; returns points (N, 3) around it [m]."""
     station_diagram = trial.diagram
     context = station_diagram.diagram.CreateDefaultContext()
