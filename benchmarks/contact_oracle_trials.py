@@ -22,6 +22,8 @@ from burg_drake.objects.library.document import load_library
 from burg_drake.objects.library.entry import ContactKind
 from burg_drake.pipeline.source import ObjectSource
 from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
+from burg_drake.simulation.mujoco.mujoco_trial import MujocoTrial
+from burg_drake.simulation.mujoco.trial_of_engine import hand_trial_of
 from burg_drake.station.document.engine import ENGINES, Engine
 from burg_drake.station.document.station_document import Station
 
@@ -72,7 +74,7 @@ def source(name: str, contact: ContactKind | None) -> ObjectSource:
 
 
 @lru_cache(maxsize=8)
-def make_trial(library: str, object: str, pose: int, engine: str) -> burg.HandTrial:
+def make_trial(library: str, object: str, pose: int, engine: str) -> burg.HandTrial | MujocoTrial:
     """A trial with an object alone in the middle of the board; the instance is `target`."""
     opened = load_library(library)
     X_SO = make_pose(p_AB=(0.3, 0.2, 0.0)) @ thing(object).X_WO(pose)
@@ -81,7 +83,7 @@ def make_trial(library: str, object: str, pose: int, engine: str) -> burg.HandTr
     station = hand_only(burg.load_station(STATION))
     if engine == DAMPED:
         station = damped(station, Path(library).parent / DAMPED)
-    return burg.HandTrial(Scene(document, opened, Path("oracle")), station, engine=KNOWN[engine])
+    return hand_trial_of(Scene(document, opened, Path("oracle")), station, KNOWN[engine])
 
 
 def damped(station: Station, folder: Path) -> Station:

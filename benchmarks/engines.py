@@ -49,7 +49,7 @@ from trial_journal import Row, TrialJournal
 import burg_drake as burg
 from burg_drake.core.content import content_hash
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.station.document.engine import ENGINES, Engine
+from burg_drake.station.document.engine import DRAKE_ENGINES, ENGINES, Engine
 
 LIBRARY = "household"
 CHUNK = 8
@@ -93,7 +93,8 @@ def main() -> None:
     parser.add_argument("--variant", action="append", default=[], type=variant)
     parser.add_argument("--workers", type=int, default=2)
     arguments = parser.parse_args()
-    engines = {e.name: e for e in (*ENGINES.values(), *arguments.variant)}
+    presets = [ENGINES[name] for name in DRAKE_ENGINES]
+    engines = {e.name: e for e in (*presets, *arguments.variant)}
     arguments.output.mkdir(parents=True, exist_ok=True)
     context = get_context("spawn")
     with ProcessPoolExecutor(arguments.workers, context) as pool:

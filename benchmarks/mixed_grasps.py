@@ -12,6 +12,7 @@ from burg_drake.core.content import rng_from
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.frames import make_pose, rot_z
 from burg_drake.scene.document.scene import Scene
+from burg_drake.simulation.mujoco.mujoco_trial import MujocoTrial
 from burg_drake.station.document.station_document import Station, Table
 
 CONE = np.deg2rad(75.0)
@@ -60,7 +61,7 @@ def sampled_grasps(scene: Scene, station: Station, name: str, count: int) -> Arr
     return sampled_set(scene, station, name, count).X_OG
 
 
-def clear_grasps(trial: burg.HandTrial, name: str, count: int) -> Array:
+def clear_grasps(trial: burg.HandTrial | MujocoTrial, name: str, count: int) -> Array:
     """Clear ones (at most `count`, 4, 4) of a hundred times as many antipodal grasps."""
     grasps = sampled_grasps(trial.diagram.scene, trial.diagram.station, name, 100 * count)
     screened = trial.clearance.check_all(name, trial.diagram.X_WO(name) @ grasps)

@@ -1,10 +1,10 @@
-"""CPU time of grasp trials, beside trials of the same grasps on PyBullet and MuJoCo.
+"""CPU time of grasp trials, beside trials of the same grasps on PyBullet.
 
     python benchmarks/trials.py [SCENE ...] [--station S] [--engine NAME ...] [--trials N]
 
 Samples grasps on every object, screens them one by one and all at a time, and executes clear ones
-with each engine. Every second one is executed with less friction, so that not all hold. With
-PyBullet or MuJoCo installed (`pip install pybullet mujoco`) the same grasps are executed there, in
+with each engine, of Drake and MuJoCo. Every second one is executed with less friction, so that not
+all hold. With PyBullet installed (`pip install pybullet`) the same grasps are executed there, in
 this process. All engines are held against published figures as well: BURG-Toolkit takes 0.45 s an
 executed trial and 0.07 s a grasp that collides, CPU time of one core in a scene of five objects.
 """
@@ -21,7 +21,6 @@ from dataclasses import dataclass, field
 from typing import Protocol, TypeVar
 
 import numpy as np
-import peer_mujoco
 import peer_pybullet
 from mixed_grasps import clear_grasps, frictions, hand_only, sampled_grasps
 
@@ -29,7 +28,9 @@ import burg_drake as burg
 from burg_drake.core.arrays import Array
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.engine import ENGINES, as_engine
+from burg_drake.simulation.mujoco.mujoco_trial import MujocoTrial
+from burg_drake.simulation.mujoco.trial_of_engine import hand_trial_of
+from burg_drake.station.document.engine import ENGINES
 from burg_drake.station.document.station_document import Station
 
 PUBLISHED_EXECUTED, PUBLISHED_REJECTED = 0.45, 0.07
@@ -48,7 +49,6 @@ class Peer(Protocol):
 
 PEERS: dict[str, tuple[Callable[[], bool], Callable[[Scene, Station], Peer]]] = {
     "PyBullet": (peer_pybullet.is_installed, peer_pybullet.Peer),
-    "MuJoCo": (peer_mujoco.is_installed, peer_mujoco.Peer),
 }
 """By name: whether it is installed, and what makes it."""
 
@@ -130,9 +130,7 @@ class Bench:
     def __init__(
         self, scene: Scene, station: Station, engines: Sequence[str], peers: Sequence[str]
     ) -> None:
-        self._trials = {
-            name: burg.HandTrial(scene, station, engine=as_engine(name)) for name in engines
-        }
+        self._trials = {name: hand_trial_of(scene, station, name) for name in engines}
         self._peers = {name: PEERS[name][1](scene, station) for name in peers}
 
     def measure(self, name: str, screened: int, executed: int) -> Rows:
@@ -151,7 +149,9 @@ class Bench:
         return rows
 
     @staticmethod
-    def _screen(trial: burg.HandTrial, name: str, grasps: np.ndarray, rows: Rows) -> None:
+    def _screen(
+        trial: burg.HandTrial | MujocoTrial, name: str, grasps: np.ndarray, rows: Rows
+    ) -> None:
         X_WG = trial.diagram.X_WO(name) @ grasps
         for X in X_WG:
             seconds, verdict = timed(lambda X=X: trial.clearance.check(name, X))
@@ -210,7 +210,7 @@ def print_ratios(name: str, rows: Rows, peers: Sequence[str]) -> None:
         f"{name}: {PUBLISHED_EXECUTED / np.mean(ours):.1f} times as fast as published for"
         f" BURG-Toolkit (mean; median {PUBLISHED_EXECUTED / np.median(ours):.1f})"
     )
-    for peer in peers:
+    for peer in [*peers, *(other for other in rows.seconds if other not in {name, *PEERS})]:
         theirs = rows.seconds[peer]
         same = np.equal(rows.held[name], rows.held[peer])
         print(

@@ -1,0 +1,176 @@
+"""How far two engines agree about the same grasps, and where they do not.
+
+    python benchmarks/engine_agreement.py [SCENE ...] [--engines standard mujoco] [--trials N]
+        [--station S] [--workers N]
+
+Samples antipodal grasps on every object, and executes the clear ones with both engines, every
+second one with less friction, so that not all hold. Two verdicts are alike if both hold the target
+at the end or neither does. Tables show what is alike by object, by the outcomes of both, and by the
+margins of the first engine: what slipped or tilted much, or is pressed little, is contested.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from itertools import pairwise
+from multiprocessing import get_context
+
+import numpy as np
+from mixed_grasps import clear_grasps, frictions, hand_only
+
+import burg_drake as burg
+from burg_drake.simulation.mujoco.trial_of_engine import hand_trial_of
+from burg_drake.simulation.trials.result import TrialResult
+from burg_drake.station.document.engine import ENGINES
+
+ENOUGH = 0.95
+"""Share of verdicts that two good engines should have alike."""
+SLIPS = (1e-4, 1e-3, 3e-3, 1e-2)
+TILTS = (0.5, 3.0, 10.0, 30.0)
+FORCES = (10.0, 20.0, 30.0, 38.0)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """One grasp, executed twice.
+
+    Attributes:
+        object: the instance, with its scene.
+        friction: coefficient.
+        results: of the two engines.
+        seconds: CPU time of each.
+    """
+
+    object: str
+    friction: float
+    results: tuple[TrialResult, TrialResult]
+    seconds: tuple[float, float]
+
+    @property
+    def alike(self) -> bool:
+        """Whether both hold the target, or neither does."""
+        one, other = self.results
+        return one.outcome.held == other.outcome.held
+
+
+@dataclass(frozen=True)
+class Share:
+    """Grasps of one object, or some of them.
+
+    Attributes:
+        scene, station, instance: where.
+        engines: names of the two.
+        count: grasps of the instance.
+        part, parts: every so many of them, from that one on.
+    """
+
+    scene: str
+    station: str
+    instance: str
+    engines: tuple[str, str]
+    count: int
+    part: int
+    parts: int
+
+
+def main() -> None:
+    """Runs the study."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("scenes", nargs="*", default=["tabletop_six"], metavar="SCENE")
+    parser.add_argument("--engines", nargs=2, choices=list(ENGINES), default=["standard", "mujoco"])
+    parser.add_argument("--station", default="panda_tabletop")
+    parser.add_argument("--trials", type=int, default=1000, help="in all")
+    parser.add_argument("--workers", type=int, default=2)
+    arguments = parser.parse_args()
+    engines = (arguments.engines[0], arguments.engines[1])
+    placed = [(s, name) for s in arguments.scenes for name in burg.load_scene(s).instances]
+    each = -(-arguments.trials // len(placed))
+    shares = [
+        Share(scene, arguments.station, name, engines, each, part, arguments.workers)
+        for scene, name in placed
+        for part in range(arguments.workers)
+    ]
+    pairs: list[Pair] = []
+    with ProcessPoolExecutor(arguments.workers, get_context("spawn")) as pool:
+        for found in pool.map(execute, shares):
+            pairs += found
+    report(pairs, engines)
+
+
+def execute(share: Share) -> list[Pair]:
+    """Executes a share of the grasps on one object."""
+    scene, station = burg.load_scene(share.scene), hand_only(burg.load_station(share.station))
+    trials = [hand_trial_of(scene, station, name) for name in share.engines]
+    name = share.instance
+    grasps = clear_grasps(trials[0], name, share.count)
+    tried = list(zip(grasps, frictions(scene, name, len(grasps)), strict=True))
+    pairs = []
+    for X_OG, friction in tried[share.part :: share.parts]:
+        results, seconds = [], []
+        for trial in trials:
+            start = time.process_time()
+            results.append(trial.run(name, X_OG, friction=float(friction)))
+            seconds.append(time.process_time() - start)
+        label = f"{share.scene}/{name}"
+        pairs.append(
+            Pair(label, float(friction), (results[0], results[1]), (seconds[0], seconds[1]))
+        )
+    return pairs
+
+
+def report(pairs: Sequence[Pair], engines: tuple[str, str]) -> None:
+    """Prints all tables."""
+    one, other = engines
+    print(f"{len(pairs)} grasps with {one} and {other}")
+    for object in dict.fromkeys(pair.object for pair in pairs):
+        print_row(object, [pair for pair in pairs if pair.object == object])
+    print_row("all", pairs)
+    print(f"\noutcomes, {one} / {other}")
+    counts = Counter(tuple(str(r.outcome) for r in pair.results) for pair in pairs)
+    for (a, b), count in counts.most_common():
+        print(f"  {a:20}{b:20}{count:6}{'' if a == b else '   other'}")
+    margins: dict[str, tuple[Callable[[TrialResult], float], Sequence[float], str, float]] = {
+        "slip": (lambda r: r.margins.slip, SLIPS, "mm", 1e3),
+        "tilt": (lambda r: float(np.rad2deg(r.margins.tilt)), TILTS, "deg", 1.0),
+        "pad force": (lambda r: r.margins.pad_force, FORCES, "N", 1.0),
+    }
+    for label, (of, edges, unit, scale) in margins.items():
+        print(f"\n{label} of {one} [{unit}]")
+        values = np.array([of(pair.results[0]) for pair in pairs])
+        bounds = [-np.inf, *edges, np.inf]
+        for low, high in pairwise(bounds):
+            within = (values >= low) & (values < high)
+            print_row(
+                f"  {scale * low:g} to {scale * high:g}",
+                [p for p, x in zip(pairs, within, strict=True) if x],
+            )
+        print_row("  never held", [p for p, x in zip(pairs, np.isnan(values), strict=True) if x])
+    cpu = np.array([pair.seconds for pair in pairs]).mean(axis=0)
+    print(f"\nCPU time a trial: {one} {cpu[0]:.3f} s, {other} {cpu[1]:.3f} s")
+    share = np.mean([pair.alike for pair in pairs])
+    print(f"{100 * share:.1f} % alike, {'as' if share >= ENOUGH else 'not as'} it should be")
+
+
+def print_row(label: str, pairs: Sequence[Pair]) -> None:
+    """Prints what is alike of some grasps, and which engine holds the others."""
+    if not pairs:
+        return
+    held = np.array([[r.outcome.held for r in pair.results] for pair in pairs])
+    alike = held[:, 0] == held[:, 1]
+    both, first = held.all(axis=1).sum(), (held[:, 0] & ~held[:, 1]).sum()
+    second = (held[:, 1] & ~held[:, 0]).sum()
+    print(
+        f"{label:24}{len(pairs):5}  alike {alike.sum():5} ({100 * alike.mean():5.1f} %), both hold"
+        f" {both:5}, only the first {first:4}, only the second {second:4}"
+    )
+
+
+if __name__ == "__main__":
+    main()
