@@ -86,15 +86,16 @@ fingers:
 than they stand in the model, their joints do not start at 0, and nothing couples them there."""
 
 
-@pytest.fixture(scope="module", params=[*HANDS, "own"])
+@pytest.fixture(scope="module", params=[*HANDS, "own", "uncoupled"])
 def case(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Case:
-    if request.param != "own":
+    if request.param in HANDS:
         return HANDS[request.param]
     folder = tmp_path_factory.mktemp("own")
     fingers = OWN_FINGER.format(name="a", offset=0.003)
     fingers += OWN_FINGER.format(name="b", offset=0.052)
     (folder / "pincer.sdf").write_text(OWN_SDF.format(fingers=fingers), encoding="utf-8")
-    (folder / "pincer.yaml").write_text(OWN_DOCUMENT, encoding="utf-8")
+    document = OWN_DOCUMENT + ("coupled: false\n" if request.param == "uncoupled" else "")
+    (folder / "pincer.yaml").write_text(document, encoding="utf-8")
     return Case(str(folder / "pincer.yaml"), 25.0, (0.02, 0.02), 0.084)
 
 
