@@ -42,7 +42,7 @@ ROOMS = {
     "ros": "",
     "grasping": "similarity sampling quality comparison clearance",
     "motion": "ik proximity collision sweep lines transit reach plans timing workspace",
-    "simulation": "rest settling trials mujoco robustness",
+    "simulation": "rest settling confidence trials mujoco robustness",
     "pipeline": "",
     "visualization": "style meshcat pictures grasps gallery scenes",
     "evaluation": "candidates stages workers cluster records store results grasp_sets robustness"

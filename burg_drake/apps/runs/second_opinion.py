@@ -89,6 +89,7 @@ def settled_line(run: Run) -> str:
     changed = Counter(
         f"{v.outcome_before} to {v.outcome}" for v in again if v.outcome_before != v.outcome
     )
-    text = f"settled {len(again)} contested grasps by {engines}; changed {changed.total()}"
+    many = "" if len(again) == 1 else "s"
+    text = f"settled {len(again)} contested grasp{many} by {engines}; changed {changed.total()}"
     details = ", ".join(f"{n} from {what}" for what, n in changed.most_common())
     return f"{text} ({details})" if details else text

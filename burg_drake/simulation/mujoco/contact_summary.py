@@ -35,15 +35,12 @@ def summarize_contacts(model: Any, data: Any, shares: Array, table: int) -> list
     area = np.zeros(len(pairs))
     share = shares[geoms]
     soft = share.max(axis=1)
-    torque: list[Array | None] = [None] * len(pairs)
     for k in np.unique(pair.reshape(-1)[soft > 0.0]):
         mine = np.flatnonzero((pair.reshape(-1) == k) & (soft > 0.0))
         one = np.take_along_axis(geoms[mine], share[mine].argmax(axis=1)[:, None], axis=1)
         area[k] = shares[np.unique(one)].sum()
-        p_W = np.asarray(found.pos)[near[mine]]
-        torque[k] = np.cross(p_W - p_W.mean(axis=0), f_W[mine]).sum(axis=0)
     return [
-        BodyContact(BodyIndex(int(a)), BodyIndex(int(b)), force[k], float(area[k]), torque[k])
+        BodyContact(BodyIndex(int(a)), BodyIndex(int(b)), force[k], float(area[k]))
         for k, (a, b) in enumerate(pairs)
     ]
 

@@ -129,7 +129,7 @@ class MujocoTrial(HandAloneTrial[MujocoWorld]):
             carrier = MujocoCarrier(world, paths, lift_clearance, approach, target)
             return Execution(world, target, set(world.free.values()), carrier)
 
-        return self.execute(instance, X_WG, begin)
+        return self.execute(instance, X_WG, begin, friction=friction, mass=mass)
 
     def _build(self, alone: str | None) -> MujocoWorld:
         return MujocoWorld(

@@ -201,7 +201,7 @@ class MujocoWorld:
         return bool(np.isfinite(self.data.qpos).all() and np.isfinite(self.data.qvel).all())
 
     def look(self) -> list[BodyContact]:
-        """All that touch, by pairs of bodies; areas and torques those of the pads.
+        """All that touch, by pairs of bodies; areas are those of the pads.
 
         Raises:
             OtherTouched: what moves meets what could, too: that is for the complete world.

@@ -137,7 +137,7 @@ class ArmTrial(DrakeTrial):
         def begin(world: TrialWorld) -> Execution:
             return self.begin(instance, plan, friction=friction, mass=mass, world=world)
 
-        return self.execute(instance, X_WG, begin)
+        return self.execute(instance, X_WG, begin, friction=friction, mass=mass)
 
     def begin(
         self,

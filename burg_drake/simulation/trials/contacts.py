@@ -21,14 +21,12 @@ class BodyContact:
         body_A, body_B: the bodies.
         f_B_W: (3,) force on body B in the world [N].
         area: of the contact patch [m^2]; 0 for contact at a point.
-        torque_B_W: (3,) torque on body B about the patch's centroid [N m]; None at a point.
     """
 
     body_A: BodyIndex
     body_B: BodyIndex
     f_B_W: Array
     area: float = 0.0
-    torque_B_W: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -39,13 +37,11 @@ class FingerContact:
         touching: whether each finger touches the target.
         force: (2, 3) force of each finger on the target in the world [N].
         area: (2,) area of the patches of each finger [m^2].
-        torque: (2, 3) torque of each finger's patches about their centroids in the world [N m].
     """
 
     touching: tuple[bool, bool]
     force: Array
     area: Array
-    torque: Array
 
     @property
     def both(self) -> bool:
@@ -58,7 +54,7 @@ class FingerContact:
         return any(self.touching)
 
 
-NO_CONTACT = FingerContact((False, False), np.zeros((2, 3)), np.zeros(2), np.zeros((2, 3)))
+NO_CONTACT = FingerContact((False, False), np.zeros((2, 3)), np.zeros(2))
 """Neither finger touches anything."""
 
 
@@ -84,16 +80,8 @@ class ContactReader:
             info = results.hydroelastic_contact_info(i)
             surface = info.contact_surface()
             body_M, body_N = self._body_of[surface.id_M()], self._body_of[surface.id_N()]
-            F_M_W = info.F_Ac_W()
-            contacts.append(
-                BodyContact(
-                    body_N,
-                    body_M,
-                    F_M_W.translational(),
-                    surface.total_area(),
-                    F_M_W.rotational(),
-                )
-            )
+            f_M_W = info.F_Ac_W().translational()
+            contacts.append(BodyContact(body_N, body_M, f_M_W, surface.total_area()))
         for i in range(results.num_point_pair_contacts()):
             pair = results.point_pair_contact_info(i)
             contacts.append(
@@ -113,22 +101,19 @@ def finger_contact(
     contacts: list[BodyContact], fingers: tuple[BodyIndex, BodyIndex], target: BodyIndex
 ) -> FingerContact:
     """Sums the contacts of each finger with the target."""
-    force, area, torque = np.zeros((2, 3)), np.zeros(2), np.zeros((2, 3))
+    force, area = np.zeros((2, 3)), np.zeros(2)
     touching = [False, False]
     for i, finger in enumerate(fingers):
         for contact in contacts:
             if (contact.body_A, contact.body_B) == (finger, target):
-                sign = 1.0
+                force[i] += contact.f_B_W
             elif (contact.body_A, contact.body_B) == (target, finger):
-                sign = -1.0
+                force[i] -= contact.f_B_W
             else:
                 continue
-            force[i] += sign * contact.f_B_W
-            if contact.torque_B_W is not None:
-                torque[i] += sign * contact.torque_B_W
             area[i] += contact.area
             touching[i] = True
-    return FingerContact((touching[0], touching[1]), force, area, torque)
+    return FingerContact((touching[0], touching[1]), force, area)
 
 
 def reached(

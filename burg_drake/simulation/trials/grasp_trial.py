@@ -16,6 +16,7 @@ from burg_drake.core import Array, InvalidInputError, check_pose
 from burg_drake.core.grasps import Outcome
 from burg_drake.grasping.clearance import Clearance, HandClearance
 from burg_drake.scene.document import Scene
+from burg_drake.simulation.confidence import GripLoad, confidence
 from burg_drake.simulation.rest import Neighbours
 from burg_drake.simulation.trials.contacts import ContactReader
 from burg_drake.simulation.trials.execution import Execution, OtherTouched
@@ -131,6 +132,8 @@ class GraspTrial(ABC, Generic[W]):
         X_WG: Array,
         begin: Callable[[W], Execution],
         *,
+        friction: float | None = None,
+        mass: float | None = None,
         without_hull: bool = False,
     ) -> TrialResult:
         """Executes a grasp, if the open hand is clear at it, and where its approach begins.
@@ -139,6 +142,7 @@ class GraspTrial(ABC, Generic[W]):
             instance: the target.
             X_WG: (4, 4) grasp in the world.
             begin: brings a world to the start of the trial.
+            friction, mass: with which it begins; the library's if None.
             without_hull: not in a world in which parts of the robot meet the target's hull.
 
         Returns:
@@ -159,7 +163,10 @@ class GraspTrial(ABC, Generic[W]):
             except OtherTouched:
                 world = self.complete_world
                 found = begin(world).run()
-            return replace(found, margins=replace(found.margins, clearance=screen.clearance))
+            margins = replace(found.margins, clearance=screen.clearance)
+            load = self.grip_load(instance, X_WG, friction=friction, mass=mass)
+            sure = confidence(self.engine, found.outcome, margins, load)
+            return replace(found, margins=margins, confidence=sure)
         except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
             world.invalidate()
             return failure(error, screen, world.time)
@@ -168,6 +175,32 @@ class GraspTrial(ABC, Generic[W]):
         """The screen of the open hand where a trial begins; None if that is at the grasp, or the
         plan of an arm tells."""
         return None
+
+    def grip_load(
+        self,
+        instance: str,
+        X_WG: Array,
+        *,
+        friction: float | None = None,
+        mass: float | None = None,
+    ) -> GripLoad:
+        """What a grip has to carry.
+
+        Args:
+            instance: the target.
+            X_WG: (4, 4) grasp in the world.
+            friction, mass: of the target; the library's if None.
+        """
+        entry = self.scene.entry(instance)
+        X_WO = instance_pose(self.scene, self.station, instance)
+        return GripLoad.of(
+            X_WG,
+            X_WO[:3, :3] @ entry.mass_properties.center_of_mass + X_WO[:3, 3],
+            friction=entry.friction if friction is None else friction,
+            force=self.station.hand.force,
+            mass=entry.mass if mass is None else mass,
+            acceleration=self.settings.acceleration,
+        )
 
     def closed_before_contact(self, instance: str, X_WG: Array) -> float:
         """How far the fingers can close, from 0 (open) to 1, before they touch anything: the

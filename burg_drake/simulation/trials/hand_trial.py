@@ -164,7 +164,9 @@ class HandTrial(HandAloneTrial[TrialWorld], DrakeTrial):
         def begin(world: TrialWorld) -> Execution:
             return self.begin(instance, X_WG, paths, friction=friction, mass=mass, world=world)
 
-        return self.execute(instance, X_WG, begin, without_hull=without_hull)
+        return self.execute(
+            instance, X_WG, begin, friction=friction, mass=mass, without_hull=without_hull
+        )
 
     def begin(
         self,
