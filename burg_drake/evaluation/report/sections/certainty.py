@@ -34,10 +34,10 @@ def certainty_section(summary: Summary) -> Html | None:
     text = (
         "Executed grasps. Contested are those, lifted or failed, whose verdict has a confidence"
         f" below {CONTESTED:g}: where friction, place, shape or the speed of the lift are slightly"
-        " other, many of them end the other way."
+        " other, some of them end the other way."
     )
     if settled:
-        text += f" {number(settled)} were judged again by another engine, whose verdict counts."
+        text += f" Settled by another engine, whose verdict counts: {number(settled)}."
     keys = [(LIFTED, "lifted"), (OPEN, "contested"), (LOST, "failed")]
     return section(
         "How sure the verdicts are",

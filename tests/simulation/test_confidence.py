@@ -1,0 +1,118 @@
+"""Confidence in verdicts: it falls towards Coulomb's limit, and is the same from all sides."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from trial_world import BOX_MASS, FORCE, GRAVITY, from_above, make_station
+
+from burg_drake.core.documents.schema import Pose
+from burg_drake.core.frames import make_pose, rot_z
+from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.core.grasps.verdict import Margins
+from burg_drake.scene.document.scene import Scene
+from burg_drake.simulation.confidence.calibration import (
+    UNSURE,
+    calibration,
+    confidence,
+    confidence_of,
+)
+from burg_drake.simulation.confidence.grip_signs import RIM, GripLoad, grip_signs
+from burg_drake.simulation.trials.hand_trial import HandTrial
+from burg_drake.simulation.trials.trial_settings import DEFAULT_TRIAL
+from burg_drake.station.document.engine import ENGINES
+
+LOAD = BOX_MASS * (GRAVITY + DEFAULT_TRIAL.acceleration)
+LIMIT = LOAD / (2 * FORCE)
+"""Smallest friction with which the pads lift the box."""
+GRIP = GripLoad(friction=0.5, force=FORCE, mass=BOX_MASS, acceleration=0.0, lever=0.0)
+
+
+@pytest.fixture(scope="module")
+def trial(make_scene: Callable[..., Scene]) -> HandTrial:
+    return HandTrial(make_scene(("box", 0.3, 0.2, 0.0)), make_station())
+
+
+def sure(trial: HandTrial, friction: float) -> float:
+    """Confidence in the verdict on the box."""
+    found = trial.run("box", from_above(0.05), friction=friction).confidence
+    assert found is not None and 0.0 <= found <= 1.0
+    return found
+
+
+def test_what_is_far_from_the_limit_is_sure(trial: HandTrial) -> None:
+    near = [sure(trial, share * LIMIT) for share in (0.98, 1.02)]
+    far = [sure(trial, share * LIMIT) for share in (0.4, 5.0)]
+    assert min(far) > 0.95
+    assert max(near) < min(far) - 0.03
+
+
+def test_the_same_with_fingers_swapped_and_the_world_turned(
+    make_scene: Callable[..., Scene], trial: HandTrial
+) -> None:
+    friction = 1.1 * LIMIT
+    swapped = from_above(0.05) @ make_pose(rot_z(np.pi))
+    other = trial.run("box", swapped, friction=friction).confidence
+    turned = make_station(Pose.from_matrix(make_pose(rot_z(2.0), (0.4, 0.1, 0.0)), quaternion=True))
+    world = HandTrial(make_scene(("box", 0.3, 0.2, 0.0)), turned)
+    expected = sure(trial, friction)
+    assert other == pytest.approx(expected, abs=0.02)
+    assert sure(world, friction) == pytest.approx(expected, abs=0.02)
+
+
+def test_an_engine_with_settings_of_its_own_has_none(
+    make_scene: Callable[..., Scene], trial: HandTrial
+) -> None:
+    own = dataclasses.replace(ENGINES["screening"], time_step=0.004)
+    scene = make_scene(("box", 0.3, 0.2, 0.0))
+    assert HandTrial(scene, make_station(), engine=own).run("box", from_above(0.06)).confidence is (
+        None
+    )
+    assert confidence(own, Outcome.LIFTED, Margins(), GRIP) is None
+    collided = trial.run("box", from_above(-0.01))
+    assert collided.outcome.stage.value == "clear" and collided.confidence is None
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("held", [True, False])
+def test_each_preset_is_calibrated(engine: str, held: bool) -> None:
+    curves = calibration()[engine, held]
+    signs = grip_signs(Margins(), GRIP)
+    assert curves.keys() <= signs.keys()
+    for curve in curves.values():
+        assert list(curve.knots) == sorted(set(curve.knots))
+        assert len(curve.knots) == len(curve.logits)
+
+
+@pytest.mark.parametrize("outcome", [o for o in Outcome if o.stage.value == "executed"])
+def test_every_outcome_of_a_trial_has_one(outcome: Outcome) -> None:
+    found = confidence_of("standard", outcome, grip_signs(Margins(), GRIP))
+    assert (found is None) is (outcome in UNSURE)
+
+
+def test_the_load_by_hand() -> None:
+    """A mass of 2 kg, 30 mm beside the closing axis, in pads that press with 40 N."""
+    X_WG = make_pose(rot_z(np.pi / 2), (0.1, 0.2, 0.3))  # closes along y
+    load = GripLoad.of(
+        X_WG,
+        np.array([0.13, 0.25, 0.28]),
+        friction=0.5,
+        force=40.0,
+        mass=2.0,
+        acceleration=0.19,
+    )
+    assert load.lever == pytest.approx(0.03)
+    assert load.carried == pytest.approx(2.0 * 10.0 / 40.0)
+    assert load.turned == pytest.approx(0.5 * 0.03 / RIM)
+    slippery = dataclasses.replace(load, friction=0.0)
+    assert math.isfinite(slippery.carried) and slippery.carried > load.carried
+
+
+def test_what_was_not_measured_counts_as_nothing() -> None:
+    signs = grip_signs(Margins(end_time=0.4), GRIP)
+    assert all(map(math.isfinite, signs.values()))
+    assert signs["pad_force"] == signs["patch_area"] == 0.0
