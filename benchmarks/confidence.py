@@ -125,7 +125,7 @@ def all_grasps(out: Path, each: int, pool: ProcessPoolExecutor) -> list[Grasp]:
     found = []
     for row in json.loads(path.read_text(encoding="utf-8")):
         case = {**row["case"], "X_OG": tuple(map(tuple, row["case"]["X_OG"]))}
-        found.append(Grasp(Case(**case), row["ordinary"]))
+        found.append(Grasp(Case(**case), row["kind"]))
     return found
 
 
@@ -194,7 +194,7 @@ def judged(grasps: Sequence[Grasp], engine: str, rows: dict[str, Row]) -> list[J
                 engine=engine,
                 object=grasp.case.object,
                 held_out=grasp.held_out,
-                ordinary=grasp.ordinary,
+                kind=grasp.kind,
                 outcome=Outcome(own["outcome"]),
                 signs=own["signs"],
                 worlds=tuple(same),

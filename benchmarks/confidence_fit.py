@@ -15,10 +15,13 @@ from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.core.grasps.verdict import CONTESTED
 from burg_drake.core.statistics import wilson_interval
 from burg_drake.simulation.confidence.calibration import Curve, Curves, confidence_of
+from burg_drake.simulation.confidence.grip_signs import FAR
 
 KNOTS = (0.02, 0.25, 0.5, 0.75, 0.98)
 """Quantiles of a sign's values at which its curve bends."""
-RIDGE = 0.5
+OWN_KNOTS = {"limit": (0.0, 0.02, 0.05, 0.1, 0.2, FAR)}
+"""Values at which the curves of other signs bend."""
+RIDGE = 0.3
 """Weight of the curves' squares, against the logarithm of the likelihood of all grasps: a sign that
 tells little stays flat."""
 BINS = 10
@@ -36,7 +39,7 @@ class Judged:
         engine: that gave it.
         object: the target.
         held_out: whether nothing is fitted on it.
-        ordinary: whether mass and friction are as they come.
+        kind: of the grasp, see `confidence_trials.Grasp`.
         outcome: by the engine.
         signs: of the verdict.
         worlds: 1 where a perturbed world gives the same, else 0.
@@ -46,7 +49,7 @@ class Judged:
     engine: str
     object: str
     held_out: bool
-    ordinary: bool
+    kind: str
     outcome: Outcome
     signs: Mapping[str, float]
     worlds: Sequence[float]
@@ -85,7 +88,10 @@ def fit(verdicts: Sequence[Judged]) -> Curves:
     """Curves that make the confirmations of verdicts most likely."""
     names = list(verdicts[0].signs)
     values = {name: np.array([v.signs[name] for v in verdicts]) for name in names}
-    knots = {name: np.unique(np.quantile(x, KNOTS).round(4)) for name, x in values.items()}
+    knots = {
+        name: np.array(OWN_KNOTS.get(name, np.unique(np.quantile(x, KNOTS).round(4))))
+        for name, x in values.items()
+    }
     names = [name for name in names if len(knots[name]) > 1]
     y = np.array([v.confirmed for v in verdicts])
     bases = [np.column_stack([_hat(values[n], knots[n], k) for k in range(len(knots[n]))])
@@ -126,7 +132,10 @@ def print_report(verdicts: Verdicts) -> None:
         for title, mine in (
             ("fitted on", [v for v in found if not v.held_out]),
             ("held out", [v for v in found if v.held_out]),
-            ("held out, ordinary", [v for v in found if v.held_out and v.ordinary]),
+            *(
+                (f"held out, {kind}", [v for v in found if v.held_out and v.kind == kind])
+                for kind in ("ordinary", "hard", "limit")
+            ),
         ):
             print_half(f"{engine}, {title}", mine)
 

@@ -14,10 +14,11 @@ from burg_drake.simulation.confidence.calibration import confidence_of
 
 WIDTH, HEIGHT, GAP = 290, 290, 40
 LEFT, TOP, BOTTOM, RIGHT = 48, 62, 66, 16
-TICKS = (0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99)
+TICKS = (0.5, 0.8, 0.9, 0.95, 0.98, 0.99)
 LOW, HIGH = 0.4, 0.997
 """Range that is drawn; what is beyond is at the edge."""
-BINS = 8
+EDGES = (0.7, 0.85, 0.93, 0.96, 0.98, 0.99)
+"""Of confidence, between the bins."""
 SHOWN = {"worlds": "perturbed worlds", "oracle": "the oracle"}
 STYLE = """
 svg { font: 12px system-ui, sans-serif; }
@@ -78,9 +79,10 @@ def _panel(left: float, verdicts: Sequence[Judged], who: str, title: str) -> Ite
 
 
 def _bins(said: Array, seen: Array) -> Iterator[tuple[float, float, float, float, int]]:
-    """What was said, the share of confirmations with its interval, and the number, by bins of as
-    many grasps each."""
-    for part in np.array_split(np.argsort(said, kind="stable"), BINS):
+    """What was said, the share of confirmations with its interval, and the number, by bins."""
+    place = np.searchsorted(EDGES, said)
+    for k in range(len(EDGES) + 1):
+        part = np.flatnonzero(place == k)
         if len(part):
             share = float(seen[part].mean())
             low, high = wilson_interval(round(share * len(part)), len(part))

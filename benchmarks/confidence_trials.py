@@ -4,9 +4,11 @@ again in worlds that a laboratory can hardly tell from the first."""
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import yaml
@@ -14,6 +16,7 @@ from contact_oracle_trials import STATION, source
 from mixed_grasps import hand_only
 from oracle.cases import Case, draw_cases
 from oracle.catalogue import HELD_OUT, TUNED, thing
+from oracle.hand import DEFAULT_PHASES
 from scipy.spatial.transform import Rotation
 
 import burg_drake as burg
@@ -24,6 +27,7 @@ from burg_drake.core.frames import make_pose
 from burg_drake.objects.library.document import load_library
 from burg_drake.pipeline.source import ObjectSource
 from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
+from burg_drake.simulation.confidence.grip_signs import GripLoad
 from burg_drake.simulation.mujoco.mujoco_trial import MujocoTrial
 from burg_drake.simulation.mujoco.trial_of_engine import hand_trial_of
 from burg_drake.simulation.trials.hand_trial import HandTrial
@@ -36,8 +40,13 @@ WORLDS = ((1.0, 1.0), (0.99, 0.7), (1.01, 1.4), (1.01, 0.7), (0.99, 1.4))
 TARGET = "target"
 ORDINARY_FRICTION, ORDINARY_MASS = (0.25, 0.7), (0.08, 0.8)
 """What an object that is not made to be hard has [-, kg]; drawn evenly in the logarithm."""
+LIMIT_SD = 0.1
+"""Of the logarithm of friction about its limit."""
 POSES = 2
 """Resting poses of an object that is not the oracle's, the most probable ones."""
+
+
+Kind = Literal["ordinary", "hard", "limit"]
 
 
 @dataclass(frozen=True)
@@ -46,11 +55,12 @@ class Grasp:
 
     Attributes:
         case: the grasp, its friction and its mass.
-        ordinary: mass and friction are as they come, not such that they hardly hold or let go.
+        kind: `ordinary` where friction and mass are as they come, `hard` where friction is from
+            half to twice of what should hold, `limit` where it is within some 10 % of that.
     """
 
     case: Case
-    ordinary: bool
+    kind: Kind
 
     @property
     def held_out(self) -> bool:
@@ -168,7 +178,8 @@ def poses(out: Path) -> list[tuple[str, int]]:
 
 
 def draw(out: Path, name: str, pose: int, each: int) -> list[Grasp]:
-    """Grasps of an object in a pose: by turns with ordinary mass and friction, and hard."""
+    """Grasps of an object in a pose, so many of each kind; fewer at the limit, where few hang
+    straight below the pads."""
     rng = rng_from("confidence", name, pose)
     cases = oracle_cases(name, pose, 2 * each) or sampled_cases(out, name, pose, 2 * each)
     grasps = []
@@ -177,8 +188,33 @@ def draw(out: Path, name: str, pose: int, each: int) -> list[Grasp]:
             friction = float(np.round(np.exp(rng.uniform(*np.log(ORDINARY_FRICTION))), 4))
             mass = float(np.round(np.exp(rng.uniform(*np.log(ORDINARY_MASS))), 4))
             case = dataclasses.replace(case, friction=friction, mass=mass)
-        grasps.append(Grasp(case, bool(k % 2)))
-    return grasps
+        grasps.append(Grasp(case, "ordinary" if k % 2 else "hard"))
+    ordinary = [grasp.case for grasp in grasps if grasp.kind == "ordinary"]
+    return grasps + at_the_limit(out, ordinary)
+
+
+def at_the_limit(out: Path, cases: Sequence[Case]) -> list[Grasp]:
+    """Those of the cases that hang straight below the pads, rather than turn in them, with friction
+    about the least that carries them."""
+    found = []
+    for case in cases:
+        rng = rng_from("confidence limit", case.id)
+        entry = open_library(str(library_folder(out, 1.0))).entry(case.object)
+        X_WO = pose_of(out, case.object, case.pose, 1.0)
+        load = GripLoad.of(
+            X_WO @ case.matrix,
+            X_WO[:3, :3] @ entry.mass_properties.center_of_mass + X_WO[:3, 3],
+            friction=1.0,
+            force=DEFAULT_PHASES.force,
+            mass=case.mass,
+            acceleration=DEFAULT_TRIAL.acceleration,
+        )
+        if load.turned < load.carried:
+            needed = float(np.hypot(load.carried, load.turned))
+            friction = float(np.round(needed * np.exp(rng.normal(0.0, LIMIT_SD)), 4))
+            changed = dataclasses.replace(case, id=f"{case.id}/limit", friction=friction)
+            found.append(Grasp(changed, "limit"))
+    return found
 
 
 def oracle_cases(name: str, pose: int, count: int) -> list[Case]:

@@ -24,7 +24,7 @@ def made_up(count: int, seed: int) -> tuple[list[Judged], np.ndarray]:
             engine="standard",
             object="box",
             held_out=False,
-            ordinary=True,
+            kind="ordinary",
             outcome=Outcome.LIFTED,
             signs={"slip": float(s), "tilt": float(o)},
             worlds=tuple((rng.random(4) < q).astype(float)),
@@ -79,16 +79,20 @@ def test_each_object_is_fitted_on_or_held_out() -> None:
     assert not is_held_out("household_bowl") and is_held_out("household_mug")
 
 
-def test_the_diagram_has_a_mark_for_each_bin() -> None:
+def test_the_diagram_says_how_often_what_was_said_came_true() -> None:
     verdicts, _ = made_up(200, seed=2)
     held_out = [Judged(**{**vars(v), "held_out": True, "signs": SIGNS}) for v in verdicts]
     text = reliability_diagram({"standard": held_out})
-    assert text.count("<circle") == 2 * 8 and text.endswith("</svg>\n")
+    # all of them have the same confidence, and so are in one bin of either panel
+    confirmed = sum(v.oracle or 0.0 for v in verdicts) / 200
+    assert text.count("<circle") == 2 and f"confirmed {confirmed:.3f} of 200" in text
+    assert "<circle" not in reliability_diagram({"standard": verdicts})
 
 
 SIGNS = {
     "carried": -1.0,
     "turned": -1.0,
+    "limit": 0.4,
     "slip": -5.0,
     "tilt": -3.0,
     "pad_force": 1.0,

@@ -19,6 +19,8 @@ SMALLEST_SLIP, SMALLEST_TILT = 1e-7, 1e-5
 """What is below sticks [m, rad]."""
 LARGEST_USE = 20.0
 """Friction that would be needed over what there is; more tells nothing more."""
+FAR = 0.4
+"""Logarithm of a load over what friction carries that is far from the limit."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,16 @@ class GripLoad:
         """The moment of the load about the closing axis over what friction carries of it."""
         return self._share(self.mass * (GRAVITY + self.acceleration) * self.lever / RIM)
 
+    @property
+    def limit(self) -> float:
+        """How far the load is from what friction carries at most: size of the logarithm of their
+        ratio, to the base of 10, `FAR` at most. At its limit a load that hangs straight below the
+        pads slides down; one that turns more than it pulls comes to hang below them, and is held.
+        """
+        if self.turned > self.carried:
+            return FAR
+        return min(FAR, abs(math.log10(max(math.hypot(self.carried, self.turned), 1e-3))))
+
     def _share(self, force: float) -> float:
         limit = 2.0 * self.friction * self.force
         return min(LARGEST_USE, force / limit) if limit > 0.0 else LARGEST_USE
@@ -85,7 +97,8 @@ def grip_signs(margins: Margins, load: GripLoad) -> Mapping[str, float]:
         load: of its grip.
 
     Returns:
-        `carried`, `turned`: logarithms of the load's shares in what friction carries; `slip`,
+        `carried`, `turned`: logarithms of the load's shares in what friction carries; `limit`: see
+        `GripLoad.limit`; `slip`,
         `tilt`: logarithms of the motion in the hand [m, rad]; `pad_force`: share of the weaker
         pad's force in that of the hand; `patch_area`: square root [m]; `lift`: how far the target
         went with the hand [m]; `end_time`: when it was decided [s]. What was not measured, as there
@@ -98,6 +111,7 @@ def grip_signs(margins: Margins, load: GripLoad) -> Mapping[str, float]:
     return {
         "carried": math.log10(max(load.carried, 1e-3)),
         "turned": math.log10(max(load.turned, 1e-3)),
+        "limit": load.limit,
         "slip": math.log10(max(measured(margins.slip), SMALLEST_SLIP)),
         "tilt": math.log10(max(measured(margins.tilt), SMALLEST_TILT)),
         "pad_force": measured(margins.pad_force) / load.force,
