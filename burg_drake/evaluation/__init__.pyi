@@ -13,4 +13,7 @@ from .replay import (
     motion_figures as motion_figures,
     rerun as rerun,
 )
-from .second_opinion import judge_again as judge_again
+from .second_opinion import (
+    judge_again as judge_again,
+    require_second_engine as require_second_engine,
+)

@@ -7,7 +7,7 @@ from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
-from burg_drake.core import InvalidInputError, UnknownNameError, nearest
+from burg_drake.core import InvalidInputError, UnknownNameError, nearest, software_versions
 from burg_drake.core.grasps import Mode, Outcome, Verdict
 from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.evaluation.candidates import Candidate
@@ -20,7 +20,7 @@ from burg_drake.evaluation.stages import (
 )
 from burg_drake.evaluation.store import JOURNAL_FILE, Run, keep_parts, load_run, save_run
 from burg_drake.evaluation.workers import Executor, Job, LocalExecutor
-from burg_drake.station.document import ENGINES
+from burg_drake.station.document import ENGINES, Engine
 
 
 def judge_again(
@@ -56,11 +56,11 @@ def judge_again(
         SimulationError: the worker processes die.
     """
     run = run if isinstance(run, Run) else load_run(run)
-    if engine not in ENGINES:
-        raise UnknownNameError(f"engine {engine!r} does not exist; {nearest(engine, ENGINES)}")
-    if ENGINES[engine] == run.document.engine:
+    require_second_engine(engine, run.document.engine, run.document.mode)
+    if run.document.shard:
         raise InvalidInputError(
-            f"{run.path} was judged with engine {engine!r}; another one has to judge again"
+            f"{run.path} is shard {run.document.shard} of a run; merge the shards, and then judge"
+            " again what is contested"
         )
     if not run.complete:
         raise InvalidInputError(
@@ -71,12 +71,42 @@ def judge_again(
     with Reporter(progress) as reporter, Journal(run.path / JOURNAL_FILE) as journal:
         left = [run.trial(id).candidate for id in run.contested]
         if left:
-            require_engine_for(ENGINES[engine], run.document.mode)
             require_scene_for(ENGINES[engine], run.scene(), run.station())
             run = _judge(run, left, engine, executor, journal, reporter)
         run = finish_run(run, run.document.table)
         keep_parts(run)
         return run
+
+
+def require_second_engine(engine: str, first: Engine, mode: Mode) -> None:
+    """Refuses an engine whose opinion of the verdicts of another one is worth nothing.
+
+    Args:
+        engine: name of a preset.
+        first: the engine of the run.
+        mode: of the run.
+
+    Raises:
+        UnknownNameError: no such preset.
+        InvalidInputError: it is the first one, or the same simulator with longer steps, or cannot
+            run trials of the mode.
+        MissingDependencyError: it is not installed.
+    """
+    if engine not in ENGINES:
+        raise UnknownNameError(f"engine {engine!r} does not exist; {nearest(engine, ENGINES)}")
+    second = ENGINES[engine]
+    others = ", ".join(name for name, one in ENGINES.items() if _is_finer(one, first))
+    if not _is_finer(second, first):
+        why = "is the one" if second == first else "takes longer steps than the one"
+        raise InvalidInputError(
+            f"engine {engine!r} {why} that has judged all grasps, {first.name!r}; give one of"
+            f" {others}"
+        ).about("engine")
+    require_engine_for(second, mode)
+
+
+def _is_finer(second: Engine, first: Engine) -> bool:
+    return second.simulator != first.simulator or second.time_step < first.time_step
 
 
 def _judge(
@@ -104,7 +134,9 @@ def _judge(
     finally:
         seconds = round(time.monotonic() - begun, 3)
         sessions = (*run.document.stretches, replace(session, judged=judged, seconds=seconds))
-        run = save_run(Run(run.path, replace(run.document, stretches=sessions)))
+        versions = software_versions(ENGINES[engine].packages) | run.document.versions
+        document = replace(run.document, stretches=sessions, versions=versions)
+        run = save_run(Run(run.path, document))
     return run
 
 

@@ -28,20 +28,28 @@ def test_all_in_one_command(
     command: list[str], tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(verdict, "CONTESTED", 1.1)  # every executed verdict is
-    assert main([*command, "--rejudge", "contested", "--engine", "screening"]) == 0
-    assert "settled 2 contested grasps by screening; changed 0" in capsys.readouterr().out
+    assert main([*command, "--rejudge", "contested", "--engine", "reference"]) == 0
+    assert "settled 2 contested grasps by reference; changed 0" in capsys.readouterr().out
     run = load_run(tmp_path / "run")
     assert run.document.engine.name == "standard"
     assert run.results["outcome"].tolist() == ["lifted", "collision_target", "no_contact"]
-    assert run.results["engine"].tolist() == ["screening", "standard", "screening"]
+    assert run.results["engine"].tolist() == ["reference", "standard", "reference"]
     # a row that a second engine gave is replayed with that engine
     lifted = str(run.results["id"][0])
     page = str(tmp_path / "replay.html")
     assert main(["replay", str(run.path), "--grasp", lifted, "--html", page]) == 0
     assert "as recorded" in capsys.readouterr().out
     # and the same command has nothing left to do
-    assert main([*command, "--rejudge", "contested", "--engine", "screening"]) == 0
+    assert main([*command, "--rejudge", "contested", "--engine", "reference"]) == 0
     assert load_run(run.path).verdicts == run.verdicts
+
+
+def test_where_nothing_is_contested(
+    command: list[str], capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(verdict, "CONTESTED", 0.0)
+    assert main([*command, "--rejudge", "contested", "--engine", "reference"]) == 0
+    assert "no verdict is contested" in capsys.readouterr().out
 
 
 def test_nothing_is_judged_where_the_request_contradicts_itself(
@@ -49,7 +57,17 @@ def test_nothing_is_judged_where_the_request_contradicts_itself(
 ) -> None:
     assert main([*command, "--rejudge", "contested"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "--rejudge needs another engine than 'standard'" in line and "reference" in line
+    assert "engine 'standard' is the one that has judged all grasps" in line
+    assert "give one of reference, mujoco" in line
+    assert main([*command, "--rejudge", "contested", "--engine", "screening"]) == 2
+    assert "'screening' takes longer steps than the one" in capsys.readouterr().err
+    assert (
+        main([*command, "--rejudge", "contested", "--engine", "reference", "--shard", "1/2"]) == 2
+    )
+    assert "merge the shards first" in capsys.readouterr().err
+    arm = ["--rejudge", "contested", "--engine", "mujoco", "--mode", "arm"]
+    assert main([*command, *arm]) == 2
+    assert "mode arm is simulated by Drake" in capsys.readouterr().err
     assert not (tmp_path / "run").exists()
     many = [command[0], "tabletop_six", "tabletop_close", *command[2:4], "--rejudge", "contested"]
     assert main([*many, "--engine", "reference"]) == 2

@@ -9,6 +9,7 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet
 import pytest
 from asked import asked
 from inline_executor import Inline
@@ -17,9 +18,11 @@ from known_many import OPTIONS, run_all, same
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.records.journal import JOURNAL_FILE
 from burg_drake.evaluation.records.table import Columns
+from burg_drake.evaluation.results.summary import summarize
 from burg_drake.evaluation.store import part_writer
 from burg_drake.evaluation.store.campaign_folder import Campaign, load_campaign
 from burg_drake.evaluation.store.loading import read_results
+from burg_drake.evaluation.store.part_file import open_part, write_part
 from burg_drake.evaluation.store.part_writer import PartWriter
 from burg_drake.evaluation.store.run_folder import load_run
 from burg_drake.station.document.station_document import Station
@@ -200,3 +203,19 @@ def test_a_large_run_of_one_scene(
     assert same(run.results, read_results(run.path))
     names = ["outcome", "slip", "none"]
     assert list(read_results(run.path, names)) == names
+
+
+def test_parts_of_a_release_that_knew_fewer_columns(campaign: Campaign) -> None:
+    """They are read, and summed up, with nothing in the columns that they lack."""
+    before = summarize(campaign)
+    lacking = ["confidence", "judged_again", "outcome_before"]
+    for path in sorted((campaign.path / "parts").glob("*.parquet")):
+        part = open_part(path)
+        assert part is not None
+        table = pyarrow.parquet.read_table(path).drop_columns(lacking)
+        path.unlink()
+        write_part(path.parent, part.number, table, part.segments)
+    now = summarize(load_campaign(campaign.path))
+    assert before.knows_confidence and not now.knows_confidence
+    assert now.total.outcomes == before.total.outcomes
+    assert (now.total.contested, now.total.settled) == (0, 0)

@@ -64,6 +64,16 @@ def test_the_same_with_fingers_swapped_and_the_world_turned(
     assert sure(world, friction) == pytest.approx(expected, abs=0.02)
 
 
+def test_the_way_to_the_grasp_does_not_count(
+    make_scene: Callable[..., Scene], trial: HandTrial
+) -> None:
+    settings = dataclasses.replace(DEFAULT_TRIAL, approach=True)
+    approaching = HandTrial(make_scene(("box", 0.3, 0.2, 0.0)), make_station(), settings=settings)
+    for share in (0.7, 1.3, 3.0):
+        expected = sure(trial, share * LIMIT)
+        assert sure(approaching, share * LIMIT) == pytest.approx(expected, abs=0.01)
+
+
 def test_an_engine_with_settings_of_its_own_has_none(
     make_scene: Callable[..., Scene], trial: HandTrial
 ) -> None:

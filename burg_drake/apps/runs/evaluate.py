@@ -150,7 +150,7 @@ def _evaluate_one(arguments: argparse.Namespace, reference: str) -> int:
             print(f"burg-drake: warning: {warning}", file=sys.stderr)
     folder = arguments.output or f"{DEFAULT_OUTPUT}/{scene.name}"
     settings = requested_settings(arguments, mode, motion)
-    settings = replace(settings, engine=first_engine(arguments, folder))
+    settings = replace(settings, engine=first_engine(arguments, folder, mode))
     with chosen_cluster(arguments) as executor:
         run = evaluate(
             scene,
@@ -164,11 +164,11 @@ def _evaluate_one(arguments: argparse.Namespace, reference: str) -> int:
             progress=not arguments.quiet,
         )
         run = settle(run, arguments, executor)
-    _print_run(run, motion)
+    _print_run(run, motion, rejudged=arguments.rejudge is not None)
     return 1 if run.failures else 0
 
 
-def _print_run(run: Run, motion: GraspMotion) -> None:
+def _print_run(run: Run, motion: GraspMotion, *, rejudged: bool) -> None:
     """The tables of a run, where its files are, and what has failed."""
     from burg_drake.evaluation.records import motion_text
     from burg_drake.station.document import GraspMotion
@@ -178,8 +178,8 @@ def _print_run(run: Run, motion: GraspMotion) -> None:
         print(f"shard   {run.document.shard}; merge all of them with burg-drake merge")
     if motion != GraspMotion():
         print(f"motion  {motion_text(motion)}")
-    if line := settled_line(run):
-        print(line)
+    if rejudged or any(verdict.judged_again for verdict in run.verdicts.values()):
+        print(settled_line(run))
     print(f"table   {run.table_path}")
     print(f"report  {run.report_path}")
     if run.failures:

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 
 from burg_drake.apps.options import Parser
 from burg_drake.core import InvalidInputError
+from burg_drake.core.grasps import CONTESTED
 
 if TYPE_CHECKING:
+    from burg_drake.core.grasps import Mode
     from burg_drake.evaluation.store import Run
     from burg_drake.evaluation.workers import Executor
     from burg_drake.station.document import Engine
@@ -30,7 +32,7 @@ def add_rejudge_contested(parser: Parser) -> None:
 
 
 def require_one_scene(arguments: argparse.Namespace) -> None:
-    """Refuses --rejudge for a run over many scenes, or for a shard.
+    """Refuses --rejudge for a run over many scenes.
 
     Raises:
         InvalidInputError: it is given.
@@ -41,13 +43,15 @@ def require_one_scene(arguments: argparse.Namespace) -> None:
         )
 
 
-def first_engine(arguments: argparse.Namespace, folder: str) -> Engine | str:
+def first_engine(arguments: argparse.Namespace, folder: str, mode: Mode) -> Engine | str:
     """The engine that judges all grasps: with --rejudge that of the run in the folder, and standard
     of a new one.
 
     Raises:
-        InvalidInputError: that is the one which is to judge again.
+        InvalidInputError: a shard is asked for; and see `require_second_engine`, also for other
+            errors.
     """
+    from burg_drake.evaluation import require_second_engine
     from burg_drake.evaluation.store import RUN_FILE, load_run
     from burg_drake.station.document import DEFAULT_ENGINE, ENGINES
 
@@ -56,12 +60,12 @@ def first_engine(arguments: argparse.Namespace, folder: str) -> Engine | str:
         return chosen
     exists = (Path(folder) / RUN_FILE).exists()
     engine = load_run(folder).document.engine if exists else ENGINES[DEFAULT_ENGINE]
-    if engine == ENGINES[chosen]:
-        others = ", ".join(name for name in ENGINES if ENGINES[name] != engine)
+    if arguments.shard is not None:
         raise InvalidInputError(
-            f"--rejudge needs another engine than {engine.name!r}, which judges all grasps; give"
-            f" --engine with one of {others}"
+            "--rejudge settles a whole run; merge the shards first (burg-drake merge), or leave"
+            " --shard out"
         )
+    require_second_engine(chosen, engine, mode)
     return engine
 
 
@@ -81,10 +85,11 @@ def settle(run: Run, arguments: argparse.Namespace, executor: Executor | None) -
 
 
 def settled_line(run: Run) -> str:
-    """How many verdicts another engine has settled, and how many of them changed; empty if none."""
+    """How many verdicts another engine has settled, and how many of them changed."""
     again = [v for v in run.verdicts.values() if v.judged_again]
     if not again:
-        return ""
+        known = any(v.confidence is not None for v in run.verdicts.values())
+        return "no verdict is contested" if known else "no verdict has a confidence to go by"
     engines = ", ".join(sorted({v.judged_again for v in again}))
     changed = Counter(
         f"{v.outcome_before} to {v.outcome}" for v in again if v.outcome_before != v.outcome
@@ -92,4 +97,6 @@ def settled_line(run: Run) -> str:
     many = "" if len(again) == 1 else "s"
     text = f"settled {len(again)} contested grasp{many} by {engines}; changed {changed.total()}"
     details = ", ".join(f"{n} from {what}" for what, n in changed.most_common())
-    return f"{text} ({details})" if details else text
+    text += f" ({details})" if details else ""
+    close = sum(v.confidence is not None and v.confidence < CONTESTED for v in again)
+    return f"{text}; {close} are close for it, too" if close else text

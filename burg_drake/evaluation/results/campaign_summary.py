@@ -62,6 +62,7 @@ def summarize_campaign(campaign: Campaign) -> Summary:
         notes=_notes(campaign),
         scenes=tuple(by_scene),
         knows_confidence=bool(np.isfinite(rows.column("confidence")).any()),
+        settled_by=tuple(sorted(text for text in rows.codes("judged_again")[1] if text)),
     )
 
 
@@ -79,7 +80,8 @@ def _groups(rows: StoredRows, keys: NDArray[np.int64], names: Sequence[str]) -> 
     flat = (keys * shape[1] + outcome) * shape[2] + stage
     counts = np.bincount(flat, minlength=math.prod(shape)).reshape(shape)
     codes, texts = rows.codes("judged_again")
-    settled = np.array([text != "" for text in texts], dtype=bool)[codes]
+    # parts of earlier releases lack the column: -1 is the last one, which is no text
+    settled = np.array([*(text != "" for text in texts), False], dtype=bool)[codes]
     contested = contested_rows(rows.column("confidence"), settled)
     lifted = contested & (outcome == OUTCOMES.index(Outcome.LIFTED))
     doubts = [

@@ -174,6 +174,7 @@ class Summary:
         scenes: by scene, in a run over many, in their order.
         knows_confidence: whether verdicts have a confidence; those of earlier releases, and of
             engines with settings of their own, have none.
+        settled_by: the engines that have judged grasps again.
     """
 
     objects: tuple[OutcomeCounts, ...]
@@ -185,6 +186,7 @@ class Summary:
     notes: tuple[str, ...] = ()
     scenes: tuple[OutcomeCounts, ...] = ()
     knows_confidence: bool = False
+    settled_by: tuple[str, ...] = ()
 
     @property
     def steps(self) -> list[str]:

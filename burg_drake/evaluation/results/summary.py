@@ -52,6 +52,7 @@ def summarize(run: Run | Campaign) -> Summary:
         lifts=short_lifts(columns[LIFT_HEIGHT], motion_in(document.trial).lift_height),
         notes=run_notes(run),
         knows_confidence=bool(np.isfinite(columns["confidence"]).any()),
+        settled_by=tuple(name for name in np.unique(columns["judged_again"]).tolist() if name),
     )
 
 

@@ -91,8 +91,8 @@ def _certainty_table(summary: Summary) -> TextTable:
         numbers = [group.executed, group.surely_lifted, group.surely_lost, group.contested]
         table.row(group.name, *map(format_count, [*numbers, *([group.settled] * settled)]))
     table.caption = (
-        f"contested: lifted or failed with a confidence below {CONTESTED:g}; another engine can"
-        " settle them"
+        f"contested: held to the end or lost with a confidence below {CONTESTED:g}; another engine"
+        " can settle them"
     )
     if settled:
         table.caption += "\nsettled: judged again by another engine, lifted or failed"

@@ -54,7 +54,7 @@ def confidence(engine: Engine, outcome: Outcome, margins: Margins, load: GripLoa
     Args:
         engine: that has executed it.
         outcome: how it ended.
-        margins: of the trial.
+        margins: of the trial, with its end counted from where the fingers met it.
         load: of its grip.
 
     Returns:

@@ -93,7 +93,7 @@ def grip_signs(margins: Margins, load: GripLoad) -> Mapping[str, float]:
     """Signs of a verdict, by name; logarithms are to the base of 10.
 
     Args:
-        margins: of a trial.
+        margins: of a trial, with its end counted from where the fingers met the target.
         load: of its grip.
 
     Returns:
@@ -101,8 +101,8 @@ def grip_signs(margins: Margins, load: GripLoad) -> Mapping[str, float]:
         `GripLoad.limit`; `slip`,
         `tilt`: logarithms of the motion in the hand [m, rad]; `pad_force`: share of the weaker
         pad's force in that of the hand; `patch_area`: square root [m]; `lift`: how far the target
-        went with the hand [m]; `end_time`: when it was decided [s]. What was not measured, as there
-        was no grip, is 0.
+        went with the hand [m]; `end_time`: how long after the fingers met the target it was decided
+        [s]. What was not measured, as there was no grip, is 0.
     """
 
     def measured(value: float) -> float:

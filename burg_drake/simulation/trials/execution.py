@@ -151,6 +151,7 @@ class Execution:
         self._in_free_air = 0.0
         self._path_is_blocked = False
         self._left_to_go = 0.0
+        self._grip_start = 0.0
 
     def run(self) -> TrialResult:
         """Runs all phases.
@@ -185,12 +186,16 @@ class Execution:
     def close(self) -> Outcome | None:
         """Closes until the fingers rest; None if both hold the target then."""
         settings = self._settings
+        self._grip_start = before = self._world.time
         self._carrier.close()
-        slow_since = math.inf
+        slow_since, met = math.inf, False
         timeout = max(settings.close_timeout, 2.0 * self._world.hand_document.closing_time)
         timeout += self._world.time
         while self._world.time < timeout:
             now = self.advance()
+            if self.contact.any and not met:
+                self._grip_start, met = before, True
+            before = now
             if self._world.finger_speed() > settings.settled_speed:
                 slow_since = math.inf
             else:
@@ -378,6 +383,7 @@ class Execution:
         )
         return TrialResult(
             outcome=outcome,
+            grip_start=self._grip_start,
             margins=margins,
             blocker=self._blocker if outcome is Outcome.BLOCKED else "",
             displacements=self._of_others(self._moved.farthest),

@@ -165,7 +165,8 @@ class GraspTrial(ABC, Generic[W]):
                 found = begin(world).run()
             margins = replace(found.margins, clearance=screen.clearance)
             load = self.grip_load(instance, X_WG, friction=friction, mass=mass)
-            sure = confidence(self.engine, found.outcome, margins, load)
+            held_for = replace(margins, end_time=margins.end_time - found.grip_start)
+            sure = confidence(self.engine, found.outcome, held_for, load)
             return replace(found, margins=margins, confidence=sure)
         except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
             world.invalidate()

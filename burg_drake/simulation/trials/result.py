@@ -15,10 +15,12 @@ class TrialResult(TrialFindings):
     Attributes:
         outcome: why it ended.
         margins: those that a trial measures, see `Margins.of_trial`.
+        grip_start: simulated time at the last look before the closing fingers met the target [s].
     """
 
     outcome: Outcome
     margins: Margins
+    grip_start: float = 0.0
 
 
 def collision(screen: Clearance) -> TrialResult:

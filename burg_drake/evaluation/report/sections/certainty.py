@@ -32,12 +32,14 @@ def certainty_section(summary: Summary) -> Html | None:
     if len(tried) > 1:
         rows.append(_row(summary.total, bool(settled), "total"))
     text = (
-        "Executed grasps. Contested are those, lifted or failed, whose verdict has a confidence"
-        f" below {CONTESTED:g}: where friction, place, shape or the speed of the lift are slightly"
-        " other, some of them end the other way."
+        "Executed grasps. Contested are those of which it has a confidence below"
+        f" {CONTESTED:g} whether the object is held to the end: where friction, place, shape or the"
+        " speed of the lift are slightly other, some of them end the other way. How near others are"
+        " to a limit of turning or disturbing, the margins tell."
     )
     if settled:
-        text += f" Settled by another engine, whose verdict counts: {number(settled)}."
+        text += f" Settled by {', '.join(summary.settled_by)}, whose verdict counts:"
+        text += f" {number(settled)}."
     keys = [(LIFTED, "lifted"), (OPEN, "contested"), (LOST, "failed")]
     return section(
         "How sure the verdicts are",
