@@ -38,6 +38,11 @@ from burg_drake.evaluation.cluster.local_nodes import LocalNodes  # noqa: E402
 from burg_drake.evaluation.cluster.members import ClusterWorkers, threads_by_address  # noqa: E402
 from burg_drake.evaluation.cluster.node import NO_WEB  # noqa: E402
 from burg_drake.evaluation.cluster.sent_job import SentJob  # noqa: E402
+from burg_drake.evaluation.cluster.versions import (  # noqa: E402
+    code_hash,
+    require_same,
+    software,
+)
 
 LIMITS = WorkerLimits(cpu=0.25)
 
@@ -183,6 +188,20 @@ def test_other_versions_are_refused(
         node.wait()
         connection.close()
     wait_for(lambda: address not in cluster.workers)
+
+
+def test_all_that_decides_about_verdicts_is_compared(tmp_path: Path) -> None:
+    """The second engine, and the curves that confidences come from."""
+    package = tmp_path / "burg_drake"
+    shutil.copytree(Path(burg_drake.__file__).parent, package)
+    ours = software()
+    assert code_hash(package) == ours["code of burg_drake"]
+    with (package / "simulation/confidence/calibration.json").open("a") as file:
+        file.write("\n")
+    assert code_hash(package) != ours["code of burg_drake"]
+    require_same({"tcp://a": ours})
+    with pytest.raises(ClusterError, match=rf"tcp://a has mujoco 1 \(here {ours['mujoco']}\)"):
+        require_same({"tcp://a": {**ours, "mujoco": "1"}})
 
 
 def test_a_worker_that_can_be_reached_from_elsewhere_is_refused(cluster: Cluster) -> None:

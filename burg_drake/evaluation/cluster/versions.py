@@ -8,19 +8,31 @@ from pathlib import Path
 
 import burg_drake
 from burg_drake.core import JUDGING, ClusterError, content_hash, software_versions
+from burg_drake.station.document import ENGINES
 
-DECIDING = {**JUDGING, "opencv": "opencv-python-headless"}
-"""Packages that decide about verdicts or images, as they are called and installed."""
+DECIDING = {
+    **JUDGING,
+    **{name: package for e in ENGINES.values() for name, package in e.packages.items()},
+    "opencv": "opencv-python-headless",
+}
+"""Packages that decide about verdicts or images, as they are called and installed; those of all
+engines, as any may be asked for."""
+CODE = (".py", ".json")
+"""Suffixes of files of the package that decide about them: modules, and curves of confidences."""
 
 
 @functools.cache
 def software() -> dict[str, str]:
     """Versions by name; of burg_drake also a hash of its code, as releases under way differ."""
-    package = Path(burg_drake.__file__).parent
-    files = sorted(package.rglob("*.py"))
-    names = [file.relative_to(package).as_posix() for file in files]
-    code = content_hash(names, files)[:12]
+    code = code_hash(Path(burg_drake.__file__).parent)
     return {**software_versions(DECIDING, with_platform=False), "code of burg_drake": code}
+
+
+def code_hash(package: Path) -> str:
+    """Hash of all files of an installed package that decide about results."""
+    files = sorted(file for file in package.rglob("*") if file.suffix in CODE)
+    names = [file.relative_to(package).as_posix() for file in files]
+    return content_hash(names, files)[:12]
 
 
 def require_same(workers: Mapping[str, Mapping[str, str] | BaseException]) -> None:
