@@ -6,9 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from burg_drake.core import (
-    software_versions,
-)
+from burg_drake.core import JUDGING, software_versions
 from burg_drake.core.grasps import (
     ARM_SCREEN_MARGINS,
     LIFT_HEIGHT,
@@ -122,7 +120,8 @@ def comparison(found: Sequence[Difference], origin: TrialOrigin) -> list[str]:
     if all(difference.rounding for difference in found):
         names = ", ".join(difference.name for difference in found)
         return [f"as recorded, but for the last digits of {names}: the table was rounded"]
-    there, here = origin.versions, software_versions()
+    there = origin.versions
+    here = software_versions({**JUDGING, **origin.engine.packages})
     changed = [
         f"{name} {there[name]}, now {here[name]}"
         for name in there

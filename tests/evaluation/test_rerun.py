@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib.metadata
 import math
 
 import numpy as np
+import pytest
 
 from burg_drake.core.grasps import Verdict
 from burg_drake.core.grasps.outcome import Outcome, Stage
@@ -115,3 +117,13 @@ def test_other_versions_are_named() -> None:
     first, *_ = comparison(found, origin)
     assert first == f"not as recorded (with drake 1.2.3, now {software_versions()['drake']})"
     assert comparison([], origin) == ["as recorded"]
+
+
+def test_a_version_of_the_engine_is_named_if_it_executed_the_trial() -> None:
+    pytest.importorskip("mujoco")
+    origin = dataclasses.replace(ORIGIN, versions={**ORIGIN.versions, "mujoco": "1.2.3"})
+    found = differences(VERDICT, changed(slip=0.4))
+    assert comparison(found, origin)[0] == "not as recorded"
+    now = importlib.metadata.version("mujoco")
+    first, *_ = comparison(found, origin.judged_by("mujoco"))
+    assert first == f"not as recorded (with mujoco 1.2.3, now {now})"

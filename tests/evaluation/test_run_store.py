@@ -16,12 +16,14 @@ from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownName
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.core.paths.references import portable_reference
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.run_document import RunDocument, run_hash
+from burg_drake.evaluation.records.run_document import RunDocument, require_same_run, run_hash
 from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.records.table_file import read_table
 from burg_drake.evaluation.report import write_report
+from burg_drake.evaluation.report.sections.reproduction import repeat_section
 from burg_drake.evaluation.store.run_folder import Run, load_run
 from burg_drake.scene.document.scene import Scene
+from burg_drake.station.document.engine import ENGINES
 from burg_drake.station.document.station_document import Station, load_station
 
 
@@ -181,6 +183,19 @@ def test_an_engine_of_the_same_name_and_other_settings_is_another_run(
             settings=EvaluationSettings(grasps_per_object=30, blind=True, engine=engine),
             progress=False,
         )
+
+
+def test_a_run_goes_on_with_the_version_of_its_engine_only(run: Run) -> None:
+    versions = {**run.document.versions, "mujoco": "3.10.0"}
+    there = dataclasses.replace(run.document, engine=ENGINES["mujoco"], versions=versions)
+    newer = dataclasses.replace(there, versions={**versions, "mujoco": "4.0.0"})
+    with pytest.raises(InvalidInputError, match=r"\(mujoco is 3.10.0 there, 4.0.0 here\)"):
+        require_same_run(run.path, there, newer)
+    assert run_hash(there) != run_hash(newer)
+    assert "mujoco 3.10.0" in str(repeat_section(Run(run.path, there)))
+    by_drake = [dataclasses.replace(one, engine=run.document.engine) for one in (there, newer)]
+    require_same_run(run.path, *by_drake)
+    assert {run_hash(one) for one in by_drake} == {run.document.hash}
 
 
 def test_a_run_of_an_older_release_is_read(run: Run) -> None:

@@ -197,6 +197,7 @@ def request_identity(document: RunRequestFields) -> dict[str, str]:
         "seed": str(document.seed),
         "burg_drake": document.versions.get("burg_drake", ""),
         "drake": document.versions.get("drake", ""),
+        **{name: document.versions.get(name, "not recorded") for name in engine.packages},
     }
 
 

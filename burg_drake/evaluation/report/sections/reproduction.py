@@ -36,7 +36,7 @@ ASKED = {
 }
 """What a mode asks of each grasp."""
 DECIDING = ("burg_drake", "drake", "python")
-"""Software whose version people ask for first."""
+"""Software whose version people ask for first, beside that of the engine."""
 
 
 def repeat_section(run: Run) -> Html:
@@ -104,13 +104,14 @@ def campaign_facts(campaign: Campaign) -> Html:
 def _common(document: RunDocument | CampaignDocument) -> list[tuple[str, str]]:
     """Settings that people ask for first."""
     approach = "; its approach is simulated" if document.trial.get("approach") else ""
+    names = (*DECIDING, *document.engine.packages)
     return [
         ("station", f"{document.station.path}, content {document.station.content[:HASH_DIGITS]}"),
         ("mode", f"{document.mode}: {ASKED[document.mode]}{approach}"),
         ("motion", motion_text(motion_in(document.trial))),
         ("engine", engine_label(document.engine)),
         ("seed", str(document.seed)),
-        ("versions", ", ".join(f"{n} {document.versions.get(n, '?')}" for n in DECIDING)),
+        ("versions", ", ".join(f"{n} {document.versions.get(n, '?')}" for n in names)),
     ]
 
 
