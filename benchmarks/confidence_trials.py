@@ -69,7 +69,7 @@ class Grasp:
 
 
 def is_held_out(name: str) -> bool:
-    """Half of the objects: those that the oracle holds out, scans, and every second one of the
+    """More than half of the objects: those that the oracle holds out, scans, and some of the
     household."""
     if name in TUNED or name in HELD_OUT:
         return name in HELD_OUT

@@ -98,11 +98,11 @@ def grip_signs(margins: Margins, load: GripLoad) -> Mapping[str, float]:
 
     Returns:
         `carried`, `turned`: logarithms of the load's shares in what friction carries; `limit`: see
-        `GripLoad.limit`; `slip`,
-        `tilt`: logarithms of the motion in the hand [m, rad]; `pad_force`: share of the weaker
-        pad's force in that of the hand; `patch_area`: square root [m]; `lift`: how far the target
-        went with the hand [m]; `end_time`: how long after the fingers met the target it was decided
-        [s]. What was not measured, as there was no grip, is 0.
+        `GripLoad.limit`; `slip`, `tilt`: logarithms of the motion in the hand [m, rad];
+        `pad_force`: share of the weaker pad's force in that of the hand; `patch_area`: square root
+        [m]; `lift`: how far the target went with the hand [m]; `end_time`: how long after the
+        fingers met the target it was decided [s]. What was not measured, as there was no grip, is
+        0.
     """
 
     def measured(value: float) -> float:
