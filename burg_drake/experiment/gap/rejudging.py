@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from burg_drake.core import (
+    JUDGING,
     content_hash,
     one_line,
     software_versions,
@@ -30,6 +31,7 @@ from burg_drake.evaluation.records import (
     origin_of,
     read_journal,
 )
+from burg_drake.evaluation.stages import require_engine_for
 from burg_drake.evaluation.store import Run
 from burg_drake.evaluation.workers import Executor, Job, JobFailed, LocalExecutor
 from burg_drake.experiment.gap.displacement import commanded
@@ -74,7 +76,8 @@ def rejudge(
 ) -> Rejudging:
     """Judges every real trial with a measured placement again.
 
-    Each is judged as its run was: mode, engine, motion and settings. The hand goes to the place in
+    Each is judged as its run was: mode, engine (or the one that judged the grasp again there),
+    motion and settings. The hand goes to the place in
     the world to which the robot was sent. Objects that were not measured stay where they were
     planned. A scene that cannot be makes a trial that is not judged, with the reason.
 
@@ -92,6 +95,7 @@ def rejudge(
     Raises:
         InvalidInputError: a run is gone, or is another one; its library or station has changed; or
             the folder cannot be written.
+        MissingDependencyError: an engine is not installed.
     """
     runs = load_sources(sheet, path) if runs is None else runs
     executor = LocalExecutor.of_this_machine() if executor is None else executor
@@ -148,7 +152,8 @@ def _rejudge_task(
 ) -> _RejudgeTask:
     assert real.outcome is not None
     grasp, verdict = run.candidate(real.grasp), run.verdicts.get(real.grasp)
-    origin = origin_of(run.document)
+    origin = origin_of(run.document).judged_by("" if verdict is None else verdict.judged_again)
+    require_engine_for(origin.engine, origin.mode)
     measured = measured_scene(planned, real.placement, check.issues)
     trial = Rejudged(
         number=real.number,
@@ -168,10 +173,11 @@ def _rejudge_task(
     settings = origin.settings(f"{run.path}: trial")
     factory = SceneJudgeFactory(measured.scene, station, origin.engine, origin.mode, settings)
     X_OG = commanded(planned, measured.scene, grasp.instance, grasp.X_OG)
-    versions = software_versions()
+    packages = origin.engine.packages
+    versions = software_versions({**JUDGING, **packages})
     key = content_hash(
         *(real.number, factory.content, grasp.instance, X_OG, grasp.width),
-        *(versions["burg_drake"], versions["drake"]),
+        *(versions[name] for name in ("burg_drake", "drake", *packages)),
     )
     id = f"{real.number}:{key[:ID_DIGITS]}"
     candidate = Candidate(id, grasp.instance, X_OG, width=grasp.width)

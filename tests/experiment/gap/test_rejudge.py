@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -19,10 +20,11 @@ from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, SimulationError
 from burg_drake.core.grasps.outcome import Outcome, RealOutcome
 from burg_drake.evaluation.candidates.candidates import Candidates
-from burg_drake.evaluation.records.journal import decode
+from burg_drake.evaluation.records.journal import Journal, decode
 from burg_drake.evaluation.records.table_file import read_table
 from burg_drake.evaluation.replay import differences
-from burg_drake.evaluation.store.run_folder import Run
+from burg_drake.evaluation.stages.station_judge import StationJudgeFactory
+from burg_drake.evaluation.store.run_folder import Run, load_run
 from burg_drake.evaluation.workers import Job, JobFailed, OnFailure
 from burg_drake.experiment.gap.measured_places import measured_scene, upright
 from burg_drake.experiment.gap.rejudged_trials import Rejudging, runs_for
@@ -40,6 +42,7 @@ from burg_drake.experiment.trials.sheet import (
 from burg_drake.experiment.trials.sources import grasp_content
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.checks.scene_check import SceneCheck
+from burg_drake.station.document.engine import ENGINES, Engine
 from tests.experiment.gap.conftest import Here
 
 MISSED = {"no_contact", "collision_target", "collision_table", "closed_empty", "one_finger"}
@@ -179,6 +182,34 @@ def test_an_answer_that_is_lost_is_asked_for_again(
     again = rejudge(sheet, "trials.yaml", tmp_path, executor=Knowing(), progress=False)  # type: ignore[arg-type]
     assert asked == [lost] and again.causes == found.causes
     assert (tmp_path / "journal.jsonl").read_bytes() == whole
+
+
+def test_who_judged_a_grasp_again_judges_where_its_object_stood(
+    run: Run, sheet: TrialSheet, tmp_path: Path
+) -> None:
+    shutil.copytree(run.path, tmp_path / "run")
+    id = run.candidates.id[0]
+    with Journal(tmp_path / "run" / "journal.jsonl") as journal:
+        journal.append(id, replace(run.verdicts[id], judged_again="reference"))
+    engines: list[Engine] = []
+
+    class Asked:
+        workers = 1
+
+        def judge(self, jobs: Iterable[Job], on_failure: OnFailure) -> Iterator[Any]:
+            for job in jobs:
+                assert isinstance(job.make_judge, StationJudgeFactory)
+                engines.append(job.make_judge.engine)
+                yield from ((job, candidate, run.verdicts[id]) for candidate in job.candidates)
+
+    runs = {"a": load_run(tmp_path / "run")}
+    found = rejudge(sheet, "trials.yaml", tmp_path / "out", runs=runs, executor=Asked())  # type: ignore[arg-type]
+    assert engines and set(engines) == {ENGINES["reference"]}
+    assert found.trials[0].origin.engine == ENGINES["reference"]
+    assert set(read_table(tmp_path / "out" / "rejudged.csv")["engine"]) == {"reference"}
+    engines.clear()
+    rejudge(sheet, "trials.yaml", tmp_path / "out", runs={"a": run}, executor=Asked())  # type: ignore[arg-type]
+    assert set(engines) == {run.document.engine}  # what another engine answered is no answer
 
 
 def test_a_scene_that_cannot_be_built_is_a_trial_that_is_not_judged(
