@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from burg_drake.apps.cli import main
+from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.grasps import Verdict
 from burg_drake.core.grasps.column_meanings import describe
 from burg_drake.core.grasps.outcome import Outcome, Stage
@@ -175,6 +176,37 @@ def test_a_narrower_call_keeps_what_is_known(copied: Run, tmp_path: Path) -> Non
         (other,) = csv.DictReader(file)
     assert other["repeats"] == other["n_lifted"] == other["success"] == ""  # of other deviations
     assert other["tug_+x_g"] == row["tug_+x_g"] and other["friction_min"] == row["friction_min"]
+
+
+def test_a_grasp_is_tested_by_the_engine_that_judged_it_again(run: Run, tmp_path: Path) -> None:
+    shutil.copytree(run.path, tmp_path / "run")
+    (id,) = run.best()
+    with Journal(tmp_path / "run" / "journal.jsonl") as journal:
+        journal.append(id, dataclasses.replace(run.verdicts[id], judged_again="screening"))
+    again = load_run(tmp_path / "run")
+    settings = RobustnessSettings(tests=("friction",))
+    found = assess_robustness(again, settings=settings, workers=1, progress=False)
+    assert read_table(found.table_path)["engine"].tolist() == ["screening"]
+    candidate = again.candidate(id)
+    trial = HandTrial(again.scene(), again.station(), engine="screening")
+    assert found.grasps[0].friction_min == friction_limit(trial, "box", candidate.X_OG)
+    # answers of the run's own engine are others
+    (probe,) = read_journal(found.table_path.with_suffix(".jsonl"))
+    (own,) = read_journal(
+        assess_robustness(
+            run, settings=settings, out=tmp_path / "own.csv", workers=1, progress=False
+        ).table_path.with_suffix(".jsonl")
+    )
+    assert probe != own
+
+
+def test_what_mujoco_judged_again_is_not_tugged(run: Run, tmp_path: Path) -> None:
+    shutil.copytree(run.path, tmp_path / "run")
+    (id,) = run.best()
+    with Journal(tmp_path / "run" / "journal.jsonl") as journal:
+        journal.append(id, dataclasses.replace(run.verdicts[id], judged_again="mujoco"))
+    with pytest.raises(InvalidInputError, match=f"Drake alone, and {id} was judged by engine muj"):
+        assess_robustness(tmp_path / "run", workers=1, progress=False)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ answers known about the grasps of the last call, those of earlier calls with equ
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -68,6 +68,42 @@ class Robustness:
     interrupted: int = 0
 
 
+@dataclass(frozen=True, eq=False)
+class _EngineTests:
+    """How grasps are tested whose verdicts one engine has given.
+
+    Attributes:
+        factory: how.
+        context: what decides about the answers beside the settings of the tests.
+    """
+
+    factory: ProbeJudgeFactory
+    context: tuple[object, ...]
+
+    @classmethod
+    def of(cls, factory: ProbeJudgeFactory) -> _EngineTests:
+        """With the versions that are installed."""
+        packages = factory.engine.packages
+        versions = software_versions({**JUDGING, **packages})
+        names = ("burg_drake", "drake", *packages)
+        return cls(factory, (*factory.content(), *(versions[name] for name in names)))
+
+    def probes(self, grasp: Candidate) -> Iterator[Probe]:
+        """All questions about a grasp."""
+        return make_probes(grasp, self.factory.scene, self.factory.settings, self.context)
+
+    def gathered(self, grasp: Candidate, answers: Mapping[str, Verdict]) -> GraspRobustness:
+        """What answers, by the id of the probe, say of a grasp."""
+        scene, settings = self.factory.scene, self.factory.settings
+        return gathered(
+            grasp.id,
+            grasp.instance,
+            scene.instance(grasp.instance).object,
+            scene.entry(grasp.instance).friction,
+            known_answers(grasp.id, answers, settings, self.context),
+        )
+
+
 def assess_robustness(
     run: Run | str | Path,
     *,
@@ -81,6 +117,8 @@ def assess_robustness(
     progress: bool | Listener = True,
 ) -> Robustness:
     """Tests how robust lifted grasps of a run are, and writes a table.
+
+    Each is tested by the engine whose verdict it has: the run's, or the one that judged it again.
 
     Args:
         run: the run, or its folder.
@@ -97,8 +135,9 @@ def assess_robustness(
 
     Raises:
         UnknownNameError: a grasp, object or instance is not in the run.
-        InvalidInputError: a grasp was not lifted, the scene has changed since the run, or the table
-            cannot be written.
+        InvalidInputError: a grasp was not lifted, the engine that judged it cannot have a test, the
+            scene has changed since the run, or the table cannot be written.
+        MissingDependencyError: that engine is not installed.
         SimulationError: the simulation of the scene cannot be built.
     """
     run = run if isinstance(run, Run) else load_run(run)
@@ -108,26 +147,8 @@ def assess_robustness(
     journal_path = table.with_suffix(".jsonl")
     _require_other_files(run, table, journal_path)
     chosen = _choose(run, grasps, best, only)
-    factory = ProbeJudgeFactory(
-        run.scene(),
-        run.station(),
-        run.document.engine,
-        origin_of(run.document).settings(f"{run.path / RUN_FILE}: trial"),
-        settings,
-    )
-    engine = factory.engine
-    loaded = [test for test in settings.tests if test in LOADED_TESTS]
-    if engine.simulator != "drake" and loaded:
-        raise InvalidInputError(
-            f"{' and '.join(loaded)} are simulated by Drake alone; of a run with engine"
-            f" {engine.name} give the tests"
-            f" {','.join(test for test in TESTS if test not in LOADED_TESTS)}"
-        ).about("tests")
-    require_engine_for(engine, "hand")
-    versions = software_versions({**JUDGING, **engine.packages})
-    context = [*factory.content(), versions["burg_drake"], versions["drake"]]
-    context += [versions[name] for name in engine.packages]
-    probes = [p for grasp in chosen for p in make_probes(grasp, factory.scene, settings, context)]
+    tests = _tests_by_grasp(run, chosen, settings)
+    probes = [probe for grasp in chosen for probe in tests[grasp.id].probes(grasp)]
     writable_folder(table.parent)
     with Reporter(progress) as reporter, Journal(journal_path) as journal:
         known = {
@@ -135,10 +156,11 @@ def assess_robustness(
             for id, verdict in read_journal(journal_path).items()
             if not verdict.is_open(retry_failed=retry_failed)
         }
-        _answer(run, probes, factory, journal, known, workers, reporter)
+        _answer(run, probes, tests, journal, known, workers, reporter)
     answers = read_journal(journal_path)
-    found = tuple(_gather(grasp, answers, factory, context) for grasp in chosen)
-    write_table(table, robustness_columns(found, settings, run.document.engine, run.document.hash))
+    found = tuple(tests[grasp.id].gathered(grasp, answers) for grasp in chosen)
+    engines = [tests[grasp.id].factory.engine for grasp in chosen]
+    write_table(table, robustness_columns(found, settings, engines, run.document.hash))
     failures = {
         p.id: answers[p.id].reason
         for p in probes
@@ -178,10 +200,36 @@ def _choose(
     return list(chosen.values())
 
 
+def _tests_by_grasp(
+    run: Run, chosen: Iterable[Candidate], settings: RobustnessSettings
+) -> dict[str, _EngineTests]:
+    """How grasps are tested, by id."""
+    scene, station, origin = run.scene(), run.station(), origin_of(run.document)
+    trial = origin.settings(f"{run.path / RUN_FILE}: trial")
+    loaded = [test for test in settings.tests if test in LOADED_TESTS]
+    by_judge: dict[str, _EngineTests] = {}
+    found = {}
+    for grasp in chosen:
+        judge = run.verdicts[grasp.id].judged_again
+        if judge not in by_judge:
+            engine = origin.judged_by(judge).engine
+            if engine.simulator != "drake" and loaded:
+                raise InvalidInputError(
+                    f"{' and '.join(loaded)} are simulated by Drake alone, and {grasp.id} was"
+                    f" judged by engine {engine.name}; give the tests"
+                    f" {','.join(test for test in TESTS if test not in LOADED_TESTS)}"
+                ).about("tests")
+            require_engine_for(engine, "hand")
+            factory = ProbeJudgeFactory(scene, station, engine, trial, settings)
+            by_judge[judge] = _EngineTests.of(factory)
+        found[grasp.id] = by_judge[judge]
+    return found
+
+
 def _answer(
     run: Run,
     probes: Sequence[Probe],
-    factory: ProbeJudgeFactory,
+    tests: Mapping[str, _EngineTests],
     journal: Journal,
     known: Collection[str],
     workers: int | None,
@@ -195,32 +243,17 @@ def _answer(
         STARTING, len(probes) - len(todo), len(probes), unit="tests", left=expected or None
     )
     pace = ProgressMeter(reporter.show, begin, "testing", work=work)
-    tests = {probe.id: probe.test for probe in todo}
-    trials = [probe.trial for probe in todo]
-    factory = replace(factory, tests=tests)
-    with closing(judge_all(trials, factory, workers=workers)) as answered:
-        for asked, verdict in answered:
-            journal.append(asked.id, verdict)
-            pace.step(work=COST[tests[asked.id]])
+    for engine in dict.fromkeys(tests.values()):
+        own = {probe.id: probe.test for probe in todo if tests[probe.grasp] is engine}
+        trials = [probe.trial for probe in todo if probe.id in own]
+        factory = replace(engine.factory, tests=own)
+        with closing(judge_all(trials, factory, workers=workers)) as answered:
+            for asked, verdict in answered:
+                journal.append(asked.id, verdict)
+                pace.step(work=COST[own[asked.id]])
 
 
 def _trial_time(run: Run, probes: Sequence[Probe]) -> float:
     """CPU time that the run's own trials of the grasps took on average [s]."""
     took = [run.verdicts[id].cpu.get(Stage.EXECUTED, 0.0) for id in {p.grasp for p in probes}]
     return sum(took) / max(len(took), 1)
-
-
-def _gather(
-    grasp: Candidate,
-    answers: dict[str, Verdict],
-    factory: ProbeJudgeFactory,
-    context: Sequence[object],
-) -> GraspRobustness:
-    instance = factory.scene.instance(grasp.instance)
-    return gathered(
-        grasp.id,
-        grasp.instance,
-        instance.object,
-        factory.scene.entry(grasp.instance).friction,
-        known_answers(grasp.id, answers, factory.settings, context),
-    )

@@ -95,9 +95,12 @@ def gathered(
 
 
 def robustness_columns(
-    grasps: Sequence[GraspRobustness], settings: RobustnessSettings, engine: Engine, run: str
+    grasps: Sequence[GraspRobustness],
+    settings: RobustnessSettings,
+    engines: Sequence[Engine],
+    run: str,
 ) -> Columns:
-    """The table."""
+    """The table; `engines` are those of the grasps."""
     columns: Columns = {
         name: np.array([getattr(g, name) for g in grasps], dtype=np.str_)
         for name in ("id", "instance", "object")
@@ -119,7 +122,7 @@ def robustness_columns(
     counts = [None if rate is None else rate.outcomes for rate in rates]
     columns |= {f"n_{outcome}": _counts(counts, itemgetter(outcome)) for outcome in OF_HANDS}
     columns["failed"] = np.array([" ".join(g.failed) for g in grasps], dtype=np.str_)
-    columns["engine"] = np.array([engine_label(engine)] * len(grasps), dtype=np.str_)
+    columns["engine"] = np.array([engine_label(engine) for engine in engines], dtype=np.str_)
     columns["seed"] = np.full(len(grasps), settings.seed, dtype=np.int64)
     columns["settings"] = np.array([_settings_text(settings)] * len(grasps), dtype=np.str_)
     columns["run"] = np.array([run] * len(grasps), dtype=np.str_)
