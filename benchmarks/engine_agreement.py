@@ -4,9 +4,11 @@
         [--station S] [--workers N]
 
 Samples antipodal grasps on every object, and executes the clear ones with both engines, every
-second one with less friction, so that not all hold. Two verdicts are alike if both hold the target
-at the end or neither does. Tables show what is alike by object, by the outcomes of both, and by the
-margins of the first engine: what slipped or tilted much, or is pressed little, is contested.
+second one with less friction, so that not all hold. An object that stands in several scenes is
+tried with other grasps in each. Two verdicts are alike if both hold the target at the end or
+neither does. Tables show what is alike by object, by the phase in which each engine loses the
+target, by the outcomes of both, and by the margins of the first engine: what slipped or tilted
+much, or is pressed little, is contested. The grasps on which the engines differ are listed.
 """
 
 from __future__ import annotations
@@ -24,12 +26,22 @@ import numpy as np
 from mixed_grasps import clear_grasps, frictions, hand_only
 
 import burg_drake as burg
+from burg_drake.core import wilson_interval
 from burg_drake.simulation.mujoco.trial_of_engine import hand_trial_of
 from burg_drake.simulation.trials.result import TrialResult
 from burg_drake.station.document.engine import ENGINES
 
 ENOUGH = 0.95
 """Share of verdicts that two good engines should have alike."""
+PHASES = {
+    "no_contact": "closing",
+    "one_finger": "closing",
+    "closed_empty": "closing",
+    "hand_collision_approach": "approach",
+    "dropped": "hold",
+    "simulation_failed": "failed",
+}
+"""In which phase an outcome that does not hold ends a trial; the others do on the lift."""
 SLIPS = (1e-4, 1e-3, 3e-3, 1e-2)
 TILTS = (0.5, 3.0, 10.0, 30.0)
 FORCES = (10.0, 20.0, 30.0, 38.0)
@@ -41,12 +53,14 @@ class Pair:
 
     Attributes:
         object: the instance, with its scene.
+        number: of the grasp on it.
         friction: coefficient.
         results: of the two engines.
         seconds: CPU time of each.
     """
 
     object: str
+    number: int
     friction: float
     results: tuple[TrialResult, TrialResult]
     seconds: tuple[float, float]
@@ -66,6 +80,7 @@ class Share:
         scene, station, instance: where.
         engines: names of the two.
         count: grasps of the instance.
+        skip: leave out so many clear ones first.
         part, parts: every so many of them, from that one on.
     """
 
@@ -74,6 +89,7 @@ class Share:
     instance: str
     engines: tuple[str, str]
     count: int
+    skip: int
     part: int
     parts: int
 
@@ -83,20 +99,26 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("scenes", nargs="*", default=["tabletop_six"], metavar="SCENE")
+    parser.add_argument(
+        "scenes", nargs="*", default=["tabletop_six", "tabletop_twelve"], metavar="SCENE"
+    )
     parser.add_argument("--engines", nargs=2, choices=list(ENGINES), default=["standard", "mujoco"])
     parser.add_argument("--station", default="panda_tabletop")
-    parser.add_argument("--trials", type=int, default=1000, help="in all")
+    parser.add_argument("--trials", type=int, default=1300, help="at most, in all")
     parser.add_argument("--workers", type=int, default=2)
     arguments = parser.parse_args()
     engines = (arguments.engines[0], arguments.engines[1])
     placed = [(s, name) for s in arguments.scenes for name in burg.load_scene(s).instances]
     each = -(-arguments.trials // len(placed))
-    shares = [
-        Share(scene, arguments.station, name, engines, each, part, arguments.workers)
-        for scene, name in placed
-        for part in range(arguments.workers)
-    ]
+    seen = Counter[str]()
+    shares = []
+    for scene, name in placed:
+        skip = each * seen[name]
+        seen[name] += 1
+        shares += [
+            Share(scene, arguments.station, name, engines, each, skip, part, arguments.workers)
+            for part in range(arguments.workers)
+        ]
     pairs: list[Pair] = []
     with ProcessPoolExecutor(arguments.workers, get_context("spawn")) as pool:
         for found in pool.map(execute, shares):
@@ -109,19 +131,19 @@ def execute(share: Share) -> list[Pair]:
     scene, station = burg.load_scene(share.scene), hand_only(burg.load_station(share.station))
     trials = [hand_trial_of(scene, station, name) for name in share.engines]
     name = share.instance
-    grasps = clear_grasps(trials[0], name, share.count)
-    tried = list(zip(grasps, frictions(scene, name, len(grasps)), strict=True))
+    grasps = clear_grasps(trials[0], name, share.skip + share.count)[share.skip :]
+    coefficients = frictions(scene, name, len(grasps))
+    tried = list(zip(range(len(grasps)), grasps, coefficients, strict=True))
     pairs = []
-    for X_OG, friction in tried[share.part :: share.parts]:
+    for number, X_OG, friction in tried[share.part :: share.parts]:
         results, seconds = [], []
         for trial in trials:
             start = time.process_time()
             results.append(trial.run(name, X_OG, friction=float(friction)))
             seconds.append(time.process_time() - start)
         label = f"{share.scene}/{name}"
-        pairs.append(
-            Pair(label, float(friction), (results[0], results[1]), (seconds[0], seconds[1]))
-        )
+        both, cost = (results[0], results[1]), (seconds[0], seconds[1])
+        pairs.append(Pair(label, number, float(friction), both, cost))
     return pairs
 
 
@@ -132,6 +154,10 @@ def report(pairs: Sequence[Pair], engines: tuple[str, str]) -> None:
     for object in dict.fromkeys(pair.object for pair in pairs):
         print_row(object, [pair for pair in pairs if pair.object == object])
     print_row("all", pairs)
+    print(f"\nphase in which the target is lost, {one} / {other}")
+    phases = Counter(tuple(phase(r) for r in pair.results) for pair in pairs)
+    for (a, b), count in phases.most_common():
+        print(f"  {a:20}{b:20}{count:6}{'' if a == b else '   other'}")
     print(f"\noutcomes, {one} / {other}")
     counts = Counter(tuple(str(r.outcome) for r in pair.results) for pair in pairs)
     for (a, b), count in counts.most_common():
@@ -152,10 +178,39 @@ def report(pairs: Sequence[Pair], engines: tuple[str, str]) -> None:
                 [p for p, x in zip(pairs, within, strict=True) if x],
             )
         print_row("  never held", [p for p, x in zip(pairs, np.isnan(values), strict=True) if x])
+    print(f"\nnot alike, {one} / {other}")
+    for pair in pairs:
+        if not pair.alike:
+            print_pair(pair)
     cpu = np.array([pair.seconds for pair in pairs]).mean(axis=0)
     print(f"\nCPU time a trial: {one} {cpu[0]:.3f} s, {other} {cpu[1]:.3f} s")
     share = np.mean([pair.alike for pair in pairs])
-    print(f"{100 * share:.1f} % alike, {'as' if share >= ENOUGH else 'not as'} it should be")
+    low, high = wilson_interval(sum(pair.alike for pair in pairs), len(pairs))
+    print(
+        f"{100 * share:.1f} % alike ({100 * low:.1f} to {100 * high:.1f}),"
+        f" {'as' if share >= ENOUGH else 'not as'} it should be"
+    )
+
+
+def phase(result: TrialResult) -> str:
+    """In which phase of the trial the target is lost; `held` if it is not."""
+    return "held" if result.outcome.held else PHASES.get(str(result.outcome), "lift")
+
+
+def print_pair(pair: Pair) -> None:
+    """Prints a grasp on which the engines differ, with the margins of both."""
+    slips, tilts = (
+        " / ".join(f"{value:.1f}" for value in values)
+        for values in (
+            [1e3 * r.margins.slip for r in pair.results],
+            [np.rad2deg(r.margins.tilt) for r in pair.results],
+        )
+    )
+    outcomes = " / ".join(str(r.outcome) for r in pair.results)
+    print(
+        f"  {pair.object:28} {pair.number:3}  friction {pair.friction:.2f}  {outcomes:32}"
+        f"  slip {slips} mm, tilt {tilts} deg"
+    )
 
 
 def print_row(label: str, pairs: Sequence[Pair]) -> None:
