@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 from trial_world import BOX, POST, QUICK, from_above, make_station
 
@@ -32,10 +33,11 @@ class Moved:
         self.bodies = {name: self.index}
         self.tracker = MotionTracker(self.world, [self.index])
 
-    def turn(self, R_W: RotationMatrix, p_WQ: tuple[float, float, float]) -> float:
-        """Turns it about a point, and measures."""
+    def turn(self, R_W: RotationMatrix, p_WQ: tuple[float, float, float], up: float = 0.0) -> float:
+        """Turns it about a point and moves it up, and measures."""
         X_WO = RigidTransform(self.world.diagram.X_WO(next(iter(self.bodies))))
         X_W = RigidTransform(p_WQ) @ RigidTransform(R_W) @ RigidTransform(-np.array(p_WQ))
+        X_W = RigidTransform((0.0, 0.0, up)) @ X_W
         body = self.plant.get_body(self.index)
         self.plant.SetFloatingBaseBodyPoseInWorldFrame(self.context, body, X_W @ X_WO)
         return self.tracker.update(set())
@@ -61,11 +63,42 @@ def test_the_tip_of_a_bar_that_turns_about_a_corner(
 def test_what_lies_is_tilted_by_more_than_45_degrees(
     make_scene: Callable[..., Scene], degrees: float, lies: bool, heading: float
 ) -> None:
+    """A post that is turned over ends as high as it began, but was not on the way."""
     post = Moved(make_scene(("post", 0.3, 0.2, 30.0)), "post")
     about = RotationMatrix.MakeZRotation(heading)
-    tilt = about @ RotationMatrix.MakeXRotation(np.deg2rad(degrees)) @ about.inverse()
-    post.turn(tilt @ RotationMatrix.MakeZRotation(2.0), (0.3, 0.2, POST[2]))
+    for angle in np.deg2rad(np.linspace(0.0, degrees, 5)):
+        tilt = about @ RotationMatrix.MakeXRotation(angle) @ about.inverse()
+        post.turn(tilt @ RotationMatrix.MakeZRotation(2.0), (0.3, 0.2, POST[2]))
     assert post.tracker.toppled(post.bodies) == (["post"] if lies else [])
+
+
+LYING = Pose((0.3, 0.2, 0.03), rpy_deg=(90.0, 0.0, 20.0))
+"""A can on its side [m, deg]."""
+
+
+@pytest.mark.parametrize("degrees", [50.0, 90.0, 180.0, 270.0])
+@pytest.mark.parametrize("below", [0.0, -0.08])
+def test_what_rolls_has_not_toppled(
+    make_scene: Callable[..., Scene], degrees: float, below: float
+) -> None:
+    """Nor if it rolls off something, and comes to rest lower down."""
+    ball = Moved(make_scene(("ball", 0.3, 0.2, 0.0)), "ball")
+    can = Moved(make_scene(Instance(object="can", X_SO=LYING)), "can")
+    axis_W = can.world.X_WB(can.index)[:3, 2]
+    for thing in (ball, can):
+        for angle in np.deg2rad(np.linspace(0.0, degrees, 10)):
+            roll = RotationMatrix(AngleAxis(angle, axis_W))
+            thing.turn(roll, (0.3, 0.2, 0.03), up=below * angle)
+        assert thing.tracker.turned[thing.index] > np.deg2rad(45.0)
+        assert thing.tracker.toppled(thing.bodies) == []
+
+
+def test_a_cube_that_falls_onto_another_side_has_toppled(make_scene: Callable[..., Scene]) -> None:
+    """It is as high as before in the end, but not on its edge."""
+    cube = Moved(make_scene(("block", 0.3, 0.2, 0.0)), "block")
+    for angle in np.linspace(0.0, np.pi / 2.0, 10):
+        cube.turn(RotationMatrix.MakeXRotation(angle), (0.3, 0.2, 0.0))
+    assert cube.tracker.toppled(cube.bodies) == ["block"]
 
 
 @pytest.fixture(scope="module")
@@ -106,6 +139,19 @@ def test_a_neighbour_that_falls_over_is_named(make_scene: Callable[..., Scene]) 
     result = trial.run("box", from_above(0.05, y=-0.03), friction=0.8)
     assert result.toppled == "post"
     assert result.displacements["post"] > POST[2] / 2
+
+
+def test_a_neighbour_that_rolls_is_not_named(make_scene: Callable[..., Scene]) -> None:
+    """Ball and can are pushed by the box, which the closing fingers move by 6 mm."""
+    can = Instance(object="can", X_SO=Pose((0.361, 0.19, 0.03), rpy_deg=(90.0, 0.0, 0.0)))
+    scene = make_scene(("box", 0.3, 0.2, 0.0), ("ball", 0.361, 0.23, 0.0), can)
+    trial = HandTrial(scene, make_station(), engine=QUICK)
+    result = trial.run("box", from_above(0.065, x=0.006))
+    free = trial.world.diagram.free
+    for name in ("ball", "can"):
+        tilted = trial.world.X_WB(free[name])[2, :3] @ trial.world.diagram.X_WO(name)[2, :3]
+        assert tilted < np.cos(np.deg2rad(45.0)), name
+    assert result.toppled == ""
 
 
 def _placed(X_WO: Array, p_OQ: Array) -> Array:

@@ -12,7 +12,10 @@ from pydrake.multibody.tree import BodyIndex
 from burg_drake.core import Array, rotation_angle
 
 TOPPLED = math.radians(45.0)
-"""An object whose axis that was upright is tilted by more than this lies [rad]."""
+"""An object topples only if its axis that was upright is tilted by more than this [rad] ..."""
+HIGHER, HIGHER_SHARE = 0.003, 0.1
+"""... and its centre of mass is higher or lower above its lowest point than it was, by more than
+this [m] and this share of the height: what rolls keeps it."""
 
 
 class PlacedBodies(Protocol):
@@ -49,6 +52,8 @@ class MotionTracker:
         self._world = world
         self._start = {index: self._pose(index) for index in bodies}
         self._last = {index: self._center(index) for index in self._start}
+        self._height = {index: self._own_height(index) for index in self._start}
+        self._overturned: set[BodyIndex] = set()
         self.farthest = dict.fromkeys(self._start, 0.0)
         self.turned = dict.fromkeys(self._start, 0.0)
 
@@ -63,16 +68,37 @@ class MotionTracker:
             moved, angle = self._since_start(index)
             self.farthest[index] = max(self.farthest[index], moved)
             self.turned[index] = max(self.turned[index], angle)
+            if self._is_tilted(index) and self._is_higher_or_lower(index):
+                self._overturned.add(index)
             center = self._center(index)
             largest = max(largest, float(np.linalg.norm(center - self._last[index])))
             self._last[index] = center
         return largest
 
     def toppled(self, bodies: Mapping[str, BodyIndex]) -> list[str]:
-        """Names of those of the bodies that lie now, and stood at the start."""
-        upright = math.cos(TOPPLED)
-        tilts = {name: self._pose(i)[0][2] @ self._start[i][0][2] for name, i in bodies.items()}
-        return [name for name, cosine in tilts.items() if cosine < upright]
+        """Names of those of the bodies that are tilted now, and went over an edge on the way or
+        rest at another height. What rolls does neither: a ball, or a can that lies."""
+        return [
+            name
+            for name, index in bodies.items()
+            if index in self._overturned and self._is_tilted(index)
+        ]
+
+    def _is_tilted(self, index: BodyIndex) -> bool:
+        """Whether the axis that was upright no longer is."""
+        cosine = self._pose(index)[0][2] @ self._start[index][0][2]
+        return bool(cosine < math.cos(TOPPLED))
+
+    def _is_higher_or_lower(self, index: BodyIndex) -> bool:
+        """Whether the centre of mass is at another height above the body's lowest point."""
+        before = self._height[index]
+        return abs(self._own_height(index) - before) > max(HIGHER, HIGHER_SHARE * before)
+
+    def _own_height(self, index: BodyIndex) -> float:
+        """Of the centre of mass above the body's lowest point [m]; what is below does not count."""
+        R_WB, p_WB = self._pose(index)
+        lowest = (self._world.corners(index) @ R_WB[2]).min() + p_WB[2]
+        return float(self._center(index)[2] - lowest)
 
     def _since_start(self, index: BodyIndex) -> tuple[float, float]:
         """How far the farthest point of a body is from where it was [m], and its rotation [rad].
