@@ -35,6 +35,13 @@ def eye(page: str) -> tuple[np.ndarray, np.ndarray, float]:
     return R_WV @ position, R_WV @ target, float(np.deg2rad(fov))
 
 
+def placed(page: str, path: str) -> np.ndarray:
+    """(4, 4) where what has a path was put last, in its parent, which is the world."""
+    said = b"set_transform\xa4path\xd9" + bytes([len(path)]) + path.encode() + b"\xa6matrix"
+    (*_, last) = (message for message in messages(page) if said in message)
+    return np.reshape(_doubles(last, 16), (4, 4)).T
+
+
 def in_view(page: str, p_WQ: np.ndarray, view: tuple[int, int]) -> np.ndarray:
     """(N, 2) image points of points (N, 3); between -1 and 1 they are in a view [pixel].
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from eye import VIEWS, in_view, messages
+from eye import VIEWS, in_view, messages, placed
 
+from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import (
     grasp_from_axes,
@@ -20,8 +21,10 @@ from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.scene.document.scene import Scene
 from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.simulation.trials.result import TrialResult
+from burg_drake.simulation.trials.trial_settings import TrialSettings
 from burg_drake.station.document.engine import ENGINES
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.station.document.station_document import Obstacle, Station, load_station
 from burg_drake.visualization.scenes.replay import (
     CLEAR_VIEW,
     VIEW,
@@ -49,7 +52,7 @@ def station() -> Station:
 def test_a_lift_is_recorded_and_ends_as_without_a_picture(scene: Scene, station: Station) -> None:
     meshcat = open_meshcat()
     early = HandTrial(scene, station).run("box", X_OG)
-    whole = dataclasses.replace(ENGINES["standard"], whole_trial=True)
+    whole = replace(ENGINES["standard"], whole_trial=True)
     shown = HandTrial(scene, station, engine=whole, meshcat=meshcat)
     result = record_trial(shown, "box", X_OG, meshcat)
     again = HandTrial(scene, station, engine=whole).run("box", X_OG)
@@ -78,6 +81,29 @@ def test_a_collision_is_a_still_picture(scene: Scene, station: Station) -> None:
     assert result.outcome is Outcome.COLLISION_TARGET
     assert b"set_animation" not in b"".join(messages(meshcat.StaticHtml()))
     assert meshcat.HasPath("/drake/visualizer/hand/panda_hand")
+
+
+def test_a_collision_before_the_approach_is_shown_where_it_is(
+    scene: Scene, station: Station
+) -> None:
+    """A rail is in the palm at the pregrasp, and above the hand at the grasp."""
+    X_WG = station.document.X_WS.matrix() @ scene.X_SO("box") @ X_OG
+    far = GraspMotion(standoff=0.30)
+    above = tuple(float(x) for x in X_WG[:3, 3] + (0.0, 0.0, 0.35))
+    rail = Obstacle(X_WB=Pose(above), size=(0.3, 0.3, 0.01))
+    document = replace(station.document, background={"rail": rail}, motion=far)
+    meshcat = open_meshcat()
+    trial = HandTrial(
+        scene,
+        replace(station, document=document),
+        settings=TrialSettings(approach=True),
+        meshcat=meshcat,
+    )
+    result = record_trial(trial, "box", X_OG, meshcat)
+    assert (result.outcome, result.blocker) == (Outcome.HAND_COLLISION_APPROACH, "rail")
+    X_WH = station.hand.X_AH(X_WG @ make_pose(p_AB=(0.0, 0.0, -far.standoff)))
+    shown = placed(meshcat.StaticHtml(), "/drake/visualizer/hand/panda_hand")
+    np.testing.assert_allclose(shown, X_WH, atol=1e-6)
 
 
 def test_unknown_target(scene: Scene, station: Station) -> None:

@@ -56,6 +56,10 @@ class HandAloneTrial(GraspTrial[W]):
         """
         return lift_paths(self.motion, X_WG, lift)
 
+    def X_WG_start(self, X_WG: Array) -> Array:
+        """Where (4, 4) the hand begins, of a grasp in the world: there, or at its pregrasp."""
+        return X_WG if self._approach(X_WG) is None else self._pregrasp(X_WG)
+
     def _screen_of_start(self, instance: str, X_WG: Array) -> Clearance | None:
         if self._approach(X_WG) is None:
             return None

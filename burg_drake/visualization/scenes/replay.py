@@ -54,7 +54,8 @@ def record_trial(
 ) -> TrialResult:
     """Executes a grasp once more and leaves the recording in Meshcat, where it plays in a loop.
 
-    A grasp whose open hand collides leaves a still picture of that.
+    A grasp whose open hand collides leaves a still picture of that, where it does: at the grasp, or
+    where the approach begins.
 
     Args:
         trial: as that to be shown, and in `meshcat`. With `Engine.whole_trial` it is shown to its
@@ -72,7 +73,7 @@ def record_trial(
     """
     scene, station = trial.scene, trial.station
     X_WG = trial.X_WG(instance, X_OG)
-    hand = _show_start(trial, X_WG)
+    hand = _show_start(trial, _still_pose(trial, instance, X_WG))
     draw_board(scene, station, meshcat, labels=False)
     others = [trial.diagram.X_WO(name)[:3, 3] for name in scene.instances if name != instance]
     offset = camera_offset(X_WG, np.reshape(others, (-1, 3)))
@@ -140,8 +141,16 @@ def describe(result: TrialResult) -> list[str]:
     return lines + ([f"toppled {result.toppled}"] if result.toppled else [])
 
 
+def _still_pose(trial: HandTrial | MujocoTrial, instance: str, X_WG: Array) -> Array:
+    """Where (4, 4) the hand is seen before the trial: at the grasp, or where the approach begins if
+    it is clear at the grasp, but not there."""
+    X_WF = trial.X_WG_start(X_WG)
+    at_grasp, at_start = (trial.clearance.check(instance, X).outcome for X in (X_WG, X_WF))
+    return X_WF if at_grasp is None and at_start is not None else X_WG
+
+
 def _show_start(trial: HandTrial | MujocoTrial, X_WG: Array) -> Array:
-    """Shows the hand at the grasp; returns points (N, 3) around it [m]."""
+    """Shows the hand at a pose; returns points (N, 3) around it [m]."""
     station_diagram = trial.diagram
     context = station_diagram.diagram.CreateDefaultContext()
     plant_context = station_diagram.plant.GetMyMutableContextFromRoot(context)
