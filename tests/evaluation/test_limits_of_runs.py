@@ -25,6 +25,7 @@ from burg_drake.evaluation.replay import differences, rerun
 from burg_drake.evaluation.report.sections.reproduction import reproduce_command
 from burg_drake.evaluation.results.summary import summarize
 from burg_drake.evaluation.store.run_folder import Run, load_run
+from burg_drake.simulation.trials.trial_settings import DEFAULT_TRIAL
 from burg_drake.station.document.station_document import load_station
 from tests.evaluation.composed import tabletop
 
@@ -137,3 +138,9 @@ def test_the_whole_arm_approaches_anyway(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match="mode arm, in which the whole arm approaches anyw"):
         evaluate(SCENE, "panda_tabletop", tmp_path, settings=asked, grasps=GRASPS)
     assert not dataclasses.replace(asked, approach=False).approach
+
+
+def test_the_usual_limits_are_those_of_trials() -> None:
+    asked = EvaluationSettings()
+    assert math.radians(asked.tilt_limit_deg) == DEFAULT_TRIAL.tilt_limit
+    assert asked.slip_limit_mm / 1000.0 == DEFAULT_TRIAL.slip_limit

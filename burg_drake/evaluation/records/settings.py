@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING
 from burg_drake.core import LARGEST_SEED, InvalidInputError, setting
 from burg_drake.core.grasps import MODES
 from burg_drake.evaluation.candidates import DEFAULT_APPROACH_ANGLE_DEG
+from burg_drake.simulation.trials import DEFAULT_TRIAL
 from burg_drake.station.document import DEFAULT_ENGINE, ENGINES
 
 if TYPE_CHECKING:
@@ -16,6 +18,9 @@ if TYPE_CHECKING:
     from burg_drake.evaluation.records.run_document import TableFormat
     from burg_drake.evaluation.records.shard import Shard
     from burg_drake.station.document import Engine, GraspMotion
+
+DEFAULT_TILT_LIMIT_DEG = round(math.degrees(DEFAULT_TRIAL.tilt_limit), 9)
+DEFAULT_SLIP_LIMIT_MM = round(1000.0 * DEFAULT_TRIAL.slip_limit, 9)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,11 +90,12 @@ class EvaluationSettings:
     )
     engine: Engine | str = setting(
         DEFAULT_ENGINE,
-        "engine preset: for reference values, for results, for a first look",
+        "engine preset: for reference values, for results, for a first look, or a second opinion"
+        " by MuJoCo (needs burg-drake[mujoco])",
         choices=tuple(ENGINES),
     )
     tilt_limit_deg: float = setting(
-        30.0,
+        DEFAULT_TILT_LIMIT_DEG,
         "what is held, but turned in the hand by more than this, ends as lifted_turned and not as"
         " lifted (180: no limit)",
         name="tilt_limit",
@@ -99,7 +105,7 @@ class EvaluationSettings:
         noun="an angle in degrees",
     )
     slip_limit_mm: float = setting(
-        20.0,
+        DEFAULT_SLIP_LIMIT_MM,
         "likewise what slid in the hand by more than this (inf: no limit)",
         metavar="MM",
         above=0,
