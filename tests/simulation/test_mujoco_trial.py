@@ -289,6 +289,18 @@ def test_the_hand_can_begin_at_the_pregrasp(make_scene) -> None:
     assert result.margins.end_time > sooner.margins.end_time + way_in
 
 
+def test_a_fatal_error_of_mujoco_is_an_outcome(make_scene) -> None:
+    """An integrator that there is not; the next trial is as if nothing had happened."""
+    trial = MujocoTrial(make_scene(("box", 0.3, 0.2, 0.0)), make_station())
+    before = trial.run("box", CENTRE)
+    option = trial.world.model.opt
+    usual, option.integrator = option.integrator, 99
+    result = trial.run("box", CENTRE)
+    assert result.outcome is Outcome.SIMULATION_FAILED and "invalid integrator" in result.reason
+    option.integrator = usual
+    assert exact(trial.run("box", CENTRE)) == exact(before)
+
+
 # --- refusals -------------------------------------------------------------------------------------
 
 

@@ -1,9 +1,10 @@
 """The floating-hand trial on MuJoCo: a second engine, so that verdicts need not hang on one.
 
 Screen, phases, force, speed, geometry, masses, friction and decisions are those of
-`trials.HandTrial`. Physics is another: all objects that can move do so from the start, and touch as
-their convex pieces, also where pads meet them: a neck that tapers in them by two degrees is lost
-with little friction. Pads are beds of springs (`export.mjcf`).
+`trials.HandTrial`. Physics is another: objects touch as their convex pieces, also where pads meet
+them: a neck that tapers in them by two degrees is lost with little friction. Pads are beds of
+springs (`export.mjcf`). The target alone can move, as in Drake's trials; if it meets another
+object, or leans on one, the trial runs in the complete world, where all can from the start.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.simulation.mujoco.mujoco_carrier import MujocoCarrier
 from burg_drake.simulation.mujoco.mujoco_world import MujocoWorld
 from burg_drake.simulation.mujoco.objects_check import check_objects
-from burg_drake.simulation.mujoco.package import require_mujoco
+from burg_drake.simulation.mujoco.package import load_mujoco
 from burg_drake.simulation.mujoco.world_picture import WorldPicture
 from burg_drake.simulation.trials import (
     DEFAULT_TRIAL,
@@ -75,12 +76,13 @@ class MujocoTrial(HandAloneTrial[MujocoWorld]):
         meshcat: Meshcat | None = None,
     ) -> None:
         scene, station, engine = as_scene(scene), as_station(station), as_engine(engine)
-        require_mujoco()
+        mujoco = load_mujoco()
         if engine.simulator != "mujoco":
             raise InvalidInputError(
                 f"engine {engine.name!r} is {engine.simulator}; a MujocoTrial needs one whose"
                 " simulator is mujoco"
             )
+        self.failures = (*self.failures, mujoco.FatalError)
         check_objects(scene)
         self._plain = build_station_diagram(scene, station, robot="hand")
         self._picture: WorldPicture | None = None

@@ -34,8 +34,8 @@ HAND_PRIORITY, OTHERS_PRIORITY, FIXED_PRIORITY = 1, 2, 3
 class MujocoWorld:
     """The world of trials in one scene.
 
-    Bodies are called by their numbers in the model as Drake's are. All objects that can move do so
-    from the start.
+    Bodies are called by their numbers in the model as Drake's are. What can move does so from the
+    start: all objects, or `alone` one of them.
 
     Args:
         scene, station: what stands where.

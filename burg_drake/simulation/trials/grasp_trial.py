@@ -80,7 +80,11 @@ class GraspTrial(ABC, Generic[W]):
     Attributes:
         scene, station, engine, settings, clearance: as given.
         motion: where the hand goes.
+        failures: errors of the simulator; a trial that has one ends as `SIMULATION_FAILED`.
     """
+
+    failures: tuple[type[BaseException], ...] = (RuntimeError, SystemExit)
+    """Drake ends some failed checks by SystemExit."""
 
     def __init__(
         self,
@@ -168,7 +172,7 @@ class GraspTrial(ABC, Generic[W]):
             held_for = replace(margins, end_time=margins.end_time - found.grip_start)
             sure = confidence(self.engine, found.outcome, held_for, load)
             return replace(found, margins=margins, confidence=sure)
-        except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
+        except self.failures as error:
             world.invalidate()
             return failure(error, screen, world.time)
 

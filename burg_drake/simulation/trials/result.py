@@ -32,10 +32,10 @@ def collision(screen: Clearance) -> TrialResult:
 
 
 def failure(error: BaseException, screen: Clearance, end_time: float) -> TrialResult:
-    """The result of a trial that Drake could not step.
+    """The result of a trial that the simulator could not step.
 
     Args:
-        error: what Drake said.
+        error: what it said.
         screen: of the open hand at the grasp.
         end_time: when that was [s].
     """
