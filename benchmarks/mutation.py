@@ -60,7 +60,8 @@ GROUPS: dict[str, Modules] = {
         "simulation/trials/execution": ("simulation/test_hand_trial",),
         "simulation/trials/contacts": ("simulation/test_hand_trial",),
         "simulation/robustness/bisection": ("simulation/test_limit",),
-        "simulation/trials/mass_centers": ("simulation/test_hand_trial",),
+        "simulation/trials/grip_motion": ("simulation/test_limits_in_hand",),
+        "simulation/rest/body_motions": ("simulation/test_body_motions",),
     },
     "frames": {
         "core/frames": ("core/test_frames",),

@@ -42,8 +42,7 @@ def test_its_actuators_grasp_and_lift(exported: Exported, scene: Scene, station:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     names = {model.actuator(k).name for k in range(model.nu)}
-    told = [word for word in names if f"'{word}'" in exported.notes[0]]
-    assert len(told) == 5
+    assert {word for word in names if f"'{word}'" in exported.notes[0]} == names
     hand, can = data.body("hand panda_hand"), data.body("can")
     p_WG = hand.xpos + hand.xmat.reshape(3, 3) @ station.hand.X_HG.matrix()[:3, 3]
     below_rim = np.array((0.0, 0.0, scene.entry("can").upper[2] - 0.02))

@@ -58,7 +58,8 @@ class GraspVolume:
         rotation: (K, 2, 4) unit quaternions wxyz of G in the frame V of the volume, and of the same
             grasp with fingers swapped.
         width: (K,) distance of the pads in voxels; nan if not known.
-        success: (K,) whether the grasp held: `Outcome.held`.
+        success: (K,) whether the grasp held: `Outcome.held`, also if another object was moved
+            (`lifted_disturbed`), or it turned or slid beyond the limits (`lifted_turned`).
         untried: (L,) rows of grasps whose outcome does not tell: `UNKNOWN_END`.
         outside: (M,) rows of the others whose centre is not in the volume.
         voxels: along each edge of the volume.
@@ -101,9 +102,9 @@ def volume_grasps(
 ) -> GraspVolume:
     """Labels of voxels.
 
-    A grasp succeeds if its outcome is `Outcome.held`, so also if it disturbed others, and fails
-    with every other outcome that tells, those of an arm that does not get there among them; for
-    labels of the hand alone, judge without an arm.
+    A grasp succeeds if its outcome is `Outcome.held`, so also if it disturbed others or the object
+    turned in the hand, and fails with every other outcome that tells, those of an arm that does not
+    get there among them; for labels of the hand alone, judge without an arm.
 
     Args:
         grasps: in any frame C.

@@ -133,7 +133,9 @@ def add_moved_hand(
     towards = [math.copysign(1.0, f.closed - f.open) for f in (first, second)]
     speeds = " and ".join(f"{sign * parts.document.closing_speed:g}" for sign in towards)
     return (
-        "actuators 'hand x', 'hand y' and 'hand z' place the hand, in metres from where it hangs;"
+        "actuators 'hand x', 'hand y' and 'hand z' place the hand, in metres from where it hangs,"
+        " and 'hand x speed', 'hand y speed' and 'hand z speed' say how fast it shall go meanwhile,"
+        " in m/s (0 damps);"
         f" {link_name(first.joint)!r} and {link_name(second.joint)!r} give its fingers a speed,"
         f" {speeds} m/s to close with {parts.document.force:g} N each"
     )
