@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 import shlex
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from burg_drake.apps.cli import main
+from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import grasp_from_axes
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.core.grasps.outcome import Outcome, Stage
@@ -102,3 +105,23 @@ def test_without_an_approach_there_are_no_such_columns(tmp_path: Path) -> None:
     assert run.results["outcome"].tolist() == [Outcome.LIFTED] * 2
     assert summarize(run).steps == ["candidates", "clear", "executed", "held", "lifted"]
     assert "--approach" not in reproduce_command(run)
+
+
+def test_an_approach_of_no_length_is_a_contradiction(tmp_path: Path) -> None:
+    settings = EvaluationSettings(mode="hand", approach=True, motion=GraspMotion(standoff=0.0))
+    message = r"the standoff asked for is 0 mm, so that there is none; give a standoff above 0"
+    with pytest.raises(InvalidInputError, match=message):
+        evaluate(BOX, "panda_tabletop", tmp_path / "run", settings=settings, grasps=GRASPS)
+    station = load_station("panda_tabletop")
+    document = dataclasses.replace(station.document, motion=GraspMotion(standoff=0.0))
+    near = dataclasses.replace(station, document=document)
+    settings = EvaluationSettings(mode="hand", approach=True)
+    with pytest.raises(InvalidInputError, match="the standoff of station 'panda_tabletop' is 0"):
+        evaluate(BOX, near, tmp_path / "run", settings=settings, grasps=GRASPS)
+    assert not (tmp_path / "run").exists()
+
+
+def test_the_options_of_it_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["evaluate", "tabletop_six", "-o", str(tmp_path / "run"), "--mode", "hand"]
+    assert main([*words, "--approach", "--standoff-mm", "0"]) == 2
+    assert capsys.readouterr().err.endswith("or leave approach out (--approach, --standoff-mm)\n")

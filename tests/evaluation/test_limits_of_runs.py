@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import shlex
+import shutil
 from pathlib import Path
 
 import pytest
@@ -107,6 +108,16 @@ def test_a_run_of_a_release_without_limits_has_none(unlimited: Run, tmp_path: Pa
     assert verdict.outcome is Outcome.LIFTED
     with pytest.raises(InvalidInputError, match="limit in the hand is none there, tilt 30 degrees"):
         judged(tmp_path)
+
+
+def test_a_run_that_watched_centres_of_mass_is_not_continued(limited: Run, tmp_path: Path) -> None:
+    shutil.copytree(limited.path, tmp_path / "run")
+    document = yaml.safe_load((limited.path / "run.yaml").read_text())
+    assert document["trial"].pop("farthest_point") == 1
+    (tmp_path / "run" / "run.yaml").write_text(yaml.safe_dump(document))
+    message = r"\(motion of others is of centres of mass there, of farthest points here\)"
+    with pytest.raises(InvalidInputError, match=message):
+        judged(tmp_path / "run", **limit_settings(limited.document.trial))
 
 
 def test_numbers_read_back_to_the_same_numbers() -> None:

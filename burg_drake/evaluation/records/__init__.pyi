@@ -24,7 +24,10 @@ from .ledger import (
     SceneState as SceneState,
     ledger_text as ledger_text,
 )
-from .limit_numbers import limit_settings as limit_settings
+from .limit_numbers import (
+    AS_MEASURED as AS_MEASURED,
+    limit_settings as limit_settings,
+)
 from .motion_numbers import (
     motion_in as motion_in,
     motion_options as motion_options,

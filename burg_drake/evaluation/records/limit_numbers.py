@@ -9,6 +9,11 @@ from typing import Any
 
 TILT, SLIP, APPROACH = "tilt_limit", "slip_limit", "approach"
 """Names in a record, see `simulation.trials.trial_settings.TrialSettings`."""
+FARTHEST = "farthest_point"
+"""Name in a record: 1 if others were moved as far as their farthest point; releases that watched
+their centres of mass did not record it."""
+AS_MEASURED = {FARTHEST: 1.0}
+"""What a run of this release records of how it measures, beside its settings."""
 
 
 def limit_settings(values: Mapping[str, float]) -> dict[str, Any]:
@@ -27,7 +32,17 @@ def limit_settings(values: Mapping[str, float]) -> dict[str, Any]:
 
 def without_limits(values: Mapping[str, float]) -> dict[str, float]:
     """Recorded numbers of other settings."""
-    return {k: v for k, v in values.items() if k not in (TILT, SLIP, APPROACH)}
+    return {k: v for k, v in values.items() if k not in (TILT, SLIP, APPROACH, FARTHEST)}
+
+
+def without_measures(values: Mapping[str, float]) -> dict[str, float]:
+    """Recorded numbers that are settings."""
+    return {k: v for k, v in values.items() if k not in AS_MEASURED}
+
+
+def measure_text(values: Mapping[str, float]) -> str:
+    """Of what point it is measured how far others were moved, for people."""
+    return "of farthest points" if values.get(FARTHEST) else "of centres of mass"
 
 
 def limits_text(values: Mapping[str, float]) -> str:

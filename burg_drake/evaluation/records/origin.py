@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from burg_drake.core import InvalidInputError, nearest, quoted
 from burg_drake.core.documents import Reader, parse_nodes
 from burg_drake.core.grasps import MODES, Mode
+from burg_drake.evaluation.records.limit_numbers import without_measures
 from burg_drake.evaluation.records.motion_numbers import gathered, without_motion
 from burg_drake.station.document import ENGINES, Engine, as_engine
 
@@ -132,6 +133,7 @@ def read_trial_settings(trial: Mapping[str, float], where: str) -> TrialSettings
     from burg_drake.simulation.trials import NO_LIMITS, TrialSettings
     from burg_drake.station.document import GraspMotion
 
+    trial = without_measures(trial)
     others, values = without_motion(trial), gathered(trial)
     motion = {name: value for name, value in values.items() if name not in others}
     settings = _typed(_truths(others, TrialSettings), TrialSettings, where)

@@ -11,7 +11,12 @@ from typing import Literal, Protocol
 from burg_drake.core import InvalidInputError, content_hash
 from burg_drake.core.grasps import Mode
 from burg_drake.core.paths import data_root
-from burg_drake.evaluation.records.limit_numbers import APPROACH, limits_text, without_limits
+from burg_drake.evaluation.records.limit_numbers import (
+    APPROACH,
+    limits_text,
+    measure_text,
+    without_limits,
+)
 from burg_drake.evaluation.records.motion_numbers import motion_in, motion_text, without_motion
 from burg_drake.evaluation.records.origin import TrialOrigin, engine_label
 from burg_drake.scene.document import Scene
@@ -111,7 +116,7 @@ class RunDocument:
         command: the command line, or the Python script, that began the run.
         scene, station, library, grasps: what was judged.
         engine: how trials were stepped.
-        trial: settings of the trial's phases.
+        trial: settings of the trial's phases, and how its results were measured.
         mode: what was asked about each grasp.
         arm: settings of the search for the arm's motions; none in mode `hand`.
         seed: of the sampling.
@@ -188,6 +193,7 @@ def request_identity(document: RunRequestFields) -> dict[str, str]:
         SETTINGS: settings,
         "motion": motion_text(motion_in(document.trial)),
         "limit in the hand": limits_text(document.trial),
+        "motion of others": measure_text(document.trial),
         **({} if document.mode == "arm" else {"approach of the hand": simulated}),
         "mode": document.mode,
         "grasps": (

@@ -23,6 +23,7 @@ from burg_drake.core.paths import PACKAGE_URI, portable_reference
 from burg_drake.evaluation.candidates import INSTANCE, chosen_instances, on_chosen
 from burg_drake.evaluation.grasp_sets import by_names
 from burg_drake.evaluation.records import (
+    AS_MEASURED,
     EvaluationSettings,
     Grasps,
     Library,
@@ -80,8 +81,8 @@ class Request:
 
         Raises:
             UnknownNameError: there is no engine of this name.
-            InvalidInputError: there is no such mode or share, the station lacks the arm, or the
-                approach is asked for of the whole arm, or the engine has none.
+            InvalidInputError: there is no such mode or share, the station or the engine lacks the
+                arm, or the approach is asked for of the whole arm, or without a standoff.
             MissingDependencyError: the engine is not installed.
         """
         engine, mode = as_engine(settings.engine), mode_for(station, settings.mode)
@@ -90,13 +91,21 @@ class Request:
                 "the approach of the hand alone is asked for with mode arm, in which the whole arm"
                 " approaches anyway; leave approach out, or give mode hand or reach"
             ).about("approach")
+        motion = settings.motion or station.document.motion
+        if settings.approach and motion.standoff <= 0.0:
+            own = motion == station.document.motion
+            where = f"of station {station.name!r}" if own else "asked for"
+            raise InvalidInputError(
+                f"the approach of the hand is to be simulated, and the standoff {where} is 0 mm, so"
+                " that there is none; give a standoff above 0, or leave approach out"
+            ).about("approach", "standoff_mm")
         require_engine_for(engine, mode)
         return cls(
             station=station,
             settings=settings,
             engine=engine,
             mode=mode,
-            motion=settings.motion or station.document.motion,
+            motion=motion,
             shard=as_shard(settings.shard),
             only=tuple(settings.only or ()),
             grasps=grasps,
@@ -203,8 +212,8 @@ class Request:
 
     @property
     def trial(self) -> dict[str, float]:
-        """Settings of the trial's phases, by name."""
-        return numbers(self.phases)
+        """Settings of the trial's phases, and how its results are measured, by name."""
+        return {**numbers(self.phases), **AS_MEASURED}
 
     @property
     def phases(self) -> TrialSettings:
