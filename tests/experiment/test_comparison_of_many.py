@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -58,6 +59,10 @@ def test_many_scenes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         assert getattr(whole.judgement.selected, cell) == sum(alone)
     assert whole.judgement.selected.fp > 0 and whole.judgement.selected.tp > 0
     _shares_belong_to_their_scene(first, second, tmp_path)
+    longer = replace(first.document, trial={**first.document.trial, "hold_time": 1.0})
+    place = f"the grasps of one (of each scene folder {first.folder('SCENE')}) again as"
+    with pytest.raises(InvalidInputError, match=re.escape(place)):
+        compare(Campaign(first.path, longer), second)
     one = compare(first, second.run("there"))
     assert one.judgement.selected == parts[1].judgement.selected
     assert one.coverage.only_first == 18

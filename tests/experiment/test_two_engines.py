@@ -19,6 +19,7 @@ from burg_drake.core.frames import grasp_from_axes, make_pose
 from burg_drake.core.grasps import Verdict
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.cascade import evaluate
+from burg_drake.evaluation.records.limit_numbers import AS_MEASURED
 from burg_drake.evaluation.records.run_document import Input, numbers
 from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
@@ -276,8 +277,8 @@ def test_all_that_differs_is_named_at_once(
         f"burg-drake: error: {first.path} and {second.path} were made with different phases:"
         " lift 0.3 m and 0.2 m; disturbance 0.01 m and 0.02 m; tilt limit none and 30 degrees;"
         " slip limit none and 0.02 m; and on different stations:"
-        f" panda_tabletop ({own.content[:12]}) and other ({'f' * 12}); evaluate the grasps of one,"
-        f" {first.path / 'grasps.npz'}, again as those of the other\n"
+        f" panda_tabletop ({own.content[:12]}) and other ({'f' * 12}); evaluate the grasps of one"
+        f" (folder {first.path}) again as those of the other\n"
     )
 
 
@@ -313,6 +314,35 @@ def test_of_two_modes_only_what_both_executed_is_compared(tmp_path: Path) -> Non
     out_of_reach = known_runs.make_run(tmp_path / "c", scene, {"mug": nothing}, mode="arm")
     with pytest.raises(InvalidInputError, match="different modes, hand and arm, and have no grasp"):
         compare(tmp_path / "a", out_of_reach)
+
+
+def test_the_whole_arm_approaches_anyway(tmp_path: Path) -> None:
+    """What was done counts, not what was asked: with the arm nobody asks for the approach."""
+    scene = known_runs.make_scene(tmp_path)
+    arm, still, going = (
+        known_runs.make_run(
+            tmp_path / name, scene, {"mug": LIFTED}, mode=mode, trial=recorded(approach=approach)
+        )
+        for name, mode, approach in (
+            ("arm", "arm", False), ("still", "reach", False), ("going", "hand", True)
+        )
+    )  # fmt: skip
+    assert compare(going, arm).notes == ()
+    note = "the hand alone did not approach in the first run; the whole arm did in the second"
+    assert compare(still, arm).notes == (note,)
+    assert compare(arm, still).notes[0].startswith("the hand alone did not approach in the second")
+    with pytest.raises(InvalidInputError, match="different phases: approach no and yes"):
+        compare(still, going)
+
+
+def test_how_others_were_watched_is_told(tmp_path: Path) -> None:
+    measured = {**recorded(), **AS_MEASURED}
+    first, second = made_up(tmp_path, LIFTED, LIFTED, trial=measured)
+    first = known_runs.make_run(tmp_path / "c", first.scene(), {"mug": LIFTED}, trial=recorded())
+    (told,) = compare(first, second).settings
+    assert told == (
+        "motion of others is of centres of mass in the first, of farthest points in the second"
+    )
 
 
 def test_against_trials_phases_may_differ(tmp_path: Path) -> None:

@@ -26,6 +26,7 @@ from burg_drake.experiment.pairing import (
     Match,
     ResultTable,
     VerdictPairs,
+    approach_note,
     make_pairs,
     match_rows,
     predicted_probability,
@@ -73,7 +74,8 @@ def compare_runs(
         pairs = pairs.with_margin(PROBABILITY, probability)
     scenes = sides[0].scenes
     wrong = disagreements(pairs, scenes, [side.folders for side in sides])
-    apart = settings_apart(*sides)
+    apart, note = settings_apart(*sides), approach_note(*sides)
+    notes = () if apart else ("the runs have the same settings",)
     return Comparison(
         kind="runs",
         success=success,
@@ -89,7 +91,7 @@ def compare_runs(
         judgement=judgement(pairs, scenes=scenes, disagreements=wrong, seed=seed),
         agreement=run_agreement(pairs, others, seed=seed),
         settings=apart,
-        notes=() if apart else ("the runs have the same settings",),
+        notes=(*notes, note) if note else notes,
         seed=seed,
     )
 
@@ -133,14 +135,13 @@ def _nothing_executed(sides: tuple[JudgedRuns, JudgedRuns], modes: Sequence[str]
 
 
 def _nothing_in_common(sides: tuple[JudgedRuns, JudgedRuns], found: Match) -> str:
-    paths = f"{sides[0].path} and {sides[1].path}"
+    paths, place = f"{sides[0].path} and {sides[1].path}", sides[0].grasps_place
     if found.other_content:
         return (
             f"{paths} have {found.other_content} grasps with the same ids, but none with the same"
-            " pose and width; evaluate the second run with the grasps of the first,"
-            f" {sides[0].path / 'grasps.npz'}"
+            f" pose and width; evaluate the second run with the grasps of the first ({place})"
         )
     return (
         f"{paths} have no grasp in common ({found.only_first} and {found.only_second} are judged);"
-        f" evaluate the second run with the grasps of the first, {sides[0].path / 'grasps.npz'}"
+        f" evaluate the second run with the grasps of the first ({place})"
     )

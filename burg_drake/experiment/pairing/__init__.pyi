@@ -11,7 +11,10 @@ from .pairs import (
     successes as successes,
     undecided as undecided,
 )
-from .phases import require_same_phases as require_same_phases
+from .phases import (
+    approach_note as approach_note,
+    require_same_phases as require_same_phases,
+)
 from .probability import predicted_probability as predicted_probability
 from .result_table import ResultTable as ResultTable
 from .side import (

@@ -22,6 +22,8 @@ UNITS = {
     "tilt_limit": "degrees",
 }
 """Units of settings in messages; others have none."""
+APPROACH = "approach"
+"""Whether a trial began at the pregrasp; of the whole arm it does, whatever was asked."""
 Value = float | bool | tuple[float, ...] | None
 
 
@@ -43,14 +45,33 @@ def require_same_phases(first: JudgedRuns, second: JudgedRuns) -> None:
     if causes:
         raise InvalidInputError(
             f"{first.path} and {second.path} were made {'; and '.join(causes)}; evaluate the grasps"
-            f" of one, {first.path / 'grasps.npz'}, again as those of the other"
+            f" of one ({first.grasps_place}) again as those of the other"
         )
+
+
+def approach_note(first: JudgedRuns, second: JudgedRuns) -> str:
+    """What to know of runs that are compared though only one of them, of the whole arm, has
+    approached; empty of others."""
+    still = [
+        which
+        for which, judged in (("first", first), ("second", second))
+        if not _phases(judged)[APPROACH]
+    ]
+    if len(still) != 1:
+        return ""
+    other = "second" if still[0] == "first" else "first"
+    return (
+        f"the hand alone did not approach in the {still[0]} run; the whole arm did in the {other}"
+    )
 
 
 def phases_apart(first: JudgedRuns, second: JudgedRuns) -> list[str]:
     """Settings of trials in which the runs of two folders differ, with both values. What a run did
-    not record is what it was then."""
+    not record is what it was then. Whether the hand alone approaches is no such difference to the
+    whole arm, which does; see `approach_note`."""
     one, other = (_phases(judged) for judged in (first, second))
+    if "arm" in (first.found.document.mode, second.found.document.mode):
+        del one[APPROACH]
     return [
         f"{TITLES.get(name, name.replace('_', ' '))} {_both(name, one[name], other[name])}"
         for name in one
@@ -72,6 +93,7 @@ def _phases(judged: JudgedRuns) -> dict[str, Value]:
     if motion.shortest == motion.lift_height:
         values["least_lift"] = None
     unlimited: Mapping[str, float] = NO_LIMITS
+    values[APPROACH] = settings.approach or judged.found.document.mode == "arm"
     return {k: None if k in unlimited and v == unlimited[k] else v for k, v in values.items()}
 
 

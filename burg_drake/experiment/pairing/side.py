@@ -101,6 +101,13 @@ class JudgedRuns:
         return ResultTable.of_columns(read_results(self.path, names), names)
 
     @property
+    def grasps_place(self) -> str:
+        """The folder that `evaluate` takes their grasps from, in words; of many scenes one each."""
+        if isinstance(self.found, Run):
+            return f"folder {self.path}"
+        return f"of each scene folder {self.found.folder('SCENE')}"
+
+    @property
     def side(self) -> Side:
         """What it is, for people."""
         document = self.found.document
