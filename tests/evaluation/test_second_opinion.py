@@ -12,6 +12,7 @@ from burg_drake.core.grasps.outcome import Outcome, Stage
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.records.journal import journal_lines
 from burg_drake.evaluation.records.settings import EvaluationSettings
+from burg_drake.evaluation.results.status import read_status
 from burg_drake.evaluation.results.summary import summarize
 from burg_drake.evaluation.second_opinion import judge_again
 from burg_drake.evaluation.store.run_folder import Run, load_run
@@ -61,6 +62,21 @@ def test_the_second_engine_settles_them(own_run: Run, second: None) -> None:
     assert summarize(run).total.lifted == summarize(own_run).total.lifted + sum(
         expected(id) is not Outcome.LIFTED for id in asked
     )
+
+
+def test_the_status_counts_each_grasp_once(own_run: Run, second: None) -> None:
+    run = judge_again(own_run, workers=1, progress=False)
+    status, total = read_status(run.path), summarize(run).total
+    assert status.judged == status.outcomes.total() == len(run.candidates)
+    assert status.outcomes == {str(o): n for o, n in total.outcomes.items()}
+
+
+def test_the_best_are_not_contested(own_run: Run) -> None:
+    lifted = [id for id in own_run.candidates.id if expected(id) is Outcome.LIFTED]
+    sure = [id for id in lifted if id not in own_run.contested]
+    assert 0 < len(sure) < len(lifted)
+    assert set(own_run.best(len(sure))) == set(sure)
+    assert set(own_run.best(len(lifted))) == set(lifted)
 
 
 def test_a_row_says_which_engine_gave_it(own_run: Run, second: None) -> None:

@@ -38,6 +38,7 @@ from burg_drake.apps.runs.second_opinion import (
     settled_line,
 )
 from burg_drake.apps.runs.settings import requested_settings
+from burg_drake.core import listing
 
 if TYPE_CHECKING:
     from burg_drake.evaluation.store import Run
@@ -180,6 +181,8 @@ def _print_run(run: Run, motion: GraspMotion, *, rejudged: bool) -> None:
         print(f"motion  {motion_text(motion)}")
     if rejudged or any(verdict.judged_again for verdict in run.verdicts.values()):
         print(settled_line(run))
+    if contested := run.contested:
+        print(f"contested: {listing(contested)}; --rejudge contested settles them")
     print(f"table   {run.table_path}")
     print(f"report  {run.report_path}")
     if run.failures:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import Array, UnknownNameError, listing
-from burg_drake.core.grasps import Outcome
+from burg_drake.core.grasps import CONTESTED, Outcome
 from burg_drake.evaluation.candidates import are_of
 from burg_drake.evaluation.records.table import Columns
 
@@ -19,6 +19,8 @@ AREA_STEP = 1e-6
 """Lengths [m], angles [rad] and areas [m2] count in whole steps: less tells no grasps apart."""
 CLEARANCE_STEP = 5e-4
 """Clearances count in steps of 0.5 mm [m]."""
+BEHIND = 1e6
+"""Steps of clearance that are more than any."""
 SLIP_SCALE = 0.005
 TILT_SCALE = 0.1
 PUSH_SCALE = 0.01
@@ -40,8 +42,8 @@ def best_rows(
     with that share is 0.6, that of all others from -0.35 to 0.25 (`benchmarks/best.py`). Of equal
     ones that which disturbed less, by slip / 5 mm + tilt / 0.1 rad + push of other objects / 10 mm,
     rounded to 0.1 mm and 0.1 deg; then by the larger contact patch of the weaker pad, rounded to
-    1 mm2, by the higher score of the sampler, and by id. A clearance that is not known ranks last,
-    other margins that are not known count as 0.
+    1 mm2, by the higher score of the sampler, and by id. Contested ones, and those whose clearance
+    is not known, rank last; other margins that are not known count as 0.
 
     Args:
         columns: a table of results.
@@ -77,9 +79,14 @@ def best_rows(
 
 
 def _room(columns: Columns, rows: NDArray[np.int64]) -> Array:
-    """Clearances of some rows in whole steps."""
+    """Clearances of some rows in whole steps; those of contested ones are behind all others."""
     clearance = columns["clearance"][rows] if "clearance" in columns else np.zeros(len(rows))
-    return np.nan_to_num(np.floor(clearance / CLEARANCE_STEP + 1e-9), nan=-np.inf)
+    steps = np.nan_to_num(np.floor(clearance / CLEARANCE_STEP + 1e-9), nan=-BEHIND)
+    if "confidence" not in columns or "judged_again" not in columns:  # of earlier releases
+        return steps
+    contested = columns["confidence"][rows] < CONTESTED
+    contested &= columns["judged_again"][rows] == ""
+    return np.where(contested, steps - 2.0 * BEHIND, steps)
 
 
 def _clearest(

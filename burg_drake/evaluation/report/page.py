@@ -73,7 +73,7 @@ def report_page(run: Run) -> str:
         scene_picture(pictures),
         cascade_section(summary),
         objects_section(summary),
-        certainty_section(summary),
+        certainty_section(summary, run.contested),
         grasp_section(pictures),
         causes_section(rows_of_run(columns, str(run.path))),
         margin_section(*tried, run.document.trial),

@@ -20,6 +20,8 @@ from burg_drake.evaluation.store.part_store import PARTS_FOLDER, PartIndex, Stor
 
 LINE = re.compile(rb'^\{"id":"((?:[^"\\]|\\.)*)","outcome":"([a-z_]+)"[^\n]*\}\n', re.MULTILINE)
 """A line of a journal, as `journal.encode` writes it."""
+BEFORE = re.compile(rb'"outcome_before":"([a-z_]+)"')
+"""In the line of a grasp that was judged again: the outcome that no longer counts."""
 FAILED = Outcome.SIMULATION_FAILED.value.encode()
 CHUNK = 1 << 22
 
@@ -69,6 +71,9 @@ class JournalTail:
         found = LINE.findall(data)
         self.lines += len(found)
         self.outcomes.update(outcome for _, outcome in found)
+        again = BEFORE.findall(data)
+        self.lines -= len(again)
+        self.outcomes.subtract(again)
         if not self.failed and self.outcomes[FAILED] == 0:
             return
         for id, outcome in found:

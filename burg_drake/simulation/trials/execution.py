@@ -270,14 +270,16 @@ class Execution:
         """Whether the target will be held to the end, as nothing is left that could change it.
 
         While the hand accelerates upwards, the load on the grip is largest. Friction that does not
-        carry it lets the target go ever faster; so what sticks to the pads then, or creeps and does
-        not get faster, in free air and with all others at rest, is held to the end, too.
+        carry it lets the target go ever faster; so what sticks to the pads then, or, where friction
+        is viscous, creeps and does not get faster, in free air and with all others at rest, is held
+        to the end, too.
         """
         if self._world.engine.whole_trial or self._path_is_blocked:
             return False
         time = self._carrier.lift_time + self._settings.hold_time
         in_hand = self._in_hand
-        if not self.contact.both or not (in_hand.is_steady or in_hand.is_coming_to_rest(time)):
+        creeps = self._world.engine.creeps and in_hand.is_coming_to_rest(time)
+        if not self.contact.both or not (in_hand.is_steady or creeps):
             return False
         if self._in_free_air < self._settings.steady_time - 1e-9:
             return False

@@ -51,6 +51,12 @@ class Engine:
         require_ranges(self, RANGES, f"engine {quoted(self.name)}")
 
     @property
+    def creeps(self) -> bool:
+        """Whether friction that holds a load lets it creep at a constant speed, as Drake's does,
+        which is viscous. Elsewhere what moves may be about to let go."""
+        return self.simulator == "drake"
+
+    @property
     def packages(self) -> dict[str, str]:
         """Packages that decide about its results beside those that always do, as they are called in
         files and installed."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from burg_drake.core.grasps import CONTESTED
 from burg_drake.core.terminal import format_count as number
 from burg_drake.evaluation.report.elements import (
@@ -9,6 +11,7 @@ from burg_drake.evaluation.report.elements import (
     BarPart,
     Html,
     element,
+    join,
     legend,
     section,
     stacked_bar,
@@ -18,10 +21,17 @@ from burg_drake.evaluation.results import OutcomeCounts, Summary
 
 LIFTED, LOST, OPEN = STYLES["lifted"], STYLES["lost during lift or hold"], "contested"
 """CSS classes."""
+NAMED = 12
+"""So many contested grasps are named."""
 
 
-def certainty_section(summary: Summary) -> Html | None:
-    """A bar an object of its executed grasps; nothing where no verdict has a confidence."""
+def certainty_section(summary: Summary, contested: Sequence[str] = ()) -> Html | None:
+    """A bar an object of its executed grasps; nothing where no verdict has a confidence.
+
+    Args:
+        summary: of a run.
+        contested: ids of the contested grasps, if they are to be named.
+    """
     if not summary.knows_confidence or not summary.total.executed:
         return None
     settled = summary.total.settled
@@ -46,7 +56,17 @@ def certainty_section(summary: Summary) -> Html | None:
         text,
         table(head, rows, numbers=(1, *range(3, width)), style="stacking"),
         legend(keys),
+        _named(contested),
     )
+
+
+def _named(contested: Sequence[str]) -> Html | None:
+    """Which grasps are contested, as far as there is room."""
+    if not contested:
+        return None
+    ids = [join(", " if k else "", element("code", id)) for k, id in enumerate(contested[:NAMED])]
+    more = len(contested) - NAMED
+    return element("p", "Contested: ", *ids, f" and {more} more" if more > 0 else "", class_="note")
 
 
 def _row(group: OutcomeCounts, settled: bool, style: str = "") -> Html:
