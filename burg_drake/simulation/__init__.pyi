@@ -1,3 +1,4 @@
+from .confidence.grip_signs import GripLoad as GripLoad
 from .mujoco.mujoco_trial import MujocoTrial as MujocoTrial
 from .mujoco.mujoco_world import MujocoWorld as MujocoWorld
 from .mujoco.trial_of_engine import hand_trial_of as hand_trial_of
