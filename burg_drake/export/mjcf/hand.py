@@ -99,7 +99,9 @@ def add_trial_options(root: Element, step: float = STEP) -> None:
     SubElement(
         root, "option", timestep=repr(step), integrator="implicitfast", cone="elliptic",
         impratio=repr(IMPRATIO), tolerance=repr(TOLERANCE),
-        # Sparse factors are wrong in MuJoCo 4.0.0 (its issue 3767).
+        # So that scenes of any size are solved alike: from 60 degrees of freedom on MuJoCo would
+        # take sparse factors. In MuJoCo 4.0.0 these give the same accelerations (within 2e-11, in
+        # 6,000 steps of trials and in piles of 20) and save 9 % in a scene of twelve objects.
         jacobian="dense",
     )  # fmt: skip
 
