@@ -1,9 +1,7 @@
 from .arm_trial import ArmTrial as ArmTrial
-from .carrier import HandSegment as HandSegment
 from .contacts import (
     BodyContact as BodyContact,
     finger_contact as finger_contact,
-    reached as reached,
 )
 from .execution import (
     Execution as Execution,
@@ -19,15 +17,12 @@ from .hand_trial import (
     HandTrial as HandTrial,
 )
 from .lift_carrier import (
-    DOWN as DOWN,
-    REST_CHECKS as REST_CHECKS,
+    FloatingCarrier as FloatingCarrier,
     LiftPath as LiftPath,
-    bears_full_load as bears_full_load,
     check_count as check_count,
 )
 from .lift_clearance import HandLiftClearance as HandLiftClearance
 from .result import TrialResult as TrialResult
-from .robot_contacts import RobotContactWatch as RobotContactWatch
 from .trial_settings import (
     DEFAULT_TRIAL as DEFAULT_TRIAL,
     NO_LIMITS as NO_LIMITS,

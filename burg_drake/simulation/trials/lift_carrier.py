@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from typing import Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from pydrake.multibody.tree import BodyIndex
@@ -12,8 +13,8 @@ from pydrake.multibody.tree import BodyIndex
 from burg_drake.core import Array, InvalidInputError
 from burg_drake.simulation.trials.carrier import HandSegment
 from burg_drake.simulation.trials.contacts import BodyContact, reached
-from burg_drake.simulation.trials.lift_clearance import HandLiftClearance
-from burg_drake.simulation.trials.robot_contacts import RobotContactWatch
+from burg_drake.simulation.trials.lift_clearance import HandLiftClearance, PlacedRobot
+from burg_drake.simulation.trials.robot_contacts import NamedBodies, RobotContactWatch
 from burg_drake.simulation.trials.trial_settings import TrialSettings
 from burg_drake.simulation.trials.trial_world import TrialWorld
 from burg_drake.station.diagram import FloatingHand
@@ -37,15 +38,33 @@ class LiftPath(NamedTuple):
     length: float
 
 
-class LiftCarrier:
-    """Takes the floating hand away from the grasp, and to it if that is asked for; see `Carrier`.
+class RobotWorld(NamedBodies, Protocol):
+    """Bodies of a world with a robot; see `StationDiagram`."""
 
-    Where one segment ends and the next begins, the hand comes to rest, and its joint is laid along
-    the new direction.
+    @property
+    def fixed(self) -> Mapping[str, BodyIndex]: ...
+
+
+class HandWorld(PlacedRobot, Protocol):
+    """A world with the floating hand; see `TrialWorld`."""
+
+    @property
+    def settings(self) -> TrialSettings: ...
+    def X_WG(self) -> Array: ...
+
+
+W = TypeVar("W", bound=HandWorld)
+
+
+class FloatingCarrier(ABC, Generic[W]):
+    """What carriers of the floating hand share, of whatever engine: the segments, and what is in
+    the way; see `Carrier`.
 
     Args:
         world: that of a trial which has been brought to its start, with the joint along the first
             of all paths: the floating hand is at the grasp, or where the approach begins.
+        bodies: of that world.
+        time_step: of the engine [s].
         paths: of the hand from the grasp on, straight, at least one.
         lift_clearance: gives the check of the path ahead with the target in the hand.
         approach: the path to the grasp; None if the hand is there.
@@ -56,41 +75,99 @@ class LiftCarrier:
 
     def __init__(
         self,
-        world: TrialWorld,
+        world: W,
+        bodies: RobotWorld,
+        time_step: float,
         paths: Sequence[LiftPath],
         lift_clearance: Callable[[], HandLiftClearance],
-        approach: LiftPath | None = None,
-        target: BodyIndex | None = None,
+        approach: LiftPath | None,
+        target: BodyIndex,
     ) -> None:
-        assert isinstance(world.hand, FloatingHand)
         settings = world.settings
-        self._world = world
-        self._floating = world.hand
+        self._world, self._bodies = world, bodies
         self._lift_clearance = lift_clearance
-        self._plant = world.diagram.plant
-        self._plant_context = self._plant.GetMyMutableContextFromRoot(world.context)
-        self._names = world.diagram.body_names
-        self._hand = set(world.diagram.robot_bodies)
+        self._hand = set(bodies.robot_bodies)
         self.segments = tuple(
             HandSegment(*path, check_count(path.length, settings) + (number + 1 < len(paths)))
             for number, path in enumerate(paths)
         )
         self.lift_time = sum(settings.time_of(path.length) for path in paths)
         self._approach = approach
-        self.approach_steps = max(1, round(settings.poll / world.diagram.engine.time_step))
+        self.approach_steps = max(1, round(settings.poll / time_step))
         self.approach_checks = 0
         self._touches: RobotContactWatch | None = None
-        if approach is not None and target is not None:
+        if approach is not None:
             self.approach_checks = check_count(approach.length, settings) + REST_CHECKS
-            self._touches = RobotContactWatch(world.diagram, (), target)
+            self._touches = RobotContactWatch(bodies, (), target)
         self._number = 0 if approach is None else -1
         self._is_approaching = self._is_lifting = False
-        self._X_WG_start = self._floating.X_WG(self._plant_context)
+        self._X_WG_start = world.X_WG()
 
     @property
     def touched(self) -> str:
         """The first touch that was not planned; "" without an approach."""
         return "" if self._touches is None else self._touches.first
+
+    def watch(self, contacts: list[BodyContact]) -> str:
+        """Looks for fixed bodies that the hand touches; the table is none of them, unless the hand
+        goes down with the target, or presses on it on its way to the grasp."""
+        if self._touches is not None:
+            stop = self._touches.update(contacts, arrived=not self._is_approaching)
+            if self._is_approaching:
+                return stop
+        fixed = set(self._bodies.fixed.values()) - {self._bodies.table}
+        if self._is_lifting and self.segments[self._number].direction_W[2] < DOWN:
+            fixed.add(self._bodies.table)
+        hit = reached(contacts, self._hand, fixed)
+        return self._bodies.body_names[min(hit)] if hit else ""
+
+    @abstractmethod
+    def travelled(self) -> float:
+        """Position of the joint [m]."""
+
+    def carries_full_load(self, check: int) -> bool:
+        """See `bears_full_load`."""
+        return bears_full_load(self.segments[-1], check, self._world.settings)
+
+    def is_free_ahead(self) -> bool:
+        """Looks along the joint's axis."""
+        last = self.segments[-1]
+        return self._lift_clearance().is_free(
+            self._world, self._X_WG_start, last.length - self.travelled(), last.direction_W
+        )
+
+    def _enter(self, number: int) -> bool:
+        """Goes on in a segment; whether it begins."""
+        self._is_lifting = True
+        if number == self._number:
+            return False
+        self._number, self._X_WG_start = number, self._world.X_WG()
+        return True
+
+
+class LiftCarrier(FloatingCarrier[TrialWorld]):
+    """Takes the floating hand away from the grasp, and to it if that is asked for; see `Carrier`.
+
+    Where one segment ends and the next begins, the hand comes to rest, and its joint is laid along
+    the new direction.
+
+    Args:
+        world, paths, lift_clearance, approach, target: see `FloatingCarrier`.
+    """
+
+    def __init__(
+        self,
+        world: TrialWorld,
+        paths: Sequence[LiftPath],
+        lift_clearance: Callable[[], HandLiftClearance],
+        approach: LiftPath | None,
+        target: BodyIndex,
+    ) -> None:
+        assert isinstance(world.hand, FloatingHand)
+        self._floating = world.hand
+        time_step = world.diagram.engine.time_step
+        super().__init__(world, world.diagram, time_step, paths, lift_clearance, approach, target)
+        self._plant_context = world.diagram.plant.GetMyMutableContextFromRoot(world.context)
 
     def approach(self) -> None:
         """Begins the way to the grasp; the speed is commanded from look to look."""
@@ -107,10 +184,7 @@ class LiftCarrier:
         """Commands the speed of the middle of the interval; in one interval more, where another
         segment follows, the hand comes to rest."""
         segment = self.segments[number]
-        self._is_lifting = True
-        if number != self._number:
-            self._number = number
-            self._X_WG_start = self._floating.X_WG(self._plant_context)
+        if self._enter(number):
             self._floating.set_lift_direction(self._plant_context, segment.direction_W)
             self._world.simulator.Initialize()
         self._command_speed(segment.length, check, self._world.settings.poll)
@@ -127,33 +201,9 @@ class LiftCarrier:
             self._command_speed(self._approach.length, check, interval)
         self._world.simulator.AdvanceTo(time)
 
-    def watch(self, contacts: list[BodyContact]) -> str:
-        """Looks for fixed bodies that the hand touches; the table is none of them, unless the hand
-        goes down with the target, or presses on it on its way to the grasp."""
-        if self._touches is not None:
-            stop = self._touches.update(contacts, arrived=not self._is_approaching)
-            if self._is_approaching:
-                return stop
-        fixed = set(self._world.diagram.fixed.values())
-        if self._is_lifting and self.segments[self._number].direction_W[2] < DOWN:
-            fixed.add(self._world.diagram.table)
-        hit = reached(contacts, self._hand, fixed)
-        return self._names[min(hit)] if hit else ""
-
     def travelled(self) -> float:
         """Position of the joint [m]."""
         return self._floating.travelled(self._plant_context)
-
-    def carries_full_load(self, check: int) -> bool:
-        """See `bears_full_load`."""
-        return bears_full_load(self.segments[-1], check, self._world.settings)
-
-    def is_free_ahead(self) -> bool:
-        """Looks along the joint's axis."""
-        last = self.segments[-1]
-        return self._lift_clearance().is_free(
-            self._world, self._X_WG_start, last.length - self.travelled(), last.direction_W
-        )
 
     def _command_speed(self, length: float, check: int, interval: float) -> None:
         """Commands the speed of the middle of an interval [s] of a path of a length [m]."""
