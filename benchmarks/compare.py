@@ -184,7 +184,7 @@ def speed(arguments: argparse.Namespace) -> None:
         with _timed("  figures"):
             judgement(pairs, scenes={})
         with _timed("  agreement"):
-            run_agreement(pairs, second)
+            run_agreement(pairs, second, {}, [])
     if len(arguments.runs) == 2:
         with _timed("runs on the disk"):
             c = compare(*arguments.runs)
@@ -235,6 +235,8 @@ def _made_up(rows: int, seed: int) -> dict[str, Array]:
         "stage": stages[ended],
         "blocker": np.where(ended == 2, "table", ""),
         "run": np.repeat(scenes, -(-rows // 1000))[:rows],
+        "judged_again": np.full(rows, ""),
+        "confidence": np.where(ended > 1, np.nan, rng.uniform(0.5, 1.0, rows)),
     }
     for name in ("x", "y", "z", "qw", "qx", "qy", "qz", "width"):
         columns[name] = rng.normal(size=rows)

@@ -10,6 +10,7 @@ from burg_drake.experiment.comparison import (
     FactorGroup as FactorGroup,
     Judgement as Judgement,
     MarginDifference as MarginDifference,
+    PartedGrasp as PartedGrasp,
     PlacementAgreement as PlacementAgreement,
     RunAgreement as RunAgreement,
     Stopped as Stopped,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,7 @@ from burg_drake.evaluation.records.run_document import Input, numbers
 from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.experiment.comparison.comparing import compare
+from burg_drake.experiment.comparison.record import comparison_json
 from burg_drake.experiment.comparison.report.page import comparison_page
 from burg_drake.experiment.comparison.run_agreement import RunAgreement
 from burg_drake.experiment.pairing.phases import UNITS
@@ -170,6 +172,80 @@ def test_disagreement_at_small_margins_is_seen_there(tmp_path: Path) -> None:
     assert found.apart == {"executed": {"executed": 10}} and found.alike.value == 0.75
     page = comparison_page(compare(tmp_path / "a", tmp_path / "b"))
     assert "10 of 10 trials, 11 to 20" in page and "0 of 10 trials, 1 to 10" in page
+
+
+def sure(outcome: str, confidence: float | None, **more: str) -> Verdict:
+    return dataclasses.replace(known_runs.ended(outcome), confidence=confidence, **more)  # type: ignore[arg-type]
+
+
+def test_grasps_that_part_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of sixty grasps every contested one is dropped by the second run, and one of no confidence;
+    on the bounds the middle group begins and ends."""
+    confidence = [*np.linspace(0.5, 0.89, 52), 0.9, 0.92, 0.95, 0.951, 0.98, 1.0, None, None]
+    first = [sure("lifted", c) for c in confidence]
+    ends = ["slipped"] * 52 + ["lifted_turned"] + ["lifted"] * 5 + ["dropped", "lifted"]
+    runs = made_up(tmp_path, list(first), [known_runs.ended(end) for end in ends])
+    comparison = compare(*runs)
+    found = comparison.agreement
+    assert found is not None
+    expected = [k for k, end in enumerate(ends) if not end.startswith("lifted")]
+    ids = [runs[0].candidates.id[k] for k in expected]
+    assert [one.grasp for one in found.parted] == ids and len(ids) == 53
+    assert [one.confidence for one in found.parted] == [confidence[k] for k in expected]
+    last = found.parted[-1]
+    assert (last.scene, last.object, last.first, last.second) == ("two", "mug", "lifted", "dropped")
+    for k, run in enumerate(runs):
+        assert last.replays[k] == f"burg-drake replay {run.path} --grasp {last.grasp}"
+    groups = {g.name: (g.agreement.trials, g.agreement.accuracy.value) for g in found.confidence}
+    assert groups == {"below 0.9": (52, 0.0), "0.9 to 0.95": (3, 1.0), "above 0.95": (3, 1.0)}
+    assert list(groups) == ["below 0.9", "0.9 to 0.95", "above 0.95"]
+
+    page = comparison_page(comparison)
+    listed = page[page.index("<h2>Grasps that only one of them holds") :]
+    listed = listed[: listed.index("</table>")]
+    assert [id in listed for id in ids] == [True] * 50 + [False] * 3
+    commands = re.sub("<[^>]*>", "", listed)
+    assert all(f"burg-drake replay {run.path} --grasp {ids[0]}" in commands for run in runs)
+    assert "<h2>Do contested grasps part?" in page
+    words = ["compare", *(str(run.path) for run in runs)]
+    assert main(words) == 0
+    out = capsys.readouterr().out
+    assert [id in out for id in ids] == [True] * 10 + [False] * 43
+    assert "43 more in the JSON" in out
+    assert main([*words, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)["agreement"]
+    assert [one["grasp"] for one in told["parted"]] == ids
+    assert told["parted"][-1]["confidence"] is None
+
+
+def test_verdicts_of_a_second_engine_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    again = {"judged_again": "reference", "outcome_before": "slipped"}
+    first = [sure("lifted", 0.97, **again) for _ in range(3)] + [known_runs.ended("lifted")] * 2
+    # of what is left out of the comparison nobody has a verdict to count
+    first.append(dataclasses.replace(known_runs.failed(), judged_again="reference"))
+    second = [known_runs.ended("lifted")] * 4 + [sure("lifted", 0.99, judged_again="mujoco")]
+    runs = made_up(tmp_path, list(first), [*second, known_runs.ended("lifted")])
+    found = compare(*runs)
+    assert found.coverage.compared == 5
+    assert (found.first.judged_again, found.reference.judged_again) == (
+        {"reference": 3},
+        {"mujoco": 1},
+    )
+    words = [
+        "engine standard, 3 grasps judged again by reference",
+        "engine standard, 1 grasp judged again by mujoco",
+    ]
+    assert main(["compare", *(str(run.path) for run in runs)]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert f"First: {words[0]}; second: {words[1]}." in out
+    page = comparison_page(found)
+    assert all(f"mode hand, {text}, station" in page for text in words)
+    assert json.loads(comparison_json(found))["first"]["judged_again"] == {"reference": 3}
+    # the order of the runs turns it, and a run without such verdicts says nothing of them
+    assert compare(*reversed(runs)).first.judged_again == {"mujoco": 1}
+    assert "judged again" not in compare(*made_up(tmp_path / "c", LIFTED, LIFTED)).first.engines
 
 
 def test_stages_and_objects(tmp_path: Path) -> None:

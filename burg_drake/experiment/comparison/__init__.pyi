@@ -12,6 +12,7 @@ from .groups import (
     Stopped as Stopped,
 )
 from .judge_assessment import Judgement as Judgement
+from .parted_grasps import PartedGrasp as PartedGrasp
 from .placement_error import (
     LIMIT_MM as LIMIT_MM,
     PlacementAgreement as PlacementAgreement,

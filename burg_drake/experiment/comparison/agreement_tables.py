@@ -7,29 +7,37 @@ from collections.abc import Iterator, Mapping, Sequence
 from burg_drake.core.grasps import Stage
 from burg_drake.core.terminal import MISSING, TextTable, format_count, format_number
 from burg_drake.experiment.comparison.groups import FactorGroup
+from burg_drake.experiment.comparison.parted_grasps import PartedGrasp
 from burg_drake.experiment.comparison.run_agreement import MarginDifference, RunAgreement
 from burg_drake.experiment.comparison.wording import interval, margin_title, number
 from burg_drake.experiment.statistics import MarginCalibration
 
 MOST_ROWS = 20
+MOST_PARTED = 10
+"""Grasps that are named; the JSON has all."""
+CONFIDENCE = "confidence of the first run"
 
 
 def agreement_tables(found: RunAgreement) -> Iterator[TextTable]:
     """What is alike by object, where the runs part by stage, and how far apart margins are; what
     there is nothing of is left out."""
     if len(found.objects) > 1:
-        yield object_table(found.objects)
+        yield alike_table("object", found.objects)
     if found.apart:
         yield stage_table(found.apart)
+    if found.parted:
+        yield parted_table(found.parted)
+    if found.confidence:
+        yield alike_table(CONFIDENCE, found.confidence)
     if found.margins:
         yield bin_table(found.margins)
     if found.differences:
         yield difference_table(found.differences)
 
 
-def object_table(groups: Sequence[FactorGroup]) -> TextTable:
-    """Held alike by object."""
-    table = TextTable("Held or not held alike, by object").names("object")
+def alike_table(head: str, groups: Sequence[FactorGroup]) -> TextTable:
+    """Held alike by what grasps have in common, such as their object."""
+    table = TextTable(f"Held or not held alike, by {head}").names(head)
     table.numbers("grasps", "alike", "95 % CI", "kappa")
     for group in groups[:MOST_ROWS]:
         a = group.agreement
@@ -52,6 +60,21 @@ def stage_table(apart: Mapping[str, Mapping[str, int]]) -> TextTable:
     table.texts("first run").numbers(*(f"{name} in the second" for name in columns))
     for stage, row in apart.items():
         table.row(stage, *(format_count(row.get(name, 0)) for name in columns))
+    return table
+
+
+def parted_table(parted: Sequence[PartedGrasp]) -> TextTable:
+    """The first grasps that only one run holds, with their outcomes in both."""
+    table = TextTable("Grasps that only one of them holds")
+    scenes = len({one.scene for one in parted}) > 1
+    if scenes:
+        table.names("scene")
+    table.names("grasp").texts("first run", "second run").numbers("confidence of the first")
+    for one in parted[:MOST_PARTED]:
+        sure = MISSING if one.confidence is None else f"{one.confidence:.3f}"
+        table.row(*([one.scene] if scenes else []), one.grasp, one.first, one.second, sure)
+    if len(parted) > MOST_PARTED:
+        table.caption = f"{format_count(len(parted) - MOST_PARTED)} more in the JSON"
     return table
 
 

@@ -82,11 +82,7 @@ def disagreements(
                     stage=pairs.stage[row],
                     blocker=pairs.blocker[row],
                     ended=pairs.ended[row],
-                    replays=tuple(
-                        shlex.join(["burg-drake", "replay", known[scene], "--grasp", grasp])
-                        for known in folders
-                        if scene in known
-                    ),
+                    replays=replay_commands(folders, scene, grasp),
                     trial=None if trial is None else trial.number,
                     note="" if trial is None else trial.note,
                     photo="" if trial is None else trial.photo,
@@ -94,3 +90,20 @@ def disagreements(
                 )
             )
     return tuple(found)
+
+
+def replay_commands(
+    folders: Sequence[Mapping[str, str]], scene: str, grasp: str
+) -> tuple[str, ...]:
+    """Commands that show a grasp in each run that has its scene.
+
+    Args:
+        folders: of the runs by content of the scene; one mapping for each run.
+        scene: its content.
+        grasp: its id.
+    """
+    return tuple(
+        shlex.join(["burg-drake", "replay", known[scene], "--grasp", grasp])
+        for known in folders
+        if scene in known
+    )

@@ -1,4 +1,4 @@
-"""A run against another one of the same grasps, whose verdicts are taken for the truth."""
+"""A run against another one of the same grasps, whose verdicts count as what happened."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from burg_drake.experiment.comparison.run_agreement import (
 from burg_drake.experiment.pairing import (
     MEASURED,
     NAMES,
+    NUMBERS,
     REFERENCE_NAMES,
     JudgedRuns,
     Match,
@@ -33,10 +34,11 @@ from burg_drake.experiment.pairing import (
     require_common_scene,
     require_same_phases,
     settings_apart,
+    settled_side,
     successes,
     undecided,
 )
-from burg_drake.experiment.statistics import PREDICTORS, PROBABILITY, Flags
+from burg_drake.experiment.statistics import PROBABILITY, Flags
 from burg_drake.experiment.trials import Success
 
 NOT_EXECUTED = "not executed in both runs, whose modes differ"
@@ -73,14 +75,15 @@ def compare_runs(
     if probability is not None:
         pairs = pairs.with_margin(PROBABILITY, probability)
     scenes = sides[0].scenes
-    wrong = disagreements(pairs, scenes, [side.folders for side in sides])
+    folders = [side.folders for side in sides]
+    wrong = disagreements(pairs, scenes, folders)
     apart, note = settings_apart(*sides), approach_note(*sides)
     notes = () if apart else ("the runs have the same settings",)
     return Comparison(
         kind="runs",
         success=success,
-        first=sides[0].side,
-        reference=sides[1].side,
+        first=settled_side(sides[0].side, pairs.judged_again),
+        reference=settled_side(sides[1].side, others.judged_again),
         coverage=Coverage(
             compared=len(pairs),
             only_first=found.only_first,
@@ -89,7 +92,7 @@ def compare_runs(
             left_out=left_out,
         ),
         judgement=judgement(pairs, scenes=scenes, disagreements=wrong, seed=seed),
-        agreement=run_agreement(pairs, others, seed=seed),
+        agreement=run_agreement(pairs, others, scenes, folders, seed=seed),
         settings=apart,
         notes=(*notes, note) if note else notes,
         seed=seed,
@@ -107,9 +110,10 @@ def pairs_of_runs(
     others = tables[1].take(found.second, MEASURED)
     ended, stage = others.texts["outcome"], others.texts["stage"]
     pairs = make_pairs(
-        tables[0].take(found.first, PREDICTORS), ended, successes(ended, success), success
+        tables[0].take(found.first, NUMBERS), ended, successes(ended, success), success
     )
-    second = SecondVerdicts(stage, {name: others.numbers[name] for name in MEASURED})
+    margins = {name: others.numbers[name] for name in MEASURED}
+    second = SecondVerdicts(stage, others.texts["judged_again"], margins)
     reasons: dict[str, Flags] = {}
     for where, verdicts in (("first", pairs.simulated), ("second", pairs.ended)):
         reasons |= {f"{k} in the {where}": rows for k, rows in undecided(verdicts).items()}

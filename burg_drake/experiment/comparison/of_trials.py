@@ -17,6 +17,7 @@ from burg_drake.experiment.comparison.judge_assessment import Judgement, Strata,
 from burg_drake.experiment.comparison.placement_error import offsets, placement_agreement
 from burg_drake.experiment.pairing import (
     NAMES,
+    NUMBERS,
     Factor,
     JudgedRuns,
     ResultTable,
@@ -25,10 +26,11 @@ from burg_drake.experiment.pairing import (
     make_pairs,
     predicted_probability,
     settings_apart,
+    settled_side,
     side_of_trials,
     undecided,
 )
-from burg_drake.experiment.statistics import PREDICTORS, PROBABILITY, paired
+from burg_drake.experiment.statistics import PROBABILITY, paired
 from burg_drake.experiment.trials import (
     RealTrial,
     Success,
@@ -73,19 +75,26 @@ def compare_trials(
         for pairs, side in zip(found, sides, strict=True)
     ]
     two = len(sides) == 2
+    asked = [
+        settled_side(side.side, pairs.judged_again)
+        for pairs, side in zip(found, sides, strict=True)
+    ]
     right = [pairs.predicted == pairs.actual for pairs in found]
     return Comparison(
         kind="simulators" if two else "trials",
         success=success,
-        first=sides[0].side,
-        second=sides[1].side if two else None,
+        first=asked[0],
+        second=asked[1] if two else None,
         reference=side_of_trials(sheet, path),
         coverage=Coverage(compared=len(trials), left_out=dict(left_out)),
         judgement=judged[0],
         other=judged[1] if two else None,
         difference=paired(*right, seed=seed) if two else None,
         settings=settings_apart(*sides) if two else (),
-        notes=_notes(sheet, trials, sides, tables, judged[0]),
+        notes=(
+            *_notes(sheet, trials, sides, tables, judged[0]),
+            *(f"{side.path}: {side.engines}" for side in asked if side.judged_again),
+        ),
         seed=seed,
     )
 
@@ -138,7 +147,7 @@ def _pairs(
     outcomes = [t.outcome for t in trials if t.outcome is not None]
     ended = Factor.of(np.array([o.value for o in outcomes], dtype=np.str_))
     actual = np.array([succeeded(o, success) for o in outcomes], dtype=bool)
-    table = ResultTable.of_columns(columns, NAMES).take(rows, PREDICTORS)
+    table = ResultTable.of_columns(columns, NAMES).take(rows, NUMBERS)
     return make_pairs(table, ended, actual, success)
 
 

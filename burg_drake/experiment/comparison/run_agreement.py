@@ -3,14 +3,15 @@ stage they part, and how far apart their margins are."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from burg_drake.core import Array
-from burg_drake.core.grasps import Stage
+from burg_drake.core.grasps import CONTESTED, Stage
 from burg_drake.experiment.comparison.groups import FactorGroup, by_factor, crossed
+from burg_drake.experiment.comparison.parted_grasps import PartedGrasp, parted_grasps
 from burg_drake.experiment.pairing import MEASURED, Factor, VerdictPairs, successes
 from burg_drake.experiment.statistics import (
     Estimate,
@@ -24,6 +25,10 @@ from burg_drake.experiment.statistics import (
 
 COVERED = 0.9
 """Share of the differences of a margin that are within `MarginDifference.within`."""
+SURE = 0.95
+"""A verdict with more confidence is among the surest."""
+CONFIDENCES = (f"below {CONTESTED:g}", f"{CONTESTED:g} to {SURE:g}", f"above {SURE:g}")
+"""Groups of verdicts by their confidence, rising."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,16 +37,18 @@ class SecondVerdicts:
 
     Attributes:
         stage: (N,) that decided.
+        judged_again: (N,) engine that gave the verdict; empty where it is the run's own.
         margins: (N,) numbers by name; NaN where there is none.
     """
 
     stage: Factor
+    judged_again: Factor
     margins: Mapping[str, Array]
 
     def take(self, rows: Values) -> SecondVerdicts:
         """Some grasps, as indices or truth values."""
         margins = {name: values[rows] for name, values in self.margins.items()}
-        return SecondVerdicts(self.stage.take(rows), margins)
+        return SecondVerdicts(self.stage.take(rows), self.judged_again.take(rows), margins)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,6 +82,9 @@ class RunAgreement:
         objects: the same by object; their accuracy is the share that is alike.
         stages: grasps by the stage that decided in the first run, and in the second.
         apart: the same of the grasps that are not alike.
+        parted: the grasps that are not alike, by name.
+        confidence: as `objects`, by the confidence of the first run's verdicts, of those that have
+            one; see `CONFIDENCES`.
         margins: share of alike grasps in quantile bins of the first run's margins, of grasps of
             which both runs measured it; `successes` are the alike ones.
         differences: of the margins, where both executed.
@@ -85,16 +95,27 @@ class RunAgreement:
     objects: tuple[FactorGroup, ...]
     stages: dict[str, dict[str, int]]
     apart: dict[str, dict[str, int]]
+    parted: tuple[PartedGrasp, ...]
+    confidence: tuple[FactorGroup, ...]
     margins: tuple[MarginCalibration, ...]
     differences: tuple[MarginDifference, ...]
 
 
-def run_agreement(pairs: VerdictPairs, second: SecondVerdicts, *, seed: int = 0) -> RunAgreement:
+def run_agreement(
+    pairs: VerdictPairs,
+    second: SecondVerdicts,
+    scenes: Mapping[str, str],
+    folders: Sequence[Mapping[str, str]],
+    *,
+    seed: int = 0,
+) -> RunAgreement:
     """Compares two runs with each other.
 
     Args:
         pairs: N grasps with the verdicts of the first run, and how they ended in the second.
         second: what the second run found of them besides.
+        scenes: names of the scenes by their content.
+        folders: of the two runs, by content of the scene.
         seed: of the intervals' resampling.
     """
     held = replace(
@@ -114,6 +135,8 @@ def run_agreement(pairs: VerdictPairs, second: SecondVerdicts, *, seed: int = 0)
         objects=by_factor(held, held.object, seed=seed),
         stages=_by_stage(pairs.stage, second.stage),
         apart=_by_stage(pairs.stage.take(~alike), second.stage.take(~alike)),
+        parted=parted_grasps(pairs, ~alike, scenes, folders),
+        confidence=_by_confidence(held, seed),
         margins=calibrations(measured, alike),
         differences=margin_differences(pairs, second),
     )
@@ -148,6 +171,17 @@ def margin_differences(pairs: VerdictPairs, second: SecondVerdicts) -> tuple[Mar
                 )
             )
     return tuple(found)
+
+
+def _by_confidence(held: VerdictPairs, seed: int) -> tuple[FactorGroup, ...]:
+    """Agreement by the confidence of the first run's verdicts, of those that have one."""
+    known = np.isfinite(held.confidence)
+    if not known.any():
+        return ()
+    values = held.confidence[known]
+    group = (values >= CONTESTED).astype(np.intp) + (values > SURE)
+    names = {name: name for name in CONFIDENCES}
+    return by_factor(held.take(known), Factor(CONFIDENCES, group), names, seed=seed)
 
 
 def _by_stage(first: Factor, second: Factor) -> dict[str, dict[str, int]]:

@@ -88,8 +88,8 @@ def alike_words(comparison: Comparison) -> str:
     bounds = interval(found.kappa, percent=False)
     return (
         f"Held in both or in neither: {brief(found.alike)}; Cohen's kappa"
-        f" {f'{kappa} {bounds}'.rstrip()}. First: engine {c.first.engine}; second: engine"
-        f" {c.reference.engine}."
+        f" {f'{kappa} {bounds}'.rstrip()}. First: {c.first.engines}; second:"
+        f" {c.reference.engines}."
     )
 
 

@@ -5,6 +5,7 @@ from .matching import (
 from .pairs import (
     MEASURED as MEASURED,
     NAMES as NAMES,
+    NUMBERS as NUMBERS,
     REFERENCE_NAMES as REFERENCE_NAMES,
     VerdictPairs as VerdictPairs,
     make_pairs as make_pairs,
@@ -22,6 +23,7 @@ from .side import (
     Side as Side,
     require_common_scene as require_common_scene,
     settings_apart as settings_apart,
+    settled_side as settled_side,
     side_of_trials as side_of_trials,
 )
 from .text_codes import Factor as Factor

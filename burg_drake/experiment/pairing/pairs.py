@@ -13,11 +13,16 @@ from burg_drake.experiment.pairing.text_codes import Factor, Ids
 from burg_drake.experiment.statistics import PREDICTORS, Flags, Values
 from burg_drake.experiment.trials import Success, succeeded
 
-NAMES = (*KEY, *CONTENT, "object", "outcome", "stage", "blocker", "run", *PREDICTORS)
+NUMBERS = (*PREDICTORS, "confidence")
+"""Columns of numbers of the run whose verdicts are predictions."""
+NAMES = (
+    *(*KEY, *CONTENT, "object", "outcome", "stage", "blocker", "run", "judged_again"),
+    *NUMBERS,
+)
 """Columns of the run whose verdicts are predictions."""
 MEASURED = tuple(name for name in PREDICTORS if name != "score")
 """Margins that two runs may measure differently: a score belongs to the grasp."""
-REFERENCE_NAMES = (*KEY, *CONTENT, "outcome", "stage", *MEASURED)
+REFERENCE_NAMES = (*KEY, *CONTENT, "outcome", "stage", "judged_again", *MEASURED)
 """Columns of a run whose verdicts say what is true."""
 UNDECIDED = (Outcome.SIMULATION_FAILED, Outcome.REACHABLE)
 """Verdicts that predict nothing: no simulation came to an end."""
@@ -32,6 +37,8 @@ class VerdictPairs:
         run: (N,) hashes of the runs of the verdicts.
         scene, object: of each grasp.
         simulated, stage, blocker: the verdict.
+        judged_again: engine that gave the verdict; empty where it is the run's own.
+        confidence: (N,) of the verdicts; NaN where there is none.
         ended: what happened: outcome of a trial, or verdict of the other run.
         predicted, actual: (N,) whether that is success.
         margins: (N,) numbers of the verdicts by name.
@@ -44,6 +51,8 @@ class VerdictPairs:
     simulated: Factor
     stage: Factor
     blocker: Factor
+    judged_again: Factor
+    confidence: Array
     ended: Factor
     predicted: Flags
     actual: Flags
@@ -58,10 +67,14 @@ class VerdictPairs:
 
     def take(self, rows: Values) -> VerdictPairs:
         """Some rows, as indices or truth values."""
-        factors = ("run", "scene", "object", "simulated", "stage", "blocker", "ended")
+        factors = (
+            *("run", "scene", "object", "simulated", "stage", "blocker", "judged_again"),
+            "ended",
+        )
         return replace(
             self,
             id=self.id.take(rows),
+            confidence=self.confidence[rows],
             predicted=self.predicted[rows],
             actual=self.actual[rows],
             margins={name: values[rows] for name, values in self.margins.items()},
@@ -89,6 +102,8 @@ def make_pairs(
         simulated=texts["outcome"],
         stage=texts["stage"],
         blocker=texts["blocker"],
+        judged_again=texts["judged_again"],
+        confidence=verdicts.numbers["confidence"],
         ended=ended,
         predicted=successes(texts["outcome"], success),
         actual=actual,

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Literal
+
+import numpy as np
 
 from burg_drake.core import InvalidInputError
 from burg_drake.evaluation.records import HASH_DIGITS, differences, engine_label, request_identity
@@ -19,6 +21,7 @@ from burg_drake.evaluation.store import (
     read_results,
 )
 from burg_drake.experiment.pairing.result_table import ResultTable
+from burg_drake.experiment.pairing.text_codes import Factor
 from burg_drake.experiment.trials import TrialSheet
 
 MOST_NAMED = 3
@@ -35,6 +38,8 @@ class Side:
         scenes: names of the scenes.
         hashes: of the runs.
         station, mode, engine: how it was judged; several are joined by commas.
+        judged_again: how many of the compared grasps another engine has judged again, by the name
+            of that engine.
     """
 
     kind: Literal["run", "trials"]
@@ -45,6 +50,15 @@ class Side:
     station: str
     mode: str
     engine: str
+    judged_again: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def engines(self) -> str:
+        """Whose verdicts they are, in words."""
+        parts = [f"engine {self.engine}"]
+        for name, count in self.judged_again.items():
+            parts.append(f"{count:,} grasp{'' if count == 1 else 's'} judged again by {name}")
+        return ", ".join(parts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +136,18 @@ class JudgedRuns:
             mode=document.mode,
             engine=engine,
         )
+
+
+def settled_side(side: Side, judged_again: Factor) -> Side:
+    """A side with the engines that have judged its grasps again.
+
+    Args:
+        side: a run.
+        judged_again: (N,) of the compared grasps; empty texts where none has.
+    """
+    counts = np.bincount(judged_again.index, minlength=len(judged_again.names)).tolist()
+    named = zip(judged_again.names, counts, strict=True)
+    return replace(side, judged_again={name: n for name, n in named if name and n})
 
 
 def side_of_trials(sheet: TrialSheet, path: Path) -> Side:

@@ -5,11 +5,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from burg_drake.core.grasps import CONTESTED
 from burg_drake.core.terminal import format_count, format_number
-from burg_drake.evaluation.report.elements import Html, element, section, table
-from burg_drake.experiment.comparison.agreement_tables import stage_columns
+from burg_drake.evaluation.report.elements import (
+    Child,
+    Html,
+    command,
+    element,
+    join,
+    section,
+    table,
+)
+from burg_drake.experiment.comparison.agreement_tables import CONFIDENCE, stage_columns
 from burg_drake.experiment.comparison.comparison import Comparison
 from burg_drake.experiment.comparison.groups import FactorGroup
+from burg_drake.experiment.comparison.parted_grasps import PartedGrasp
 from burg_drake.experiment.comparison.report.figures import share_mark
 from burg_drake.experiment.comparison.report.plots import reliability_plot
 from burg_drake.experiment.comparison.run_agreement import MarginDifference
@@ -17,6 +27,8 @@ from burg_drake.experiment.comparison.wording import alike_words, margin_title, 
 from burg_drake.experiment.statistics import MarginCalibration
 
 MOST_ROWS = 60
+MOST_PARTED = 50
+"""Grasps that are named; the JSON has all."""
 
 
 def agreement_sections(comparison: Comparison) -> list[Html | None]:
@@ -25,14 +37,17 @@ def agreement_sections(comparison: Comparison) -> list[Html | None]:
     if found is None:
         return []
     return [
-        section("Held or not held alike", alike_words(comparison), _objects(found.objects)),
+        section("Held or not held alike", alike_words(comparison), _alike("object", found.objects)),
         _stages(found.stages, found.apart),
+        _parted(found.parted),
+        _confidence(found.confidence),
         _margins(found.margins),
         _differences(found.differences),
     ]
 
 
-def _objects(groups: Sequence[FactorGroup]) -> Html:
+def _alike(head: str, groups: Sequence[FactorGroup]) -> Html:
+    """Held alike by what grasps have in common, such as their object."""
     rows = [
         element(
             "tr",
@@ -52,8 +67,8 @@ def _objects(groups: Sequence[FactorGroup]) -> Html:
         )
         for group in groups[:MOST_ROWS]
     ]
-    head = ["object", "grasps", "alike, 95 % interval", "Cohen's kappa"]
-    return table(head, rows, numbers=(1, 3), style="groups")
+    names = [head, "grasps", "alike, 95 % interval", "Cohen's kappa"]
+    return table(names, rows, numbers=(1, 3), style="groups")
 
 
 def _stages(
@@ -74,6 +89,40 @@ def _stages(
     )
     head = ["first run", *(f"{name} in the second" for name in columns)]
     return section("At which stage they part", text, table(head, rows, numbers=range(1, len(head))))
+
+
+def _parted(parted: Sequence[PartedGrasp]) -> Html | None:
+    """The first grasps that only one run holds, and how to look at them in either."""
+    if not parted:
+        return None
+    head = ["grasp", "first", "second", "confidence of the first", "replay"]
+    rows = []
+    for one in parted[:MOST_PARTED]:
+        cells: tuple[Child, ...] = (
+            one.grasp,
+            one.first.replace("_", " "),
+            one.second.replace("_", " "),
+            "-" if one.confidence is None else f"{one.confidence:.3f}",
+            join(*(command(line) for line in one.replays)),
+        )
+        cases = (element("td", c, data_label=h) for h, c in zip(head, cells, strict=True))
+        rows.append(element("tr", *cases))
+    text = (
+        f"{format_count(len(parted))} grasps; the commands show them in the first and the second."
+    )
+    if len(parted) > MOST_PARTED:
+        text += f" The first {MOST_PARTED}; the JSON has all."
+    return section("Grasps that only one of them holds", text, table(head, rows, style="cases"))
+
+
+def _confidence(groups: Sequence[FactorGroup]) -> Html | None:
+    if not groups:
+        return None
+    text = (
+        f"Share of grasps that both hold, or both do not, by the confidence of the first run's"
+        f" verdict, of those that have one; below {CONTESTED:g} it is contested."
+    )
+    return section("Do contested grasps part?", text, _alike(CONFIDENCE, groups))
 
 
 def _margins(margins: Sequence[MarginCalibration]) -> Html | None:

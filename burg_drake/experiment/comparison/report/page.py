@@ -208,7 +208,7 @@ def _settings(c: Comparison) -> Html:
 
 def _side(side: Side) -> str:
     hashes = ", ".join(side.hashes[:6]) + (" and others" if len(side.hashes) > 6 else "")
-    how = "" if side.kind == "trials" else f", mode {side.mode}, engine {side.engine}"
+    how = "" if side.kind == "trials" else f", mode {side.mode}, {side.engines}"
     run = "runs" if len(side.hashes) > 1 else "run"
     return f"{side.path}{how}, station {side.station}, {run} {hashes}"
 
