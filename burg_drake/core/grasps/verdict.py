@@ -184,7 +184,8 @@ class TrialFindings:
             to. Empty if no trial started or it failed.
         turned: the same of its rotation [rad].
         toppled: names of the instances among them whose axis that was upright is tilted by more
-            than 45 degrees at the end, separated by commas.
+            than 45 degrees at the end, and that lie or stand otherwise than before, separated by
+            commas; not what rolled.
         pushed: the same when the hand began to close, and of the target, too: what the approach
             moved [m]. Empty where the trial began at the grasp.
         touched: the first touch that was not planned, as "panda_link5 vs can": of the robot with
