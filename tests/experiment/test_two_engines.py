@@ -140,6 +140,20 @@ def test_all_of_it_is_told(
     assert (told["first"]["engine"], told["reference"]["engine"]) == ("screening", "standard")
 
 
+def test_neither_of_two_runs_is_called_the_truth(
+    engines: tuple[Run, Run], capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = comparison_page(compare(*engines))
+    assert main(["compare", *(str(run.path) for run in engines)]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    for text in (re.sub("<[^>]*>", " ", page.split("</style>")[-1]), out):
+        for word in ("truth", "actual success", "elected trials", "redicted", "happened:"):
+            assert word not in text, word
+        assert "success in the second" in text and "Verdicts of both runs" in text
+    assert "Figures of the first run, with the second run in the place of what happened" in page
+    assert "<dt>first run</dt>" in page and "<dt>second run</dt>" in page
+
+
 def made_up(folder: Path, *outcomes: list[Verdict | None], **fields: object) -> tuple[Run, Run]:
     """Two runs of the mug by verdicts, of which the second has other fields in its document."""
     scene = known_runs.make_scene(folder)
@@ -430,3 +444,18 @@ def test_against_trials_phases_may_differ(tmp_path: Path) -> None:
     found = compare(first, second, tmp_path / "trials.yaml")
     assert found.agreement is None and found.coverage.compared == 2
     assert any(text.startswith("motion is ") for text in found.settings)
+
+
+def test_verdicts_of_a_second_engine_are_told_beside_trials(tmp_path: Path) -> None:
+    verdicts = [sure("lifted", 0.8, judged_again="reference"), known_runs.ended("slipped")]
+    first, second = made_up(tmp_path, list(verdicts), LIFTED)
+    sheet = burg.trials.plan_trials(first, out=tmp_path / "trials.yaml")
+    for trial in sheet.trials:
+        burg.trials.TrialBook(tmp_path / "trials.yaml").record(trial.number, outcome="lifted")
+    note = f"{first.path}: engine standard, 1 grasp judged again by reference"
+    for found in (
+        compare(first, tmp_path / "trials.yaml"),
+        compare(first, second, tmp_path / "trials.yaml"),
+    ):
+        assert [text for text in found.notes if "judged again" in text] == [note]
+    assert "judged again" not in " ".join(compare(second, tmp_path / "trials.yaml").notes)

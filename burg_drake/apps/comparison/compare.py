@@ -36,9 +36,9 @@ def add_to(verbs: Any) -> None:
         "burg-drake compare runs/screening runs/standard",
         "burg-drake compare runs/screening runs/standard trials.yaml",
         "",
-        "Of two runs, the second is the reference for the first; runs with other phases, limits",
-        "or stations are refused. With trials, both are compared with them, and McNemar's test",
-        "says whether one is right more often.",
+        "Of two runs, the second is in the place of what happened, though neither is the truth;",
+        "runs with other phases, limits or stations are refused. With trials, both are compared",
+        "with them, and McNemar's test says whether one is right more often.",
         options=_add_options,
     )
 
@@ -56,8 +56,8 @@ def _add_options(parser: Parser) -> None:
     parser.add_argument(
         "--success",
         choices=SUCCESSES,
-        help="what counts as success: lifted, or held even if another object was disturbed"
-        " (default: what the trials were planned with, or lifted)",
+        help="what counts as success: lifted, or held even if it turned in the hand or another"
+        " object was disturbed (default: what the trials were planned with, or lifted)",
     )
     parser.add_argument(
         "--placement-limit-mm",

@@ -31,7 +31,7 @@ def compare(
 
     Args:
         first: run whose verdicts are taken as predictions, or its folder.
-        second: a trials file, or a run of the same grasps, which then says what is true.
+        second: a trials file, or a run of the same grasps, which then counts as what happened.
         trials: a trials file; both runs are then compared with it, and with each other.
         success: what counts as success; if None what the trials were planned with, or `lifted`.
         placement_limit_mm: how far off every object may be in trials with good placement [mm].

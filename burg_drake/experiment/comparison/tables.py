@@ -16,8 +16,10 @@ from burg_drake.experiment.comparison.wording import (
     headline,
     interval,
     margin_title,
+    measure_name,
     number,
     of_selected,
+    success_of,
 )
 from burg_drake.experiment.statistics import MEASURES, Agreement, MarginCalibration
 
@@ -34,16 +36,16 @@ def comparison_tables(comparison: Comparison) -> Iterator[TextTable | str]:
     for name, judged in _judgements(c):
         of = of_selected(c) + name
         yield matrix_table(c, judged, name)
-        yield figure_table(judged, name)
+        yield figure_table(c, judged, name)
         yield bias_words(c, judged)
         if len(judged.objects) > 1:
             yield group_table(f"By object{of}", "object", judged.objects)
         if len(judged.scenes) > 1:
             yield group_table(f"By scene{of}", "scene", judged.scenes)
-        yield stopped_table(judged, of)
-        telling = [c for c in judged.calibration if c.auroc.value is not None]
+        yield stopped_table(c, judged, of)
+        telling = [m for m in judged.calibration if m.auroc.value is not None]
         if telling:
-            yield calibration_table(telling, name)
+            yield calibration_table(c, telling, name)
         if judged.placement is not None:
             yield placement_table(judged, of)
     yield coverage_words(c)
@@ -59,8 +61,10 @@ def _judgements(comparison: Comparison) -> list[tuple[str, Judgement]]:
 
 def matrix_table(comparison: Comparison, judged: Judgement, name: str = "") -> TextTable:
     """The confusion matrix."""
-    other = "second run" if comparison.kind == "runs" else "on the robot"
-    table = TextTable(f"Verdicts and outcomes{name}").texts("predicted")
+    runs = comparison.kind == "runs"
+    title = "Verdicts of both runs" if runs else f"Verdicts and outcomes{name}"
+    other = "in the second" if runs else "on the robot"
+    table = TextTable(title).texts("in the first" if runs else "predicted")
     table.numbers(f"success {other}", f"failure {other}")
     found = judged.selected
     table.row("success", format_count(int(found.tp)), format_count(int(found.fp)))
@@ -68,7 +72,7 @@ def matrix_table(comparison: Comparison, judged: Judgement, name: str = "") -> T
     return table
 
 
-def figure_table(judged: Judgement, name: str = "") -> TextTable:
+def figure_table(comparison: Comparison, judged: Judgement, name: str = "") -> TextTable:
     """All figures, of the selected trials and of all grasps."""
     table = TextTable(f"Figures{name}").texts("figure")
     found: list[Agreement] = [judged.selected]
@@ -82,12 +86,12 @@ def figure_table(judged: Judgement, name: str = "") -> TextTable:
             f"selected trials: the {found[0].trials} that were compared; all grasps: the {grasps}"
             " that they were chosen from, each trial standing for its share"
         )
-    for key, measure in MEASURES.items():
+    for key in MEASURES:
         cells = []
         for agreement in found:
             f, percent = agreement.figure(key), key in SHARES
             cells += [number(f, percent=percent), interval(f, percent=percent) or "-"]
-        table.row(measure.name, *cells)
+        table.row(measure_name(comparison, key), *cells)
     reasons = {f.reason for a in found for f in (a.figure(k) for k in MEASURES) if f.reason}
     if reasons:
         undefined = f"-: undefined, as {'; '.join(sorted(reasons))}"
@@ -114,10 +118,12 @@ def group_table(title: str, head: str, groups: Sequence[FactorGroup]) -> TextTab
     return table
 
 
-def stopped_table(judged: Judgement, name: str = "") -> TextTable:
+def stopped_table(comparison: Comparison, judged: Judgement, name: str = "") -> TextTable:
     """What became of grasps by verdict."""
     table = TextTable(f"What became of each verdict{name}")
-    table.texts("simulated").names("body in the way").numbers("trials", "succeeded", "95 % CI")
+    runs = comparison.kind == "runs"
+    table.texts("first run" if runs else "simulated").names("body in the way")
+    table.numbers("trials", "success in the second" if runs else "succeeded", "95 % CI")
     for row in judged.stopped[:MOST_ROWS]:
         table.row(
             row.outcome,
@@ -131,10 +137,14 @@ def stopped_table(judged: Judgement, name: str = "") -> TextTable:
     return table
 
 
-def calibration_table(found: Sequence[MarginCalibration], name: str = "") -> TextTable:
+def calibration_table(
+    comparison: Comparison, found: Sequence[MarginCalibration], name: str = ""
+) -> TextTable:
     """How well each margin ranks success above failure."""
     weighted = any(c.auroc_weighted is not None for c in found)
-    table = TextTable(f"How margins predict success{name}").texts("margin", "better")
+    table = TextTable(f"How margins predict {success_of(comparison)}{name}").texts(
+        "margin", "better"
+    )
     table.numbers("trials", "AUROC", "95 % CI")
     if weighted:
         table.numbers("all grasps")

@@ -14,11 +14,35 @@ CELL_NAMES = {
     "fn": "failure predicted, success seen",
     "tn": "failure predicted and seen",
 }
+CELL_NAMES_OF_RUNS = {
+    "tp": "success in both runs",
+    "fp": "success in the first run, failure in the second",
+    "fn": "failure in the first run, success in the second",
+    "tn": "failure in both runs",
+}
+"""Cells of two runs, of which neither is the truth."""
 
 
 def of_selected(comparison: Comparison) -> str:
     """What titles add to say of which trials their figures are; nothing where all count alike."""
     return "" if comparison.kind == "runs" else ", selected trials"
+
+
+def cell_name(comparison: Comparison, cell: str) -> str:
+    """What the grasps of a cell of the matrix have in common."""
+    return (CELL_NAMES_OF_RUNS if comparison.kind == "runs" else CELL_NAMES)[cell]
+
+
+def measure_name(comparison: Comparison, key: str) -> str:
+    """What a figure is called."""
+    if comparison.kind == "runs" and key in ("predicted", "actual"):
+        return f"success in the {'first' if key == 'predicted' else 'second'} run"
+    return MEASURES[key].name
+
+
+def success_of(comparison: Comparison) -> str:
+    """What margins are to tell of."""
+    return "success in the second run" if comparison.kind == "runs" else "actual success"
 
 
 def number(found: Estimate, *, percent: bool) -> str:
@@ -110,16 +134,23 @@ def bias_words(comparison: Comparison, judged: Judgement | None = None) -> str:
     size = f"{100 * abs(b.difference.value):.1f} percentage points {more} success than"
     if b.difference.value == 0:
         size = "just as much success as"
+    parted = (
+        f"{b.only_first:,} predicted successes did not come true, {b.only_second:,} came about"
+        " against the prediction"
+    )
     who, other = ("simulator promises", "the robot achieved")
     if comparison.kind == "runs":
         who, other = "first run sees", "the second"
+        parted = (
+            f"{b.only_first:,} are a success in the first alone, {b.only_second:,} in the second"
+            " alone"
+        )
     elif comparison.other is not None:
         which = "second" if judged is comparison.other else "first"
         who = f"{which} simulator promises"
     return (
-        f"The {who} {size} {other} {interval(b.difference, percent=True)}: {b.only_first:,}"
-        f" predicted successes did not come true, {b.only_second:,} came about against the"
-        f" prediction (McNemar's exact test: p = {format_number(b.p_value)})."
+        f"The {who} {size} {other} {interval(b.difference, percent=True)}: {parted}"
+        f" (McNemar's exact test: p = {format_number(b.p_value)})."
     )
 
 

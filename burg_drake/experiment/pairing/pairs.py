@@ -23,7 +23,7 @@ NAMES = (
 MEASURED = tuple(name for name in PREDICTORS if name != "score")
 """Margins that two runs may measure differently: a score belongs to the grasp."""
 REFERENCE_NAMES = (*KEY, *CONTENT, "outcome", "stage", "judged_again", *MEASURED)
-"""Columns of a run whose verdicts say what is true."""
+"""Columns of a run whose verdicts count as what happened."""
 UNDECIDED = (Outcome.SIMULATION_FAILED, Outcome.REACHABLE)
 """Verdicts that predict nothing: no simulation came to an end."""
 

@@ -21,6 +21,7 @@ from burg_drake.experiment.comparison.comparison import Comparison
 from burg_drake.experiment.comparison.disagreement import Disagreement
 from burg_drake.experiment.comparison.judge_assessment import Judgement
 from burg_drake.experiment.comparison.report.figures import share_mark
+from burg_drake.experiment.comparison.wording import cell_name
 
 MOST_CASES = 50
 MOST_STOPPED = 30
@@ -37,10 +38,8 @@ def case_section(comparison: Comparison, judged: Judgement, photos: Path | None)
     if not judged.disagreements:
         return None
     tables = []
-    for kind, title in (
-        ("fp", "Success predicted, failure seen"),
-        ("fn", "Failure predicted, success seen"),
-    ):
+    for kind in ("fp", "fn"):
+        title = cell_name(comparison, kind).capitalize()
         cases = [d for d in judged.disagreements if d.kind == kind]
         if cases:
             total = round(getattr(judged.selected, kind))
@@ -89,7 +88,7 @@ def _note(case: Disagreement, photos: Path | None) -> Child:
     return join(case.note, " " if case.note else "", link)
 
 
-def stopped_section(judged: Judgement, of: str) -> Html:
+def stopped_section(comparison: Comparison, judged: Judgement, of: str) -> Html:
     """What became of grasps by verdict and the body in the way; `of` says of which."""
     rows = [
         element(
@@ -107,6 +106,9 @@ def stopped_section(judged: Judgement, of: str) -> Html:
         more = f" The first {MOST_STOPPED} of {len(judged.stopped)}."
     head = ["simulated", "body in the way", "stage", "trials", "succeeded, 95 % interval"]
     text = f"By what the simulation said: how many of these grasps succeeded.{more}"
+    if comparison.kind == "runs":
+        head[0], head[-1] = "first run", "success in the second, 95 % interval"
+        text = f"By what the first run said: how many of these succeed in the second run.{more}"
     return section(
         f"What became of each verdict{of}",
         text,
@@ -124,12 +126,15 @@ def outcome_section(comparison: Comparison, judged: Judgement) -> Html:
             for name in happened
         ]
         rows.append(element("tr", element("th", simulated.replace("_", " "), scope="row"), *cells))
-    head = ["simulated", *(name.replace("_", " ") for name in happened)]
-    other = "by the second run" if comparison.kind == "runs" else "on the robot"
+    runs = comparison.kind == "runs"
+    head = ["first run" if runs else "simulated", *(n.replace("_", " ") for n in happened)]
+    judge, other = ("in simulation", "on the robot")
+    if runs:
+        judge, other = "in the first run", "in the second"
     numbers = range(1, len(head))
     style = "matrix" if len(head) > 6 else ""
     return folded(
         "Outcome by outcome",
-        f"Rows: how grasps ended in simulation. Columns: how they ended {other}.",
+        f"Rows: how grasps ended {judge}. Columns: how they ended {other}.",
         table(head, rows, numbers=numbers, style=style),
     )

@@ -17,7 +17,13 @@ from burg_drake.evaluation.report.elements import (
 from burg_drake.experiment.comparison.comparison import Comparison
 from burg_drake.experiment.comparison.groups import FactorGroup
 from burg_drake.experiment.comparison.judge_assessment import Judgement
-from burg_drake.experiment.comparison.wording import CELL_NAMES, SHARES, interval, number
+from burg_drake.experiment.comparison.wording import (
+    SHARES,
+    cell_name,
+    interval,
+    measure_name,
+    number,
+)
 from burg_drake.experiment.statistics import CELLS, MEASURES, Agreement, Estimate
 
 MOST_ROWS = 60
@@ -27,7 +33,7 @@ Named = Sequence[tuple[str, Judgement]]
 
 def matrix_section(comparison: Comparison, judged: Named) -> Html:
     """Confusion matrices of the trials, and of all grasps that they stand for."""
-    other = "second run" if comparison.kind == "runs" else "on the robot"
+    title = "Verdicts of both runs" if comparison.kind == "runs" else "Verdicts and outcomes"
     blocks = []
     for name, judgement in judged:
         found = [("selected trials", judgement.selected)]
@@ -35,36 +41,41 @@ def matrix_section(comparison: Comparison, judged: Named) -> Html:
             found.append(("all grasps", judgement.all_grasps))
         elif comparison.kind == "runs":
             found = [("grasps", judgement.selected)]
-        blocks += [_matrix(_titled(title, name), a, other) for title, a in found]
+        blocks += [_matrix(comparison, _titled(which, name), a) for which, a in found]
     text = "Rows: what the simulation predicted. Columns: what happened."
+    if comparison.kind == "runs":
+        text = "Rows: the first run. Columns: the second run."
     if any(j.all_grasps is not None for _, j in judged):
         text += (
             " Selected trials are counted as they are; for all grasps each trial counts for the"
             " grasps that it was chosen from."
         )
-    return section("Verdicts and outcomes", text, element("div", *blocks, class_="beside"))
+    return section(title, text, element("div", *blocks, class_="beside"))
 
 
 def _titled(title: str, name: str) -> str:
     return f"{title}, {name}" if name else title
 
 
-def _matrix(title: str, found: Agreement, other: str) -> Html:
+def _matrix(comparison: Comparison, title: str, found: Agreement) -> Html:
+    runs = comparison.kind == "runs"
+    judge, other = ("in the first", "in the second") if runs else ("predicted", "on the robot")
+
     def cell(name: str, style: str) -> Html:
         value = format_count(round(getattr(found, name)))
-        tip = CELL_NAMES[name]
+        tip = cell_name(comparison, name)
         return element(
             "td", element("b", value), element("small", name.upper()), class_=style, title=tip
         )
 
     rows = [
-        element("tr", element("th", "success predicted", scope="row"), *pair)
+        element("tr", element("th", f"success {judge}", scope="row"), *pair)
         for pair in [(cell("tp", "right"), cell("fp", "wrong"))]
     ]
     rows.append(
         element(
             "tr",
-            element("th", "failure predicted", scope="row"),
+            element("th", f"failure {judge}", scope="row"),
             cell("fn", "wrong"),
             cell("tn", "right"),
         )
@@ -75,7 +86,7 @@ def _matrix(title: str, found: Agreement, other: str) -> Html:
     )
 
 
-def figure_section(judged: Named) -> Html:
+def figure_section(comparison: Comparison, judged: Named) -> Html:
     """All measures with their intervals."""
     columns: list[tuple[str, Agreement]] = []
     for name, judgement in judged:
@@ -86,9 +97,11 @@ def figure_section(judged: Named) -> Html:
         columns = [("value", columns[0][1])]
     head = ["figure", *(name for name, _ in columns)]
     rows = []
-    for key, measure in MEASURES.items():
+    for key in MEASURES:
         cells = [figure_cell(a.figure(key), percent=key in SHARES) for _, a in columns]
-        rows.append(element("tr", element("th", measure.name, scope="row"), *cells))
+        rows.append(
+            element("tr", element("th", measure_name(comparison, key), scope="row"), *cells)
+        )
     return section(
         "Figures", _how(judged), table(head, rows, numbers=range(1, len(head)), style="figures")
     )

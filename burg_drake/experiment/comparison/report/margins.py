@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from burg_drake.core.terminal import format_count
 from burg_drake.evaluation.report.elements import Html, element, section, table
+from burg_drake.experiment.comparison.comparison import Comparison
 from burg_drake.experiment.comparison.groups import FactorGroup
 from burg_drake.experiment.comparison.judge_assessment import Judgement
 from burg_drake.experiment.comparison.report.figures import figure_cell, group_section
 from burg_drake.experiment.comparison.report.plots import reliability_plot
-from burg_drake.experiment.comparison.wording import margin_title
+from burg_drake.experiment.comparison.wording import margin_title, success_of
 from burg_drake.experiment.statistics import Estimate, MarginCalibration
 
 MOST_PLOTS = 4
 
 
-def margin_section(judged: Judgement) -> Html | None:
+def margin_section(comparison: Comparison, judged: Judgement) -> Html | None:
     """What margins say about success; nothing where there are none."""
     defined = [c for c in judged.calibration if c.auroc.value is not None]
     found = sorted(defined, key=_informative, reverse=True)
@@ -24,7 +25,7 @@ def margin_section(judged: Judgement) -> Html | None:
     head = ["margin", "trials", "AUROC"]
     head += ["AUROC, all grasps"] if weighted else []
     rows = [_row(c, weighted) for c in found]
-    plots = [reliability_plot(c, "actual success") for c in found[:MOST_PLOTS]]
+    plots = [reliability_plot(c, success_of(comparison)) for c in found[:MOST_PLOTS]]
     trials = "grasps, each trial standing for its share," if weighted else "trials"
     text = (
         "AUROC: of a grasp that succeeded and one that failed, how often the first has the"
@@ -33,7 +34,7 @@ def margin_section(judged: Judgement) -> Html | None:
         " intervals; line: the monotone curve that fits best; dashes: all of them."
     )
     return section(
-        "Do margins predict success?",
+        f"Do margins predict {success_of(comparison)}?",
         text,
         element("div", *plots, class_="charts plots"),
         table(head, rows, numbers=range(1, len(head)), style="figures"),

@@ -101,13 +101,18 @@ def _about(c: Comparison) -> str:
 def _lead(c: Comparison) -> Html:
     found = c.judgement.selected
     entries: list[tuple[str, Child, str]] = [
-        _tile("Right verdicts", found.accuracy, "accuracy"),
+        _tile("Same verdict" if c.kind == "runs" else "Right verdicts", found.accuracy, "accuracy"),
         _tile("Precision", found.precision, "precision"),
         _tile("Recall", found.recall, "recall"),
         _tile("Matthews correlation", found.matthews, "matthews"),
         _tile("Cohen's kappa", found.kappa, "kappa"),
     ]
-    first = " (first simulator)" if c.kind == "simulators" else ""
+    what, whose = "trials", "of the selected trials"
+    if c.kind == "simulators":
+        whose += " (first simulator)"
+    elif c.kind == "runs":
+        what = "grasps"
+        whose = "of the first run, with the second run in the place of what happened"
     return element(
         "div",
         element(
@@ -116,9 +121,8 @@ def _lead(c: Comparison) -> Html:
         tiles(entries),
         element(
             "p",
-            f"Figures of the selected trials{first}, with 95 % intervals that take trials as"
-            " independent; trials on one object are alike, so that for other objects the range is"
-            " wider.",
+            f"Figures {whose}, with 95 % intervals that take {what} as independent; {what} on one"
+            " object are alike, so that for other objects the range is wider.",
             class_="note",
         ),
     )
@@ -143,14 +147,15 @@ def _sections(c: Comparison, photos: Path | None) -> list[Html | None]:
     if c.other is not None:
         judged = [("first", c.judgement), ("second", c.other)]
     parts = [*agreement_sections(c), matrix_section(c, judged), _difference(c)]
-    parts.append(figure_section(judged))
+    parts.append(figure_section(c, judged))
     for name, judgement in judged:
         parts += [_named(part, name) for part in _of_one(c, judgement, photos)]
     return parts
 
 
 def _of_one(c: Comparison, judgement: Judgement, photos: Path | None) -> list[Html | None]:
-    text = "Share of right verdicts, precision and recall, with 95 % intervals."
+    right = "verdicts that are the same in both runs" if c.kind == "runs" else "right verdicts"
+    text = f"Share of {right}, precision and recall, with 95 % intervals."
     of = of_selected(c)
     parts = [
         group_section(f"By object{of}", text, "object", judgement.objects),
@@ -158,8 +163,8 @@ def _of_one(c: Comparison, judgement: Judgement, photos: Path | None) -> list[Ht
         if len(judgement.scenes) > 1
         else None,
         placement_section(judgement, of),
-        margin_section(judgement),
-        stopped_section(judgement, of),
+        margin_section(c, judgement),
+        stopped_section(c, judgement, of),
         case_section(c, judgement, photos),
         outcome_section(c, judgement),
     ]
@@ -192,6 +197,8 @@ def _settings(c: Comparison) -> Html:
     """What was compared, what was left out, in what runs differ."""
     facts: list[tuple[str, str]] = []
     sides = [("predictions", c.first), ("second simulation", c.second), ("truth", c.reference)]
+    if c.kind == "runs":
+        sides = [("first run", c.first), ("second run", c.reference)]
     facts += [(name, _side(side)) for name, side in sides if side is not None]
     v = c.coverage
     facts.append(("compared", format_count(v.compared)))
