@@ -156,7 +156,7 @@ def _figure(
 
 RANKED = (
     *("id", "instance", "object", "outcome", "clearance", "slip", "tilt", "others_moved"),
-    *("patch_area", "score"),
+    *("patch_area", "score", "confidence", "judged_again"),
 )
 """Columns that `best_rows` asks for."""
 
