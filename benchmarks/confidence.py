@@ -11,10 +11,10 @@ the object 1 % larger or smaller, the lift 0.7 or 1.4 times as long; and, where 
 oracle's, by the oracle. A verdict, held to the end or not, is confirmed in as many of these as give
 the same.
 
-Half of the objects are held out. `--fit` fits the curves of `simulation.confidence` to the others,
-and writes them. Then, in any case, what the package says of each verdict is held against how often
-it was confirmed: expected calibration error over ten bins of as many grasps each, by worlds and by
-the oracle. `--plot` draws that of the held-out objects.
+More than half of the objects are held out. `--fit` fits the curves of `simulation.confidence` to
+the others, and writes them. Then, in any case, what the package says of each verdict is held
+against how often it was confirmed: expected calibration error over ten bins of as many grasps each,
+by worlds and by the oracle. `--plot` draws that of the held-out objects.
 
 FOLDER keeps the libraries, the grasps and a journal (trials.jsonl): a run that was interrupted goes
 on where it was. After a change of trials take a new folder.

@@ -99,4 +99,4 @@ def settled_line(run: Run) -> str:
     details = ", ".join(f"{n} from {what}" for what, n in changed.most_common())
     text += f" ({details})" if details else ""
     close = sum(v.confidence is not None and v.confidence < CONTESTED for v in again)
-    return f"{text}; {close} are close for it, too" if close else text
+    return f"{text}; close for it, too: {close}" if close else text

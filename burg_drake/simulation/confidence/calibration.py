@@ -3,8 +3,8 @@
 Confidence is the probability that the same question, held to the end or not, is answered alike by
 trials that differ by what nobody knows exactly (friction, place of the hand, size of the object,
 duration of the lift) and by an oracle that shares no code with the engines. Each engine has curves
-of its own, for what it holds and for what it loses. `benchmarks/confidence.py` fits them, on half
-of its objects, and writes `calibration.json`; the other half says how far they can be trusted.
+of its own, for what it holds and for what it loses. `benchmarks/confidence.py` fits them, on some
+of its objects, and writes `calibration.json`; the others say how far they can be trusted.
 """
 
 from __future__ import annotations

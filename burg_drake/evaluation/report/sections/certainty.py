@@ -42,10 +42,10 @@ def certainty_section(summary: Summary, contested: Sequence[str] = ()) -> Html |
     if len(tried) > 1:
         rows.append(_row(summary.total, bool(settled), "total"))
     text = (
-        "Executed grasps. Contested are those of which it has a confidence below"
-        f" {CONTESTED:g} whether the object is held to the end: where friction, place, shape or the"
-        " speed of the lift are slightly other, some of them end the other way. How near others are"
-        " to a limit of turning or disturbing, the margins tell."
+        "Of the executed grasps, those are contested whose object is said to be held, or lost, with"
+        f" a confidence below {CONTESTED:g}: with friction, place, shape or speed of the lift"
+        " slightly other, some of them end the other way. How near the others are to a limit of"
+        " turning or disturbing is among the margins."
     )
     if settled:
         text += f" Settled by {', '.join(summary.settled_by)}, whose verdict counts:"
