@@ -5,13 +5,11 @@ from __future__ import annotations
 import ast
 import re
 import sys
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Iterator
 
 from tests.imports import Package
 
-MOST = 15
-"""Modules in a folder."""
 MOST_PARAMETERS = 9
 """Of a function; what takes more takes a settings object."""
 CAMEL_CASE = re.compile(r"[A-Z][a-z]\w*")
@@ -129,12 +127,6 @@ def defined_twice(house: Package) -> list[str]:
         and not name.startswith("_")
         and not all((name, module) in variables for module in where)
     ]
-
-
-def crowded(house: Package) -> list[str]:
-    """Folders with too many modules."""
-    counts = Counter(module.rpartition(".")[0] for module in house.modules)
-    return [f"{package} has {n} modules" for package, n in counts.items() if n > MOST]
 
 
 def many_parameters(house: Package) -> list[str]:

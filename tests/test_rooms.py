@@ -14,7 +14,6 @@ import pytest
 from tests.imports import HOUSE, Import, Package
 from tests.rules import (
     beside_faces,
-    crowded,
     defined_twice,
     eager,
     imports_drake,
@@ -102,10 +101,6 @@ def test_faces_show_what_others_use() -> None:
 
 def test_one_name_means_one_thing() -> None:
     assert defined_twice(HOUSE) == []
-
-
-def test_folders_are_not_crowded() -> None:
-    assert crowded(HOUSE) == []
 
 
 def test_functions_take_few_parameters() -> None:
@@ -264,11 +259,6 @@ def test_a_type_that_is_repeated_is_found(tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ["_Ball = int | None", "BALL = 1", 'Ball = TypeVar("Ball")'])
 def test_what_is_private_or_stands_for_any_type_may_be_repeated(tmp_path: Path, text: str) -> None:
     assert defined_twice(built(tmp_path, a_in_low=text, b_in_high=text)) == []
-
-
-def test_a_crowded_folder_is_found(tmp_path: Path) -> None:
-    house = built(tmp_path, **{f"m{k}_in_low": "" for k in range(16)})
-    assert crowded(house) == ["house.low has 16 modules"]
 
 
 def test_long_lists_of_parameters_are_found(tmp_path: Path) -> None:
