@@ -144,6 +144,30 @@ def test_contacts_have_drakes_friction(trial: MujocoTrial) -> None:
     assert found[frozenset(("table", "box"))] == pytest.approx(2 * own * table / (own + table))
 
 
+def test_pads_end_where_the_real_ones_do(trial: MujocoTrial) -> None:
+    """The rubber of the Panda's finger: 17.5 x 15.2 x 18.5 mm (franka_ros, franka_hand.xacro)."""
+    model = trial.world.model
+    ends = []
+    for k in range(model.ngeom):
+        if model.geom(k).name.startswith("hand sphere panda_leftfinger"):
+            center, radius = model.geom_pos[k], model.geom_size[k, 0]
+            ends += [center - radius, center + radius]
+    low, high = np.min(ends, axis=0), np.max(ends, axis=0)
+    np.testing.assert_allclose((high - low)[[0, 2]], PAD, atol=1e-9)
+    middle = np.array((0.0, 0.00758, 0.04525))
+    np.testing.assert_allclose(((low + high) / 2)[[0, 2]], middle[[0, 2]], atol=1e-9)
+    assert low[1] == pytest.approx(middle[1] - 0.0152 / 2, abs=2e-5)
+
+
+def test_tips_that_the_screen_calls_clear_do_not_touch_the_table(make_scene) -> None:
+    """Tips end 9.5 mm below the grasp frame, here 0.2 mm above the table."""
+    settings = replace(lifting(0.1, 0.7), approach=True)
+    trial = MujocoTrial(make_scene(("bar", 0.3, 0.2, 0.0)), make_station(), settings=settings)
+    result = trial.run("bar", from_above(0.0097), friction=0.5)
+    assert result.margins.clearance == pytest.approx(2e-4, abs=1e-5)
+    assert (result.outcome, result.touched) == (Outcome.LIFTED, "")
+
+
 # --- symmetry and identity ------------------------------------------------------------------------
 
 GRASPS = [CENTRE, from_above(0.06, y=0.01, yaw=0.1), from_above(0.065, y=0.035)]

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 import trimesh
 
+from burg_drake.core import transform_points
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.paths.resources import resolve
+from burg_drake.export.mjcf.hand import pad_spheres
 from burg_drake.objects.library.document import LibraryDocument, ObjectLibrary
 from burg_drake.scene.document.scene import Board, Scene, SceneDocument
 from burg_drake.station.diagram.builder import build_station_diagram
@@ -120,22 +122,27 @@ def test_where_links_and_their_masses_are(tmp_path: Path) -> None:
         assert finger.front.stiffness == pytest.approx(1e7 / 0.005)
 
 
-def test_a_convex_mesh_has_the_front_that_it_has(tmp_path: Path) -> None:
-    """It is widest in its middle, and narrows to a front on either side."""
+def test_a_mesh_pad_has_the_front_and_the_spheres_that_fit_it(tmp_path: Path) -> None:
+    """The pad is widest in its middle, and narrows to a front on either side."""
     corners = [(y, z) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]
     points = [(0.0, 0.012 * y, 0.015 * z) for y, z in corners]
     points += [(x, 0.010 * y, 0.012 * z) for x in (-0.005, 0.005) for y, z in corners]
-    trimesh.PointCloud(points).convex_hull.export(tmp_path / "pad.obj")
+    pad = trimesh.PointCloud(points).convex_hull
+    pad.export(tmp_path / "pad.obj")
     shape = (
         "<mesh xmlns:drake='http://drake.mit.edu'><uri>pad.obj</uri><drake:declare_convex/></mesh>"
     )
     found = described(pincer(tmp_path, shape))
     for finger in found.fingers:
         assert sorted(finger.front.size) == pytest.approx([0.020, 0.024])
-        half = np.array(finger.front.size) / 2
-        asked = half * [(0.0, 0.0), (0.9, 0.9), (1.1, 0.0), (0.0, -1.1)]
-        assert finger.front.contains(asked).tolist() == [True, True, False, False]
         assert finger.front.stiffness == pytest.approx(1e7 / 0.005)
+        centers, radii = pad_spheres(finger.front)
+        center_of_pad = (0.0, 0.0, -0.005)
+        spheres = transform_points(finger.front.X_BP, centers - center_of_pad)
+        depth = np.einsum("fi,sfi->sf", pad.face_normals, pad.triangles[:, 0] - spheres[:, None])
+        np.testing.assert_array_less(radii, depth.min(axis=1) + 1e-9)
+        np.testing.assert_allclose(centers[:, 2], -radii)
+        assert len(radii) >= 36
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from burg_drake.core import Array, make_pose
 from burg_drake.export.mjcf.bodies import add_body
@@ -32,8 +33,9 @@ objects weigh a hundred g."""
 FEWEST, SPHERE_PITCH, MOST = 6, 0.0035, 12
 """Spheres along a side of a pad, at least and at most, and their distance in between [m]. 8 x 8 on
 the Panda's give as many verdicts of the oracle as 6 x 6."""
-RADIUS = 0.002
-"""Of the spheres [m]; with 2 to 6 mm as many verdicts are the oracle's."""
+SPHERE_RADIUS, MIN_SPHERE_RADIUS = 0.002, 1e-5
+"""Of the spheres [m], smaller where the pad ends; with 2 to 6 mm as many verdicts are
+the oracle's."""
 BACKING = 0.002
 """How far behind the spheres' fronts the rigid backing begins [m]. At 0.5 mm objects that turn
 between the pads meet it, and are held by it."""
@@ -180,22 +182,28 @@ def add_hand(
     _add_servos(root, parts, joints)
 
 
-def pad_sphere_centers(front: PadFront) -> Array:
-    """(N, 3) of the spheres of a pad in its frame P [m]: each amid its share of the front."""
-    radius = sphere_radius(front)
+def pad_spheres(front: PadFront) -> tuple[Array, Array]:
+    """Spheres of a pad: one amid each share of the front, touching its plane from behind.
+
+    Those at the rim are smaller, so that none sticks out of the pad: the screen of the open hand
+    takes the pad as it is, and what it calls clear must be clear here.
+
+    Returns:
+        Their centers (N, 3) in the pad's frame P and radii (N,) [m].
+    """
     x, y = (
         ((np.arange(n) + 0.5) / n - 0.5) * side
         for side in front.size
         for n in (min(max(FEWEST, math.ceil(side / SPHERE_PITCH - 1e-9)), MOST),)
     )
     grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-    grid = grid[front.contains(grid)]
-    return np.column_stack([grid, np.full(len(grid), -radius)])
-
-
-def sphere_radius(front: PadFront) -> float:
-    """Radius of the spheres [m]."""
-    return min(RADIUS, front.thickness / 2)
+    # Of a sphere that touches the plane z = 0 at (x, y), centered at -r: n (x, y, -r) + d <= -r.
+    planes = ConvexHull(front.corners).equations
+    sides = planes[planes[:, 2] < 1 - 1e-6]
+    room = -(grid @ sides[:, :2].T + sides[:, 3]) / (1 - sides[:, 2])
+    radii = np.minimum(room.min(axis=1), SPHERE_RADIUS)
+    grid, radii = grid[radii > MIN_SPHERE_RADIUS], radii[radii > MIN_SPHERE_RADIUS]
+    return np.column_stack([grid, -radii]), radii
 
 
 def pad_contact(front: PadFront, mobility: float, step: float) -> tuple[tuple[float, float], float]:
@@ -214,7 +222,7 @@ def pad_contact(front: PadFront, mobility: float, step: float) -> tuple[tuple[fl
         Stiffness and damping of `solref`, and the impedance of `solimp`.
     """
     rate = STEPS_IN_PERIOD / step
-    share = front.area / len(pad_sphere_centers(front))
+    share = front.area / len(pad_spheres(front)[1])
     regularization = rate**2 / (front.stiffness * share)
     d = mobility / (mobility + regularization)
     return (-d * rate**2, -d * PAD_DAMPING * rate**2), d
@@ -234,10 +242,9 @@ def _add_link(parent: Element, asset: Element, link: HandLink, X_PB: Array) -> E
 
 def _add_pad(body: Element, asset: Element, link: str, pad: HandShape, front: PadFront) -> None:
     """Soft spheres along the front, and what is rigid behind them."""
-    radius = sphere_radius(front)
-    for k, center in enumerate(pad_sphere_centers(front)):
+    for k, (center, radius) in enumerate(zip(*pad_spheres(front), strict=True)):
         X_BS = front.X_BP @ make_pose(p_AB=center)
-        _add_geom(body, f"{SPHERE} {link} {k}", X_BS, type="sphere", size=repr(radius))
+        _add_geom(body, f"{SPHERE} {link} {k}", X_BS, type="sphere", size=repr(float(radius)))
     if front.thickness > 2.0 * BACKING:
         corners = front.corners.copy()
         corners[:, 2] = np.minimum(corners[:, 2], -BACKING)

@@ -26,7 +26,6 @@ class PadFront:
         X_BP: (4, 4) frame P in the middle of the smallest rectangle about the front, with the axes
             x and y along its sides and z out of the pad.
         size: extents of the rectangle along x and y [m].
-        outline: (N, 2) corners of the front in P, counter-clockwise [m].
         area: of the front [m^2].
         stiffness: pressure over depth [N/m^3].
         thickness: of the pad, behind the front [m].
@@ -35,18 +34,10 @@ class PadFront:
 
     X_BP: Array
     size: tuple[float, float]
-    outline: Array
     area: float
     stiffness: float
     thickness: float
     corners: Array
-
-    def contains(self, points: Array) -> Array:
-        """(K,) whether points (K, 2) in P are on the front."""
-        ahead = np.roll(self.outline, -1, axis=0) - self.outline
-        to_point = points[:, None] - self.outline
-        cross = ahead[:, 0] * to_point[..., 1] - ahead[:, 1] * to_point[..., 0]
-        return np.asarray((cross >= -FLAT * np.linalg.norm(ahead, axis=1)).all(axis=1))
 
 
 def pad_front(
@@ -102,7 +93,6 @@ def pad_front(
     return PadFront(
         X_BP=X_BP,
         size=(float(high[0] - low[0]), float(high[1] - low[1])),
-        outline=(outline - middle) @ R.T,
         area=float(area),
         stiffness=float(modulus * inside[first] / inside.max() / depth[first]),
         thickness=float(depth.max()),
