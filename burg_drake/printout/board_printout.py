@@ -205,7 +205,7 @@ def _needed(
     lower, upper = points.min(axis=0), points.max(axis=0)
     inner = np.array(paper.lower), np.array(size) - paper.margin
     for drawing in drawings:
-        for outline in drawing.outline:
+        for outline in (*drawing.outline, *drawing.raised):
             lower = np.minimum(lower, np.maximum(outline.min(axis=0), inner[0]))
             upper = np.maximum(upper, np.minimum(outline.max(axis=0), inner[1]))
     return lower, upper

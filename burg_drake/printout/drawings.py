@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from burg_drake.core import Array
 from burg_drake.core.terminal import Rgb
 from burg_drake.printout.outlines import mask_outlines
-from burg_drake.printout.projection import Grid, Layer
+from burg_drake.printout.projection import Grid, Layer, area_above, lowest_of
 from burg_drake.printout.relief import instance_hue, projected_layers
 from burg_drake.printout.tints import DARKEST, LIGHTEST, height_at, tint
 from burg_drake.scene.document import IN_BOUNDS_TOLERANCE, Scene, placed_vertices
@@ -25,6 +25,8 @@ TOUCHING = 1e-3
 OUTLINE_LUMA = 0.45
 FOOTPRINT_LUMA = 0.30
 """Luma of the lines around an object and around where it touches the sheet."""
+OUTLINE_DASHES = (0.0, 4e-3, 1.5e-3)
+"""Lengths of the dashes of outlines in turn [m], which tell objects apart in a grey print."""
 ON_BLACK_LUMA = 0.50
 """Luma of both on black cells."""
 ARROW_INSET = 0.022
@@ -47,6 +49,8 @@ class Drawing:
         footprint: around where it touches the sheet, in `footprint_color`.
         on_black: colour of both lines on black cells.
         fixed: whether it belongs to the background.
+        dash: length of the dashes of the outline [m]; 0 of one that is drawn through.
+        raised: around the part that lies above other objects, which covers none of the sheet.
     """
 
     name: str
@@ -59,6 +63,8 @@ class Drawing:
     footprint_color: Rgb
     on_black: Rgb
     fixed: bool
+    dash: float = 0.0
+    raised: Polygons = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -79,36 +85,52 @@ class Arrow:
 
 def draw_objects(scene: Scene) -> list[Drawing]:
     """The objects of a scene as they are drawn, free ones first; without those wholly beyond the
-    board or above others."""
+    board. Of what lies above other objects there is an outline alone."""
     layers = projected_layers(scene, Grid(scene.board.size, FINENESS))
-    return [_drawing(scene, name, layer) for name, layer in layers.items() if layer.covered.any()]
+    lowest = dict(zip(layers, lowest_of([*layers.values()]), strict=True))
+    return [
+        _drawing(scene, name, layers, lowest[name])
+        for name, layer in layers.items()
+        if layer.covered.any()
+    ]
 
 
-def _drawing(scene: Scene, name: str, layer: Layer) -> Drawing:
+def _drawing(scene: Scene, name: str, layers: dict[str, Layer], lowest: Layer) -> Drawing:
+    whole, number = layers[name], list(layers).index(name)
     hue, fixed = instance_hue(scene, name), name in scene.background
     lumas = DARKEST + (LIGHTEST - DARKEST) * (np.arange(BANDS) + 0.5) / BANDS
     tops = height_at(DARKEST + (LIGHTEST - DARKEST) * np.arange(1, BANDS) / BANDS)
-    outline = mask_outlines(layer, layer.covered)
+    outline = mask_outlines(lowest, lowest.covered)
     bands = [(_rgb(hue, lumas[-1]), outline)]
     for k in range(BANDS - 1)[::-1]:
-        area = mask_outlines(layer, layer.height < tops[k], BAND_SMOOTHING)
+        area = mask_outlines(lowest, lowest.height < tops[k], BAND_SMOOTHING)
         if area:
             bands.append((_rgb(hue, lumas[k]), area))
     notes = ["fixed"] if fixed else []
-    if layer.lowest > TOUCHING:
-        notes.append(f"{1e3 * layer.lowest:.0f} mm up")
+    if whole.covered.sum() > 2 * lowest.covered.sum():
+        notes.append(f"on {_supporter(name, layers)}")
+    if whole.lowest > TOUCHING:
+        notes.append(f"{1e3 * whole.lowest:.0f} mm up")
     return Drawing(
         name=name,
         words=name + (f" ({', '.join(notes)})" if notes else ""),
-        layer=layer,
+        layer=lowest if outline else whole,
         bands=tuple(bands),
         outline=outline,
         outline_color=_rgb(hue, OUTLINE_LUMA),
-        footprint=mask_outlines(layer, layer.height < TOUCHING),
+        footprint=mask_outlines(lowest, lowest.height < TOUCHING),
         footprint_color=_rgb(hue, FOOTPRINT_LUMA),
         on_black=_rgb(hue, ON_BLACK_LUMA),
         fixed=fixed,
+        dash=OUTLINE_DASHES[number % len(OUTLINE_DASHES)],
+        raised=mask_outlines(whole, whole.covered & ~lowest.covered),
     )
+
+
+def _supporter(name: str, layers: dict[str, Layer]) -> str:
+    """The object above which most of another lies."""
+    others = [other for other in layers if other != name]
+    return max(others, key=lambda other: area_above(layers[name], layers[other]))
 
 
 def _rgb(hue: Rgb, luma: float) -> Rgb:

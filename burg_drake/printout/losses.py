@@ -23,9 +23,10 @@ def margin_losses(sheet: Sheet, tiling: Tiling) -> list[str]:
     lost = []
     for tile in tiling.tiles:
         for drawing in sheet.drawings:
-            if drawing.name in beyond or not drawing.outline:
+            loops = [*drawing.outline, *drawing.raised]
+            if drawing.name in beyond or not loops:
                 continue
-            points = _between_cuts(np.concatenate(drawing.outline), tile)
+            points = _between_cuts(np.concatenate(loops), tile)
             if not len(points):
                 continue
             below = np.array(tile.lower) - points.min(axis=0)
@@ -47,7 +48,7 @@ def printer_losses(sheet: Sheet, tiling: Tiling) -> list[str]:
     lower = np.full(2, USUAL_MARGIN)
     upper = np.array([paper.width, paper.height]) - USUAL_MARGIN
     corners = [c[:, :2] for c in sheet.layout.p_SQ]
-    outlines = [loop for d in sheet.drawings for loop in d.outline]
+    outlines = [loop for d in sheet.drawings for loop in (*d.outline, *d.raised)]
     lost = []
     for tile in tiling.tiles:
         shown = np.array([tile.lower, tile.upper]) + tile.p_PS

@@ -50,10 +50,12 @@ class Pen:
         self._stroke(width, color, dash)
         self.canvas.drawPath(self._path([np.array(points)], closed=False), stroke=1, fill=0)
 
-    def outline(self, polygons: Sequence[Array], width: float, color: Rgb) -> None:
+    def outline(
+        self, polygons: Sequence[Array], width: float, color: Rgb, dash: float = 0.0
+    ) -> None:
         """Draws around areas."""
         if polygons:
-            self._stroke(width, color)
+            self._stroke(width, color, dash)
             self.canvas.drawPath(self._path(polygons), stroke=1, fill=0)
 
     def area(self, polygons: Sequence[Array], color: Rgb, *, holes: bool = True) -> None:

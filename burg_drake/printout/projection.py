@@ -107,22 +107,33 @@ def lowest_of(layers: list[Layer]) -> list[Layer]:
     return [_seen_below(layer, [o for o in layers if o is not layer]) for layer in layers]
 
 
+def area_above(layer: Layer, other: Layer) -> int:
+    """Pixels in which a layer lies above another one."""
+    mine, its = _shared(layer, other)
+    return int((other.height[its] < layer.height[mine]).sum())
+
+
 def _seen_below(layer: Layer, others: list[Layer]) -> Layer:
     height = layer.height.copy()
     for other in others:
-        top, left = max(layer.row, other.row), max(layer.column, other.column)
-        bottom = min(layer.window[0].stop, other.window[0].stop)
-        right = min(layer.window[1].stop, other.window[1].stop)
-        if bottom <= top or right <= left:
-            continue
-        mine = np.s_[
-            top - layer.row : bottom - layer.row, left - layer.column : right - layer.column
-        ]
-        its = np.s_[
-            top - other.row : bottom - other.row, left - other.column : right - other.column
-        ]
+        mine, its = _shared(layer, other)
         height[mine][other.height[its] < layer.height[mine]] = np.inf
     return dataclasses.replace(layer, height=height)
+
+
+def _shared(layer: Layer, other: Layer) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+    """The part of the grid that two layers share, in the pixels of the one and of the other."""
+    top, left = max(layer.row, other.row), max(layer.column, other.column)
+    bottom = max(top, min(layer.window[0].stop, other.window[0].stop))
+    right = max(left, min(layer.window[1].stop, other.window[1].stop))
+
+    def window(one: Layer) -> tuple[slice, slice]:
+        return (
+            slice(top - one.row, bottom - one.row),
+            slice(left - one.column, right - one.column),
+        )
+
+    return window(layer), window(other)
 
 
 def _paint(height: NDArray[np.float32], corners: Array, shape: tuple[int, int]) -> None:

@@ -68,7 +68,7 @@ def height_map(scene: SceneLike, resolution: float = RESOLUTION) -> HeightMap:
     height = np.full(grid.shape, np.nan, dtype=np.float32)
     instance = np.full(grid.shape, -1, dtype=np.int16)
     image = np.full((*grid.shape, 3), 255, dtype=np.uint8)
-    for k, (name, layer) in enumerate(layers.items()):
+    for k, (name, layer) in enumerate(zip(layers, lowest_of([*layers.values()]), strict=True)):
         seen = layer.covered
         height[layer.window][seen] = layer.height[seen]
         instance[layer.window][seen] = k
@@ -78,13 +78,13 @@ def height_map(scene: SceneLike, resolution: float = RESOLUTION) -> HeightMap:
 
 
 def projected_layers(scene: Scene, grid: Grid) -> dict[str, Layer]:
-    """What each instance shows on the sheet, by name: its lowest surface where nothing is below."""
+    """The lowest surface of each instance over the sheet, by name, free ones first."""
     layers = {}
     for name in (*scene.instances, *scene.background):
         surface = scene.library.surface(scene.instance(name).object)
         p_SV = transform_points(scene.X_SO(name), surface.vertices)
         layers[name] = lowest_surface(grid, p_SV, surface.faces)
-    return dict(zip(layers, lowest_of(list(layers.values())), strict=True))
+    return layers
 
 
 def instance_hue(scene: Scene, name: str) -> Rgb:

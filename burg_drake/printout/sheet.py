@@ -45,6 +45,8 @@ NAME_CLEAR = 1e-3
 LEAST_PART = 0.5e-4
 """Of an object on another page that has its name, too [m^2]."""
 OUTLINE_WIDTH, FOOTPRINT_WIDTH = 0.2e-3, 0.4e-3
+RAISED_DASH = 0.8e-3
+"""Of outlines of what lies above other objects [m]."""
 EDGE_CLEAR = 1.0e-3
 """Distance of the objects' lines from the edges of markers [m], where gaps and cells are wide
 enough."""
@@ -248,8 +250,11 @@ def _draw_outlines(pen: Pen, sheet: Sheet) -> None:
         pen.clip([board, *outer, *inner])
         pen.clip(cells if on_black else [board, *cells])
         for d in sheet.drawings:
-            pen.outline(d.outline, OUTLINE_WIDTH, d.on_black if on_black else d.outline_color)
-            pen.outline(d.footprint, FOOTPRINT_WIDTH, d.on_black if on_black else d.footprint_color)
+            color = d.on_black if on_black else d.outline_color
+            pen.outline(d.outline, OUTLINE_WIDTH, color, d.dash)
+            dark = d.on_black if on_black else d.footprint_color
+            pen.outline(d.raised, OUTLINE_WIDTH, dark, RAISED_DASH)
+            pen.outline(d.footprint, FOOTPRINT_WIDTH, dark)
         pen.canvas.restoreState()
 
 

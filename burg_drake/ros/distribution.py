@@ -22,7 +22,9 @@ ROS_1_HINT = (
     " python3-rospy python3-sensor-msgs python3-geometry-msgs python3-tf2-msgs"
 )
 ROS_2_HINT = (
-    "for ROS 2 source /opt/ros/jazzy/setup.bash, and install burg_drake for the same Python"
+    "for ROS 2 source /opt/ros/jazzy/setup.bash, and install burg_drake for the same Python; or, on"
+    " Linux with Python 3.11, run: pip install 'ros-rclpy[fastrtps]' ros-sensor-msgs"
+    " ros-geometry-msgs ros-std-msgs"
 )
 
 
@@ -69,6 +71,8 @@ def connect(version: int, names: Names, *, with_camera_info: bool) -> Link:
         from burg_drake.ros.ros2 import Ros2Link
 
         return Ros2Link(names, with_camera_info=with_camera_info)
+    except MissingDependencyError:
+        raise
     except ImportError as error:
         raise MissingDependencyError(f"{error}. {_advice([version])}") from error
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from burg_drake.core import InvalidInputError
+from burg_drake.core import InvalidInputError, MissingDependencyError
 from burg_drake.ros.board_node import Sighting
 from burg_drake.ros.messages import (
     MessageClasses,
@@ -112,6 +112,11 @@ class Publications:
         self._status = advertise("~/status", classes.String, QUEUE)
         self._frames = None
         if names.parent is not Parent.NONE:
+            if classes.TFMessage is None:
+                raise MissingDependencyError(
+                    "tf2_msgs is not installed, which the board's frame on tf needs; install it, or"
+                    " give --tf-parent none"
+                )
             self._frames = advertise("/tf", classes.TFMessage, TF_QUEUE)
 
     def publish(self, sighting: Sighting, draw: Callable[[Sighting], Any]) -> None:

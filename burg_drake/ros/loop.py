@@ -39,6 +39,8 @@ class StatusLog:
     def record_image(self, sighting: Sighting, now: float) -> tuple[str, bool] | None:
         """After an image: a line and whether it is a warning, or None."""
         self._last_image, self._hinted = now, False
+        if not self._images:
+            self._since = now
         self._images += 1
         self._poses += sighting.estimate.valid
         reason = "" if sighting.estimate.valid else sighting.estimate.reason
@@ -64,10 +66,14 @@ class StatusLog:
             return f"nobody publishes {' and '.join(silent)}; is the camera running? Still waiting"
         return f"no images on {next(iter(publishers))}, though it is published; still waiting"
 
-    def rate(self, now: float) -> str | None:
-        """Now and then: how many images a second, and how many with a pose."""
+    def rate(self, now: float, *, last: bool = False) -> str | None:
+        """Images answered a second, and how many of them with a pose.
+
+        None while the time since the last such line is less than RATE_EVERY, unless this is the
+        last one; and without images.
+        """
         elapsed = now - self._since
-        if elapsed < RATE_EVERY or not self._images:
+        if not self._images or elapsed <= 0.0 or not (last or elapsed >= RATE_EVERY):
             return None
         line = (
             f"{self._images / elapsed:.1f} images a second,"
@@ -81,6 +87,15 @@ def serve(link: Link, node: BoardNode) -> None:
     """Answers every image until ROS or Ctrl-C ends it. While one is being worked at, newer ones
     replace each other: the latest is next."""
     account = StatusLog(time.monotonic())
+    try:
+        _answer(link, node, account)
+    finally:
+        rate = account.rate(time.monotonic(), last=True)
+        if rate:
+            link.log(rate)
+
+
+def _answer(link: Link, node: BoardNode, account: StatusLog) -> None:
     while link.running():
         image = link.next_image(PATIENCE)
         if image is None:

@@ -23,6 +23,7 @@ class MessageClasses:
     """The messages of a ROS distribution.
 
     Attributes:
+        TFMessage: None where tf2_msgs is not installed.
         octets: makes of bytes what a field `uint8[]` takes.
     """
 
@@ -31,8 +32,8 @@ class MessageClasses:
     CameraInfo: type
     PoseWithCovarianceStamped: type
     TransformStamped: type
-    TFMessage: type
     String: type
+    TFMessage: Any
     octets: Callable[[bytes], Any]
 
 
@@ -45,7 +46,6 @@ def message_classes(octets: Callable[[bytes], Any]) -> MessageClasses:
     packages = {
         "sensor_msgs": ("Image", "CompressedImage", "CameraInfo"),
         "geometry_msgs": ("PoseWithCovarianceStamped", "TransformStamped"),
-        "tf2_msgs": ("TFMessage",),
         "std_msgs": ("String",),
     }
     found = {
@@ -53,6 +53,10 @@ def message_classes(octets: Callable[[bytes], Any]) -> MessageClasses:
         for package, names in packages.items()
         for name in names
     }
+    try:
+        found["TFMessage"] = importlib.import_module("tf2_msgs.msg").TFMessage
+    except ImportError:
+        found["TFMessage"] = None
     return MessageClasses(**found, octets=octets)
 
 

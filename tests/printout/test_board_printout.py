@@ -268,6 +268,28 @@ def test_what_is_beyond_the_board() -> None:
     assert red > 150 and green < 60 and blue < 60
 
 
+def test_what_stands_wholly_on_another() -> None:
+    """A can over a bowl has its name, and an outline: a circle across the bowl's tints."""
+    scene, at, height = load_scene("tabletop_twelve"), (0.3, 0.21), 0.1
+    below = Instance(name="below", object="bowl", X_SO=Pose((*at, 0.0)))
+    above = Instance(name="above", object="can", X_SO=Pose((*at, height)))
+    dpi, images = 200, {}
+    for instances in ((below,), (below, above)):
+        printout = print_board(changed(scene, instances=instances), PrintSettings(page="A2"))
+        (image,) = rasterised(printout.pdf, dpi)
+        images[len(instances)] = image.astype(int)
+    (text,) = words(printout.pdf)
+    assert f"above (on below, {1e3 * height:.0f} mm up)" in text
+    rows, columns = np.nonzero(np.abs(images[2] - images[1]) > 20)
+    u, v = printout.p_PQ(1, np.array(at)) / 0.0254 * dpi
+    distance = np.hypot(columns - u, image.shape[0] - rows - v) * 0.0254 / dpi
+    radius = scene.entry("can").upper[0]
+    drawn = np.abs(distance - radius) < 1.5e-3
+    assert drawn.sum() > 100
+    angle = np.arctan2(image.shape[0] - rows - v, columns - u)[drawn]
+    assert len(np.unique(np.round(angle / 0.2))) > 20  # all around
+
+
 @pytest.mark.parametrize(
     ("settings", "message"),
     [

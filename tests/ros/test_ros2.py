@@ -1,12 +1,17 @@
-"""The node of ROS 2, against a stand-in for rclpy: it shows that the node asks for what rclpy's
-documentation offers, not that rclpy does as documented."""
+"""The command `burg-drake ros` in a real ROS 2: rclpy and its messages from wheels, over Fast DDS.
+
+`tools/setup/test_programs.sh` installs the wheels, which there are for Python 3.11, in an
+environment of their own beside that of the tests.
+"""
 
 from __future__ import annotations
 
+import json
+import os
+import signal
+import subprocess
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass, field, fields
-from types import ModuleType, SimpleNamespace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,206 +20,98 @@ from numpy.typing import NDArray
 
 from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.core.arrays import Array
-from burg_drake.core.errors import MissingDependencyError
-from burg_drake.ros.board_node import BoardNode
-from burg_drake.ros.distribution import connect
-from burg_drake.ros.link import Names, Parent
-from burg_drake.ros.loop import serve
-from burg_drake.ros.messages import MessageClasses
+from burg_drake.core.frames import inverse, make_pose, rotation_angle, rotation_from_quaternion
+from tests.ros.test_ros1 import camera_info
 
-try:
-    import rclpy as installed
-except ImportError:
-    installed = None
-
-pytestmark = pytest.mark.skipif(installed is not None, reason="the real rclpy is here")
-PACKAGES = {
-    "sensor_msgs": ("Image", "CompressedImage", "CameraInfo"),
-    "geometry_msgs": ("PoseWithCovarianceStamped", "TransformStamped"),
-    "tf2_msgs": ("TFMessage",),
-    "std_msgs": ("String",),
-}
+ROS2_PYTHON = Path(__file__).parents[2] / ".venv-ros2" / "bin" / "python"
+CAMERA = Path(__file__).with_name("ros2_camera.py")
+HANG = 120.0  # seconds
+NODE = ("ros", "tabletop_six", "--tf-parent", "none")
 
 
-class ExternalShutdownException(Exception):
-    pass
-
-
-@dataclass(kw_only=True)
-class QoSProfile:
-    depth: int
-    reliability: str = "reliable"
-
-
-@dataclass
-class Publisher:
-    message_class: type
-    qos: QoSProfile
-    listeners: int
-    sent: list[Any] = field(default_factory=list)
-
-    def publish(self, message: Any) -> None:
-        assert isinstance(message, self.message_class)
-        self.sent.append(message)
-
-    def get_subscription_count(self) -> int:
-        return self.listeners
-
-
-@dataclass
-class Graph:
-    """What the stand-in's node knows: messages to come, and what became of them."""
-
-    to_come: list[tuple[str, Any]] = field(default_factory=list)
-    listeners: int = 1
-    publishers: dict[str, Publisher] = field(default_factory=dict)
-    subscriptions: dict[str, tuple[type, Callable[[Any], None], QoSProfile]] = field(
-        default_factory=dict
-    )
-    log: list[str] = field(default_factory=list)
-    ended: list[str] = field(default_factory=list)
-    name: str = ""
-
-    def create_publisher(self, message_class: type, topic: str, qos: QoSProfile) -> Publisher:
-        publisher = Publisher(message_class, qos, self.listeners)
-        self.publishers[topic] = publisher
-        return publisher
-
-    def create_subscription(
-        self, message_class: type, topic: str, callback: Any, qos: QoSProfile
-    ) -> None:
-        self.subscriptions[topic] = (message_class, callback, qos)
-
-    def count_publishers(self, topic: str) -> int:
-        return int(topic in self.subscriptions)
-
-    def get_logger(self) -> Any:
-        return SimpleNamespace(info=self.log.append, warning=self.log.append)
-
-    def destroy_node(self) -> None:
-        self.ended.append("node")
-
-
-@pytest.fixture
-def graph(monkeypatch: pytest.MonkeyPatch, ros2_classes: MessageClasses) -> Graph:
-    """An installation of ROS 2 in which nothing happens but what the test says."""
-    graph = Graph()
-
-    class SingleThreadedExecutor:
-        def add_node(self, node: Graph) -> None:
-            assert node is graph
-
-        def spin_once(self, timeout_sec: float) -> None:
-            assert timeout_sec > 0.0
-            if not graph.to_come:
-                graph.ended.append("outside")
-                raise ExternalShutdownException
-            topic, message = graph.to_come.pop(0)
-            graph.subscriptions[topic][1](message)
-
-        def shutdown(self) -> None:
-            graph.ended.append("executor")
-
-    def create_node(name: str) -> Graph:
-        graph.name = name
-        return graph
-
-    modules: dict[str, dict[str, Any]] = {
-        "rclpy": {
-            "init": lambda *, args, signal_handler_options: None,
-            "create_node": create_node,
-            "ok": lambda: "outside" not in graph.ended,
-            "try_shutdown": lambda: graph.ended.append("context"),
-        },
-        "rclpy.executors": {
-            "SingleThreadedExecutor": SingleThreadedExecutor,
-            "ExternalShutdownException": ExternalShutdownException,
-        },
-        "rclpy.qos": {
-            "QoSProfile": QoSProfile,
-            "ReliabilityPolicy": SimpleNamespace(BEST_EFFORT="best effort"),
-        },
-        "rclpy.signals": {"SignalHandlerOptions": SimpleNamespace(NO=0)},
+def environment() -> dict[str, str]:
+    """Of both processes: messages stay on this machine, and do not meet those of another test.
+    The packages of the running Python come along; those of ROS are in the other environment."""
+    packages = [path for path in sys.path if path and Path(path).is_dir()]
+    packages = [path for path in packages if path.endswith("-packages") or _has_package(path)]
+    return {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(packages),
+        "ROS_VERSION": "2",
+        "ROS_DOMAIN_ID": str(1 + os.getpid() % 100),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
     }
-    for package, names in PACKAGES.items():
-        modules[package] = {}
-        modules[f"{package}.msg"] = {name: getattr(ros2_classes, name) for name in names}
-    for name, content in modules.items():
-        module = ModuleType(name)
-        vars(module).update(content)
-        monkeypatch.setitem(sys.modules, name, module)
-    return graph
 
 
-@pytest.fixture
-def messages(
+def _has_package(folder: str) -> bool:
+    return (Path(folder) / "burg_drake").is_dir()
+
+
+@pytest.mark.parametrize(("reliability", "images"), [("reliable", 12), ("best_effort", 2)])
+def test_a_node_in_a_real_ros(
+    tmp_path: Path,
     picture: NDArray[np.uint8],
     intrinsics: Intrinsics,
-    image_message: Callable[..., Any],
-    info_message: Callable[..., Any],
-    ros2_classes: MessageClasses,
-) -> list[tuple[str, Any]]:
-    """A camera_info and an image, as they come in ROS 2: data are an array."""
-    image = image_message(ros2_classes.octets(picture.tobytes()), (480, 640), "rgb8", step=1920)
-    image.header.stamp = ros2_classes.Image().header.stamp
-    return [("/camera/camera_info", info_message(intrinsics)), ("/camera/image_raw", image)]
-
-
-def test_from_image_to_tf(graph: Graph, messages: list[Any], scene: Any, X_SC: Array) -> None:
-    graph.to_come = messages
-    stamp = messages[1][1].header.stamp
-    link = connect(2, Names(image="/camera/image_raw"), with_camera_info=True)
-    serve(link, BoardNode(scene))
-    link.close()
-
-    sent = {topic: publisher.sent for topic, publisher in graph.publishers.items()}
-    assert sorted(sent) == ["/tf", "~/camera_pose", "~/overlay", "~/overlay/compressed", "~/status"]
-    assert all(len(of_topic) == 1 for of_topic in sent.values())
-    position = sent["~/camera_pose"][0].pose.pose.position
-    assert [position.x, position.y, position.z] == pytest.approx(X_SC[:3, 3], abs=1e-3)
-    (transform,) = sent["/tf"][0].transforms
-    assert (transform.header.frame_id, transform.child_frame_id) == ("camera_optical", "board")
-    assert transform.header.stamp is stamp and sent["~/overlay"][0].header.stamp is stamp
-    assert " markers, " in sent["~/status"][0].data
-    assert graph.name == "burg_board"
-    assert "the board is in sight" in graph.log[0]
-    assert graph.ended == ["outside", "executor", "node", "context"]
-
-
-def test_the_latest_image_wins_and_any_camera_is_heard(
-    graph: Graph, ros2_classes: MessageClasses
+    X_SC: Array,
+    reliability: str,
+    images: int,
 ) -> None:
-    connect(2, Names(image="/camera/image_raw/compressed"), with_camera_info=True)
-    message_class, _, qos = graph.subscriptions["/camera/image_raw/compressed"]
-    assert message_class is ros2_classes.CompressedImage
-    assert (qos.depth, qos.reliability) == (1, "best effort")
-    assert graph.subscriptions["/camera/camera_info"][2].reliability == "best effort"
+    """Every image of a reliable camera is answered, although it comes in hundreds of packets."""
+    if not ROS2_PYTHON.exists():
+        pytest.skip(f"no ROS 2: there is no {ROS2_PYTHON.parents[1].name} (Python 3.11 only)")
+    picture_file = tmp_path / "picture.npy"
+    np.save(picture_file, picture)
+    info = camera_info(intrinsics)
+    lower = {k.lower(): [float(v) for v in info[k]] for k in "KDP"}
+    plain = {k: v for k, v in info.items() if k not in "KDP"}
+    info_file = tmp_path / "info.json"
+    info_file.write_text(json.dumps(plain | lower))
+    log = tmp_path / "node.log"
+    with log.open("w") as out:
+        node = subprocess.Popen(
+            [ROS2_PYTHON, "-m", "burg_drake.apps.cli", *NODE],
+            env=environment(),
+            stdout=out,
+            stderr=subprocess.STDOUT,
+        )
+        try:
+            shown = subprocess.run(
+                [
+                    ROS2_PYTHON,
+                    CAMERA,
+                    tmp_path / "picture.npy",
+                    info_file,
+                    reliability,
+                    str(images),
+                ],
+                env=environment(),
+                capture_output=True,
+                text=True,
+                timeout=HANG,
+                check=False,
+            )
+            node.send_signal(signal.SIGINT)
+            code = node.wait(HANG)
+        finally:
+            node.kill()
+            node.wait()
+    told = log.read_text()
+    assert shown.returncode == 0, (shown.stderr, told)
+    answers = json.loads(shown.stdout)
+    assert len(answers) == images
+    for answer in answers:
+        check_pose(answer, X_SC)
+        assert answer["overlay"] == [480, 640, "rgb8"]
+    assert code == 0 and "Traceback" not in told
+    assert "the board is in sight" in told
+    assert "images a second, 100 % with a pose" in told
+    assert ("with best effort" in told) == (reliability == "best_effort")
+    if reliability == "reliable":
+        assert [answer["sent"] for answer in answers] == [1] * images
 
 
-def test_nobody_listens(graph: Graph, messages: list[Any], scene: Any) -> None:
-    """No overlay is drawn then; and tf is left alone where that is wanted."""
-    graph.to_come, graph.listeners = messages, 0
-    names = Names(image="/camera/image_raw", parent=Parent.NONE)
-    serve(connect(2, names, with_camera_info=True), BoardNode(scene))
-    assert not graph.publishers["~/overlay"].sent
-    assert not graph.publishers["~/overlay/compressed"].sent
-    assert graph.publishers["~/camera_pose"].sent
-    assert "/tf" not in graph.publishers
-
-
-def test_images_without_a_frame_stay_off_tf(graph: Graph, messages: list[Any], scene: Any) -> None:
-    messages[1][1].header.frame_id = ""
-    graph.to_come = messages
-    serve(connect(2, Names(image="/camera/image_raw"), with_camera_info=True), BoardNode(scene))
-    assert graph.publishers["~/camera_pose"].sent and not graph.publishers["/tf"].sent
-
-
-def test_a_package_of_messages_is_missing(graph: Graph, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "tf2_msgs.msg", None)
-    with pytest.raises(MissingDependencyError, match=r"tf2_msgs.*For ROS 2 source"):
-        connect(2, Names(image="/camera/image_raw"), with_camera_info=True)
-
-
-def test_every_message_class_is_in_a_package() -> None:
-    named = {name for names in PACKAGES.values() for name in names}
-    assert named == {f.name for f in fields(MessageClasses)} - {"octets"}
+def check_pose(answer: dict[str, Any], X_SC: Array) -> None:
+    X_error = inverse(X_SC) @ make_pose(rotation_from_quaternion(answer["q_wxyz"]), answer["p"])
+    assert answer["frame"] == "board"
+    assert np.linalg.norm(X_error[:3, 3]) < 2e-4
+    assert rotation_angle(X_error[:3, :3]) < np.radians(0.02)

@@ -74,3 +74,11 @@ def test_rate() -> None:
     assert account.rate(0.9 * RATE_EVERY) is None
     assert account.rate(RATE_EVERY) == "2.0 images a second, 75 % with a pose"
     assert account.rate(RATE_EVERY + 1.0) is None
+
+
+def test_the_last_rate_counts_from_the_first_image() -> None:
+    account = StatusLog(0.0)
+    assert account.rate(9.0, last=True) is None
+    for number in range(10):
+        account.record_image(FOUND, 9.0 + 0.1 * number)
+    assert account.rate(10.0, last=True) == "10.0 images a second, 100 % with a pose"

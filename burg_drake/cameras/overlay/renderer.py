@@ -11,8 +11,8 @@ from burg_drake.cameras.optics import FieldOfView, Intrinsics
 from burg_drake.cameras.overlay.corrections import COLORS, Mark, PlacementVerdict, mark, ring
 from burg_drake.cameras.overlay.painting import Ink, fill, stroke
 from burg_drake.cameras.overlay.style import OverlayStyle
-from burg_drake.cameras.overlay.tag_layout import lay_out
-from burg_drake.cameras.overlay.text_tags import WHITE, notice, paste, tag
+from burg_drake.cameras.overlay.tag_layout import write_tags
+from burg_drake.cameras.overlay.text_tags import WHITE, notice, tag
 from burg_drake.cameras.placement import PlacementCheck
 from burg_drake.cameras.projection import (
     NOTHING,
@@ -200,10 +200,7 @@ class Overlay:
                 color = COLORS[note.verdict] if note else WHITE
                 plates.append(tag("  ".join(words), color, round(LETTERS * len(drawn))))
         if plates:
-            sizes = [(p[0].shape[1], p[0].shape[0]) for p in plates]
-            corners = lay_out(np.array(boxes), sizes, (drawn.shape[1], drawn.shape[0]))
-            for plate, corner in zip(plates, corners, strict=True):
-                paste(drawn, plate, corner)
+            write_tags(drawn, np.array(boxes), plates, owner != NOTHING)
 
 
 def instance_labels(scene: SceneLike, intrinsics: Intrinsics, X_SC: Array) -> NDArray[np.int16]:

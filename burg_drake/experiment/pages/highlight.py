@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from burg_drake.cameras.overlay import lay_out, paste, tag
+from burg_drake.cameras.overlay import tag, write_tags
 from burg_drake.core import Array, Bytes, inverse
 from burg_drake.experiment.pages.painting import Painting, Viewpoint
 from burg_drake.experiment.pages.scene_bodies import GROUND, HAND, PlacedBody
@@ -50,18 +50,17 @@ def with_names(
         marked: names that stand out.
     """
     image = painting.color.copy()
-    boxes, plates = [], []
+    boxes, plates, bodies = [], [], np.zeros(image.shape[:2], dtype=bool)
     for name in dict.fromkeys(one.name for one in placed if one.name not in (GROUND, HAND)):
-        rows, columns = np.nonzero(painting.shows(placed, name))
+        body = painting.shows(placed, name)
+        bodies |= body
+        rows, columns = np.nonzero(body)
         if len(rows) >= SEEN:
             boxes.append([[columns.min(), rows.min()], [columns.max(), rows.max()]])
             color = (255, 205, 120) if name in marked else (255, 255, 255)
             plates.append(tag(name, color, round(LETTERS * image.shape[0])))
     if plates:
-        sizes = [(p[0].shape[1], p[0].shape[0]) for p in plates]
-        corners = lay_out(np.array(boxes, float), sizes, (image.shape[1], image.shape[0]))
-        for plate, corner in zip(plates, corners, strict=True):
-            paste(image, plate, corner)
+        write_tags(image, np.array(boxes, float), plates, bodies)
     return image
 
 

@@ -121,7 +121,7 @@ def draw_plan(pen: Pen, tiling: Tiling, size: tuple[float, float], objects: list
         pen.area([rectangle(lower, upper)], shade)
         pen.outline([rectangle(lower, upper)], 0.25e-3, INK)
     for drawing in objects:
-        loops = [shift + scale * loop for loop in drawing.outline]
+        loops = [shift + scale * loop for loop in (*drawing.outline, *drawing.raised)]
         pen.outline(loops, 0.3e-3, drawing.outline_color)
     for tile in tiling.tiles:
         (left, right), (top, bottom) = xs[tile.column :][:2], ys[tile.row :][:2]
