@@ -23,6 +23,7 @@ from burg_drake.objects.library import (
     ObjectLibrary,
     load_library,
 )
+from burg_drake.objects.meshes import check_size
 from burg_drake.pipeline.keys import StageKeys, stage_keys
 from burg_drake.pipeline.pool import BuildTask, build_all
 from burg_drake.pipeline.source import ObjectSource, object_name
@@ -32,6 +33,8 @@ from burg_drake.pipeline.target import check_targets, opened_for_build, scratch_
 OnObjectBuilt = Callable[[str, str, int, int], None]
 """Called after each object with its name, its state (`built`, `cached` or `failed`), the number of
 objects done and the number of all."""
+OnObjectFailed = Callable[[str, str], None]
+"""Called with the name and the message of an object that cannot be built."""
 
 SAVING_INTERVAL = 1.0
 """Least time between two writings of `library.yaml` during a build [s]."""
@@ -67,6 +70,7 @@ def build_library(
     confirm: bool = True,
     workers: int = 1,
     progress: OnObjectBuilt | None = None,
+    on_failure: OnObjectFailed | None = None,
 ) -> BuildReport:
     """Builds or updates a library.
 
@@ -78,6 +82,7 @@ def build_library(
             what is fixed, the quasi-static ones are taken as they are.
         workers: number of objects to work on at a time, each in a process of its own.
         progress: called after each object.
+        on_failure: called at once for each object that cannot be built.
 
     Returns:
         The library and what was done; an object that cannot be built is in `failed`, and its
@@ -94,7 +99,7 @@ def build_library(
     with opened_for_build(out) as root:
         library = _open(root, name)
         check_targets(named, root, library.objects)
-        tally = _Tally(_renamed(library, name), len(named), progress)
+        tally = _Tally(_renamed(library, name), len(named), progress, on_failure)
         _build(named, tally, confirm, workers)
         return tally.report(named)
 
@@ -115,6 +120,7 @@ def _build(named: Sequence[ObjectSource], tally: _Tally, confirm: bool, workers:
             tally.count(source.name, "cached")
         else:
             todo.append((source, keys))
+    todo = [item for item in todo if _has_plausible_size(item[0], tally)]
     with scratch_folder(root) as scratch:
         work = [
             BuildTask(s, keys, root, scratch / s.name, _confirms(s, confirm))
@@ -128,6 +134,16 @@ def _build(named: Sequence[ObjectSource], tally: _Tally, confirm: bool, workers:
                     tally.fail(item.source.name, outcome)
         finally:
             tally.save()
+
+
+def _has_plausible_size(source: ObjectSource, tally: _Tally) -> bool:
+    """Whether an object can be on a table: a wrong unit is told before anything is built."""
+    try:
+        check_size(source.mesh, source.scale)
+    except Exception as error:
+        tally.fail(source.name, error)
+        return False
+    return True
 
 
 def _confirms(source: ObjectSource, confirm: bool) -> bool:
@@ -152,11 +168,18 @@ def _longest_first(
 class _Tally:
     """The library while it grows, and the report."""
 
-    def __init__(self, library: ObjectLibrary, total: int, progress: OnObjectBuilt | None) -> None:
+    def __init__(
+        self,
+        library: ObjectLibrary,
+        total: int,
+        progress: OnObjectBuilt | None,
+        on_failure: OnObjectFailed | None,
+    ) -> None:
         self.library = library
         self.entries: dict[str, ObjectEntry] = dict(library.objects)
         self.total = total
         self.progress = progress
+        self.on_failure = on_failure
         self.saved = time.monotonic()
         self.state: dict[str, str] = {}
         self.failed: dict[str, str] = {}
@@ -171,6 +194,8 @@ class _Tally:
     def fail(self, name: str, error: BaseException) -> None:
         text = " ".join(str(error).split())
         self.failed[name] = text if isinstance(error, BurgError) else one_line(error)
+        if self.on_failure is not None:
+            self.on_failure(name, self.failed[name])
         self.count(name, "failed")
 
     def publish(self, source: ObjectSource, built: Built, scratch: Path) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from burg_drake.core import BurgError, MeshError
 from burg_drake.objects.collision import deviation_warning, pieces_instead
 from burg_drake.objects.library import ObjectEntry, ObjectLibrary
-from burg_drake.objects.meshes import mesh_hash
+from burg_drake.objects.meshes import mesh_hash, missing_textures
 from burg_drake.objects.physics import implausible
 from burg_drake.pipeline.record import (
     Record,
@@ -88,6 +88,9 @@ def _file_issues(library: ObjectLibrary, name: str, entry: ObjectEntry) -> Itera
     traced = bool(entry.source.path) and source.is_file()
     if traced and record is not None and _hash(source) != record.keys.mesh:
         yield _issue(name, "stale", f"{source.resolve()} has changed since; build it again")
+    if traced:
+        for sentence in missing_textures(source):
+            yield _issue(name, "unsure", sentence)
     if not missing:
         drake_problem = drake_error(library.root / entry.sdf)
         if drake_problem:
@@ -147,7 +150,9 @@ def _fit_issues(name: str, entry: ObjectEntry) -> Iterator[LibraryIssue]:
         yield _issue(name, "unsure", text)
         return
     diagonal = float(np.linalg.norm(np.subtract(entry.upper, entry.lower)))
-    text = deviation_warning(entry.fit, diagonal)
+    text = deviation_warning(
+        entry.fit, diagonal, entry.decomposition.threshold if entry.decomposition else None
+    )
     if text:
         yield _issue(name, "implausible", text)
 

@@ -22,6 +22,7 @@ from burg_drake.objects.library import (
     StablePose,
     model_sdf,
 )
+from burg_drake.objects.meshes import missing_textures
 from burg_drake.objects.physics import DEFAULT_DENSITY, implausible, mass_properties
 from burg_drake.pipeline.geometry import build_geometry, placed_contact
 from burg_drake.pipeline.keys import StageKeys
@@ -140,10 +141,13 @@ def _notes(source: ObjectSource, geometry: Geometry, properties: MassProperties)
         notes.append(f"{why}: {properties.mass:.4g} kg from {used:g} kg/m^3")
     if not geometry.closed:
         notes.append("the mesh is not closed; its volume is that of the convex pieces")
+    if not isinstance(source.mesh, trimesh.Trimesh):
+        notes += missing_textures(Path(source.mesh))
     notes += implausible(properties, geometry.lower, geometry.upper)
     diagonal = float(np.linalg.norm(np.subtract(geometry.upper, geometry.lower)))
     notes.append(pieces_instead(geometry.contact, len(geometry.pieces)))
-    notes += [geometry.cut, deviation_warning(geometry.fit, diagonal), *geometry.notes]
+    coarse = deviation_warning(geometry.fit, diagonal, geometry.threshold)
+    notes += [geometry.cut, coarse, *geometry.notes]
     return [note for note in notes if note]
 
 

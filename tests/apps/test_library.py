@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import shutil
 from pathlib import Path
@@ -161,6 +162,44 @@ def test_millimetres_are_pointed_out(tmp_path: Path, capsys: Capture) -> None:
     (line,) = capsys.readouterr().err.splitlines()
     assert "try unit mm (scale=0.001 makes it 60 mm)" in line
     assert not (tmp_path / "library").exists()
+
+
+def test_a_wrong_unit_is_told_before_the_others_are_built(
+    mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    """And the unit of one mesh can be given, by which it gets its size."""
+    original, told = stages.build_geometry, []
+
+    def told_by_now(*arguments: Any) -> Any:
+        told.append(capsys.readouterr().err)
+        return original(*arguments)
+
+    monkeypatch.setattr(stages, "build_geometry", told_by_now)
+    trimesh.creation.box((50, 40, 60)).export(tmp_path / "wrong.stl")
+    meshes = (mesh, tmp_path / "wrong.stl")
+    assert build(*meshes, QUICK, "-o", tmp_path / "library") == 1
+    assert len(told) == 1 and "wrong.stl: largest extent is 60 m" in told[0]
+    assert told[0].endswith("; for this mesh alone --unit wrong=mm\n")
+    capsys.readouterr()
+    assert build(*meshes, QUICK, "-o", tmp_path / "library", "--unit", "wrong=mm") == 0
+    library = load_library(tmp_path / "library")
+    assert library.entry("wrong").upper == pytest.approx((0.025, 0.02, 0.03))
+    assert library.entry("block").source.scale == 1.0
+
+
+@pytest.mark.parametrize(
+    ("unit", "message"),
+    [
+        ("block=foot", "'block=foot' is not [NAME=]UNIT with one of the units mm, cm, m, in"),
+        ("blok=mm", "--unit blok: no such mesh; did you mean 'block'?"),
+    ],
+)
+def test_units_that_are_none(
+    unit: str, message: str, mesh: Path, tmp_path: Path, capsys: Capture
+) -> None:
+    with contextlib.suppress(SystemExit):
+        assert build(mesh, "-o", tmp_path / "library", "--unit", unit) == 2
+    assert message in capsys.readouterr().err
 
 
 def test_folders_of_the_users_are_not_replaced(

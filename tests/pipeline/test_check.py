@@ -10,10 +10,13 @@ from pathlib import Path
 
 import pytest
 import trimesh
+from PIL import Image
 
 from burg_drake.core.documents.schema import save_document
+from burg_drake.objects.collision.fit import deviation_warning
 from burg_drake.objects.library.document import ObjectLibrary, load_library
-from burg_drake.objects.library.entry import ContactGeometry
+from burg_drake.objects.library.entry import ContactGeometry, Fit
+from burg_drake.objects.meshes.mesh_file import missing_textures
 from burg_drake.pipeline.build import build_library
 from burg_drake.pipeline.check import check_library
 from burg_drake.pipeline.source import ObjectSource
@@ -171,3 +174,42 @@ def test_implausible_values(tmp_path: Path) -> None:
     assert "the convex pieces are coarse: " in messages
     assert "mass 0.0194 kg was not given; it follows from 1000 kg/m^3" in messages
     assert found["leaden", "unsure"] == "its stable poses were not confirmed in simulation"
+
+
+def test_missing_textures_are_told(tmp_path: Path) -> None:
+    """By a build and by a check, until the picture is there."""
+    obj = trimesh.creation.box((0.05, 0.06, 0.07)).export(file_type="obj")
+    (tmp_path / "box.obj").write_text(f"mtllib box.mtl\nusemtl front\n{obj}")
+    (tmp_path / "box.mtl").write_text("newmtl front\nmap_Kd -s 1 1 1 front.png\n")
+    source = ObjectSource.from_file(tmp_path / "box.obj", mass=0.1, contact="pieces")
+    report = build_library([source], tmp_path / "lib", confirm=False)
+    assert not report.failed
+    told = "box.mtl names front.png, which is missing: the object has no picture"
+    assert any(note.startswith(told) for note in report.notes["box"])
+    assert any(issue.message.startswith(told) for issue in check_library(report.library))
+    Image.new("RGB", (4, 4)).save(tmp_path / "front.png")
+    report = build_library([source], tmp_path / "lib", confirm=False)
+    assert report.built == ("box",) and "box" not in report.notes
+    assert not any("front.png" in issue.message for issue in check_library(report.library))
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.obj", "mtllib gone.mtl\nv 0 0 0\n"),
+        ("a.ply", "ply\nformat ascii 1.0\ncomment TextureFile gone.png\nend_header\n"),
+        ("a.gltf", '{"images": [{"uri": "gone%2Epng"}, {"uri": "data:image/png;base64,"}]}'),
+    ],
+)
+def test_what_names_a_texture(name: str, text: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text(text)
+    (sentence,) = missing_textures(tmp_path / name)
+    assert sentence.startswith(f"{name} names gone.")
+
+
+def test_advice_on_coarse_pieces_is_what_was_not_tried() -> None:
+    """At the default threshold and below, finer cuts were tried already."""
+    coarse = Fit(volume_ratio=1.6, hausdorff=0.01)
+    assert "a lower decomposition.threshold" in deviation_warning(coarse, 0.1, 0.2)
+    for threshold in (0.05, 0.01, None):
+        assert "pieces of your own" in deviation_warning(coarse, 0.1, threshold)

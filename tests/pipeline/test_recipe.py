@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import trimesh
 
 from burg_drake.core.documents.schema import save_document
 from burg_drake.core.errors import DocumentError
 from burg_drake.objects.library.entry import Decomposition
+from burg_drake.pipeline.build import build_library
 from burg_drake.pipeline.recipe import Cutting, Defaults, RecipeDocument, RecipeObject, load_recipe
 from burg_drake.pipeline.source import ObjectSource, check_source
 
@@ -134,7 +136,7 @@ def one(lines: str) -> str:
 
 KNOWN = (
     "center_of_mass, contact, decomposition, density, description, friction, inertia, mass,"
-    " mesh, openings, rgba, scale, unit, wall_thickness"
+    " mesh, openings, pieces, rgba, scale, unit, wall_thickness"
 )
 
 
@@ -214,3 +216,24 @@ def test_messages_name_file_line_key_and_remedy(tmp_path: Path, text: str, messa
     with pytest.raises(DocumentError) as caught:
         load_recipe(path)
     assert str(caught.value) == message.replace("FILE", str(path))
+
+
+def test_pieces_of_ones_own(tmp_path: Path) -> None:
+    """Two boxes make an L, in millimetres; they are taken as they are."""
+    bars = [trimesh.creation.box((60, 10, 10)), trimesh.creation.box((10, 60, 10))]
+    bars[1].apply_translation((-25, 35, 0))
+    for k, bar in enumerate(bars):
+        bar.export(tmp_path / f"bar{k}.stl")
+    trimesh.util.concatenate(bars).export(tmp_path / "l.stl")
+    (tmp_path / "objects.yaml").write_text(
+        "version: 1\nobjects:\n"
+        "  l: {mesh: l.stl, unit: mm, mass: 0.1, pieces: [bar0.stl, bar1.stl]}\n"
+    )
+    report = build_library(
+        load_recipe(tmp_path / "objects.yaml").sources(), tmp_path / "library", confirm=False
+    )
+    assert not report.failed
+    entry = report.library.entry("l")
+    assert entry.decomposition is None and len(entry.pieces) == 2
+    pieces = [trimesh.load_mesh(report.library.root / piece) for piece in entry.pieces]
+    assert [p.volume for p in pieces] == pytest.approx([6e-6, 6e-6])

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -122,6 +123,14 @@ def _build(
             count = pace.skip if state == "cached" else pace.step
             count(1, note=f"{name} {state}")
 
+        by_name = {source.name: source for source in sources}
+
+        def on_failure(name: str, message: str) -> None:
+            """Told at once, as the others may take long; an only object's ends the command."""
+            if len(sources) > 1:
+                text = _failure(by_name[name], message) + _unit_option(name, message)
+                print(f"burg-drake: error: {text}", file=sys.stderr)
+
         report = build_library(
             sources,
             output,
@@ -129,19 +138,18 @@ def _build(
             confirm=not arguments.no_confirm,
             workers=arguments.workers or default_workers(),
             progress=progress,
+            on_failure=on_failure,
         )
-    failures = [_failure(s, report.failed[s.name]) for s in sources if s.name in report.failed]
     done = {*report.built, *report.cached}
-    if failures and not done:
-        *others, last = failures
-        _print_failures(others)
+    if report.failed and not done:
         _print_summary(report)
-        raise InvalidInputError(last)
+        if len(sources) == 1:
+            raise InvalidInputError(_failure(sources[0], report.failed[sources[0].name]))
+        raise InvalidInputError(f"none of the {len(sources)} objects could be built")
     print_library(report.library, only=done)
     _print_notes(report)
-    _print_failures(failures)
     _print_summary(report)
-    return 1 if failures else 0
+    return 1 if report.failed else 0
 
 
 def _print_notes(report: BuildReport) -> None:
@@ -168,6 +176,7 @@ def _failure(source: ObjectSource, message: str) -> str:
     return message if is_named else f"{source.name}: {message}"
 
 
-def _print_failures(failures: Iterable[str]) -> None:
-    for text in failures:
-        print(f"burg-drake: error: {text}", file=sys.stderr)
+def _unit_option(name: str, message: str) -> str:
+    """How the unit that a message proposes is given for one of several meshes."""
+    proposed = re.search(r"try unit (\w+)", message)
+    return f"; for this mesh alone --unit {name}={proposed[1]}" if proposed else ""

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from burg_drake.core import DocumentError, InvalidInputError, UnknownNameError, nearest
 
@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     import yaml
 
     from burg_drake.pipeline import ObjectSource
+
+
+_T = TypeVar("_T")
 
 
 def sources_of(arguments: argparse.Namespace) -> tuple[list[ObjectSource], str | None]:
@@ -56,15 +59,20 @@ def with_common_values(
     """Sources with what the arguments say of all objects."""
     from burg_drake.objects.meshes import unit_scale
 
-    scale = unit_scale(arguments.unit) if arguments.unit else arguments.scale
+    units = _by_name([u for u in arguments.unit if u[0]], {s.name for s in sources}, "unit")
+    common = next((unit for name, unit in reversed(arguments.unit) if not name), None)
     values = {
-        "scale": scale,
+        "scale": unit_scale(common) if common else arguments.scale,
         "wall_thickness": arguments.wall_thickness,
         "openings": arguments.openings,
         "contact": arguments.contact,
     }
     given = {name: value for name, value in values.items() if value is not None}
-    return [replace(source, **given) for source in sources]
+    changed = [replace(source, **given) for source in sources]
+    return [
+        replace(source, scale=unit_scale(units[source.name])) if source.name in units else source
+        for source in changed
+    ]
 
 
 @dataclass(frozen=True)
@@ -137,11 +145,11 @@ def _mesh_files(arguments: Iterable[str]) -> list[Path]:
     return files
 
 
-def _by_name(pairs: Iterable[tuple[str, float]], names: set[str], what: str) -> dict[str, float]:
+def _by_name(pairs: Iterable[tuple[str, _T]], names: set[str], what: str) -> dict[str, _T]:
     """Values by object name; the name of the mesh file's stem is as good."""
     from burg_drake.pipeline import object_name
 
-    values: dict[str, float] = {}
+    values: dict[str, _T] = {}
     for given, value in pairs:
         name = object_name(given)
         if name not in names:

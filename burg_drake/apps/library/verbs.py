@@ -17,6 +17,7 @@ from burg_drake.apps.options import (
     friction,
     named_positive,
     positive,
+    unit,
 )
 
 FORMATS_TEXT = """\
@@ -34,11 +35,13 @@ format of objects.yaml, which takes every setting of an object:
     mug: {mesh: scans/mug.obj, mass: 0.118}
     tin: {mesh: scans/tin.stl, mass: 0.05, wall_thickness: 0.0003}
     rack: {mesh: scans/rack.stl, mass: 0.4, decomposition: {threshold: 0.02}}
+    chair: {mesh: chair.obj, mass: 0.9, pieces: [seat.obj, back.obj]}
 
 convex pieces: 'decomposition.threshold' says how finely a shape is cut into them (0.01 to 1,
 default 0.05). Pieces of more than 1.25 times the volume, or off by more than 5 % of the diagonal,
 are coarse: where no threshold is given, 0.02 and 0.01 are then tried, with at most 96 pieces, and
-build says what came of it"""
+build says what came of it. 'decomposition.timeout' bounds the CPU time of a cut (300 s); 'pieces'
+names mesh files of convex pieces of your own"""
 
 
 def add_to(verbs: Any) -> None:
@@ -231,7 +234,14 @@ def _add_common_values(parser: Parser) -> None:
 
     _add_density(parser)
     scale = parser.add_mutually_exclusive_group()
-    scale.add_argument("--unit", choices=list(UNITS), help="unit of the meshes (default: m)")
+    scale.add_argument(
+        "--unit",
+        metavar="[NAME=]UNIT",
+        type=unit,
+        action="append",
+        default=[],
+        help=f"unit of one mesh or of all: {', '.join(UNITS)} (default: m)",
+    )
     scale.add_argument(
         "--scale", type=positive, help="factor from the meshes' unit to metres: 0.0005, for example"
     )

@@ -81,4 +81,5 @@ from .values import (
     positive_int as positive_int,
     seed as seed,
     two_numbers as two_numbers,
+    unit as unit,
 )

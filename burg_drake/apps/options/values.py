@@ -95,6 +95,18 @@ def named_positive(text: str) -> tuple[str, float]:
         raise argparse.ArgumentTypeError(f"{name}: {error}") from error
 
 
+def unit(text: str) -> tuple[str, str]:
+    """`NAME=UNIT`, or `UNIT` for all (then the name is empty)."""
+    from burg_drake.objects.meshes import UNITS
+
+    name, _, value = text.rpartition("=")
+    if value not in UNITS:
+        raise argparse.ArgumentTypeError(
+            f"{quoted(text)} is not [NAME=]UNIT with one of the units {', '.join(UNITS)}"
+        )
+    return name, value
+
+
 def friction(text: str) -> tuple[str, float]:
     """`NAME=MU`, or `MU` for all (then the name is empty), with a coefficient from 0."""
     name, _, value = text.rpartition("=")

@@ -36,7 +36,7 @@ def run_coacd(
         vertices: (N, 3) [m].
         faces: (F, 3).
         options: of `coacd.run_coacd`.
-        timeout: wall time allowed [s].
+        timeout: CPU time allowed [s].
 
     Returns:
         The vertices (Ni, 3) of each part, and the child's CPU time [s].
@@ -46,19 +46,18 @@ def run_coacd(
         KeyboardInterrupt: the child was interrupted, as the user interrupts all processes.
     """
     package = io.BytesIO()
-    np.savez(package, vertices=vertices, faces=faces, options=json.dumps(options))
+    told = json.dumps({"timeout": timeout, "options": options})
+    np.savez(package, vertices=vertices, faces=faces, told=told)
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
-    try:
-        child = subprocess.run(
-            [sys.executable, "-P", str(Path(__file__))],
-            input=package.getvalue(),
-            capture_output=True,
-            env=environment,
-            timeout=timeout,
-            check=False,
-        )
-    except subprocess.TimeoutExpired as error:
-        raise DecompositionFailed(f"it took longer than {timeout:g} s") from error
+    child = subprocess.run(
+        [sys.executable, "-P", str(Path(__file__))],
+        input=package.getvalue(),
+        capture_output=True,
+        env=environment,
+        check=False,
+    )
+    if child.returncode == -signal.SIGPROF:
+        raise DecompositionFailed(f"it took longer than {timeout:g} s of CPU time")
     if child.returncode in (-signal.SIGINT, -signal.SIGTERM):
         raise KeyboardInterrupt
     if child.returncode != 0:
@@ -76,9 +75,10 @@ def _main() -> None:
 
     with np.load(io.BytesIO(sys.stdin.buffer.read()), allow_pickle=False) as given:
         mesh = coacd.Mesh(given["vertices"], given["faces"].astype(np.int32))
-        options = json.loads(str(given["options"]))
+        told = json.loads(str(given["told"]))
+    signal.setitimer(signal.ITIMER_PROF, told["timeout"])  # SIGPROF ends the process
     coacd.set_log_level("off")
-    parts = coacd.run_coacd(mesh, **options)
+    parts = coacd.run_coacd(mesh, **told["options"])
     result = io.BytesIO()
     named: dict[str, Any] = {f"part{i}": np.asarray(v) for i, (v, _) in enumerate(parts)}
     np.savez(result, count=len(parts), seconds=time.process_time(), **named)

@@ -147,4 +147,8 @@ def _cut(
         if parts:
             return parts, seconds
         reason = "it found no parts"
-    raise MeshError(f"convex decomposition failed: {reason}; repair the mesh or give pieces")
+    raise MeshError(
+        f"convex decomposition failed: {reason}; repair or simplify the mesh, cut it more coarsely"
+        f" (decomposition.threshold above {parameters.threshold:g}), or give convex pieces of your"
+        " own (pieces in an objects.yaml)"
+    )

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from burg_drake.core import Array, MeshError
 from burg_drake.geometry import triangle_distances
-from burg_drake.objects.library import Fit
+from burg_drake.objects.library import Decomposition, Fit
 from burg_drake.objects.physics import sample_surface, spread_over
 
 MOST_VOLUME = 1.25
@@ -75,14 +75,20 @@ def deviation(fit: Fit | None, surface: trimesh.Trimesh | float) -> float:
     return max(fit.volume_ratio / MOST_VOLUME, fit.hausdorff / (MOST_DEVIATION * diagonal))
 
 
-def deviation_warning(fit: Fit | None, diagonal: float) -> str:
-    """What to say of coarse pieces; empty if they are not."""
+def deviation_warning(fit: Fit | None, diagonal: float, threshold: float | None) -> str:
+    """What to say of coarse pieces; empty if they are not.
+
+    Args:
+        fit: of the pieces, if it is known.
+        diagonal: of the object [m].
+        threshold: that they were cut with; None for pieces that came with the object.
+    """
     if fit is None or deviation(fit, diagonal) <= 1.0:
         return ""
-    return (
-        f"the convex pieces are coarse: {describe_fit(fit)}; a lower decomposition.threshold"
-        " cuts finer"
-    )
+    mend = "give finer convex pieces of your own (pieces in an objects.yaml) if that matters"
+    if threshold is not None and threshold > Decomposition().threshold:
+        mend = "a lower decomposition.threshold cuts finer"
+    return f"the convex pieces are coarse: {describe_fit(fit)}; {mend}"
 
 
 def describe_fit(fit: Fit) -> str:

@@ -93,7 +93,7 @@ class Decomposition:
         tolerance: pieces stay within this distance of the full hull where `max_vertices`
             allows [m].
         min_thickness: thinner pieces are dropped [m].
-        timeout: wall time allowed for CoACD [s].
+        timeout: CPU time allowed for CoACD [s].
         seed: of CoACD's search.
     """
 

@@ -1,5 +1,9 @@
 from .cleaning import signed_volume as signed_volume
-from .mesh_file import companions as companions
+from .mesh_file import (
+    companions as companions,
+    missing_textures as missing_textures,
+    read_mesh as read_mesh,
+)
 from .offset import (
     folded as folded,
     offsets as offsets,
@@ -14,6 +18,7 @@ from .surface import (
     UNITS as UNITS,
     Preparation as Preparation,
     SurfaceMesh as SurfaceMesh,
+    check_size as check_size,
     load_mesh as load_mesh,
     mesh_hash as mesh_hash,
     texture_image as texture_image,

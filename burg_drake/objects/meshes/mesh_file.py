@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import os
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
+from urllib.parse import quote, unquote
 
 import numpy as np
 import trimesh
@@ -29,7 +30,7 @@ FORMATS = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf")
 NO_COLOUR = (204, 204, 204, 255)
 """Colour of parts without one, beside parts that have one."""
 
-REFERRING = (".obj", ".gltf")
+REFERRING = (".obj", ".gltf", ".ply")
 """Mesh formats that refer to other files, such as materials and textures."""
 
 TEXT_ONLY = (".obj", ".off")
@@ -148,6 +149,60 @@ def companions(path: Path) -> list[Path]:
         found += fresh
         queue += [p for p in fresh if p.suffix.lower() == ".mtl"]
     return sorted(found)
+
+
+def missing_textures(path: Path) -> list[str]:
+    """A sentence for each picture or file of materials that a mesh names and that is not there.
+
+    Args:
+        path: of the mesh.
+    """
+    suffix = path.suffix.lower()
+    found: list[tuple[Path, str]] = []
+    if suffix == ".obj":
+        for library in _named(path, "mtllib"):
+            file = path.parent / library
+            found.append((path, library))
+            if file.is_file():
+                found += [(file, _picture(file, text)) for text in _named(file, "map_Kd")]
+    elif suffix == ".ply":
+        found += [(path, name) for name in _named(path, "comment TextureFile", until="end_header")]
+    elif suffix == ".gltf":
+        found += [(path, uri) for uri in _image_uris(path)]
+    return [
+        f"{file.name} names {name}, which is missing: the object has no picture; put it beside"
+        f" {file.name} and build again"
+        for file, name in dict.fromkeys(found)
+        if not (file.parent / name.replace("\\", "/")).is_file()
+    ]
+
+
+def _picture(materials: Path, text: str) -> str:
+    """The file that `map_Kd` names; options such as `-s 1 1 1` may stand before it."""
+    return text if (materials.parent / text).is_file() else text.split()[-1]
+
+
+def _image_uris(path: Path) -> list[str]:
+    """Pictures beside a glTF file; none of one that is damaged."""
+    try:
+        images = json.loads(path.read_bytes()).get("images", ())
+        uris = [image.get("uri", "data:") for image in images]
+    except (AttributeError, RecursionError, TypeError, ValueError):
+        return []
+    return [unquote(uri) for uri in uris if not uri.startswith("data:")]
+
+
+def _named(path: Path, keyword: str, until: str = "") -> list[str]:
+    """What follows a keyword at the start of a line of a text."""
+    names = []
+    with path.open("rb") as lines:
+        for raw in lines:
+            line = raw.decode("utf-8", errors="replace").strip()
+            if until and line == until:
+                break
+            if line.lower().startswith(f"{keyword.lower()} "):
+                names.append(line[len(keyword) :].strip())
+    return names
 
 
 def _check_file(path: Path) -> None:
