@@ -28,9 +28,11 @@ from burg_drake.dataset.appearance import (
 from burg_drake.dataset.appearance.patterns import table_texture
 from burg_drake.dataset.appearance.rendering import environment_file, render_parameters
 from burg_drake.dataset.appearance.room import environment_map
+from burg_drake.objects.library import load_library
 from burg_drake.scene.document import load_scene
 from burg_drake.station.document import Obstacle, load_station
 
+CLUTTER = load_library("clutter")
 SCENE, STATION = load_scene("tabletop_six"), load_station("panda_tabletop")
 NOTHING = AppearanceSettings(
     lights=None,
@@ -81,7 +83,7 @@ def test_the_same_seed_gives_the_same_look_and_it_is_plain_data() -> None:
 
 def test_all_can_be_switched_off() -> None:
     look = draw_appearance(NOTHING, SCENE, STATION, np.random.default_rng(0))
-    assert look == Appearance()
+    assert look == Appearance(library="clutter")
 
 
 def test_settings_that_contradict_themselves_and_data_that_do_not_fit() -> None:
@@ -125,7 +127,7 @@ def test_distractors_stand_on_the_table_clear_of_all() -> None:
         hulls = list(taken)
         for one in draw_appearance(settings, SCENE, station, rng).distractors:
             X_SO = one.X_SO.matrix()
-            p = SCENE.library.surface(one.object).vertices @ X_SO[:3, :3].T + X_SO[:3, 3]
+            p = CLUTTER.surface(one.object).vertices @ X_SO[:3, :3].T + X_SO[:3, 3]
             assert abs(p[:, 2].min()) < 2e-3
             p_W = np.linalg.inv(X_SW)[:3, :3] @ p.T + np.linalg.inv(X_SW)[:3, 3:]
             inside = np.abs(p_W[:2].T - station.document.table.center)
@@ -145,7 +147,7 @@ def test_boxes_of_distractors_hold_them_and_no_more() -> None:
     assert len(boxes) == len(look.distractors) > 2
     for one, box in zip(look.distractors, boxes, strict=True):
         X_BO = np.linalg.inv(box.X_SB) @ one.X_SO.matrix()
-        p_BO = SCENE.library.surface(one.object).vertices @ X_BO[:3, :3].T + X_BO[:3, 3]
+        p_BO = CLUTTER.surface(one.object).vertices @ X_BO[:3, :3].T + X_BO[:3, 3]
         np.testing.assert_allclose(np.abs(p_BO).max(axis=0), box.half, atol=2e-3)
 
 

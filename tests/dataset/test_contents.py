@@ -77,7 +77,7 @@ def test_an_unknown_library_leaves_no_folder(tmp_path: Path) -> None:
 def test_what_a_scene_shows_is_no_distractor() -> None:
     scene, station = burg.load_scene("tabletop_six"), burg.load_station("panda_tabletop")
     labelled = {one.object for one in scene.instances.values()}
-    settings = AppearanceSettings(distractors=(4, 4))
+    settings = AppearanceSettings(distractors=(4, 4), distractor_library="household")
     seen = {
         thing.object
         for k in range(10)
@@ -85,6 +85,17 @@ def test_what_a_scene_shows_is_no_distractor() -> None:
     }
     assert seen and not seen & labelled
     assert labelled < set(scene.library.objects)
+
+
+def test_distractors_are_of_no_library_that_is_labelled() -> None:
+    """What one scene does not show may be labelled in another."""
+    scene, station = burg.load_scene("tabletop_six"), burg.load_station("panda_tabletop")
+    things = draw_appearance(
+        AppearanceSettings(distractors=(6, 6)), scene, station, rng_from("test", 0)
+    ).distractors
+    clutter = burg.load_library("clutter").objects
+    assert things and {thing.object for thing in things} <= set(clutter)
+    assert not set(clutter) & set(burg.load_library("household").objects)
 
 
 @pytest.mark.parametrize(("count", "workers"), [(0, 1), (None, 0)])

@@ -84,7 +84,7 @@ class AppearanceSettings:
     electrons: tuple[float, float] | None = (1500.0, 20_000.0)
     color_gain: float = 0.1
     distractors: tuple[int, int] = (0, 4)
-    distractor_library: str = "household"
+    distractor_library: str = "clutter"
     distractors_on_board: bool = False
 
     def __post_init__(self) -> None:
