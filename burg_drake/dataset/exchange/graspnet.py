@@ -57,6 +57,9 @@ DEFAULT_CAMERA = "realsense"
 BEST_SCORE, DISTURBED_SCORE, SLIP_COST, LARGEST_SLIP = 1.0, 0.7, 0.3, 0.02
 """Scores, see `grasp_scores`; `LARGEST_SLIP` is in metres."""
 
+TRAIN_SCENES = 100
+"""Scenes of the split `train`, all of whose `object_id_list.txt` graspnetAPI reads at first."""
+
 HEADER = 116
 """Bytes of text that a MAT file begins with; scipy writes the time of day there."""
 
@@ -121,9 +124,13 @@ def write_graspnet(
     """
     lost = {
         "GraspNet has no silhouettes behind other objects, and no visibilities.",
-        "Files grasp_label and collision_label are missing: they have all grasps of a grid on each"
-        " object, and not those that were judged; grasps are in the folder grasps of each camera.",
+        "graspnetAPI's loadGrasp of 6D grasps and its evaluation do not work: grasp_label and"
+        " collision_label have 300 directions, 12 angles and 4 depths at each of thousands of"
+        " points, of which only some were judged; these are in the folder grasps of each camera.",
+        "graspnetAPI's evaluation also needs models/*/textured.obj and textured.sdf, and its check"
+        " of completeness rs_wrt_kn.npy of two cameras; none of them is written.",
     }
+    numbers: set[int] = set()
     with new_folder(folder) as fresh:
         for k, name in enumerate(samples.objects):
             place = fresh / "models" / f"{k:03d}"
@@ -131,6 +138,7 @@ def write_graspnet(
             write_ply(visual_model(samples.library, name), place / "nontextured.ply", unit=1.0)
         for number, views in scenes_of(samples):
             scene = fresh / "scenes" / f"scene_{number:04d}"
+            numbers.add(number)
             cameras: dict[str, _Camera] = {}
             for sample in views:
                 name = camera or sample.view.camera
@@ -140,6 +148,11 @@ def write_graspnet(
                 lost |= lost_depth(sample, "GraspNet", sensor=sensor_depth)
             for one in cameras.values():
                 one.finish()
+    if not numbers >= set(range(TRAIN_SCENES)):
+        lost.add(
+            f"graspnetAPI opens a data set only with all scenes of a split, of 'train' 0 to"
+            f" {TRAIN_SCENES - 1}: here are {len(numbers)}; read the files by themselves."
+        )
     return tuple(sorted(lost))
 
 
