@@ -13,7 +13,6 @@ from .groups import (
 )
 from .judge_assessment import (
     Judgement as Judgement,
-    Strata as Strata,
     Unpredictable as Unpredictable,
 )
 from .of_trials import strata_of as strata_of

@@ -18,7 +18,7 @@ from burg_drake.experiment.statistics import Flags, excess_p_value, holm
 
 LEVEL = 0.05
 """Probability of naming anything where nothing stands out, at most."""
-Kind = Literal["object", "verdict", "body in the way"]
+GroupKind = Literal["object", "verdict", "body in the way"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +36,7 @@ class StandingOut:
         corrected: the same by Holm's method, for all groups that were looked at.
     """
 
-    kind: Kind
+    kind: GroupKind
     name: str
     predicted: bool
     wrong: int
@@ -58,13 +58,13 @@ def standing_out(pairs: VerdictPairs) -> tuple[tuple[StandingOut, ...], int]:
         Those whose corrected p-value is below `LEVEL`, the least likely first, and how many groups
         were tested: those in which enough trials, right or wrong, are for a p-value below `LEVEL`.
     """
-    factors: list[tuple[Kind, Factor]] = [
+    factors: list[tuple[GroupKind, Factor]] = [
         ("object", pairs.object),
         ("verdict", pairs.simulated),
         ("body in the way", pairs.blocker),
     ]
     wrong = pairs.predicted != pairs.actual
-    groups: list[tuple[Kind, str, bool, Flags, tuple[int, int, int, int]]] = []
+    groups: list[tuple[GroupKind, str, bool, Flags, tuple[int, int, int, int]]] = []
     for predicted in (True, False):
         same = pairs.predicted == predicted
         for kind, factor in factors:

@@ -48,8 +48,8 @@ def rejudged_words(found: Rejudging) -> list[str]:
         )
     if wrong:
         sentences.append(
-            f"Of the {wrong} that disagree{'s' if wrong == 1 else ''} as planned, placement explains {count}"
-            f" ({format_percent(count / wrong)}, 95 % interval {100 * low:.0f} to"
+            f"Of the {wrong} that disagree{'s' if wrong == 1 else ''} as planned, placement"
+            f" explains {count} ({format_percent(count / wrong)}, 95 % interval {100 * low:.0f} to"
             f" {100 * high:.0f} %), and {of['physics']}"
             f" {'is' if of['physics'] == 1 else 'are'} left to physics."
         )
