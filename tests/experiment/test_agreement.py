@@ -7,6 +7,7 @@ import warnings
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from scipy.stats import beta
 from sklearn import metrics
 from statsmodels.stats.contingency_tables import mcnemar
 from statsmodels.stats.inter_rater import cohens_kappa
@@ -129,6 +130,35 @@ def test_a_stratum_that_stands_for_many_widens_recall() -> None:
     many = agreement(counts, population=np.array([100.0, 5000.0])).recall
     assert few.value == many.value == 1.0
     assert (many.low or 0) < 0.5 < (few.low or 0)
+
+
+@pytest.mark.parametrize("cells", [(3, 2), (2, 2), (9, 1), (20, 10)])
+def test_intervals_of_many_strata_have_the_spread_of_stratified_sampling(
+    cells: tuple[int, int],
+) -> None:
+    """The unbiased variance of a stratified share, W^2 p (1 - p) / (n - 1) of each stratum (W. G.
+    Cochran, Sampling Techniques, 1977, ch. 5, without the correction for finite populations);
+    half a trial a cell is nothing among a hundred strata."""
+    one, other = cells
+    size, strata = one + other, 100
+    weight = np.random.default_rng(0).uniform(50, 500, strata)
+    counts = np.tile((one, other, 0, 0), (strata, 1))
+    found = agreement(counts, population=weight).precision
+    p, W = one / size, weight / weight.sum()
+    error = np.sqrt((W**2).sum() * p * (1 - p) / (size - 1))
+    assert found.value == pytest.approx(p)
+    assert found.low is not None and found.high is not None
+    assert (found.high - found.low) / (2 * 1.96 * error) == pytest.approx(1.0, abs=0.06)
+
+
+def test_strata_of_two_trials_count_as_a_third_of_them() -> None:
+    """Their spread cannot be told from themselves. Shares are drawn from a beta distribution with a
+    third of the trials, whose variance scipy knows."""
+    counts = np.tile((1, 1, 0, 0), (300, 1))
+    found = agreement(counts, population=np.ones(300)).precision
+    assert found.low is not None and found.high is not None
+    expected = np.sqrt(beta(1 / 3, 1 / 3).var() / 300)
+    assert (found.high - found.low) / (2 * 1.96) == pytest.approx(expected, rel=0.06)
 
 
 def test_prior_is_half_a_trial_a_cell() -> None:
