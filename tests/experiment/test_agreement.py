@@ -22,7 +22,7 @@ from burg_drake.experiment.statistics.confusion import (
 )
 from burg_drake.experiment.statistics.estimates import MEASURES
 from burg_drake.experiment.statistics.exact_tests import paired, paired_counts
-from burg_drake.experiment.statistics.resampling import PRIOR, prior
+from burg_drake.experiment.statistics.resampling import PRIOR, bounds, prior
 
 PAPER = (
     ((21, 9, 10, 20), "70.00", "67.74"),
@@ -159,6 +159,34 @@ def test_strata_of_two_trials_count_as_a_third_of_them() -> None:
     assert found.low is not None and found.high is not None
     expected = np.sqrt(beta(1 / 3, 1 / 3).var() / 300)
     assert (found.high - found.low) / (2 * 1.96) == pytest.approx(expected, rel=0.06)
+
+
+def test_bounds_are_quantiles() -> None:
+    rng = np.random.default_rng(0)
+    for draws in (2, 5, 40, 401):
+        values = rng.normal(size=(draws, 3, 2))
+        expected = np.quantile(values, (0.025, 0.975), axis=0)
+        np.testing.assert_allclose(bounds(values), expected, atol=1e-12)
+    assert bounds(np.array([[np.nan], [np.nan]]))[1].tolist() == [0.0]
+
+
+def test_groups_have_the_intervals_of_their_own_trials() -> None:
+    """Each as if it were alone, but for the draws; of many trials normal ones."""
+    cells = [(4200, 1800, 2000, 4000), (300, 300, 100, 500), (40, 10, 20, 30)]
+    every = agreements(np.array(cells))
+    for own, found in zip(cells, every, strict=True):
+        alone = agreement(np.array(own))
+        for name in MEASURES:
+            a, b = alone.figure(name), found.figure(name)
+            assert a.value == b.value and a.low is not None and a.high is not None
+            tolerance = 0.1 * (a.high - a.low)
+            assert (b.low, b.high) == pytest.approx((a.low, a.high), abs=tolerance), name
+    n = 12000  # predicted 6000, actual 6200: the difference of a matched pair
+    error = np.sqrt((1800 + 2000) / n - (200 / n) ** 2) / np.sqrt(n)
+    for found in (every[0].excess, paired_counts(*cells[0]).difference):
+        assert found.value == pytest.approx(-200 / n)
+        bounds_of_normal = (-200 / n - 1.96 * error, -200 / n + 1.96 * error)
+        assert (found.low, found.high) == pytest.approx(bounds_of_normal, abs=0.1 * error)
 
 
 def test_prior_is_half_a_trial_a_cell() -> None:

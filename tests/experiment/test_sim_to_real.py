@@ -225,7 +225,11 @@ def test_an_object_that_slips_stands_out(tmp_path: Path) -> None:
     assert box.p_value == pytest.approx((at_least + beyond) / 2)
     assert box.corrected == pytest.approx(box.p_value * found.looked_at)
     text = comparison_page(compare(run, sheet))
-    assert "What stands out: box (object)." in text and "6 slipped" in text
+    assert (
+        "What stands out: box (object; 6 of 8 predicted successes failed, of all others 1 of 15)"
+        in text
+        and "6 slipped" in text
+    )
 
 
 def test_a_cause_that_stands_out_is_named(tmp_path: Path) -> None:

@@ -24,6 +24,7 @@ from burg_drake.experiment.comparison.wording import (
     nothing_stands_out,
     number,
     of_selected,
+    standing_out_name,
     success_of,
     unpredictable_words,
 )
@@ -151,7 +152,7 @@ def standing_out_table(judged: Judgement, name: str = "") -> TextTable | str:
     for one in judged.standing_out:
         table.row(
             one.kind,
-            outcome_label(one.name) if one.kind == "verdict" else one.name,
+            standing_out_name(one),
             "success" if one.predicted else "failure",
             f"{one.wrong} of {one.trials}",
             f"{one.other_wrong} of {one.other_trials}",
@@ -162,6 +163,8 @@ def standing_out_table(judged: Judgement, name: str = "") -> TextTable | str:
         "wrong more often than others with the same prediction: Fisher's exact test, one-sided"
         f" mid-p, corrected by Holm's method for {judged.looked_at} groups"
     )
+    if judged.unpredictable is not None:
+        table.caption += "; without what the hand alone cannot predict"
     return table
 
 

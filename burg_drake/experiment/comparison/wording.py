@@ -8,6 +8,7 @@ from burg_drake.core.grasps import outcome_label
 from burg_drake.core.terminal import MISSING, format_number
 from burg_drake.experiment.comparison.comparison import Comparison
 from burg_drake.experiment.comparison.judge_assessment import Judgement
+from burg_drake.experiment.comparison.standing_out import StandingOut
 from burg_drake.experiment.statistics import MEASURES, PROBABILITY, Agreement, Estimate
 
 IN_PERCENT = frozenset(name for name, measure in MEASURES.items() if measure.is_share) | {"excess"}
@@ -244,6 +245,22 @@ def unpredictable_words(judged: Judgement) -> str:
 def counts_words(outcomes: Mapping[str, int]) -> str:
     """Outcomes with how often they occur."""
     return ", ".join(f"{n:,} {outcome_label(name)}" for name, n in outcomes.items())
+
+
+def standing_out_name(one: StandingOut) -> str:
+    """What an object or cause that stands out is called."""
+    return outcome_label(one.name) if one.kind == "verdict" else one.name
+
+
+def standing_out_words(judged: Judgement) -> str:
+    """What stands out, in one sentence; empty if nothing does."""
+    parts = [
+        f"{standing_out_name(one)} ({one.kind}; {one.wrong} of {one.trials} predicted"
+        f" {'successes failed' if one.predicted else 'failures succeeded'}, of all others"
+        f" {one.other_wrong} of {one.other_trials})"
+        for one in judged.standing_out
+    ]
+    return f"What stands out: {', '.join(parts)}." if parts else ""
 
 
 def nothing_stands_out(judged: Judgement) -> str:

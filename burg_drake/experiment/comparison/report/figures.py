@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from burg_drake.core.grasps import outcome_label
 from burg_drake.core.terminal import format_count, format_number
 from burg_drake.evaluation.report.elements import (
     Child,
@@ -27,6 +26,7 @@ from burg_drake.experiment.comparison.wording import (
     measure_name,
     nothing_stands_out,
     number,
+    standing_out_name,
     unpredictable_words,
 )
 from burg_drake.experiment.statistics import CELLS, MEASURES, Agreement, Estimate
@@ -154,18 +154,24 @@ def standing_out_section(judged: Judgement) -> Html:
             counts_words(one.ended),
             format_number(one.corrected),
         ]
-        name = outcome_label(one.name) if one.kind == "verdict" else one.name
         rows.append(
-            element("tr", element("th", name, scope="row"), *(element("td", c) for c in cells))
+            element(
+                "tr",
+                element("th", standing_out_name(one), scope="row"),
+                *(element("td", c) for c in cells),
+            )
         )
-    head = ["", "what", "predicted", "wrong", "others wrong", "how the wrong ones ended", "p"]
+    apart = " Trials that ended as the hand alone cannot predict are left out."
+    if judged.unpredictable is None:
+        apart = ""
+    names = ["", "what", "predicted", "wrong", "others wrong", "how the wrong ones ended", "p"]
     return section(
         "What stands out",
         "Objects, verdicts and bodies in the way whose trials ended otherwise than predicted more"
         " often than others with the same prediction. p: one-sided mid-p of Fisher's exact test,"
         f" corrected by Holm's method for the {judged.looked_at} groups that were tested, so that"
-        " nothing is named in 19 of 20 experiments in which nothing differs.",
-        table(head, rows),
+        f" nothing is named in 19 of 20 experiments in which nothing differs.{apart}",
+        table(names, rows),
     )
 
 

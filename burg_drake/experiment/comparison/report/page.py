@@ -45,6 +45,7 @@ from burg_drake.experiment.comparison.wording import (
     interval,
     number,
     of_selected,
+    standing_out_words,
     unpredictable_words,
     weighted,
 )
@@ -147,9 +148,7 @@ def _more_words(c: Comparison) -> list[str]:
     judged = c.judgement
     if c.kind == "simulators":
         return [difference_of_all_words(c)]
-    found = [f"{one.name} ({one.kind})" for one in judged.standing_out]
-    more = f"What stands out: {', '.join(found)}." if found else ""
-    return [bias_words(c), unpredictable_words(judged), more]
+    return [bias_words(c), unpredictable_words(judged), standing_out_words(judged)]
 
 
 def _unbroken(text: str) -> str:
