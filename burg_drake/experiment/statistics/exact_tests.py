@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import comb
 
 import numpy as np
 
@@ -85,10 +86,12 @@ def excess_p_value(errors: int, trials: int, other_errors: int, other_trials: in
         errors, trials: of the group.
         other_errors, other_trials: of all others.
     """
-    from scipy.stats import hypergeom
-
-    of = hypergeom(trials + other_trials, errors + other_errors, trials)
-    return float(min(1.0, of.sf(errors) + 0.5 * of.pmf(errors)))
+    total = errors + other_errors
+    ways = [
+        comb(trials, k) * comb(other_trials, total - k)
+        for k in range(errors, min(trials, total) + 1)
+    ]
+    return (ways[0] + 2 * sum(ways[1:])) / (2 * comb(trials + other_trials, total))
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
