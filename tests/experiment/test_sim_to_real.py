@@ -280,7 +280,7 @@ def made_up(wrong: float, planted: float, rng: np.random.Generator) -> VerdictPa
 
 def test_false_alarms_are_rare_and_a_bad_object_is_found() -> None:
     """300 experiments each: 5 % of false alarms would be 15, and 23 is two standard deviations
-    more; a method without correction names something in a third of them."""
+    more; without correction something is named in 180."""
     rng = np.random.default_rng(2)
     alarms = sum(bool(standing_out(made_up(0.2, 0.2, rng))[0]) for _ in range(300))
     assert 1 <= alarms <= 23
