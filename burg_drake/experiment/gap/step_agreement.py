@@ -13,6 +13,7 @@ from burg_drake.core.grasps import Outcome
 from burg_drake.evaluation.store import Run
 from burg_drake.experiment.comparison import strata_of
 from burg_drake.experiment.gap.steps import GapSteps, StepName
+from burg_drake.experiment.pairing import JudgedRuns, unpredictable_for
 from burg_drake.experiment.statistics import Agreement, agreement, matrix_of
 from burg_drake.experiment.trials import RealTrial, Success, TrialSheet, grasp_contents, succeeded
 
@@ -25,11 +26,13 @@ class StepAgreement:
         step: its name.
         found: confusion matrix and figures of the trials, each counted once.
         all_grasps: the same of all grasps that they were chosen from; None if that is not known.
+        unpredictable: trials, among them, that ended as no verdict of the step's mode can predict.
     """
 
     step: StepName
     found: Agreement
     all_grasps: Agreement | None
+    unpredictable: int = 0
 
     @property
     def estimated(self) -> Agreement:
@@ -93,5 +96,7 @@ def agreement_by_step(
         answers = np.array(predicted, dtype=bool), np.array(actual, dtype=bool)
         strata = strata_of(sheet, told)
         every = None if strata is None else strata.agreement(*answers)
-        found.append(StepAgreement(step.name, agreement(matrix_of(*answers)), every))
+        beyond = unpredictable_for(JudgedRuns(runs[0])) if runs else frozenset()
+        apart = sum(trial.outcome in beyond for trial in told)
+        found.append(StepAgreement(step.name, agreement(matrix_of(*answers)), every, apart))
     return tuple(found)

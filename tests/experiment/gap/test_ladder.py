@@ -313,6 +313,9 @@ def test_each_step_is_held_against_the_robot(known: GapSteps) -> None:
     assert found[2].found.recall.value == 0.5
     assert all(a.all_grasps is None and a.estimated is a.found for a in found)
     assert "each counted once" in reality_words(found)
+    stopped = [replace(t, outcome=RealOutcome.NO_PATH) for t in trials]
+    apart = agreement_by_step(known, sheet, stopped, "lifted")
+    assert [(a.step, a.unpredictable) for a in apart] == [("hand", 3), ("reach", 0), ("placed", 2)]
 
 
 def test_shares_beside_the_robot_hold_for_all_grasps_that_were_chosen_from(known: GapSteps) -> None:

@@ -24,6 +24,7 @@ from burg_drake.evaluation.results import PUSH, pushes
 from burg_drake.experiment.gap.changes import Change, OutcomeChange, successes_by_object
 from burg_drake.experiment.gap.report.flow import FlowColumn, flow_chart
 from burg_drake.experiment.gap.report.sentences import (
+    NOT_PREDICTABLE,
     TITLES,
     left_out,
     reality_words,
@@ -220,6 +221,7 @@ def reality_section(agreement: Sequence[StepAgreement]) -> Html | None:
     rows = []
     for one in agreement:
         cells: list[Child] = [one.found.trials, *(f"{cell:g}" for cell in one.found.cells)]
+        cells.append(one.unpredictable)
         numbers = [element("td", cell, class_="number") for cell in cells]
         shares = [
             element("td", _estimate(one.estimated.figure(name)), class_="estimate")
@@ -227,13 +229,16 @@ def reality_section(agreement: Sequence[StepAgreement]) -> Html | None:
         ]
         head = element("th", TITLES[one.step], scope="row")
         rows.append(element("tr", head, *numbers, *shares))
-    names = ["step", "trials", "TP", "FP", "FN", "TN", "precision", "recall", "accuracy"]
+    names = ["step", "trials", "TP", "FP", "FN", "TN", NOT_PREDICTABLE]
+    names += ["precision", "recall", "accuracy"]
     return section(
         "Beside the robot",
         "Real trials beside each step's verdicts on the same grasps, with 95 % intervals. Positive"
         " means that success is predicted; in displaced scenes, in more than half of them. Here"
-        f" {reality_words(agreement)}.",
-        table(names, rows, numbers=(1, 2, 3, 4, 5)),
+        f" {reality_words(agreement)}. {NOT_PREDICTABLE.capitalize()} are trials, among them, that"
+        " ended as no verdict of the step can predict, such as without a path of the arm where the"
+        " hand is judged alone.",
+        table(names, rows, numbers=(1, 2, 3, 4, 5, 6)),
     )
 
 

@@ -18,6 +18,8 @@ TITLES: dict[StepName, str] = {
     "arm": "whole arm executes",
     "placed": "objects displaced",
 }
+NOT_PREDICTABLE = "not predictable"
+"""Column of trials that ended as no verdict of a step's mode can predict."""
 VERBS: dict[Success, str] = {"lifted": "lifts", "held": "holds"}
 
 

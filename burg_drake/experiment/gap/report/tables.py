@@ -14,6 +14,7 @@ from burg_drake.evaluation.results import pushes
 from burg_drake.experiment.comparison import interval, plain
 from burg_drake.experiment.gap.changes import Change, successes_by_object
 from burg_drake.experiment.gap.report.sentences import (
+    NOT_PREDICTABLE,
     TITLES,
     reality_words,
     replay_command,
@@ -64,10 +65,10 @@ def reality_view(agreement: Sequence[StepAgreement]) -> TextTable:
     table = TextTable(
         "Beside the robot", caption=f"{reality_words(agreement)}; positive: success predicted"
     )
-    table.names("step").numbers("trials", "TP", "FP", "FN", "TN", *FIGURES)
+    table.names("step").numbers("trials", "TP", "FP", "FN", "TN", NOT_PREDICTABLE, *FIGURES)
     for one in agreement:
         found = one.found
-        counts = (found.trials, *(f"{cell:g}" for cell in found.cells))
+        counts = (found.trials, *(f"{cell:g}" for cell in found.cells), one.unpredictable)
         table.row(
             TITLES[one.step], *map(str, counts), *(_share(one.estimated.figure(n)) for n in FIGURES)
         )
@@ -115,6 +116,7 @@ def gap_json(
                 "weighted": False,
                 **plain(one.found),
                 "all_grasps": plain(one.all_grasps),
+                "unpredictable": one.unpredictable,
             }
             for one in agreement
         ],
