@@ -3,6 +3,7 @@
     python benchmarks/compare.py coverage [--repeats 400]
     python benchmarks/compare.py speed [RUN RUN] [--rows 1000000]
     python benchmarks/compare.py area [--rows 1000000]
+    python benchmarks/compare.py standing-out [--repeats 400]
 
 `coverage` draws trials from populations whose figures are known, as `trials plan` chooses them (so
 many of each object from those that were predicted to be lifted, and from the others), and counts
@@ -16,6 +17,10 @@ two runs on the disk; wall time, and CPU time in brackets.
 
 `area` measures by how much the area under the ROC curve changes where trials with neighbouring
 numbers share a row, as they do beyond `ordered.FINEST` different ones.
+
+`standing-out` counts in how many made-up experiments `compare` names an object or a cause: where
+all verdicts are wrong equally often (false alarms), and where predicted successes of one object
+fail more often than those of the others.
 """
 
 from __future__ import annotations
@@ -33,9 +38,11 @@ from burg_drake.experiment.comparison.comparing import compare
 from burg_drake.experiment.comparison.judge_assessment import judgement
 from burg_drake.experiment.comparison.of_runs import pairs_of_runs
 from burg_drake.experiment.comparison.run_agreement import run_agreement
+from burg_drake.experiment.comparison.standing_out import standing_out
 from burg_drake.experiment.pairing.matching import match_rows
-from burg_drake.experiment.pairing.pairs import NAMES, REFERENCE_NAMES
+from burg_drake.experiment.pairing.pairs import NAMES, REFERENCE_NAMES, VerdictPairs
 from burg_drake.experiment.pairing.result_table import ResultTable
+from burg_drake.experiment.pairing.text_codes import Factor, Ids
 from burg_drake.experiment.statistics import ordered
 from burg_drake.experiment.statistics.confusion import _all_measures, agreement
 from burg_drake.experiment.statistics.estimates import MEASURES
@@ -44,7 +51,17 @@ from burg_drake.experiment.statistics.ordered import Ordered
 from burg_drake.experiment.statistics.rank_statistics import ranking
 from burg_drake.experiment.statistics.resampling import bounds
 
-FIGURES = ("precision", "recall", "specificity", "f1", "accuracy", "matthews", "kappa", "actual")
+FIGURES = (
+    "precision",
+    "recall",
+    "specificity",
+    "f1",
+    "accuracy",
+    "matthews",
+    "kappa",
+    "actual",
+    "excess",
+)
 
 
 def main() -> None:
@@ -61,6 +78,9 @@ def main() -> None:
     joined = verbs.add_parser("area")
     joined.add_argument("--rows", type=int, default=1_000_000)
     joined.set_defaults(run=area)
+    outstanding = verbs.add_parser("standing-out")
+    outstanding.add_argument("--repeats", type=int, default=400)
+    outstanding.set_defaults(run=name_what_stands_out)
     arguments = parser.parse_args()
     arguments.run(arguments)
 
@@ -168,6 +188,56 @@ def _cover_ranking(repeats: int, rng: np.random.Generator) -> None:
                 held += found.low <= truth <= found.high
                 wide += found.high - found.low
         print(f"  {trials} trials, true {truth:.2f}: {held / repeats:.3f} ({wide / repeats:.2f})")
+
+
+def name_what_stands_out(arguments: argparse.Namespace) -> None:
+    """Prints how often objects and causes are named, rightly and wrongly."""
+    rng = np.random.default_rng(0)
+    print("objects  of each  wrong  of one object   false alarms   it is named")
+    for objects, each in ((6, 5), (6, 10), (6, 20), (12, 5), (12, 10)):
+        for wrong, planted in ((0.05, 0.5), (0.05, 0.8), (0.2, 0.6), (0.2, 0.8), (0.4, 0.8)):
+            false, power = 0, 0
+            for _ in range(arguments.repeats):
+                found, _ = standing_out(_made_up_trials(objects, each, wrong, wrong, rng))
+                false += bool(found)
+                found, _ = standing_out(_made_up_trials(objects, each, wrong, planted, rng))
+                power += any((one.kind, one.name) == ("object", "0") for one in found)
+            rates = (f"{100 * n / arguments.repeats:.1f} %" for n in (false, power))
+            print(f"{objects:7} {each:8} {wrong:6} {planted:14}", *(f"{r:>14}" for r in rates))
+
+
+def _made_up_trials(
+    objects: int, each: int, wrong: float, planted: float, rng: np.random.Generator
+) -> VerdictPairs:
+    """Trials of so many predicted successes and failures of each object, whose verdicts are wrong
+    so often; of predicted successes of object 0 another share.
+
+    Returns:
+        Predicted failures have three verdicts, two of them with one of three bodies in the way.
+    """
+    index = np.repeat(np.arange(objects), 2 * each)
+    predicted = np.tile(np.repeat([True, False], each), objects)
+    chance = np.where(predicted & (index == 0), planted, wrong)
+    actual = predicted ^ (rng.random(len(index)) < chance)
+    verdicts = rng.choice(["slipped", "collision_table", "collision_clutter"], len(index))
+    bodies = rng.choice(["a", "b", "c"], len(index))
+    simulated = np.where(predicted, "lifted", verdicts)
+    none = Factor.of(np.full(len(index), ""))
+    return VerdictPairs(
+        id=Ids(np.arange(len(index)).astype(str)),
+        run=none,
+        scene=none,
+        object=Factor.of(index.astype(str)),
+        simulated=Factor.of(simulated),
+        stage=none,
+        blocker=Factor.of(np.where(predicted | (verdicts == "slipped"), "", bodies)),
+        judged_again=none,
+        confidence=np.full(len(index), np.nan),
+        ended=Factor.of(np.where(actual, "lifted", "slipped")),
+        predicted=predicted,
+        actual=actual,
+        margins={},
+    )
 
 
 def speed(arguments: argparse.Namespace) -> None:

@@ -49,6 +49,19 @@ GROUPS: dict[str, Modules] = {
         "core/errors": ("core/test_errors",),
         "core/workers/processes": ("core/test_processes",),
     },
+    "statistics": {
+        "core/statistics": ("core/test_statistics",),
+        "experiment/statistics/confusion": ("experiment/test_agreement",),
+        "experiment/statistics/estimates": ("experiment/test_agreement",),
+        "experiment/statistics/exact_tests": (
+            "experiment/test_agreement",
+            "experiment/test_sim_to_real",
+        ),
+        "experiment/statistics/resampling": ("experiment/test_agreement",),
+        "experiment/statistics/margin_calibration": ("experiment/test_calibration",),
+        "experiment/statistics/rank_statistics": ("experiment/test_calibration",),
+        "experiment/comparison/standing_out": ("experiment/test_sim_to_real",),
+    },
     "verdicts": {
         "core/grasps/outcome": ("core/test_outcome",),
         "evaluation/stages/judge": ("evaluation/test_judge",),

@@ -13,7 +13,9 @@ from burg_drake.experiment.comparison import (
     PartedGrasp as PartedGrasp,
     PlacementAgreement as PlacementAgreement,
     RunAgreement as RunAgreement,
+    StandingOut as StandingOut,
     Stopped as Stopped,
+    Unpredictable as Unpredictable,
     compare as compare,
 )
 from burg_drake.experiment.gap import (

@@ -3,34 +3,90 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+from typing import overload
 
-from burg_drake.core import InvalidInputError, UnknownNameError, nearest, software_versions
+from burg_drake.core import (
+    InvalidInputError,
+    UnknownNameError,
+    listing,
+    nearest,
+    software_versions,
+)
 from burg_drake.core.grasps import Mode, Outcome, Verdict
 from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.records import Journal, begun_now, origin_of
-from burg_drake.evaluation.run import finish_run
+from burg_drake.evaluation.records import Journal, Ledger, Lock, begun_now, origin_of
+from burg_drake.evaluation.report import renew_report
+from burg_drake.evaluation.results import summarize
+from burg_drake.evaluation.run import finish_run, is_finished
 from burg_drake.evaluation.stages import (
     StationJudgeFactory,
     require_engine_for,
     require_scene_for,
 )
-from burg_drake.evaluation.store import JOURNAL_FILE, Run, keep_parts, load_run, save_run
+from burg_drake.evaluation.store import (
+    JOURNAL_FILE,
+    LOCK_FILE,
+    REPORT_FILE,
+    Campaign,
+    PartWriter,
+    Run,
+    keep_parts,
+    load_campaign,
+    load_run,
+    open_results,
+    save_campaign,
+    save_run,
+)
 from burg_drake.evaluation.workers import Executor, Job, LocalExecutor
 from burg_drake.station.document import ENGINES, Engine
 
 
+@overload
 def judge_again(
-    run: Run | str | Path,
+    run: Run,
+    *,
+    engine: str = ...,
+    executor: Executor | None = ...,
+    workers: int | None = ...,
+    progress: bool | Listener = ...,
+) -> Run: ...
+
+
+@overload
+def judge_again(
+    run: Campaign,
+    *,
+    engine: str = ...,
+    executor: Executor | None = ...,
+    workers: int | None = ...,
+    progress: bool | Listener = ...,
+) -> Campaign: ...
+
+
+@overload
+def judge_again(
+    run: str | Path,
+    *,
+    engine: str = ...,
+    executor: Executor | None = ...,
+    workers: int | None = ...,
+    progress: bool | Listener = ...,
+) -> Run | Campaign: ...
+
+
+def judge_again(
+    run: Run | Campaign | str | Path,
     *,
     engine: str = "reference",
     executor: Executor | None = None,
     workers: int | None = None,
     progress: bool | Listener = True,
-) -> Run:
+) -> Run | Campaign:
     """Has another engine execute the contested grasps of a run, and settle their verdicts.
 
     The new verdict takes the place of the old one in the table and in all counts; the columns
@@ -39,7 +95,8 @@ def judge_again(
     it was.
 
     Args:
-        run: complete; or its folder.
+        run: of one scene or of many, complete; or its folder. Scenes of a run over many that could
+            not be judged are left out.
         engine: name of a preset, not the run's own.
         executor: who judges, in place of so many processes of this machine.
         workers: number of processes; as many as there are processors if None.
@@ -55,27 +112,46 @@ def judge_again(
         MissingDependencyError: it is not installed.
         SimulationError: the worker processes die.
     """
-    run = run if isinstance(run, Run) else load_run(run)
-    require_second_engine(engine, run.document.engine, run.document.mode)
-    if run.document.shard:
+    found = run if isinstance(run, (Run, Campaign)) else open_results(run)
+    require_second_engine(engine, found.document.engine, found.document.mode)
+    if found.document.shard:
         raise InvalidInputError(
-            f"{run.path} is shard {run.document.shard} of a run; merge the shards, and then judge"
-            " again what is contested"
+            f"{found.path} is shard {found.document.shard} of a run; merge the shards, and then"
+            " judge again what is contested"
         )
-    if not run.complete:
-        raise InvalidInputError(
-            f"{run.path} is not complete; run the command that began it to the end first:"
-            f" {run.document.command}"
-        )
+    _require_complete(found)
     executor = executor or LocalExecutor.of_this_machine(workers)
-    with Reporter(progress) as reporter, Journal(run.path / JOURNAL_FILE) as journal:
-        left = [run.trial(id).candidate for id in run.contested]
-        if left:
-            require_scene_for(ENGINES[engine], run.scene(), run.station())
-            run = _judge(run, left, engine, executor, journal, reporter)
-        run = finish_run(run, run.document.table)
-        keep_parts(run)
-        return run
+    with Reporter(progress) as reporter:
+        if isinstance(found, Campaign):
+            return _judge_scenes(found, engine, executor, reporter)
+        settled_runs: list[Run] = []
+
+        def finish(judged: Run) -> None:
+            settled_runs.append(finish_run(judged, judged.document.table))
+            keep_parts(settled_runs[-1])
+
+        count = len(found.contested)
+        _judge([found], count, engine, executor, reporter, finish)
+        return settled_runs[0]
+
+
+def _require_complete(found: Run | Campaign) -> None:
+    """Refuses a run in which grasps are open, or scenes that can be judged.
+
+    Raises:
+        InvalidInputError: there are such.
+    """
+    if isinstance(found, Run):
+        complete, which = found.complete, ""
+    else:
+        ended = [n for n, s in found.states.items() if s.state in ("done", "empty", "failed")]
+        left = [name for name in found.names if name not in ended]
+        complete, which = not left, f" ({listing(left)})"
+    if not complete:
+        raise InvalidInputError(
+            f"{found.path} is not complete{which}; run the command that began it to the end first:"
+            f" {found.document.command}"
+        )
 
 
 def require_second_engine(engine: str, first: Engine, mode: Mode) -> None:
@@ -109,35 +185,151 @@ def _is_finer(second: Engine, first: Engine) -> bool:
     return second.simulator != first.simulator or second.time_step < first.time_step
 
 
+def _judge_scenes(
+    campaign: Campaign, engine: str, executor: Executor, reporter: Reporter
+) -> Campaign:
+    """Judges again what is contested in each scene, and writes what is made of the verdicts."""
+    with Lock(campaign.path / LOCK_FILE):
+        document, ledger = campaign.document, Ledger(campaign.path)
+        done = {name for name, state in ledger.states.items() if state.state == "done"}
+        contested = {g.name: g.contested for g in summarize(campaign).scenes if g.name in done}
+        reports = {name: (campaign.folder(name) / REPORT_FILE).exists() for name in contested}
+        names = [
+            name
+            for name, count in contested.items()
+            if count or not _is_finished(campaign, ledger, name, report=reports[name])
+        ]
+
+        def finish(run: Run) -> None:
+            name = run.path.name
+            finish_run(run, document.table, report=reports[name])
+            size = (run.path / JOURNAL_FILE).stat().st_size
+            ledger.note(replace(ledger.states[name], size=size))
+
+        runs = (load_run(campaign.folder(name)) for name in names)
+        session, begun = begun_now(executor.workers, sum(contested.values())), time.monotonic()
+        judged = _judge(runs, sum(contested.values()), engine, executor, reporter, finish)
+        if judged:
+            seconds = round(time.monotonic() - begun, 3)
+            sessions = (*document.stretches, replace(session, judged=judged, seconds=seconds))
+            versions = software_versions(ENGINES[engine].packages) | document.versions
+            document = replace(document, stretches=sessions, versions=versions)
+            save_campaign(Campaign(campaign.path, document))
+        writer = PartWriter(campaign.path, campaign.places, document.instances)
+        writer.catch_up()
+        writer.close()
+        campaign = load_campaign(campaign.path)
+        renew_report(campaign)
+        return campaign
+
+
+def _is_finished(campaign: Campaign, ledger: Ledger, name: str, *, report: bool) -> bool:
+    size, table = ledger.states[name].size, campaign.document.table
+    return is_finished(campaign.folder(name), size, table, report=report)
+
+
 def _judge(
-    run: Run,
-    left: list[Candidate],
+    runs: Iterable[Run],
+    count: int,
     engine: str,
     executor: Executor,
-    journal: Journal,
     reporter: Reporter,
-) -> Run:
-    mode: Mode = "arm" if run.document.mode == "arm" else "hand"
-    settings = origin_of(run.document).settings()
-    factory = StationJudgeFactory(run.scene(), run.station(), ENGINES[engine], mode, settings)
-    pace = ProgressMeter(reporter.show, Progress(STARTING, 0, len(left)), "judging again")
-    session, begun, judged = begun_now(executor.workers, len(run.verdicts)), time.monotonic(), 0
-    job = Job(run.document.scene.name, factory, left)
+    finish: Callable[[Run], None],
+) -> int:
+    """Judges the contested grasps of runs again; how many have a new verdict.
+
+    Args:
+        runs: are opened when workers have nothing else to do.
+        count: of contested grasps, for the progress.
+        engine, executor, reporter: see `judge_again`.
+        finish: is given each run with all of its verdicts, once.
+    """
+    opened: dict[str, _Settling] = {}
+    pace = ProgressMeter(reporter.show, Progress(STARTING, 0, count), "judging again")
+    judged = 0
+
+    def jobs() -> Iterator[Job]:
+        for run in runs:
+            settling = _Settling(run, engine, executor.workers)
+            if settling.left:
+                opened[str(run.path)] = settling
+                yield settling.job
+            else:
+                finish(settling.close())
+
     try:
-        with closing(executor.judge([job])) as verdicts:
-            for _, candidate, verdict in verdicts:
-                before = run.verdicts[candidate.id]
-                if verdict.outcome is not Outcome.SIMULATION_FAILED:
-                    journal.append(candidate.id, settled(before, verdict, engine))
-                    judged += 1
+        with closing(executor.judge(jobs())) as verdicts:
+            for job, candidate, verdict in verdicts:
+                settling = opened[job.key]
+                judged += settling.take(candidate, verdict)
                 pace.step(outcome=verdict.outcome)
+                if not settling.open:
+                    finish(opened.pop(job.key).close())
     finally:
-        seconds = round(time.monotonic() - begun, 3)
-        sessions = (*run.document.stretches, replace(session, judged=judged, seconds=seconds))
-        versions = software_versions(ENGINES[engine].packages) | run.document.versions
-        document = replace(run.document, stretches=sessions, versions=versions)
-        run = save_run(Run(run.path, document))
-    return run
+        for settling in opened.values():
+            settling.close()
+    return judged
+
+
+class _Settling:
+    """A run while its contested grasps are judged again.
+
+    Attributes:
+        left: grasps that are judged again.
+        open: how many of them have no answer yet.
+    """
+
+    def __init__(self, run: Run, engine: str, workers: int) -> None:
+        """Opens the journal.
+
+        Raises:
+            InvalidInputError: another process is writing it, or the engine cannot have an object.
+        """
+        self._journal = Journal(run.path / JOURNAL_FILE)
+        self._run, self._engine = run, engine
+        self.left = [run.trial(id).candidate for id in run.contested]
+        self.open = len(self.left)
+        self._session, self._begun = begun_now(workers, len(run.verdicts)), time.monotonic()
+        self._judged = 0
+        if self.left:
+            try:
+                require_scene_for(ENGINES[engine], run.scene(), run.station())
+            except Exception:
+                self._journal.close()
+                raise
+
+    @property
+    def job(self) -> Job:
+        """What is to be judged."""
+        run = self._run
+        mode: Mode = "arm" if run.document.mode == "arm" else "hand"
+        settings = origin_of(run.document).settings()
+        engine = ENGINES[self._engine]
+        factory = StationJudgeFactory(run.scene(), run.station(), engine, mode, settings)
+        return Job(str(run.path), factory, self.left)
+
+    def take(self, candidate: Candidate, verdict: Verdict) -> bool:
+        """Keeps an answer; whether it settles the grasp."""
+        self.open -= 1
+        if verdict.outcome is Outcome.SIMULATION_FAILED:
+            return False
+        before = self._run.verdicts[candidate.id]
+        self._journal.append(candidate.id, settled(before, verdict, self._engine))
+        self._judged += 1
+        return True
+
+    def close(self) -> Run:
+        """Writes into the run's document what was done, and closes the journal."""
+        self._journal.close()
+        document = self._run.document
+        if not self.left:
+            return Run(self._run.path, document)
+        seconds = round(time.monotonic() - self._begun, 3)
+        session = replace(self._session, judged=self._judged, seconds=seconds)
+        versions = software_versions(ENGINES[self._engine].packages) | document.versions
+        sessions = (*document.stretches, session)
+        document = replace(document, stretches=sessions, versions=versions)
+        return save_run(Run(self._run.path, document))
 
 
 def settled(before: Verdict, verdict: Verdict, engine: str) -> Verdict:

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from burg_drake.apps.cli import main
+from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.grasps import verdict
 from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.evaluation.records.journal import Journal
+from burg_drake.evaluation.results import contested
+from burg_drake.evaluation.second_opinion import judge_again, settled
+from burg_drake.evaluation.store.campaign_folder import Campaign, load_campaign
 from burg_drake.evaluation.store.run_folder import load_run
 
 from .conftest import X_OG
@@ -69,6 +76,89 @@ def test_nothing_is_judged_where_the_request_contradicts_itself(
     assert main([*command, *arm]) == 2
     assert "mode arm is simulated by Drake" in capsys.readouterr().err
     assert not (tmp_path / "run").exists()
-    many = [command[0], "tabletop_six", "tabletop_close", *command[2:4], "--rejudge", "contested"]
-    assert main([*many, "--engine", "reference"]) == 2
-    assert "--rejudge settles the run of one scene" in capsys.readouterr().err
+
+
+def of_scenes(command: list[str]) -> list[str]:
+    """The command for two scenes."""
+    return [command[0], "tabletop_six", "tabletop_close", *command[2:]]
+
+
+@pytest.fixture(scope="module")
+def judged(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a run over two scenes."""
+    pytest.importorskip("pyarrow")
+    folder = tmp_path_factory.mktemp("scenes")
+    GraspSet.create(X_OG, object="box").save(folder / "grasps.npz")
+    words = ["evaluate", "-", "-o", str(folder / "run"), "--mode", "hand"]
+    words += ["--grasps", str(folder / "grasps.npz"), "--quiet", "--workers", "1"]
+    assert main(of_scenes(words)) == 0
+    return folder / "run"
+
+
+@pytest.fixture
+def many(judged: Path, tmp_path: Path) -> Campaign:
+    """A copy of it."""
+    return load_campaign(shutil.copytree(judged, tmp_path / "run"))
+
+
+def test_all_scenes_of_a_run_are_settled(
+    command: list[str], many: Campaign, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(verdict, "CONTESTED", 1.1)
+    monkeypatch.setattr(contested, "CONTESTED", 1.1)
+    names = ("outcome", "judged_again", "engine", "run")
+    before = many.columns(names)
+    executed = before["outcome"] != "collision_target"
+    assert executed.sum() == 4 and not (before["judged_again"] != "").any()
+    again = [*of_scenes(command), "--rejudge", "contested", "--engine", "reference"]
+    assert main(again) == 0
+    assert "settled 4 contested grasps by reference" in capsys.readouterr().out
+    campaign = load_campaign(many.path)
+    after = campaign.columns(names)
+    assert (after["judged_again"] == np.where(executed, "reference", "")).all()
+    assert (after["engine"] == np.where(executed, "reference", "standard")).all()
+    assert (after["run"] == before["run"]).all() and len(after["run"]) == len(before["run"])
+    for run in campaign.runs:  # as a run of that scene alone would tell
+        assert run.contested == [] and (run.results["judged_again"] != "").sum() == 2
+        rows = (run.path / "results.csv").read_text()
+        assert rows.count("reference") >= 2
+    assert (campaign.path / "report.html").stat().st_mtime_ns >= max(
+        (run.path / "results.csv").stat().st_mtime_ns for run in campaign.runs
+    )
+    sessions = len(campaign.document.stretches)
+    # the same commands have nothing left to do
+    for words in (again, of_scenes(command)):
+        assert main(words) == 0
+        assert len(load_campaign(campaign.path).document.stretches) == sessions
+
+
+def test_a_scene_that_was_left_half_way_is_finished(
+    many: Campaign, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As after an interruption: the journal has the new verdict, the table has not."""
+    monkeypatch.setattr(verdict, "CONTESTED", 0.0)
+    monkeypatch.setattr(contested, "CONTESTED", 0.0)
+    run = many.runs[0]
+    id = run.candidates.id[0]
+    with Journal(run.path / "journal.jsonl") as journal:
+        journal.append(id, settled(run.verdicts[id], run.verdicts[id], "reference"))
+    campaign = judge_again(str(many.path), workers=1, progress=False)
+    assert isinstance(campaign, Campaign)
+    assert "reference" in (run.path / "results.csv").read_text()
+    again = campaign.columns(["judged_again"])["judged_again"].tolist()
+    assert again.count("reference") == 1 and len(again) == 6
+    state = campaign.states[campaign.names[0]]
+    assert state.size == (run.path / "journal.jsonl").stat().st_size
+
+
+def test_what_contradicts_itself_is_refused_of_many_scenes(
+    command: list[str], many: Campaign, capsys: Capture
+) -> None:
+    words = [*of_scenes(command), "--rejudge", "contested", "--engine"]
+    assert main([*words, "standard"]) == 2
+    assert "'standard' is the one that has judged all" in capsys.readouterr().err
+    assert main([*words, "reference", "--shard", "1/2"]) == 2
+    assert "merge the shards first" in capsys.readouterr().err
+    (many.path / "scenes.jsonl").unlink()
+    with pytest.raises(InvalidInputError, match=r"is not complete \(.*tabletop_six"):
+        judge_again(load_campaign(many.path))

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
+import statsmodels.api as sm
 
-from burg_drake.core.statistics import wilson_interval
+from burg_drake.core.statistics import clustered_interval, wilson_interval
 
 
 def test_wilson_interval_has_the_published_values() -> None:
@@ -30,3 +32,35 @@ def test_wilson_interval_solves_its_equation() -> None:
     assert wilson_interval(5, 5)[1] == 1.0
     low, high = wilson_interval(3, 10)
     assert wilson_interval(7, 10) == pytest.approx((1 - high, 1 - low))
+
+
+CLUSTERS = (
+    ([9, 1, 8, 2, 7], [10, 10, 10, 10, 10]),
+    ([30, 2, 0, 5], [31, 40, 9, 12]),
+    ([0, 20], [20, 21]),
+)
+
+
+@pytest.mark.parametrize(("successes", "trials"), CLUSTERS)
+def test_clustered_interval_is_that_of_a_regression_with_clustered_errors(
+    successes: list[int], trials: list[int]
+) -> None:
+    """statsmodels: least squares of a constant, with a sandwich by cluster and Student's quantile;
+    clusters without trials change nothing."""
+    outcomes = np.concatenate([np.arange(n) < k for k, n in zip(successes, trials, strict=True)])
+    group = np.repeat(np.arange(len(trials)), trials)
+    model = sm.OLS(outcomes.astype(float), np.ones(len(outcomes)))
+    fit = model.fit(cov_type="cluster", cov_kwds={"groups": group}, use_t=True)
+    low, high = fit.conf_int()[0]
+    wilson = wilson_interval(sum(successes), sum(trials))
+    assert low < wilson[0] and high > wilson[1]  # clusters differ by more than chance
+    expected = (max(0.0, low), min(1.0, high))
+    assert clustered_interval(successes, trials) == pytest.approx(expected)
+    assert clustered_interval([0, *successes], [0, *trials]) == pytest.approx(expected)
+
+
+def test_clusters_that_are_alike_are_independent_trials() -> None:
+    for successes, trials in (([5, 5, 5, 5], [10, 10, 10, 10]), ([3], [9]), ([3, 0], [9, 0])):
+        wilson = wilson_interval(sum(successes), sum(trials))
+        assert clustered_interval(successes, trials) == wilson
+    assert clustered_interval([], []) == clustered_interval([0], [0]) == (0.0, 1.0)

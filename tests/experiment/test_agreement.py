@@ -7,6 +7,7 @@ import warnings
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from scipy.stats import beta
 from sklearn import metrics
 from statsmodels.stats.contingency_tables import mcnemar
 from statsmodels.stats.inter_rater import cohens_kappa
@@ -20,8 +21,8 @@ from burg_drake.experiment.statistics.confusion import (
     matrix_of,
 )
 from burg_drake.experiment.statistics.estimates import MEASURES
-from burg_drake.experiment.statistics.mcnemar import paired, paired_counts
-from burg_drake.experiment.statistics.resampling import PRIOR, prior
+from burg_drake.experiment.statistics.exact_tests import paired, paired_counts
+from burg_drake.experiment.statistics.resampling import PRIOR, bounds, prior
 
 PAPER = (
     ((21, 9, 10, 20), "70.00", "67.74"),
@@ -129,6 +130,65 @@ def test_a_stratum_that_stands_for_many_widens_recall() -> None:
     many = agreement(counts, population=np.array([100.0, 5000.0])).recall
     assert few.value == many.value == 1.0
     assert (many.low or 0) < 0.5 < (few.low or 0)
+
+
+@pytest.mark.parametrize("cells", [(3, 2), (2, 2), (9, 1), (20, 10)])
+def test_intervals_of_many_strata_have_the_spread_of_stratified_sampling(
+    cells: tuple[int, int],
+) -> None:
+    """The unbiased variance of a stratified share, W^2 p (1 - p) / (n - 1) of each stratum (W. G.
+    Cochran, Sampling Techniques, 1977, ch. 5, without the correction for finite populations);
+    half a trial a cell is nothing among a hundred strata."""
+    one, other = cells
+    size, strata = one + other, 100
+    weight = np.random.default_rng(0).uniform(50, 500, strata)
+    counts = np.tile((one, other, 0, 0), (strata, 1))
+    found = agreement(counts, population=weight).precision
+    p, W = one / size, weight / weight.sum()
+    error = np.sqrt((W**2).sum() * p * (1 - p) / (size - 1))
+    assert found.value == pytest.approx(p)
+    assert found.low is not None and found.high is not None
+    assert (found.high - found.low) / (2 * 1.96 * error) == pytest.approx(1.0, abs=0.06)
+
+
+def test_strata_of_two_trials_count_as_a_third_of_them() -> None:
+    """Their spread cannot be told from themselves. Shares are drawn from a beta distribution with a
+    third of the trials, whose variance scipy knows."""
+    counts, widths = np.tile((1, 1, 0, 0), (300, 1)), []
+    for seed in range(4):
+        found = agreement(counts, population=np.ones(300), seed=seed).precision
+        assert found.low is not None and found.high is not None
+        widths.append(found.high - found.low)
+    expected = np.sqrt(beta(1 / 3, 1 / 3).var() / 300)
+    assert np.mean(widths) / (2 * 1.96) == pytest.approx(expected, rel=0.025)
+
+
+def test_bounds_are_quantiles() -> None:
+    rng = np.random.default_rng(0)
+    for draws in (2, 5, 40, 401):
+        values = rng.normal(size=(draws, 3, 2))
+        expected = np.quantile(values, (0.025, 0.975), axis=0)
+        np.testing.assert_allclose(bounds(values), expected, atol=1e-12)
+    assert bounds(np.array([[np.nan], [np.nan]]))[1].tolist() == [0.0]
+
+
+def test_groups_have_the_intervals_of_their_own_trials() -> None:
+    """Each as if it were alone, but for the draws; of many trials normal ones."""
+    cells = [(4200, 1800, 2000, 4000), (300, 300, 100, 500), (40, 10, 20, 30)]
+    every = agreements(np.array(cells))
+    for own, found in zip(cells, every, strict=True):
+        alone = agreement(np.array(own))
+        for name in MEASURES:
+            a, b = alone.figure(name), found.figure(name)
+            assert a.value == b.value and a.low is not None and a.high is not None
+            tolerance = 0.1 * (a.high - a.low)
+            assert (b.low, b.high) == pytest.approx((a.low, a.high), abs=tolerance), name
+    n = 12000  # predicted 6000, actual 6200: the difference of a matched pair
+    error = np.sqrt((1800 + 2000) / n - (200 / n) ** 2) / np.sqrt(n)
+    for found in (every[0].excess, paired_counts(*cells[0]).difference):
+        assert found.value == pytest.approx(-200 / n)
+        bounds_of_normal = (-200 / n - 1.96 * error, -200 / n + 1.96 * error)
+        assert (found.low, found.high) == pytest.approx(bounds_of_normal, abs=0.1 * error)
 
 
 def test_prior_is_half_a_trial_a_cell() -> None:

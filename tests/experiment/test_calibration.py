@@ -49,6 +49,21 @@ def test_interval_of_the_area_meets_a_bootstrap() -> None:
     assert (found.low, found.high) == pytest.approx((low, high), abs=0.015)
 
 
+@pytest.mark.parametrize(("good", "bad"), [(4, 400), (6, 6), (30, 90)])
+def test_interval_of_a_number_that_tells_nothing_is_that_of_mann_and_whitney(
+    good: int, bad: int
+) -> None:
+    """Evenly mixed; the statistic has the variance (m + n + 1) / (12 m n) where nothing is told,
+    also of few trials."""
+    values = np.r_[(np.arange(good) + 0.5) / good, (np.arange(bad) + 0.5) / bad]
+    found = ranking(Ordered.of(values, np.arange(good + bad) < good))
+    assert found.value == pytest.approx(0.5)
+    assert found.low is not None and found.high is not None
+    odds = np.log(found.high / (1 - found.high)) / 1.96 * 0.25  # one standard error of the area
+    expected = np.sqrt((good + bad + 1) / (12 * good * bad))
+    assert odds == pytest.approx(expected, rel=0.15)
+
+
 def test_equal_weights_are_no_weights() -> None:
     values, good = trials(90, 4, 1)
     rows = Ordered.of(values, good, np.full(90, 7.0))

@@ -332,7 +332,9 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     sheet, page = make_sheet(first, tmp_path), tmp_path / "out" / "compare.html"
     assert main(["compare", str(first.path), str(sheet), "--html", str(page)]) == 0
     out = capsys.readouterr().out
-    assert "In 10 trials on the robot" in out and "By object, selected trials" in out
+    told = " ".join(out.split())
+    assert "Estimated for the 480 grasps that 10 trials on the robot stand for" in told
+    assert "By object, selected trials" in out
     line = re.sub(r"<[^>]+>", "", page.read_text().split("How to repeat it")[1])
     assert f"burg-drake compare {first.path} {sheet} --html {page}" in line
     assert main(["compare", str(first.path), str(second.path), str(sheet), "--json"]) == 0

@@ -143,7 +143,7 @@ def run_gap(arguments: argparse.Namespace) -> int:
         measured = _measure(arguments, run, sheet, cluster)
     success = "lifted" if sheet is None else sheet.selection.success
     tried = [] if sheet is None else tried_grasps(sheet, arguments.trials, measured.first)
-    agreement = agreement_by_step(measured, tried, success) if tried else ()
+    agreement = agreement_by_step(measured, sheet, tried, success) if sheet and tried else ()
     found = gap_changes(measured, success)
     line = shlex.join(["burg-drake", *sys.argv[1:]])
     write_gap_report(measured, success, agreement, line)

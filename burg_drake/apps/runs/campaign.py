@@ -5,10 +5,16 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import chosen_motion, how_to_retry, read_given, require_standoff_of_arm
+from burg_drake.apps.runs.second_opinion import (
+    SETTLED,
+    first_engine,
+    settle,
+    settled_line,
+)
 from burg_drake.apps.runs.settings import requested_settings
 from burg_drake.core import InvalidInputError, listing
 
@@ -48,18 +54,23 @@ def evaluate_many(
     mode = mode_for(station, arguments.mode)
     require_standoff_of_arm(arguments, mode)
     motion = chosen_motion(arguments, station)
+    settings = requested_settings(arguments, mode, motion)
+    settings = replace(settings, engine=first_engine(arguments, arguments.output, mode))
     campaign = evaluate(
         list(references),
         station,
         arguments.output,
-        settings=requested_settings(arguments, mode, motion),
+        settings=settings,
         grasps=_given(arguments, station),
         executor=executor,
         workers=arguments.workers,
         retry_failed=arguments.retry_failed,
         progress=not arguments.quiet,
     )
+    campaign = settle(campaign, arguments, executor)
     print_campaign(campaign)
+    if arguments.rejudge is not None:
+        print(settled_line(campaign.columns(SETTLED)))
     if motion != GraspMotion():
         print(f"motion  {motion_text(motion)}")
     return campaign_exit_code(campaign)

@@ -31,9 +31,9 @@ from burg_drake.apps.options import (
 )
 from burg_drake.apps.runs.campaign import evaluate_many
 from burg_drake.apps.runs.second_opinion import (
+    SETTLED,
     add_rejudge_contested,
     first_engine,
-    require_one_scene,
     settle,
     settled_line,
 )
@@ -122,7 +122,6 @@ def run_evaluate(arguments: argparse.Namespace) -> int:
     require_sampled(arguments)
     references = scene_references(arguments.scenes)
     if len(references) > 1 or Path(arguments.scenes[0]).is_dir():
-        require_one_scene(arguments)
         with chosen_cluster(arguments) as executor:
             return evaluate_many(arguments, references, executor=executor)
     return _evaluate_one(arguments, references[0])
@@ -180,7 +179,7 @@ def _print_run(run: Run, motion: GraspMotion, *, rejudged: bool) -> None:
     if motion != GraspMotion():
         print(f"motion  {motion_text(motion)}")
     if rejudged or any(verdict.judged_again for verdict in run.verdicts.values()):
-        print(settled_line(run))
+        print(settled_line({name: run.results[name] for name in SETTLED}))
     if contested := run.contested:
         print(f"contested: {listing(contested)}; --rejudge contested settles them")
     print(f"table   {run.table_path}")

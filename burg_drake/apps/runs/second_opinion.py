@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
 
 from burg_drake.apps.options import Parser
 from burg_drake.core import InvalidInputError
@@ -13,11 +15,14 @@ from burg_drake.core.grasps import CONTESTED
 
 if TYPE_CHECKING:
     from burg_drake.core.grasps import Mode
-    from burg_drake.evaluation.store import Run
+    from burg_drake.evaluation.records import Columns
+    from burg_drake.evaluation.store import Campaign, Run
     from burg_drake.evaluation.workers import Executor
     from burg_drake.station.document import Engine
 
 REJUDGE = ("contested",)
+SETTLED = ("judged_again", "outcome_before", "outcome", "confidence")
+"""Columns that `settled_line` is told from."""
 
 
 def add_rejudge_contested(parser: Parser) -> None:
@@ -31,18 +36,6 @@ def add_rejudge_contested(parser: Parser) -> None:
     )
 
 
-def require_one_scene(arguments: argparse.Namespace) -> None:
-    """Refuses --rejudge for a run over many scenes.
-
-    Raises:
-        InvalidInputError: it is given.
-    """
-    if arguments.rejudge is not None:
-        raise InvalidInputError(
-            "--rejudge settles the run of one scene; give one scene, and its run as -o"
-        )
-
-
 def first_engine(arguments: argparse.Namespace, folder: str, mode: Mode) -> Engine | str:
     """The engine that judges all grasps: with --rejudge that of the run in the folder, and standard
     of a new one.
@@ -52,14 +45,14 @@ def first_engine(arguments: argparse.Namespace, folder: str, mode: Mode) -> Engi
             errors.
     """
     from burg_drake.evaluation import require_second_engine
-    from burg_drake.evaluation.store import RUN_FILE, load_run
+    from burg_drake.evaluation.store import RUN_FILE, is_campaign, open_results
     from burg_drake.station.document import DEFAULT_ENGINE, ENGINES
 
     chosen: str = arguments.engine
     if arguments.rejudge is None:
         return chosen
-    exists = (Path(folder) / RUN_FILE).exists()
-    engine = load_run(folder).document.engine if exists else ENGINES[DEFAULT_ENGINE]
+    exists = is_campaign(folder) or (Path(folder) / RUN_FILE).exists()
+    engine = open_results(folder).document.engine if exists else ENGINES[DEFAULT_ENGINE]
     if arguments.shard is not None:
         raise InvalidInputError(
             "--rejudge settles a whole run; merge the shards first (burg-drake merge), or leave"
@@ -69,7 +62,10 @@ def first_engine(arguments: argparse.Namespace, folder: str, mode: Mode) -> Engi
     return engine
 
 
-def settle(run: Run, arguments: argparse.Namespace, executor: Executor | None) -> Run:
+Judged = TypeVar("Judged", "Run", "Campaign")
+
+
+def settle(run: Judged, arguments: argparse.Namespace, executor: Executor | None) -> Judged:
     """Judges contested grasps again, if that is asked for, and says what came of it."""
     if arguments.rejudge is None:
         return run
@@ -84,19 +80,26 @@ def settle(run: Run, arguments: argparse.Namespace, executor: Executor | None) -
     )
 
 
-def settled_line(run: Run) -> str:
-    """How many verdicts another engine has settled, and how many of them changed."""
-    again = [v for v in run.verdicts.values() if v.judged_again]
-    if not again:
-        known = any(v.confidence is not None for v in run.verdicts.values())
+def settled_line(columns: Columns) -> str:
+    """How many verdicts another engine has settled, and how many of them changed.
+
+    Args:
+        columns: `SETTLED` of a run.
+    """
+    engine, before, outcome, confidence = (columns[name] for name in SETTLED)
+    again = np.flatnonzero(engine != "")
+    if not len(again):
+        known = np.isfinite(confidence).any()
         return "no verdict is contested" if known else "no verdict has a confidence to go by"
-    engines = ", ".join(sorted({v.judged_again for v in again}))
+    engines = ", ".join(sorted(set(engine[again].tolist())))
     changed = Counter(
-        f"{v.outcome_before} to {v.outcome}" for v in again if v.outcome_before != v.outcome
+        f"{was} to {now}"
+        for was, now in zip(before[again].tolist(), outcome[again].tolist(), strict=True)
+        if was != now
     )
     many = "" if len(again) == 1 else "s"
     text = f"settled {len(again)} contested grasp{many} by {engines}; changed {changed.total()}"
     details = ", ".join(f"{n} from {what}" for what, n in changed.most_common())
     text += f" ({details})" if details else ""
-    close = sum(v.confidence is not None and v.confidence < CONTESTED for v in again)
+    close = int((confidence[again] < CONTESTED).sum())
     return f"{text}; close for it, too: {close}" if close else text

@@ -27,6 +27,7 @@ from .outcome import (
     Outcome as Outcome,
     RealOutcome as RealOutcome,
     Stage as Stage,
+    outcome_label as outcome_label,
 )
 from .provenance import parts_of as parts_of
 from .storage import (

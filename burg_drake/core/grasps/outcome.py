@@ -160,6 +160,11 @@ class RealOutcome(StrEnum):
     NO_PATH = "no_path"
 
     @property
+    def of_arm(self) -> bool:
+        """Whether only an arm ends a trial so: a run of the hand alone cannot predict it."""
+        return self.value in _OF_ARM
+
+    @property
     def attempted(self) -> bool:
         """Whether it tells anything of the grasp."""
         return self not in (RealOutcome.NOT_ATTEMPTED, RealOutcome.PERCEPTION_FAILED)
@@ -169,3 +174,20 @@ class RealOutcome(StrEnum):
         """The target was lifted and is held, however it lies in the hand, and whatever happened to
         the others."""
         return self.value in (one.value for one in Outcome if one.held)
+
+
+_OF_ARM = (
+    *("no_ik", "joint_limit", "arm_collision", "approach_line", "retreat_line", "lift_line"),
+    *("no_path", "protective_stop"),
+)
+_LABELS = {
+    "lifted_disturbed": "lifted, others moved",
+    "lifted_turned": "lifted, turned",
+    "hand_collision_approach": "hit on the approach",
+}
+"""Labels that are not the value with spaces."""
+
+
+def outcome_label(outcome: str) -> str:
+    """An outcome, simulated or real, as buttons, pages and tables call it."""
+    return _LABELS.get(outcome) or outcome.replace("_", " ")

@@ -11,7 +11,11 @@ from .groups import (
     FactorGroup as FactorGroup,
     Stopped as Stopped,
 )
-from .judge_assessment import Judgement as Judgement
+from .judge_assessment import (
+    Judgement as Judgement,
+    Unpredictable as Unpredictable,
+)
+from .of_trials import strata_of as strata_of
 from .parted_grasps import PartedGrasp as PartedGrasp
 from .placement_error import (
     LIMIT_MM as LIMIT_MM,
@@ -25,5 +29,6 @@ from .run_agreement import (
     MarginDifference as MarginDifference,
     RunAgreement as RunAgreement,
 )
+from .standing_out import StandingOut as StandingOut
 from .tables import comparison_tables as comparison_tables
 from .wording import interval as interval

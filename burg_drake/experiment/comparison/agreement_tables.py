@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from burg_drake.core.grasps import Stage
+from burg_drake.core.grasps import Stage, outcome_label
 from burg_drake.core.terminal import MISSING, TextTable, format_count, format_number
 from burg_drake.experiment.comparison.groups import FactorGroup
 from burg_drake.experiment.comparison.parted_grasps import PartedGrasp
@@ -72,7 +72,8 @@ def parted_table(parted: Sequence[PartedGrasp]) -> TextTable:
     table.names("grasp").texts("first run", "second run").numbers("confidence of the first")
     for one in parted[:MOST_PARTED]:
         sure = MISSING if one.confidence is None else f"{one.confidence:.3f}"
-        table.row(*([one.scene] if scenes else []), one.grasp, one.first, one.second, sure)
+        outcomes = outcome_label(one.first), outcome_label(one.second)
+        table.row(*([one.scene] if scenes else []), one.grasp, *outcomes, sure)
     if len(parted) > MOST_PARTED:
         table.caption = f"{format_count(len(parted) - MOST_PARTED)} more in the JSON"
     return table

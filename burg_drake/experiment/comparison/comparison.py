@@ -9,7 +9,7 @@ from typing import Literal
 from burg_drake.experiment.comparison.judge_assessment import Judgement
 from burg_drake.experiment.comparison.run_agreement import RunAgreement
 from burg_drake.experiment.pairing import Side
-from burg_drake.experiment.statistics import Paired
+from burg_drake.experiment.statistics import Estimate, Paired
 from burg_drake.experiment.trials import Success
 
 
@@ -46,6 +46,8 @@ class Comparison:
         judgement: figures of the first run.
         other: figures of the second run of `simulators`.
         difference: how often either of them was right about the same trial.
+        difference_of_all: share of all grasps that the trials stand for about which the first is
+            right, less that of the second; None if nothing says what they were chosen from.
         agreement: of the two `runs`, where neither is taken for the truth.
         settings: in what two runs differ, in words.
         notes: what people should know before they trust the figures.
@@ -62,6 +64,7 @@ class Comparison:
     judgement: Judgement
     other: Judgement | None = None
     difference: Paired | None = None
+    difference_of_all: Estimate | None = None
     agreement: RunAgreement | None = None
     settings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()

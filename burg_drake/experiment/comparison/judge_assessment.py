@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import Array
+from burg_drake.core.grasps import RealOutcome
 from burg_drake.experiment.comparison.disagreement import Disagreement
 from burg_drake.experiment.comparison.groups import (
     FactorGroup,
@@ -18,9 +20,11 @@ from burg_drake.experiment.comparison.groups import (
     stopped,
 )
 from burg_drake.experiment.comparison.placement_error import PlacementAgreement
+from burg_drake.experiment.comparison.standing_out import StandingOut, standing_out
 from burg_drake.experiment.pairing import VerdictPairs
 from burg_drake.experiment.statistics import (
     Agreement,
+    Flags,
     MarginCalibration,
     Paired,
     agreement,
@@ -49,11 +53,39 @@ class Strata:
         size = np.bincount(self.index, minlength=len(self.population))
         return (self.population / np.maximum(size, 1))[self.index]
 
+    def keep(self, rows: Flags) -> Strata:
+        """Without some trials, the others standing for as many grasps as before."""
+        every = np.bincount(self.index, minlength=len(self.population))
+        kept = np.bincount(self.index[rows], minlength=len(self.population))
+        return Strata(self.index[rows], self.population * kept / np.maximum(every, 1))
+
+    def agreement(self, first: Flags, second: Flags, *, seed: int = 0) -> Agreement:
+        """Figures of all grasps, from two answers, (N,), about each trial."""
+        counts = grouped(first, second, self.index, len(self.population))
+        return agreement(counts, population=self.population, seed=seed)
+
     @property
     def missing(self) -> int:
         """Grasps that no trial stands for."""
         size = np.bincount(self.index, minlength=len(self.population))
         return int(self.population[size == 0].sum())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unpredictable:
+    """Trials that ended as no verdict of the hand alone can predict, and the figures without them.
+
+    Attributes:
+        outcomes: these trials by how they ended, the most frequent first.
+        promised: how many of them were predicted to succeed.
+        selected, all_grasps: figures of the other trials, and of the grasps that they stand for;
+            see `Judgement`.
+    """
+
+    outcomes: dict[str, int]
+    promised: int
+    selected: Agreement
+    all_grasps: Agreement | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +97,13 @@ class Judgement:
         all_grasps: figures of all grasps that they were chosen from, each trial standing for so
             many; None if nothing says what they were chosen from.
         not_represented: grasps that could have been chosen and that no trial stands for.
-        bias: predicted against actual success: whether it promises too much or too little.
+        unpredictable: trials that ended as no verdict of a run of the hand alone can predict; all
+            other figures count them as failures. None of other modes, and where there are none.
+        bias: predicted against actual success of the trials themselves; `all_grasps.excess` says
+            whether it promises too much or too little where trials stand for others.
+        standing_out: objects and causes whose verdicts are wrong more often than those of others,
+            without what is unpredictable. Of real trials alone.
+        looked_at: how many groups were tested for that.
         objects, scenes, stages: figures by object, by scene, and by the stage that decided.
         stopped: what became of the grasps by verdict and body in the way.
         outcomes: trials by verdict and what happened.
@@ -77,7 +115,10 @@ class Judgement:
     selected: Agreement
     all_grasps: Agreement | None
     not_represented: int
+    unpredictable: Unpredictable | None
     bias: Paired
+    standing_out: tuple[StandingOut, ...]
+    looked_at: int
     objects: tuple[FactorGroup, ...]
     scenes: tuple[FactorGroup, ...]
     stages: tuple[FactorGroup, ...]
@@ -95,6 +136,8 @@ def judgement(
     strata: Strata | None = None,
     placement: PlacementAgreement | None = None,
     disagreements: tuple[Disagreement, ...] = (),
+    unpredictable: Collection[RealOutcome] = (),
+    real: bool = False,
     seed: int = 0,
 ) -> Judgement:
     """Works out all figures.
@@ -104,18 +147,22 @@ def judgement(
         scenes: names of the scenes by their content.
         strata: what the trials were chosen from; None if that is not known.
         placement, disagreements: what was found of them.
+        unpredictable: outcomes that no verdict can predict.
+        real: whether what happened are trials on the robot.
         seed: of the intervals' resampling.
     """
-    weight, represented = None, None
-    counts = matrix_of(pairs.predicted, pairs.actual)[None]
-    if strata is not None:
-        weight = strata.weight
-        counts = grouped(pairs.predicted, pairs.actual, strata.index, len(strata.population))
-        represented = agreement(counts, population=strata.population, seed=seed)
+    weight = None if strata is None else strata.weight
+    selected, represented = _agreements(pairs, strata, seed)
+    names = {outcome.value for outcome in unpredictable}
+    apart = pairs.ended.where([name in names for name in pairs.ended.names])
+    found, looked_at = standing_out(pairs.take(~apart)) if real else ((), 0)
     return Judgement(
-        selected=agreement(counts, seed=seed),
+        selected=selected,
         all_grasps=represented,
         not_represented=0 if strata is None else strata.missing,
+        unpredictable=_without(pairs, strata, apart, seed) if apart.any() else None,
+        standing_out=found,
+        looked_at=looked_at,
         bias=paired(pairs.predicted, pairs.actual, seed=seed),
         objects=by_factor(pairs, pairs.object, seed=seed),
         scenes=by_factor(pairs, pairs.scene, scenes, seed=seed),
@@ -125,4 +172,28 @@ def judgement(
         calibration=calibrations(pairs.margins, pairs.actual, weight),
         placement=placement,
         disagreements=disagreements,
+    )
+
+
+def _agreements(
+    pairs: VerdictPairs, strata: Strata | None, seed: int
+) -> tuple[Agreement, Agreement | None]:
+    """Figures of the trials, and of all grasps that they stand for."""
+    if strata is None:
+        return agreement(matrix_of(pairs.predicted, pairs.actual)[None], seed=seed), None
+    counts = grouped(pairs.predicted, pairs.actual, strata.index, len(strata.population))
+    represented = strata.agreement(pairs.predicted, pairs.actual, seed=seed)
+    return agreement(counts, seed=seed), represented
+
+
+def _without(pairs: VerdictPairs, strata: Strata | None, apart: Flags, seed: int) -> Unpredictable:
+    """What some trials are, and the figures without them."""
+    kept = None if strata is None else strata.keep(~apart)
+    selected, represented = _agreements(pairs.take(~apart), kept, seed)
+    ended = Counter(pairs.ended.names[k] for k in pairs.ended.index[apart].tolist())
+    return Unpredictable(
+        outcomes=dict(ended.most_common()),
+        promised=int(pairs.predicted[apart].sum()),
+        selected=selected,
+        all_grasps=represented,
     )

@@ -107,13 +107,14 @@ def pairs_of_runs(
 ) -> tuple[VerdictPairs, SecondVerdicts, dict[str, int]]:
     """Pairs of verdicts of the grasps in common, what else the second run found of them, and what
     is left out by reason: of different modes all that not both executed."""
-    others = tables[1].take(found.second, MEASURED)
+    others = tables[1].take(found.second, (*MEASURED, "confidence"))
     ended, stage = others.texts["outcome"], others.texts["stage"]
     pairs = make_pairs(
         tables[0].take(found.first, NUMBERS), ended, successes(ended, success), success
     )
     margins = {name: others.numbers[name] for name in MEASURED}
-    second = SecondVerdicts(stage, others.texts["judged_again"], margins)
+    again, confidence = others.texts["judged_again"], others.numbers["confidence"]
+    second = SecondVerdicts(stage, again, confidence, margins)
     reasons: dict[str, Flags] = {}
     for where, verdicts in (("first", pairs.simulated), ("second", pairs.ended)):
         reasons |= {f"{k} in the {where}": rows for k, rows in undecided(verdicts).items()}

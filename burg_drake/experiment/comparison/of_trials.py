@@ -29,6 +29,7 @@ from burg_drake.experiment.pairing import (
     settled_side,
     side_of_trials,
     undecided,
+    unpredictable_for,
 )
 from burg_drake.experiment.statistics import PROBABILITY, paired
 from burg_drake.experiment.trials import (
@@ -80,6 +81,7 @@ def compare_trials(
         for pairs, side in zip(found, sides, strict=True)
     ]
     right = [pairs.predicted == pairs.actual for pairs in found]
+    strata = strata_of(sheet, trials)
     return Comparison(
         kind="simulators" if two else "trials",
         success=success,
@@ -90,6 +92,7 @@ def compare_trials(
         judgement=judged[0],
         other=judged[1] if two else None,
         difference=paired(*right, seed=seed) if two else None,
+        difference_of_all=strata.agreement(*right, seed=seed).excess if two and strata else None,
         settings=settings_apart(*sides) if two else (),
         notes=(
             *_notes(sheet, trials, sides, tables, judged[0]),
@@ -164,14 +167,16 @@ def _judgement(
     return judgement(
         pairs,
         scenes=side.scenes,
-        strata=_strata(sheet, trials),
+        strata=strata_of(sheet, trials),
         placement=placement,
+        unpredictable=unpredictable_for(side),
+        real=True,
         disagreements=disagreements(pairs, side.scenes, [side.folders], trials, offsets_mm[0]),
         seed=seed,
     )
 
 
-def _strata(sheet: TrialSheet, trials: Sequence[RealTrial]) -> Strata | None:
+def strata_of(sheet: TrialSheet, trials: Sequence[RealTrial]) -> Strata | None:
     """What the trials were chosen from; None if one of them was not chosen from anything."""
     keys = {key: k for k, key in enumerate(sheet.strata)}
     if not keys or any(trial.stratum not in keys for trial in trials):

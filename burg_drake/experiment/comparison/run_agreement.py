@@ -38,17 +38,20 @@ class SecondVerdicts:
     Attributes:
         stage: (N,) that decided.
         judged_again: (N,) engine that gave the verdict; empty where it is the run's own.
+        confidence: (N,) of the verdict; NaN where there is none.
         margins: (N,) numbers by name; NaN where there is none.
     """
 
     stage: Factor
     judged_again: Factor
+    confidence: Array
     margins: Mapping[str, Array]
 
     def take(self, rows: Values) -> SecondVerdicts:
         """Some grasps, as indices or truth values."""
         margins = {name: values[rows] for name, values in self.margins.items()}
-        return SecondVerdicts(self.stage.take(rows), self.judged_again.take(rows), margins)
+        texts = self.stage.take(rows), self.judged_again.take(rows)
+        return SecondVerdicts(*texts, self.confidence[rows], margins)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,6 +82,8 @@ class RunAgreement:
     Attributes:
         alike: share of the grasps that both hold, or both do not, with Wilson's interval.
         kappa: Cohen's, of the same.
+        same_rows: grasps with the same outcome, stage, engine, confidence and margins in both, to
+            the last digit, as those of a copy have them.
         objects: the same by object; their accuracy is the share that is alike.
         stages: grasps by the stage that decided in the first run, and in the second.
         apart: the same of the grasps that are not alike.
@@ -92,6 +97,7 @@ class RunAgreement:
 
     alike: Estimate
     kappa: Estimate
+    same_rows: int
     objects: tuple[FactorGroup, ...]
     stages: dict[str, dict[str, int]]
     apart: dict[str, dict[str, int]]
@@ -132,6 +138,7 @@ def run_agreement(
     return RunAgreement(
         alike=found.accuracy,
         kappa=found.kappa,
+        same_rows=int(_same_rows(pairs, second).sum()),
         objects=by_factor(held, held.object, seed=seed),
         stages=_by_stage(pairs.stage, second.stage),
         apart=_by_stage(pairs.stage.take(~alike), second.stage.take(~alike)),
@@ -149,6 +156,23 @@ def both_executed(first: Factor, second: Factor) -> Flags:
         for stage in (first, second)
     )
     return one & other
+
+
+def _same_rows(pairs: VerdictPairs, second: SecondVerdicts) -> Flags:
+    """(N,) whether both runs have the same verdicts with the same numbers."""
+    same = _same_texts(pairs.simulated, pairs.ended) & _same_texts(pairs.stage, second.stage)
+    same &= _same_texts(pairs.judged_again, second.judged_again)
+    numbers = [(pairs.margins[name], second.margins[name]) for name in MEASURED]
+    for one, other in [*numbers, (pairs.confidence, second.confidence)]:
+        same &= (one == other) | (np.isnan(one) & np.isnan(other))
+    return same
+
+
+def _same_texts(first: Factor, second: Factor) -> Flags:
+    place = {name: k for k, name in enumerate(second.names)}
+    codes = np.array([place.get(name, -1) for name in first.names], dtype=np.intp)
+    same: Flags = codes[first.index] == second.index
+    return same
 
 
 def margin_differences(pairs: VerdictPairs, second: SecondVerdicts) -> tuple[MarginDifference, ...]:

@@ -4,40 +4,56 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from burg_drake.core.grasps import outcome_label
 from burg_drake.core.terminal import TextTable, format_count, format_number
 from burg_drake.experiment.comparison.agreement_tables import agreement_tables
 from burg_drake.experiment.comparison.comparison import Comparison
 from burg_drake.experiment.comparison.groups import FactorGroup
 from burg_drake.experiment.comparison.judge_assessment import Judgement
 from burg_drake.experiment.comparison.wording import (
-    SHARES,
+    IN_PERCENT,
     alike_words,
     bias_words,
+    counts_words,
+    difference_of_all_words,
+    have_same_rows,
     headline,
     interval,
     margin_title,
     measure_name,
+    nothing_stands_out,
     number,
     of_selected,
+    standing_out_name,
     success_of,
+    unpredictable_words,
 )
 from burg_drake.experiment.statistics import MEASURES, Agreement, MarginCalibration
 
 MOST_ROWS = 20
+ABOUT_UNPREDICTABLE = ("precision", "recall", "accuracy")
+"""Figures that are given with and without outcomes that cannot be predicted."""
 
 
 def comparison_tables(comparison: Comparison) -> Iterator[TextTable | str]:
     """Tables and sentences, the most important first."""
     c = comparison
     yield headline(c)
-    if c.agreement is not None:
+    if c.agreement is not None and not have_same_rows(c):
         yield alike_words(c)
         yield from agreement_tables(c.agreement)
-    for name, judged in _judgements(c):
+    if words := difference_of_all_words(c):
+        yield words
+    for name, judged in [] if have_same_rows(c) else _judgements(c):
         of = of_selected(c) + name
         yield matrix_table(c, judged, name)
         yield figure_table(c, judged, name)
         yield bias_words(c, judged)
+        if judged.unpredictable is not None:
+            yield unpredictable_words(judged)
+            yield unpredictable_table(judged, name)
+        if c.kind != "runs":
+            yield standing_out_table(judged, name)
         if len(judged.objects) > 1:
             yield group_table(f"By object{of}", "object", judged.objects)
         if len(judged.scenes) > 1:
@@ -62,7 +78,7 @@ def _judgements(comparison: Comparison) -> list[tuple[str, Judgement]]:
 def matrix_table(comparison: Comparison, judged: Judgement, name: str = "") -> TextTable:
     """The confusion matrix."""
     runs = comparison.kind == "runs"
-    title = "Verdicts of both runs" if runs else f"Verdicts and outcomes{name}"
+    title = "Verdicts of both runs" if runs else f"Verdicts and outcomes, selected trials{name}"
     other = "in the second" if runs else "on the robot"
     table = TextTable(title).texts("in the first" if runs else "predicted")
     table.numbers(f"success {other}", f"failure {other}")
@@ -89,13 +105,66 @@ def figure_table(comparison: Comparison, judged: Judgement, name: str = "") -> T
     for key in MEASURES:
         cells = []
         for agreement in found:
-            f, percent = agreement.figure(key), key in SHARES
+            f, percent = agreement.figure(key), key in IN_PERCENT
             cells += [number(f, percent=percent), interval(f, percent=percent) or "-"]
         table.row(measure_name(comparison, key), *cells)
     reasons = {f.reason for a in found for f in (a.figure(k) for k in MEASURES) if f.reason}
     if reasons:
         undefined = f"-: undefined, as {'; '.join(sorted(reasons))}"
         table.caption = f"{table.caption}\n{undefined}" if table.caption else undefined
+    return table
+
+
+def unpredictable_table(judged: Judgement, name: str = "") -> TextTable:
+    """Figures with and without trials that ended as no verdict of the hand alone predicts."""
+    table = TextTable(f"With and without outcomes that the hand alone cannot predict{name}")
+    table.texts("of")
+    for key in ABOUT_UNPREDICTABLE:
+        table.numbers(key, "95 % CI")
+    for title, found in with_and_without(judged):
+        cells = []
+        for f in map(found.figure, ABOUT_UNPREDICTABLE):
+            cells += [number(f, percent=True), interval(f, percent=True) or "-"]
+        table.row(title, *cells)
+    return table
+
+
+def with_and_without(judged: Judgement) -> list[tuple[str, Agreement]]:
+    """Figures with and without what cannot be predicted, of trials and of all grasps."""
+    assert judged.unpredictable is not None
+    pairs = [("trials", judged.selected, judged.unpredictable.selected)]
+    if judged.all_grasps is not None and judged.unpredictable.all_grasps is not None:
+        pairs = [("selected trials", *pairs[0][1:])]
+        pairs.append(("all grasps", judged.all_grasps, judged.unpredictable.all_grasps))
+    return [
+        (title, found)
+        for of, every, without in pairs
+        for title, found in ((f"{of}, with", every), (f"{of}, without", without))
+    ]
+
+
+def standing_out_table(judged: Judgement, name: str = "") -> TextTable | str:
+    """Objects and causes whose verdicts are wrong more often than those of others."""
+    if not judged.standing_out:
+        return nothing_stands_out(judged)
+    table = TextTable(f"What stands out{name}").names("what", "").texts("predicted")
+    table.numbers("wrong", "others wrong").texts("ended").numbers("p corrected")
+    for one in judged.standing_out:
+        table.row(
+            one.kind,
+            standing_out_name(one),
+            "success" if one.predicted else "failure",
+            f"{one.wrong} of {one.trials}",
+            f"{one.other_wrong} of {one.other_trials}",
+            counts_words(one.ended),
+            format_number(one.corrected),
+        )
+    table.caption = (
+        "wrong more often than others with the same prediction: Fisher's exact test, one-sided"
+        f" mid-p, corrected by Holm's method for {judged.looked_at} groups"
+    )
+    if judged.unpredictable is not None:
+        table.caption += "; without what the hand alone cannot predict"
     return table
 
 
@@ -126,7 +195,7 @@ def stopped_table(comparison: Comparison, judged: Judgement, name: str = "") -> 
     table.numbers("trials", "success in the second" if runs else "succeeded", "95 % CI")
     for row in judged.stopped[:MOST_ROWS]:
         table.row(
-            row.outcome,
+            outcome_label(row.outcome),
             row.blocker,
             format_count(row.trials),
             number(row.successes, percent=True),
@@ -145,9 +214,9 @@ def calibration_table(
     table = TextTable(f"How margins predict {success_of(comparison)}{name}").texts(
         "margin", "better"
     )
-    table.numbers("trials", "AUROC", "95 % CI")
+    table.numbers("trials", "AUROC, selected trials" if weighted else "AUROC", "95 % CI")
     if weighted:
-        table.numbers("all grasps")
+        table.numbers("AUROC, all grasps")
     for c in found:
         cells = [format_count(c.trials), number(c.auroc, percent=False)]
         cells.append(interval(c.auroc, percent=False) or "-")

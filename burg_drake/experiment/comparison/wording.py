@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+from burg_drake.core.grasps import outcome_label
 from burg_drake.core.terminal import MISSING, format_number
 from burg_drake.experiment.comparison.comparison import Comparison
 from burg_drake.experiment.comparison.judge_assessment import Judgement
-from burg_drake.experiment.statistics import MEASURES, PROBABILITY, Estimate
+from burg_drake.experiment.comparison.standing_out import StandingOut
+from burg_drake.experiment.statistics import MEASURES, PROBABILITY, Agreement, Estimate
 
-SHARES = frozenset(name for name, measure in MEASURES.items() if measure.is_share)
+IN_PERCENT = frozenset(name for name, measure in MEASURES.items() if measure.is_share) | {"excess"}
 CELL_NAMES = {
     "tp": "success predicted and seen",
     "fp": "success predicted, failure seen",
@@ -20,7 +24,12 @@ CELL_NAMES_OF_RUNS = {
     "fn": "failure in the first run, success in the second",
     "tn": "failure in both runs",
 }
-"""Cells of two runs, of which neither is the truth."""
+NAMES_OF_RUNS = {
+    "predicted": "success in the first run",
+    "actual": "success in the second run",
+    "excess": "success in the first less the second",
+}
+"""Cells and figures of two runs, of which neither is the truth."""
 
 
 def of_selected(comparison: Comparison) -> str:
@@ -35,8 +44,8 @@ def cell_name(comparison: Comparison, cell: str) -> str:
 
 def measure_name(comparison: Comparison, key: str) -> str:
     """What a figure is called."""
-    if comparison.kind == "runs" and key in ("predicted", "actual"):
-        return f"success in the {'first' if key == 'predicted' else 'second'} run"
+    if comparison.kind == "runs" and key in NAMES_OF_RUNS:
+        return NAMES_OF_RUNS[key]
     return MEASURES[key].name
 
 
@@ -73,7 +82,9 @@ def brief(found: Estimate) -> str:
 
 def headline(comparison: Comparison) -> str:
     """What was found, in one sentence."""
-    c, found = comparison, comparison.judgement.selected
+    c, found = comparison, estimated(comparison.judgement)
+    if have_same_rows(c):
+        return _same_rows_words(c)
     if c.kind == "runs":
         return (
             f"On {found.trials:,} grasps the two runs agree in {brief(found.accuracy)}: success in"
@@ -81,7 +92,11 @@ def headline(comparison: Comparison) -> str:
             f" {brief(found.actual)} by the second ({c.reference.label})."
         )
     plural = "" if found.trials == 1 else "s"
-    trials = f"In {found.trials:,} trial{plural} on the robot"
+    trials = f"{found.trials:,} trial{plural} on the robot"
+    where = f"In {trials}"
+    if weighted(c.judgement) is not None:
+        stand = "stand" if plural else "stands"
+        where = f"Estimated for the {round(sum(found.cells)):,} grasps that {trials} {stand} for:"
     if c.other is not None and c.second is not None and c.difference is not None:
         first, second = f"the first simulator ({c.first.label})", f"the second ({c.second.label})"
         p = (
@@ -90,8 +105,8 @@ def headline(comparison: Comparison) -> str:
             else f" (McNemar p = {format_number(c.difference.p_value)})"
         )
         return (
-            f"{trials} {first} was right in {brief(found.accuracy)}, {second} in"
-            f" {brief(c.other.selected.accuracy)}; {difference_words(c)}{p}."
+            f"{where} {first} was right in {brief(found.accuracy)}, {second} in"
+            f" {brief(estimated(c.other).accuracy)}; {difference_words(c)}{p}."
         )
     true = f"of the successes that it predicted {brief(found.precision)} came true"
     foreseen = f"of those that came about it had predicted {brief(found.recall)}"
@@ -99,8 +114,39 @@ def headline(comparison: Comparison) -> str:
         true = "it predicted no success"
     if found.recall.value is None:
         foreseen = "none came about"
-    right = f"{trials} the simulator's verdict was right in {brief(found.accuracy)}"
+    right = f"{where} the simulator's verdict was right in {brief(found.accuracy)}"
     return f"{right}; {true}, {foreseen}."
+
+
+def estimated(judged: Judgement) -> Agreement:
+    """The figures that sentences are made of: of all grasps that the trials stand for, if known;
+    figures of the trials themselves depend on how many of which were chosen."""
+    return weighted(judged) or judged.selected
+
+
+def weighted(judged: Judgement) -> Agreement | None:
+    """Figures of all grasps that the trials stand for; None if that is not known, or if they stand
+    for themselves alone."""
+    found = judged.all_grasps
+    return None if found is None or round(sum(found.cells)) <= found.trials else found
+
+
+def have_same_rows(comparison: Comparison) -> bool:
+    """Whether two runs have the same rows, of which no figure of agreement says anything."""
+    found = comparison.agreement
+    return found is not None and found.same_rows == comparison.coverage.compared
+
+
+def _same_rows_words(c: Comparison) -> str:
+    why = "their settings differ, which changed nothing"
+    if c.first.hashes == c.reference.hashes:
+        why = f"both are run {', '.join(c.first.hashes[:3])}, one a copy of the other"
+    elif not c.settings:
+        why = "they were made with the same settings"
+    return (
+        f"The {c.coverage.compared:,} rows of both runs are the same, in outcome, stage and every"
+        f" margin: {why}. They are one opinion, not two."
+    )
 
 
 def alike_words(comparison: Comparison) -> str:
@@ -125,20 +171,30 @@ def difference_words(comparison: Comparison) -> str:
     return f"in {d.only_first} trials only the first was right, in {d.only_second} only the second"
 
 
+def difference_of_all_words(comparison: Comparison) -> str:
+    """Which of two simulators is right about more of the grasps that the trials stand for; empty
+    where nothing says what they were chosen from."""
+    found = comparison.difference_of_all
+    if found is None or found.value is None:
+        return ""
+    return (
+        f"Of all grasps that the trials stand for, the first is right about"
+        f" {100 * found.value:+.1f} percentage points more {interval(found, percent=True)}."
+    )
+
+
 def bias_words(comparison: Comparison, judged: Judgement | None = None) -> str:
-    """Whether a simulator promises too much."""
-    b = (judged or comparison.judgement).bias
+    """Whether a simulator promises too much: of all grasps that the trials stand for, if that is
+    known, and then of the trials themselves as well, whose mix may turn it round."""
+    judged = judged or comparison.judgement
+    b = judged.bias
     if b.difference.value is None:
         return "no trials"
-    more = "more" if b.difference.value > 0 else "less"
-    size = f"{100 * abs(b.difference.value):.1f} percentage points {more} success than"
-    if b.difference.value == 0:
-        size = "just as much success as"
     parted = (
         f"{b.only_first:,} predicted successes did not come true, {b.only_second:,} came about"
         " against the prediction"
     )
-    who, other = ("simulator promises", "the robot achieved")
+    who, other = "simulator promises", "the robot achieved"
     if comparison.kind == "runs":
         who, other = "first run sees", "the second"
         parted = (
@@ -148,9 +204,73 @@ def bias_words(comparison: Comparison, judged: Judgement | None = None) -> str:
     elif comparison.other is not None:
         which = "second" if judged is comparison.other else "first"
         who = f"{which} simulator promises"
+    every = weighted(judged)
+    if every is not None and every.excess.value is not None:
+        return (
+            f"Over all these grasps the {who} {_more(every.excess.value, 'success than')} {other}"
+            f" {interval(every.excess, percent=True)}. In the selected trials alone, each counted"
+            f" once, it promises {_more(b.difference.value, 'than')} {other}: {parted}."
+        )
     return (
-        f"The {who} {size} {other} {interval(b.difference, percent=True)}: {parted}"
+        f"The {who} {_more(b.difference.value, 'success than')} {other}"
+        f" {interval(b.difference, percent=True)}: {parted}"
         f" (McNemar's exact test: p = {format_number(b.p_value)})."
+    )
+
+
+def _more(difference: float, of: str) -> str:
+    """By how much something is more, or less, in percentage points."""
+    if difference == 0:
+        return f"just as much {of.replace('than', 'as')}"
+    more = "more" if difference > 0 else "less"
+    return f"{100 * abs(difference):.1f} percentage points {more} {of}"
+
+
+def unpredictable_words(judged: Judgement) -> str:
+    """What ended trials that no verdict of the hand alone predicts, and precision without them;
+    empty where nothing did."""
+    found = judged.unpredictable
+    if found is None:
+        return ""
+    count = sum(found.outcomes.values())
+    without = found.selected if weighted(judged) is None else found.all_grasps or found.selected
+    return (
+        f"{count:,} trial{'' if count == 1 else 's'} ended as no verdict of the hand alone can"
+        f" predict ({counts_words(found.outcomes)}), {found.promised:,} of them after a predicted"
+        f" success. They count as failures; without them precision is"
+        f" {brief(without.precision)} instead of {brief(estimated(judged).precision)}."
+    )
+
+
+def counts_words(outcomes: Mapping[str, int]) -> str:
+    """Outcomes with how often they occur."""
+    return ", ".join(f"{n:,} {outcome_label(name)}" for name, n in outcomes.items())
+
+
+def standing_out_name(one: StandingOut) -> str:
+    """What an object or cause that stands out is called."""
+    return outcome_label(one.name) if one.kind == "verdict" else one.name
+
+
+def standing_out_words(judged: Judgement) -> str:
+    """What stands out, in one sentence; empty if nothing does."""
+    parts = [
+        f"{standing_out_name(one)} ({one.kind}; {one.wrong} of {one.trials} predicted"
+        f" {'successes failed' if one.predicted else 'failures succeeded'}, of all others"
+        f" {one.other_wrong} of {one.other_trials})"
+        for one in judged.standing_out
+    ]
+    return f"What stands out: {', '.join(parts)}." if parts else ""
+
+
+def nothing_stands_out(judged: Judgement) -> str:
+    """What is said where no object or cause stands out."""
+    if not judged.looked_at:
+        return "Too few trials to tell whether verdicts of an object or a cause stand out."
+    groups = f"{judged.looked_at} groups" if judged.looked_at > 1 else "group"
+    return (
+        f"No object, verdict or body in the way stands out among the {groups} that were tested"
+        " (Fisher's exact test with Holm's correction)."
     )
 
 

@@ -99,12 +99,21 @@ def joined(tables: list[Columns]) -> Columns:
 
 def rejudging_json(found: Rejudging) -> dict[str, Any]:
     """The figures as JSON values."""
-    count = len(found.judged)
+    count = len(found.predictable)
     return {
         "success": found.success,
-        "judged": count,
+        "judged": len(found.judged),
+        "unpredictable": found.causes["unpredictable"],
         "agree": {
             name: _share(*found.agreement(measured=measured), count)
+            for name, measured in (("planned", False), ("measured", True))
+        },
+        "precision": {
+            name: {
+                which: dict(zip(("count", "of"), shares, strict=True))
+                for which, every in (("all", True), ("predictable", False))
+                for shares in [found.precision(measured=measured, every=every)]
+            }
             for name, measured in (("planned", False), ("measured", True))
         },
         "causes": {cause: found.causes[cause] for cause in CAUSES},

@@ -14,16 +14,18 @@ from burg_drake.core.grasps import Outcome, RealOutcome, Verdict
 from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.records import TrialOrigin
 from burg_drake.evaluation.store import Run
+from burg_drake.experiment.pairing import unpredictable_outcomes
 from burg_drake.experiment.statistics import Paired, paired_counts
 from burg_drake.experiment.trials import RealTrial, Success, TrialSheet, grasp_contents, succeeded
 from burg_drake.scene.document import Scene
 
-TrialCause = Literal["agreed", "placement", "worsened", "physics"]
+TrialCause = Literal["agreed", "placement", "worsened", "physics", "unpredictable"]
 CAUSES: dict[TrialCause, str] = {
     "agreed": "agreed as planned, and as measured",
     "placement": "disagreed as planned, agree as measured: explained by the placement",
     "worsened": "agreed as planned, disagree as measured: worsened",
     "physics": "disagree either way: left to physics",
+    "unpredictable": "ended as no verdict of the hand alone can predict",
 }
 """What a pair of verdicts says of a real one."""
 
@@ -73,15 +75,25 @@ class Rejudged:
             return ""
         return self.reason or (self.verdict.reason if self.verdict else "")
 
+    @cached_property
+    def unpredictable(self) -> bool:
+        """Whether no verdict of the run's mode could predict how it ended on the robot."""
+        approach = self.origin.settings().approach
+        return self.real in unpredictable_outcomes(self.origin.mode, approach=approach)
+
+    def is_right(self, success: Success, *, measured: bool) -> bool:
+        """Whether the verdict as planned, or as measured, agrees with the robot."""
+        verdict = self.outcome if measured else self.planned
+        return verdict is not None and succeeded(verdict, success) is succeeded(self.real, success)
+
     def cause(self, success: Success) -> TrialCause | None:
         """What the two verdicts say of the real one; None if it could not be judged again, or not
         as planned."""
         if self.outcome is None or self.planned is Outcome.SIMULATION_FAILED:
             return None
-        real = succeeded(self.real, success)
-        planned, measured = (
-            succeeded(outcome, success) is real for outcome in (self.planned, self.outcome)
-        )
+        if self.unpredictable:
+            return "unpredictable"
+        planned, measured = (self.is_right(success, measured=m) for m in (False, True))
         if planned:
             return "agreed" if measured else "worsened"
         return "placement" if measured else "physics"
@@ -127,11 +139,33 @@ class Rejudging:
             for t in self.judged
         )
 
-    def agreement(self, *, measured: bool) -> tuple[int, float, float]:
+    @cached_property
+    def predictable(self) -> tuple[Rejudged, ...]:
+        """Those of them that ended as a verdict can predict."""
+        return tuple(t for t in self.judged if not t.unpredictable)
+
+    def agreement(self, *, measured: bool, every: bool = False) -> tuple[int, float, float]:
         """Number of trials that agree with reality, as planned or as measured, and Wilson's 95 %
-        interval of their share."""
-        count = self.causes["agreed"] + self.causes["placement" if measured else "worsened"]
-        return count, *wilson_interval(count, len(self.judged))
+        interval of their share.
+
+        Args:
+            measured: the verdicts with the objects where they stood, not those as planned.
+            every: of all trials, and not only of the predictable ones.
+        """
+        trials = self.judged if every else self.predictable
+        count = sum(trial.is_right(self.success, measured=measured) for trial in trials)
+        return count, *wilson_interval(count, len(trials))
+
+    def precision(self, *, measured: bool, every: bool = False) -> tuple[int, int]:
+        """Successes among the predicted successes, and how many those are; arguments as those of
+        `agreement`."""
+        promised = [
+            trial
+            for trial in (self.judged if every else self.predictable)
+            if (verdict := trial.outcome if measured else trial.planned) is not None
+            and succeeded(verdict, self.success)
+        ]
+        return sum(succeeded(trial.real, self.success) for trial in promised), len(promised)
 
     @property
     def explained(self) -> tuple[int, int, float, float]:

@@ -11,7 +11,9 @@ import numpy as np
 from burg_drake.core import InvalidInputError
 from burg_drake.core.grasps import Outcome
 from burg_drake.evaluation.store import Run
+from burg_drake.experiment.comparison import strata_of
 from burg_drake.experiment.gap.steps import GapSteps, StepName
+from burg_drake.experiment.pairing import JudgedRuns, unpredictable_for
 from burg_drake.experiment.statistics import Agreement, agreement, matrix_of
 from burg_drake.experiment.trials import RealTrial, Success, TrialSheet, grasp_contents, succeeded
 
@@ -22,11 +24,20 @@ class StepAgreement:
 
     Attributes:
         step: its name.
-        found: confusion matrix and figures.
+        found: confusion matrix and figures of the trials, each counted once.
+        all_grasps: the same of all grasps that they were chosen from; None if that is not known.
+        unpredictable: trials, among them, that ended as no verdict of the step's mode can predict.
     """
 
     step: StepName
     found: Agreement
+    all_grasps: Agreement | None
+    unpredictable: int = 0
+
+    @property
+    def estimated(self) -> Agreement:
+        """The figures that hold for the grasps of the run, as far as that is known."""
+        return self.all_grasps or self.found
 
 
 def tried_grasps(sheet: TrialSheet, path: str | Path, run: Run) -> list[RealTrial]:
@@ -56,7 +67,7 @@ def tried_grasps(sheet: TrialSheet, path: str | Path, run: Run) -> list[RealTria
 
 
 def agreement_by_step(
-    steps: GapSteps, trials: Sequence[RealTrial], success: Success
+    steps: GapSteps, sheet: TrialSheet, trials: Sequence[RealTrial], success: Success
 ) -> tuple[StepAgreement, ...]:
     """Compares each step with the trials that tell anything of its grasp.
 
@@ -64,14 +75,15 @@ def agreement_by_step(
 
     Args:
         steps: all steps.
-        trials: see `tried_grasps`. Each counts once, whatever it was chosen from.
+        sheet: the trials file, which says what they were chosen from.
+        trials: see `tried_grasps`.
         success: what counts.
     """
     real = [trial for trial in trials if trial.outcome and trial.outcome.attempted]
     found = []
     for step in steps.steps:
         runs = [*step.runs, *steps.tried] if step.name == "placed" else list(step.runs)
-        predicted, actual = [], []
+        predicted, actual, told = [], [], []
         for trial in real:
             assert trial.outcome is not None
             verdicts = [run.verdicts[trial.grasp] for run in runs if trial.grasp in run.verdicts]
@@ -80,6 +92,11 @@ def agreement_by_step(
                 good = sum(succeeded(outcome, success) for outcome in judged)
                 predicted.append(good > len(judged) / 2)
                 actual.append(succeeded(trial.outcome, success))
-        cells = matrix_of(np.array(predicted, dtype=bool), np.array(actual, dtype=bool))
-        found.append(StepAgreement(step.name, agreement(cells)))
+                told.append(trial)
+        answers = np.array(predicted, dtype=bool), np.array(actual, dtype=bool)
+        strata = strata_of(sheet, told)
+        every = None if strata is None else strata.agreement(*answers)
+        beyond = unpredictable_for(JudgedRuns(runs[0])) if runs else frozenset()
+        apart = sum(trial.outcome in beyond for trial in told)
+        found.append(StepAgreement(step.name, agreement(matrix_of(*answers)), every, apart))
     return tuple(found)

@@ -5,31 +5,24 @@ from __future__ import annotations
 import math
 
 from burg_drake.core import Array
-from burg_drake.core.grasps import RealOutcome
+from burg_drake.core.grasps import RealOutcome, outcome_label as outcome_label
 
-SHORT_LIST: dict[RealOutcome, tuple[str, str]] = {
-    RealOutcome.LIFTED: ("lifted", "held at the end of the lift, nothing else moved"),
-    RealOutcome.LIFTED_DISTURBED: (
-        "lifted, others moved",
-        "held at the end of the lift, but another object was moved",
-    ),
-    RealOutcome.LIFTED_TURNED: (
-        "lifted, turned",
-        "held at the end of the lift, but turned or slid in the hand",
-    ),
-    RealOutcome.SLIPPED: ("slipped", "gripped, and lost during the lift"),
-    RealOutcome.DROPPED: ("dropped", "lifted, and lost while it was held"),
-    RealOutcome.CLOSED_EMPTY: ("closed empty", "the fingers closed without the object"),
-    RealOutcome.HAND_COLLISION_APPROACH: (
-        "hit on the approach",
-        "the hand hit something before it closed",
-    ),
-    RealOutcome.PROTECTIVE_STOP: ("protective stop", "the robot stopped itself"),
+_MEANINGS: dict[RealOutcome, str] = {
+    RealOutcome.LIFTED: "held at the end of the lift, nothing else moved",
+    RealOutcome.LIFTED_DISTURBED: "held at the end of the lift, but another object was moved",
+    RealOutcome.LIFTED_TURNED: "held at the end of the lift, but turned or slid in the hand",
+    RealOutcome.SLIPPED: "gripped, and lost during the lift",
+    RealOutcome.DROPPED: "lifted, and lost while it was held",
+    RealOutcome.CLOSED_EMPTY: "the fingers closed without the object",
+    RealOutcome.HAND_COLLISION_APPROACH: "the hand hit something before it closed",
+    RealOutcome.PROTECTIVE_STOP: "the robot stopped itself",
     RealOutcome.PERCEPTION_FAILED: (
-        "perception failed",
-        "the scene was not seen well enough to try; says nothing of the grasp",
+        "the scene was not seen well enough to try; says nothing of the grasp"
     ),
-    RealOutcome.NOT_ATTEMPTED: ("not attempted", "nobody tried; says nothing of the grasp"),
+    RealOutcome.NOT_ATTEMPTED: "nobody tried; says nothing of the grasp",
+}
+SHORT_LIST: dict[RealOutcome, tuple[str, str]] = {
+    outcome: (outcome_label(outcome), meaning) for outcome, meaning in _MEANINGS.items()
 }
 """Outcomes that an operator tells apart at a glance, in the order of their keys 1 to 9 and 0: what
 is written, and what it means."""
@@ -48,11 +41,6 @@ SIDES = (
     "near right",
 )
 """From which side of the board a hand comes, in steps of 45 degrees from +x on."""
-
-
-def outcome_label(outcome: RealOutcome) -> str:
-    """An outcome as buttons and boxes call it."""
-    return SHORT_LIST[outcome][0] if outcome in SHORT_LIST else outcome.value.replace("_", " ")
 
 
 def approach_text(X_SG: Array) -> str:

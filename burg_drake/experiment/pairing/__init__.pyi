@@ -15,6 +15,8 @@ from .pairs import (
 from .phases import (
     approach_note as approach_note,
     require_same_phases as require_same_phases,
+    unpredictable_for as unpredictable_for,
+    unpredictable_outcomes as unpredictable_outcomes,
 )
 from .probability import predicted_probability as predicted_probability
 from .result_table import ResultTable as ResultTable

@@ -22,7 +22,7 @@ NAMES = (
 """Columns of the run whose verdicts are predictions."""
 MEASURED = tuple(name for name in PREDICTORS if name != "score")
 """Margins that two runs may measure differently: a score belongs to the grasp."""
-REFERENCE_NAMES = (*KEY, *CONTENT, "outcome", "stage", "judged_again", *MEASURED)
+REFERENCE_NAMES = (*KEY, *CONTENT, "outcome", "stage", "judged_again", "confidence", *MEASURED)
 """Columns of a run whose verdicts count as what happened."""
 UNDECIDED = (Outcome.SIMULATION_FAILED, Outcome.REACHABLE)
 """Verdicts that predict nothing: no simulation came to an end."""

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 
 from burg_drake.core import InvalidInputError
+from burg_drake.core.grasps import Mode, RealOutcome
 from burg_drake.evaluation.records import HASH_DIGITS, read_trial_settings
 from burg_drake.experiment.pairing.side import JudgedRuns
 
@@ -25,6 +26,27 @@ UNITS = {
 APPROACH = "approach"
 """Whether a trial began at the pregrasp; of the whole arm it does, whatever was asked."""
 Value = float | bool | tuple[float, ...] | None
+
+
+def unpredictable_outcomes(mode: Mode, *, approach: bool) -> frozenset[RealOutcome]:
+    """Real outcomes that no verdict of a mode can predict: of the hand alone those of an arm, and
+    a collision on the approach that its trials leave out.
+
+    Args:
+        mode: of the run.
+        approach: whether its trials approach.
+    """
+    if mode != "hand":
+        return frozenset()
+    of_arm = [outcome for outcome in RealOutcome if outcome.of_arm]
+    return frozenset(of_arm if approach else [*of_arm, RealOutcome.HAND_COLLISION_APPROACH])
+
+
+def unpredictable_for(judged: JudgedRuns) -> frozenset[RealOutcome]:
+    """Real outcomes that no verdict of some runs can predict."""
+    document = judged.found.document
+    settings = read_trial_settings(document.trial, str(judged.path))
+    return unpredictable_outcomes(document.mode, approach=settings.approach)
 
 
 def require_same_phases(first: JudgedRuns, second: JudgedRuns) -> None:

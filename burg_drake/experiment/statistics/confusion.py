@@ -36,6 +36,7 @@ class Agreement:
         matthews: correlation of predicted and actual success.
         kappa: agreement beyond chance.
         predicted, actual: shares of successes.
+        excess: the first less the second: above 0 where too much is predicted.
     """
 
     trials: int
@@ -53,6 +54,7 @@ class Agreement:
     kappa: Estimate
     predicted: Estimate
     actual: Estimate
+    excess: Estimate
 
     @property
     def cells(self) -> tuple[float, float, float, float]:

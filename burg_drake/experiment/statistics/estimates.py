@@ -114,6 +114,10 @@ def _kappa(tp: Array, fp: Array, fn: Array, tn: Array) -> Array:
     return 1.0 - (tp + fp + fn + tn) * (fp + fn) / chance
 
 
+def _excess(tp: Array, fp: Array, fn: Array, tn: Array) -> Array:
+    return (fp - fn) / (tp + fp + fn + tn)
+
+
 MEASURES: Final[Mapping[str, Measure]] = {
     "precision": _share("precision", (0,), (0, 1), "no success was predicted"),
     "recall": _share("recall", (0,), (0, 2), "nothing succeeded"),
@@ -127,6 +131,7 @@ MEASURES: Final[Mapping[str, Measure]] = {
     "kappa": Measure("Cohen's kappa", _kappa, "all verdicts and outcomes are alike", low=-1.0),
     "predicted": _share("predicted success", (0, 1), (0, 1, 2, 3), "no trials"),
     "actual": _share("actual success", (0, 2), (0, 1, 2, 3), "no trials"),
+    "excess": Measure("predicted less actual success", _excess, "no trials", low=-1.0),
 }
 """All measures by the name of their field in `confusion.Agreement`.
 

@@ -25,13 +25,23 @@ from burg_drake.evaluation.workers import Job
 from burg_drake.experiment.gap.changes import gap_changes
 from burg_drake.experiment.gap.measurement import measure_gap
 from burg_drake.experiment.gap.placement_noise import PlacementNoise
-from burg_drake.experiment.gap.report.sections import change_section, push_section
-from burg_drake.experiment.gap.report.sentences import step_sentences
+from burg_drake.experiment.gap.report.sections import (
+    change_section,
+    push_section,
+    reality_section,
+)
+from burg_drake.experiment.gap.report.sentences import reality_words, step_sentences
 from burg_drake.experiment.gap.report.tables import gap_json
 from burg_drake.experiment.gap.settings import GapSettings
 from burg_drake.experiment.gap.step_agreement import agreement_by_step, tried_grasps
 from burg_drake.experiment.gap.steps import GapStep, GapSteps
-from burg_drake.experiment.trials.sheet import RealTrial, Selection, SourceRun, TrialSheet
+from burg_drake.experiment.trials.sheet import (
+    RealTrial,
+    Selection,
+    SourceRun,
+    Stratum,
+    TrialSheet,
+)
 from burg_drake.experiment.trials.sources import grasp_contents
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.document.engine import ENGINES
@@ -264,10 +274,9 @@ def real_trials(run: Run, *outcomes: RealOutcome) -> list[RealTrial]:
     ]
 
 
-def test_another_grasp_of_the_same_id_is_not_the_one_that_was_tried(run: Run) -> None:
+def sheet_of(run: Run, trials: tuple[RealTrial, ...]) -> TrialSheet:
+    """A sheet that does not say what its trials were chosen from."""
     document = run.document
-    trials = real_trials(run, *[RealOutcome.LIFTED] * 3)
-    changed = (trials[0], replace(trials[1], content="0123456789ab"))
     source = SourceRun(
         path=str(run.path),
         hash="another",
@@ -277,9 +286,14 @@ def test_another_grasp_of_the_same_id_is_not_the_one_that_was_tried(run: Run) ->
         engine="screening",
     )
     selection = Selection(per_object=1, balance="none")
-    sheet = TrialSheet(runs={"a": source}, selection=selection, trials=changed)
+    return TrialSheet(runs={"a": source}, selection=selection, trials=trials)
+
+
+def test_another_grasp_of_the_same_id_is_not_the_one_that_was_tried(run: Run) -> None:
+    trials = real_trials(run, *[RealOutcome.LIFTED] * 3)
+    sheet = sheet_of(run, (trials[0], replace(trials[1], content="0123456789ab")))
     assert tried_grasps(sheet, "trials.yaml", run) == trials[:1]
-    own = replace(sheet, runs={"a": replace(source, hash=document.hash)})
+    own = replace(sheet, runs={"a": replace(sheet.runs["a"], hash=run.document.hash)})
     with pytest.raises(InvalidInputError, match=r"trial 2: grasp .* it had 0123456789ab when"):
         tried_grasps(own, "trials.yaml", run)
 
@@ -288,7 +302,8 @@ def test_each_step_is_held_against_the_robot(known: GapSteps) -> None:
     real = (RealOutcome.LIFTED, RealOutcome.SLIPPED, RealOutcome.LIFTED)
     trials = real_trials(known.first, *real)
     later = replace(trials[0], number=4, outcome=None)
-    found = agreement_by_step(known, [*trials, later], "lifted")
+    sheet = sheet_of(known.first, (*trials, later))
+    found = agreement_by_step(known, sheet, [*trials, later], "lifted")
     assert [(a.step, *a.found.cells) for a in found] == [
         ("hand", 1, 1, 1, 0),
         ("reach", 2, 0, 0, 1),
@@ -296,6 +311,35 @@ def test_each_step_is_held_against_the_robot(known: GapSteps) -> None:
     ]
     assert found[1].found.precision.value == 1.0
     assert found[2].found.recall.value == 0.5
+    assert all(a.all_grasps is None and a.estimated is a.found for a in found)
+    assert "each counted once" in reality_words(found)
+    stopped = [replace(t, outcome=RealOutcome.NO_PATH) for t in trials]
+    apart = agreement_by_step(known, sheet, stopped, "lifted")
+    assert [(a.step, a.unpredictable) for a in apart] == [("hand", 3), ("reach", 0), ("placed", 2)]
+
+
+def test_shares_beside_the_robot_hold_for_all_grasps_that_were_chosen_from(known: GapSteps) -> None:
+    """Of 100 grasps, 10 of which the hand lifts, it was right about one of two, and about none of
+    the 90 that it does not lift: by hand."""
+    trials = real_trials(
+        known.first, *[RealOutcome.LIFTED, RealOutcome.SLIPPED, RealOutcome.LIFTED]
+    )
+    sizes = {"success": 10, "failure": 90}
+    strata = {
+        label: Stratum(run="a", object="box", label=label, population=n, selected=2, wanted=2)
+        for label, n in sizes.items()
+    }
+    labels = ("success", "success", "failure")
+    told = [replace(trial, stratum=label) for trial, label in zip(trials, labels, strict=True)]
+    sheet = replace(sheet_of(known.first, tuple(told)), strata=strata)
+    hand = agreement_by_step(known, sheet, told, "lifted")[0]
+    assert hand.found.accuracy.value == pytest.approx(1 / 3)
+    assert hand.all_grasps is not None
+    assert hand.all_grasps.cells == pytest.approx((5, 5, 90, 0))
+    assert hand.estimated.accuracy.value == pytest.approx(0.05)
+    assert hand.estimated.recall.value == pytest.approx(5 / 95)
+    page = reality_section([hand])
+    assert page is not None and "estimated for the 100 grasps" in page and " 5.0 %" in page
 
 
 def test_the_page_shows_all_sections(ladder: GapSteps) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import shutil
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -153,11 +154,50 @@ def test_the_hand_goes_where_it_was_sent(run: Run, found: Rejudging) -> None:
 
 def test_reality_slipped_and_only_the_displaced_scene_says_so(found: Rejudging) -> None:
     """Trials 1 and 4 are lifted either way: physics; 2 is explained; 3 is not judged."""
-    assert found.causes == {"agreed": 0, "placement": 1, "worsened": 0, "physics": 2}
+    assert found.causes == {
+        "agreed": 0,
+        "placement": 1,
+        "worsened": 0,
+        "physics": 2,
+        "unpredictable": 0,
+    }
     assert found.table == {(True, True, False): 2, (True, False, False): 1}
     assert found.explained[:2] == (1, 3)
     assert found.paired.p_value == 1.0
     assert [t.cause("lifted") for t in found.trials] == ["physics", "placement", None, "physics"]
+
+
+def test_what_the_hand_alone_cannot_predict_is_left_to_nothing(
+    run: Run, sheet: TrialSheet, found: Rejudging, tmp_path: Path
+) -> None:
+    """The arm failed where the verdict agrees as measured, and where it disagrees either way."""
+    shutil.copytree(found.path, tmp_path / "again")
+    real = {1: RealOutcome.NO_PATH, 2: RealOutcome.PROTECTIVE_STOP}
+    trials = [replace(t, outcome=real.get(t.number, t.outcome)) for t in sheet.trials]
+    other = replace(sheet, trials=tuple(trials))
+    told = rejudge(other, "trials.yaml", tmp_path / "again", executor=Nobody(), progress=False)  # type: ignore[arg-type]
+    assert run.document.mode == "hand"
+    assert told.causes == {
+        "agreed": 0,
+        "placement": 0,
+        "worsened": 0,
+        "physics": 1,
+        "unpredictable": 2,
+    }
+    assert told.agreement(measured=True)[0] == 0
+    assert told.agreement(measured=True, every=True)[0] == 1
+    # all three were predicted to lift, one of which was predictable, and none did
+    assert told.precision(measured=False, every=True) == (0, 3)
+    assert told.precision(measured=False) == (0, 1) and told.precision(measured=True) == (0, 1)
+    words = " ".join(rejudged_words(told))
+    assert "2 trials ended as no verdict of the hand alone can predict (1 no path, 1" in words
+    assert re.search(r"as planned 0 of 3 \(0\S* %\) with them, 0 of 1 \(0\S* %\) without", words)
+    assert "Of the 1 that disagrees as planned" in words and "1 is left to physics" in words
+    page = rejudged_section(told)
+    assert "Not predictable" in page and "as measured, with what cannot be predicted" in page
+    data = json.loads((told.path / "rejudged.json").read_text())
+    assert data["unpredictable"] == 2 and data["agree"]["planned"]["of"] == 1
+    assert data["precision"]["planned"]["all"] == {"count": 0, "of": 3}
 
 
 def test_an_answer_that_is_lost_is_asked_for_again(

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from burg_drake.core.grasps import CONTESTED
+from burg_drake.core.grasps import CONTESTED, outcome_label
 from burg_drake.core.terminal import format_count, format_number
 from burg_drake.evaluation.report.elements import (
     Child,
@@ -100,8 +100,8 @@ def _parted(parted: Sequence[PartedGrasp]) -> Html | None:
     for one in parted[:MOST_PARTED]:
         cells: tuple[Child, ...] = (
             one.grasp,
-            one.first.replace("_", " "),
-            one.second.replace("_", " "),
+            outcome_label(one.first),
+            outcome_label(one.second),
             "-" if one.confidence is None else f"{one.confidence:.3f}",
             join(*(command(line) for line in one.replays)),
         )

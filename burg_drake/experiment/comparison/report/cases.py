@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import quote
 
+from burg_drake.core.grasps import outcome_label
 from burg_drake.core.terminal import format_count, format_number
 from burg_drake.evaluation.report.elements import (
     Child,
@@ -38,11 +39,30 @@ def case_section(comparison: Comparison, judged: Judgement, photos: Path | None)
     if not judged.disagreements:
         return None
     tables = []
-    for kind in ("fp", "fn"):
-        title = cell_name(comparison, kind).capitalize()
-        cases = [d for d in judged.disagreements if d.kind == kind]
+    apart = judged.unpredictable
+    beyond = {} if apart is None else apart.outcomes
+    promised = 0 if apart is None else apart.promised
+    of = [d for d in judged.disagreements if d.kind == "fp"]
+    groups = [
+        (
+            cell_name(comparison, "fp"),
+            [d for d in of if d.ended not in beyond],
+            round(judged.selected.fp) - promised,
+        ),
+        (
+            "success predicted, ended as the hand alone cannot predict",
+            [d for d in of if d.ended in beyond],
+            promised,
+        ),
+        (
+            cell_name(comparison, "fn"),
+            [d for d in judged.disagreements if d.kind == "fn"],
+            round(judged.selected.fn),
+        ),
+    ]
+    for name, cases, total in groups:
+        title = name.capitalize()
         if cases:
-            total = round(getattr(judged.selected, kind))
             shown = min(len(cases), MOST_CASES)
             more = f", the first {shown}" if total > shown else ""
             tables += [
@@ -60,12 +80,12 @@ def _case_table(cases: Sequence[Disagreement], photos: Path | None) -> Html:
     head.append("replay")
     rows = []
     for case in cases:
-        verdict = case.simulated.replace("_", " ")
+        verdict = outcome_label(case.simulated)
         cells: list[Child] = [case.trial] if real else []
         cells += [
             case.object,
             f"{verdict} ({case.blocker})" if case.blocker else verdict,
-            case.ended.replace("_", " "),
+            outcome_label(case.ended),
         ]
         if real:
             offset = "-" if case.offset_mm is None else f"{format_number(case.offset_mm)} mm"
@@ -93,7 +113,7 @@ def stopped_section(comparison: Comparison, judged: Judgement, of: str) -> Html:
     rows = [
         element(
             "tr",
-            element("th", row.outcome.replace("_", " "), scope="row"),
+            element("th", outcome_label(row.outcome), scope="row"),
             element("td", row.blocker or "", class_="faint"),
             element("td", row.stage),
             element("td", format_count(row.trials), class_="number", data_label="trials"),
@@ -116,8 +136,8 @@ def stopped_section(comparison: Comparison, judged: Judgement, of: str) -> Html:
     )
 
 
-def outcome_section(comparison: Comparison, judged: Judgement) -> Html:
-    """Simulated outcomes by what happened."""
+def outcome_section(comparison: Comparison, judged: Judgement, of: str) -> Html:
+    """Simulated outcomes by what happened; `of` says of which trials."""
     happened = sorted({name for row in judged.outcomes.values() for name in row})
     rows = []
     for simulated, row in judged.outcomes.items():
@@ -125,16 +145,16 @@ def outcome_section(comparison: Comparison, judged: Judgement) -> Html:
             element("td", row.get(name, "·"), class_="number" if name in row else "number zero")
             for name in happened
         ]
-        rows.append(element("tr", element("th", simulated.replace("_", " "), scope="row"), *cells))
+        rows.append(element("tr", element("th", outcome_label(simulated), scope="row"), *cells))
     runs = comparison.kind == "runs"
-    head = ["first run" if runs else "simulated", *(n.replace("_", " ") for n in happened)]
+    head = ["first run" if runs else "simulated", *(outcome_label(n) for n in happened)]
     judge, other = ("in simulation", "on the robot")
     if runs:
         judge, other = "in the first run", "in the second"
     numbers = range(1, len(head))
     style = "matrix" if len(head) > 6 else ""
     return folded(
-        "Outcome by outcome",
+        f"Outcome by outcome{of}",
         f"Rows: how grasps ended {judge}. Columns: how they ended {other}.",
         table(head, rows, numbers=numbers, style=style),
     )

@@ -22,8 +22,8 @@ def margin_section(comparison: Comparison, judged: Judgement) -> Html | None:
     if not found:
         return None
     weighted = any(c.auroc_weighted is not None for c in found)
-    head = ["margin", "trials", "AUROC"]
-    head += ["AUROC, all grasps"] if weighted else []
+    head = ["margin", "trials"]
+    head += ["AUROC, selected trials", "AUROC, all grasps"] if weighted else ["AUROC"]
     rows = [_row(c, weighted) for c in found]
     plots = [reliability_plot(c, success_of(comparison)) for c in found[:MOST_PLOTS]]
     trials = "grasps, each trial standing for its share," if weighted else "trials"
@@ -43,7 +43,8 @@ def margin_section(comparison: Comparison, judged: Judgement) -> Html | None:
 
 def _informative(found: MarginCalibration) -> float:
     """How far the interval stays from telling nothing; plots are drawn of those that tell most."""
-    low, high = found.auroc.low, found.auroc.high
+    area = found.auroc_weighted or found.auroc
+    low, high = area.low, area.high
     return -1.0 if low is None or high is None else max(low - 0.5, 0.5 - high)
 
 

@@ -31,15 +31,23 @@ from burg_drake.experiment.comparison.report.figures import (
     figure_section,
     group_section,
     matrix_section,
+    standing_out_section,
+    unpredictable_section,
 )
 from burg_drake.experiment.comparison.report.margins import margin_section, placement_section
 from burg_drake.experiment.comparison.wording import (
-    SHARES,
+    IN_PERCENT,
     bias_words,
+    difference_of_all_words,
+    estimated,
+    have_same_rows,
     headline,
     interval,
     number,
     of_selected,
+    standing_out_words,
+    unpredictable_words,
+    weighted,
 )
 from burg_drake.experiment.pairing import Side
 from burg_drake.experiment.statistics import Estimate
@@ -99,7 +107,9 @@ def _about(c: Comparison) -> str:
 
 
 def _lead(c: Comparison) -> Html:
-    found = c.judgement.selected
+    if have_same_rows(c):
+        return element("p", element("b", headline(c)), class_="lead")
+    found = estimated(c.judgement)
     entries: list[tuple[str, Child, str]] = [
         _tile("Same verdict" if c.kind == "runs" else "Right verdicts", found.accuracy, "accuracy"),
         _tile("Precision", found.precision, "precision"),
@@ -108,6 +118,8 @@ def _lead(c: Comparison) -> Html:
         _tile("Cohen's kappa", found.kappa, "kappa"),
     ]
     what, whose = "trials", "of the selected trials"
+    if weighted(c.judgement) is not None:
+        whose = f"estimated for the {round(sum(found.cells)):,} grasps that the trials stand for"
     if c.kind == "simulators":
         whose += " (first simulator)"
     elif c.kind == "runs":
@@ -116,7 +128,10 @@ def _lead(c: Comparison) -> Html:
     return element(
         "div",
         element(
-            "p", element("b", _unbroken(headline(c))), _unbroken(f" {bias_words(c)}"), class_="lead"
+            "p",
+            element("b", _unbroken(headline(c))),
+            _unbroken(f" {' '.join(filter(None, _more_words(c)))}"),
+            class_="lead",
         ),
         tiles(entries),
         element(
@@ -128,13 +143,21 @@ def _lead(c: Comparison) -> Html:
     )
 
 
+def _more_words(c: Comparison) -> list[str]:
+    """The sentences after the first one; empty ones are left out."""
+    judged = c.judgement
+    if c.kind == "simulators":
+        return [difference_of_all_words(c)]
+    return [bias_words(c), unpredictable_words(judged), standing_out_words(judged)]
+
+
 def _unbroken(text: str) -> str:
     """Keeps per cent signs with their numbers."""
     return text.replace(" %", "\u00a0%")
 
 
 def _tile(name: str, found: Estimate, key: str) -> tuple[str, Child, str]:
-    percent = key in SHARES
+    percent = key in IN_PERCENT
     if found.value is None:
         return name, "-", found.reason
     if percent:
@@ -146,6 +169,8 @@ def _sections(c: Comparison, photos: Path | None) -> list[Html | None]:
     judged = [("", c.judgement)]
     if c.other is not None:
         judged = [("first", c.judgement), ("second", c.other)]
+    if have_same_rows(c):
+        return []
     parts = [*agreement_sections(c), matrix_section(c, judged), _difference(c)]
     parts.append(figure_section(c, judged))
     for name, judgement in judged:
@@ -158,6 +183,8 @@ def _of_one(c: Comparison, judgement: Judgement, photos: Path | None) -> list[Ht
     text = f"Share of {right}, precision and recall, with 95 % intervals."
     of = of_selected(c)
     parts = [
+        unpredictable_section(judgement),
+        standing_out_section(judgement) if c.kind != "runs" else None,
         group_section(f"By object{of}", text, "object", judgement.objects),
         group_section(f"By scene{of}", text, "scene", judgement.scenes)
         if len(judgement.scenes) > 1
@@ -166,7 +193,7 @@ def _of_one(c: Comparison, judgement: Judgement, photos: Path | None) -> list[Ht
         margin_section(c, judgement),
         stopped_section(c, judgement, of),
         case_section(c, judgement, photos),
-        outcome_section(c, judgement),
+        outcome_section(c, judgement, of),
     ]
     return parts
 
@@ -185,12 +212,13 @@ def _difference(c: Comparison) -> Html | None:
         return None
     points = interval(d.difference, percent=True)
     text = (
-        f"Both are right in {d.both} of {d.trials} trials, only the first in {d.only_first}, only"
-        f" the second in {d.only_second}, neither in {d.neither}. The first is right"
-        f" {100 * d.difference.value:+.1f} percentage points more often {points}; McNemar's exact"
-        f" test of equally many right verdicts: p = {d.p_value:.3g}."
+        f"{difference_of_all_words(c)} Both are right in {d.both} of {d.trials} trials, only the"
+        f" first in {d.only_first}, only the second in {d.only_second}, neither in {d.neither}. In"
+        f" these trials the first is right {100 * d.difference.value:+.1f} percentage points more"
+        f" often {points}; McNemar's exact test of equally many right verdicts:"
+        f" p = {d.p_value:.3g}."
     )
-    return section("Which simulator is right more often?", text)
+    return section("Which simulator is right more often?", text.lstrip())
 
 
 def _settings(c: Comparison) -> Html:

@@ -6,7 +6,7 @@ import shlex
 from collections import Counter
 from collections.abc import Sequence
 
-from burg_drake.core.grasps import Stage
+from burg_drake.core.grasps import Stage, outcome_label
 from burg_drake.core.terminal import TextTable, format_percent
 from burg_drake.evaluation.report.elements import (
     Child,
@@ -25,28 +25,33 @@ HEADS: dict[TrialCause, str] = {
     "placement": "Explained by placement",
     "worsened": "Worsened",
     "physics": "Left to physics",
+    "unpredictable": "Not predictable",
 }
 ROWS = 40
 
 
 def rejudged_words(found: Rejudging) -> list[str]:
     """What came of it, in sentences."""
-    whole = len(found.judged)
-    if not whole:
+    if not found.judged:
         return ["None of the trials could be judged again.", *_skipped(found)]
-    of, p = found.causes, found.paired.p_value
+    of, whole = found.causes, len(found.predictable)
     planned, measured = (found.agreement(measured=m)[0] for m in (False, True))
     count, wrong, low, high = found.explained
-    sentences = [
-        f"Of {whole} trials {planned} agree with the robot as planned"
-        f" ({format_percent(planned / whole)}), and {measured} with the objects where they stood"
-        f" ({format_percent(measured / whole)}); McNemar's exact test: p = {p:.2g}."
-    ]
+    sentences = _unpredictable(found)
+    if whole:
+        sentences.append(
+            f"Of {whole} {'other ' if sentences else ''}trials, each counted once whatever it"
+            f" stands for, {planned} agree with the robot as planned"
+            f" ({format_percent(planned / whole)}), and {measured} with the objects where they"
+            f" stood ({format_percent(measured / whole)}); McNemar's exact test:"
+            f" p = {found.paired.p_value:.2g}."
+        )
     if wrong:
         sentences.append(
-            f"Of the {wrong} that disagree as planned, placement explains {count}"
-            f" ({format_percent(count / wrong)}, 95 % interval {100 * low:.0f} to"
-            f" {100 * high:.0f} %), and {of['physics']} are left to physics."
+            f"Of the {wrong} that disagree{'s' if wrong == 1 else ''} as planned, placement"
+            f" explains {count} ({format_percent(count / wrong)}, 95 % interval {100 * low:.0f} to"
+            f" {100 * high:.0f} %), and {of['physics']}"
+            f" {'is' if of['physics'] == 1 else 'are'} left to physics."
         )
     if of["worsened"]:
         sentences.append(f"Worsened: {of['worsened']} that agreed as planned.")
@@ -60,6 +65,30 @@ def rejudged_words(found: Rejudging) -> list[str]:
     if not_judged:
         sentences.append(f"{len(not_judged)} could not be judged again.")
     return [*sentences, *_skipped(found)]
+
+
+def _unpredictable(found: Rejudging) -> list[str]:
+    """What is counted apart, and precision with and without it."""
+    apart = [trial for trial in found.judged if trial.unpredictable]
+    if not apart:
+        return []
+    ended = Counter(outcome_label(trial.real) for trial in apart)
+    plural = "" if len(apart) == 1 else "s"
+    texts = ", ".join(f"{n} {name}" for name, n in ended.most_common())
+    precision = "; ".join(
+        f"{name} {_share(found.precision(measured=m, every=True))} with them,"
+        f" {_share(found.precision(measured=m))} without"
+        for name, m in (("as planned", False), ("as measured", True))
+    )
+    return [
+        f"{len(apart)} trial{plural} ended as no verdict of the hand alone can predict ({texts}):"
+        f" counted apart, and left to neither placement nor physics. Precision {precision}."
+    ]
+
+
+def _share(count: tuple[int, int]) -> str:
+    part, whole = count
+    return f"{part} of {whole} ({format_percent(part / whole)})" if whole else "undefined"
 
 
 def _skipped(found: Rejudging) -> list[str]:
@@ -96,10 +125,13 @@ def _spread(*parts: Html | None) -> list[Html]:
 
 
 def _counts(found: Rejudging) -> Html:
-    whole = len(found.judged)
     rows = []
-    for name, measured in (("as planned", False), ("as measured", True)):
-        count, low, high = found.agreement(measured=measured)
+    cases = [("as planned", False, False), ("as measured", True, False)]
+    if len(found.predictable) < len(found.judged):
+        cases += [(f"{name}, with what cannot be predicted", m, True) for name, m, _ in cases]
+    for name, measured, every in cases:
+        whole = len(found.judged if every else found.predictable)
+        count, low, high = found.agreement(measured=measured, every=every)
         share: Child = "-"
         if whole:
             share = join(
@@ -150,22 +182,18 @@ def _rows(trials: Sequence[Rejudged], head: str) -> list[Html]:
     rows = []
     for k, trial in enumerate(trials[:ROWS]):
         more = f" (first {ROWS} of {len(trials)})" if len(trials) > ROWS else ""
-        measured = trial.outcome.value if trial.outcome else trial.why_not
-        notes = "; ".join(trial.notes)
-        cells: list[Child] = [trial.object, trial.planned.value, measured, trial.real.value, notes]
+        measured = outcome_label(trial.outcome) if trial.outcome else trial.why_not
+        planned, real = outcome_label(trial.planned), outcome_label(trial.real)
+        cells: list[Child] = [trial.object, planned, measured, real, "; ".join(trial.notes)]
         rows.append(
             element(
                 "tr",
                 element("th", f"{head}{more}" if k == 0 else "", scope="row"),
                 element("td", trial.number, class_="number"),
-                *(element("td", _spaced(cell)) for cell in cells),
+                *(element("td", cell) for cell in cells),
             )
         )
     return rows
-
-
-def _spaced(cell: Child) -> str:
-    return str(cell).replace("_", " ")
 
 
 def replay_line(found: Rejudging, row: int) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from burg_drake.core.grasps import PUSHED, Outcome
+from burg_drake.core.grasps import PUSHED, Outcome, outcome_label
 from burg_drake.core.terminal import format_percent
 from burg_drake.evaluation.report.elements import (
     Child,
@@ -23,7 +23,13 @@ from burg_drake.evaluation.report.elements import (
 from burg_drake.evaluation.results import PUSH, pushes
 from burg_drake.experiment.gap.changes import Change, OutcomeChange, successes_by_object
 from burg_drake.experiment.gap.report.flow import FlowColumn, flow_chart
-from burg_drake.experiment.gap.report.sentences import TITLES, left_out, replay_command, words
+from burg_drake.experiment.gap.report.sentences import (
+    NOT_PREDICTABLE,
+    TITLES,
+    left_out,
+    reality_words,
+    replay_command,
+)
 from burg_drake.experiment.gap.step_agreement import StepAgreement
 from burg_drake.experiment.gap.steps import GapSteps
 from burg_drake.experiment.statistics import Estimate
@@ -111,8 +117,8 @@ def _flow_table(change: Change) -> Html:
         rows.append(
             element(
                 "tr",
-                element("td", words(before)),
-                element("td", words(after)),
+                element("td", outcome_label(before)),
+                element("td", outcome_label(after)),
                 element("td", count, class_="number"),
                 element("td", by or "-", class_="faint"),
             )
@@ -132,7 +138,7 @@ def _objects_table(change: Change) -> Html | None:
             "tr",
             element("th", name, scope="row"),
             element("td", f"{count} of {had[name]}", class_="number"),
-            element("td", ", ".join(f"{words(o)} {n}" for o, n in into.most_common(3))),
+            element("td", ", ".join(f"{outcome_label(o)} {n}" for o, n in into.most_common(3))),
         )
         for name, count in lost.most_common()
         for into in [Counter(m.after for m in change.lost if m.object == name)]
@@ -159,8 +165,8 @@ def _listed(move: OutcomeChange) -> Html:
     return element(
         "tr",
         element("td", element("code", move.grasp)),
-        element("td", words(move.before)),
-        element("td", words(move.after)),
+        element("td", outcome_label(move.before)),
+        element("td", outcome_label(move.after)),
         element("td", move.blocker or "-", class_="faint"),
         element("td", element("code", line, class_="copy")),
     )
@@ -215,21 +221,24 @@ def reality_section(agreement: Sequence[StepAgreement]) -> Html | None:
     rows = []
     for one in agreement:
         cells: list[Child] = [one.found.trials, *(f"{cell:g}" for cell in one.found.cells)]
+        cells.append(one.unpredictable)
         numbers = [element("td", cell, class_="number") for cell in cells]
         shares = [
-            element("td", _estimate(one.found.figure(name)), class_="estimate")
+            element("td", _estimate(one.estimated.figure(name)), class_="estimate")
             for name in ("precision", "recall", "accuracy")
         ]
         head = element("th", TITLES[one.step], scope="row")
         rows.append(element("tr", head, *numbers, *shares))
-    names = ["step", "trials", "TP", "FP", "FN", "TN", "precision", "recall", "accuracy"]
+    names = ["step", "trials", "TP", "FP", "FN", "TN", NOT_PREDICTABLE]
+    names += ["precision", "recall", "accuracy"]
     return section(
         "Beside the robot",
         "Real trials beside each step's verdicts on the same grasps, with 95 % intervals. Positive"
-        " means that success is predicted; in displaced scenes, in more than half of them. Figures"
-        " are of the tried grasps, not weighted by what they were chosen from, as those of"
-        " burg-drake compare are.",
-        table(names, rows, numbers=(1, 2, 3, 4, 5)),
+        " means that success is predicted; in displaced scenes, in more than half of them. Here"
+        f" {reality_words(agreement)}. {NOT_PREDICTABLE.capitalize()} are trials, among them, that"
+        " ended as no verdict of the step can predict, such as without a path of the arm where the"
+        " hand is judged alone.",
+        table(names, rows, numbers=(1, 2, 3, 4, 5, 6)),
     )
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from burg_drake.core.grasps import Outcome
+from burg_drake.core.grasps import outcome_label
 from burg_drake.core.terminal import format_percent
 from burg_drake.experiment.gap.changes import Change
+from burg_drake.experiment.gap.step_agreement import StepAgreement
 from burg_drake.experiment.gap.steps import GapDocument, GapSteps, StepName
 from burg_drake.experiment.trials import Success, succeeded
 
@@ -17,6 +18,8 @@ TITLES: dict[StepName, str] = {
     "arm": "whole arm executes",
     "placed": "objects displaced",
 }
+NOT_PREDICTABLE = "not predictable"
+"""Column of trials that ended as no verdict of a step's mode can predict."""
 VERBS: dict[Success, str] = {"lifted": "lifts", "held": "holds"}
 
 
@@ -77,14 +80,20 @@ def _noise(document: GapDocument) -> str:
 def _causes(change: Change) -> str:
     """The outcomes that successes turn into, most frequent first."""
     into = Counter(move.after for move in change.lost)
-    parts = [f"{count} {words(outcome)}" for outcome, count in into.most_common(4)]
+    parts = [f"{count} {outcome_label(outcome)}" for outcome, count in into.most_common(4)]
     rest = into.total() - sum(count for _, count in into.most_common(4))
     return f" ({', '.join(parts)}{f', {rest} otherwise' if rest else ''})" if parts else ""
 
 
-def words(outcome: Outcome) -> str:
-    """An outcome for people."""
-    return outcome.value.replace("_", " ")
+def reality_words(agreement: Sequence[StepAgreement]) -> str:
+    """What the counts and the shares beside the robot are of."""
+    if any(one.all_grasps is None for one in agreement):
+        return "counts and shares are of the tried grasps, each counted once"
+    grasps = round(max(sum(one.estimated.cells) for one in agreement))
+    return (
+        "counts are of the tried grasps; precision, recall and accuracy are estimated for the"
+        f" {grasps:,} grasps that they were chosen from"
+    )
 
 
 def replay_command(run: str, grasp: str) -> list[str]:

@@ -8,11 +8,18 @@ from dataclasses import asdict
 from typing import Any
 
 from burg_drake.core.documents import plain_data
+from burg_drake.core.grasps import outcome_label
 from burg_drake.core.terminal import TextTable, format_percent
 from burg_drake.evaluation.results import pushes
 from burg_drake.experiment.comparison import interval, plain
 from burg_drake.experiment.gap.changes import Change, successes_by_object
-from burg_drake.experiment.gap.report.sentences import TITLES, replay_command, step_sentences, words
+from burg_drake.experiment.gap.report.sentences import (
+    NOT_PREDICTABLE,
+    TITLES,
+    reality_words,
+    replay_command,
+    step_sentences,
+)
 from burg_drake.experiment.gap.step_agreement import StepAgreement
 from burg_drake.experiment.gap.steps import GapSteps
 from burg_drake.experiment.statistics import Estimate
@@ -31,7 +38,7 @@ def steps_view(steps: GapSteps, found: Sequence[Change]) -> TextTable:
     for change in found:
         lost, whole = len(change.lost), change.successes
         low, high = change.share_lost
-        into = Counter(words(move.after) for move in change.lost)
+        into = Counter(outcome_label(move.after) for move in change.lost)
         table.row(
             TITLES[change.step],
             *(str(n) for n in (whole, lost, len(change.won), whole - lost + len(change.won))),
@@ -56,13 +63,15 @@ def _caption(steps: GapSteps) -> str:
 def reality_view(agreement: Sequence[StepAgreement]) -> TextTable:
     """What each step does to the agreement with the robot."""
     table = TextTable(
-        "Beside the robot", caption="of the tried grasps, not weighted; positive: success predicted"
+        "Beside the robot", caption=f"{reality_words(agreement)}; positive: success predicted"
     )
-    table.names("step").numbers("trials", "TP", "FP", "FN", "TN", *FIGURES)
+    table.names("step").numbers("trials", "TP", "FP", "FN", "TN", NOT_PREDICTABLE, *FIGURES)
     for one in agreement:
         found = one.found
-        counts = (found.trials, *(f"{cell:g}" for cell in found.cells))
-        table.row(TITLES[one.step], *map(str, counts), *(_share(found.figure(n)) for n in FIGURES))
+        counts = (found.trials, *(f"{cell:g}" for cell in found.cells), one.unpredictable)
+        table.row(
+            TITLES[one.step], *map(str, counts), *(_share(one.estimated.figure(n)) for n in FIGURES)
+        )
     return table
 
 
@@ -101,7 +110,16 @@ def gap_json(
         ],
         "changes": [_change_json(change) for change in found],
         "pushed": None if pushed is None else asdict(pushed),
-        "reality": [{"step": one.step, "weighted": False, **plain(one.found)} for one in agreement],
+        "reality": [
+            {
+                "step": one.step,
+                "weighted": False,
+                **plain(one.found),
+                "all_grasps": plain(one.all_grasps),
+                "unpredictable": one.unpredictable,
+            }
+            for one in agreement
+        ],
     }
 
 

@@ -1,0 +1,113 @@
+"""Objects, verdicts and bodies in the way whose verdicts are wrong more often than those of others.
+
+Trials are compared with others of the same prediction: a predicted success that failed with other
+predicted successes, a predicted failure that succeeded with other predicted failures. So it does
+not matter how many of either were chosen. `benchmarks/compare.py` measures false alarms and power.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from burg_drake.experiment.pairing import Factor, VerdictPairs
+from burg_drake.experiment.statistics import Flags, excess_p_value, holm
+
+LEVEL = 0.05
+"""Probability of naming anything where nothing stands out, at most."""
+GroupKind = Literal["object", "verdict", "body in the way"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class StandingOut:
+    """Trials whose verdicts are wrong more often than those of others with the same prediction.
+
+    Attributes:
+        kind: what the trials have in common.
+        name: the object, simulated outcome, or body in the way.
+        predicted: whether their success was predicted.
+        wrong, trials: how many of these trials ended otherwise, and how many there are.
+        other_wrong, other_trials: the same of all other trials with this prediction.
+        ended: the wrong ones by how they ended, the most frequent first.
+        p_value: one-sided mid-p of Fisher's exact test.
+        corrected: the same by Holm's method, for all groups that were looked at.
+    """
+
+    kind: GroupKind
+    name: str
+    predicted: bool
+    wrong: int
+    trials: int
+    other_wrong: int
+    other_trials: int
+    ended: dict[str, int]
+    p_value: float
+    corrected: float
+
+
+def standing_out(pairs: VerdictPairs) -> tuple[tuple[StandingOut, ...], int]:
+    """Looks for groups whose verdicts are wrong more often than those of others.
+
+    Args:
+        pairs: N trials that the verdicts can predict.
+
+    Returns:
+        Those whose corrected p-value is below `LEVEL`, the least likely first, and how many groups
+        were tested: those in which enough trials, right or wrong, are for a p-value below `LEVEL`.
+    """
+    factors: list[tuple[GroupKind, Factor]] = [
+        ("object", pairs.object),
+        ("verdict", pairs.simulated),
+        ("body in the way", pairs.blocker),
+    ]
+    wrong = pairs.predicted != pairs.actual
+    groups: list[tuple[GroupKind, str, bool, Flags, tuple[int, int, int, int]]] = []
+    for predicted in (True, False):
+        same = pairs.predicted == predicted
+        for kind, factor in factors:
+            for k in np.unique(factor.index[same]).tolist():
+                rows = same & (factor.index == k)
+                counts = _counts(wrong, rows, same & ~rows)
+                if factor.names[k] and _could_stand_out(*counts):
+                    groups.append((kind, factor.names[k], predicted, rows & wrong, counts))
+    p_values = [excess_p_value(*counts) for *_, counts in groups]
+    found = [
+        StandingOut(
+            kind=kind,
+            name=name,
+            predicted=predicted,
+            wrong=count[0],
+            trials=count[1],
+            other_wrong=count[2],
+            other_trials=count[3],
+            ended=_ended(pairs.ended, rows),
+            p_value=p_value,
+            corrected=corrected,
+        )
+        for (kind, name, predicted, rows, count), p_value, corrected in zip(
+            groups, p_values, holm(p_values), strict=True
+        )
+        if corrected < LEVEL
+    ]
+    return tuple(sorted(found, key=lambda one: one.p_value)), len(groups)
+
+
+def _counts(wrong: Flags, rows: Flags, others: Flags) -> tuple[int, int, int, int]:
+    """Wrong verdicts and trials of a group, and of the others."""
+    parts = (rows & wrong, rows, others & wrong, others)
+    return int(parts[0].sum()), int(parts[1].sum()), int(parts[2].sum()), int(parts[3].sum())
+
+
+def _could_stand_out(wrong: int, trials: int, other_wrong: int, other_trials: int) -> bool:
+    """Whether a group would stand out, uncorrected, if all wrong verdicts were its own as far as it
+    has room; that depends on the totals alone, so that others need not be corrected for."""
+    total = wrong + other_wrong
+    most = min(total, trials)
+    return excess_p_value(most, trials, total - most, other_trials) < LEVEL
+
+
+def _ended(ended: Factor, rows: Flags) -> dict[str, int]:
+    return dict(Counter(ended.names[k] for k in ended.index[rows].tolist()).most_common())
