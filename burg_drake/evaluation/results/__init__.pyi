@@ -1,3 +1,7 @@
+from .balance import (
+    lifted_and_failed as lifted_and_failed,
+    unbalanced_notes as unbalanced_notes,
+)
 from .best_grasps import (
     RankedGrasps as RankedGrasps,
     best_of_each as best_of_each,
