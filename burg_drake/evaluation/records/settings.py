@@ -79,9 +79,9 @@ class EvaluationSettings:
     )
     balanced_among: Among = setting(
         "executed",
-        "with {until_balanced}, count grasps of the same kind as `trials plan --among`: executed"
-        " ones, those that the arm can be at, those at which the hand is clear, or all (default:"
-        " executed)",
+        "with {until_balanced}, count the grasps that were tried in simulation, those that the arm"
+        " can be at, those at which the hand is clear, or all, as `trials plan` chooses among them"
+        " (default: executed)",
         choices=get_args(Among),
     )
     max_grasps_per_object: int = setting(
