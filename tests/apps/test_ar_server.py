@@ -276,7 +276,7 @@ def test_more_connections_than_are_served_are_told_why(server: ViewServer) -> No
 
 
 def test_a_flood_of_connections_takes_no_threads(server: ViewServer) -> None:
-    """Beyond those that are served, and those that are told, connections are closed at once."""
+    """Those that ask for nothing make room for the next ones."""
     small = ViewServer(server.live, server.actions, port=0, connections=1)
     small.start()
     before = threading.active_count()
@@ -285,8 +285,10 @@ def test_a_flood_of_connections_takes_no_threads(server: ViewServer) -> None:
         for _ in range(MOST_REFUSALS + 4)
     ]
     try:
-        assert flood[-1].recv(1) == b""
+        assert [connection.recv(1) for connection in flood[:-1]] == [b""] * (len(flood) - 1)
         assert threading.active_count() <= before + 1 + MOST_REFUSALS
+        flood[-1].sendall(b"GET /status HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        assert flood[-1].recv(100).startswith(b"HTTP/1.1 200")
     finally:
         for connection in flood:
             connection.close()

@@ -217,6 +217,14 @@ def test_without_a_token_nothing_opens(open_to_all: ServedPage) -> None:
         assert answer(open_to_all, f"/{query}")[0] == 403
 
 
+def test_a_token_that_is_no_text_is_a_wrong_one(open_to_all: ServedPage) -> None:
+    for path, cookie in ((b"/?token=\xe4", b""), (b"/", b"\xe4")):
+        head = b"GET %s HTTP/1.1\r\nHost: localhost\r\nCookie: burg_drake_%d=%s\r\n\r\n"
+        with socket.create_connection(("127.0.0.1", open_to_all.port), timeout=60) as connection:
+            connection.sendall(head % (path, open_to_all.port, cookie))
+            assert connection.recv(100).startswith(b"HTTP/1.1 403")
+
+
 def test_browsers_are_counted(door: ServedPage, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(admission, "MOST_CONNECTIONS", 0)
     own = ("Origin", "http://127.0.0.1")
