@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -19,6 +20,7 @@ from hypothesis import example, given, settings, strategies as st
 from burg_drake.core.documents.schema import Pose, dump_document, parse_document, plain_data
 from burg_drake.core.documents.yaml_nodes import parse_nodes
 from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownNameError
+from burg_drake.core.files import UNFINISHED
 from burg_drake.core.grasps.outcome import RealOutcome
 from burg_drake.experiment.trials.book import TrialBook, TrialChanged
 from burg_drake.experiment.trials.evidence import keep_evidence
@@ -212,11 +214,60 @@ def test_an_old_buffer_loses_nothing_and_an_edit_is_kept(tmp_path: Path) -> None
     assert book.sheet().trial(3).outcome is RealOutcome.DROPPED
 
 
-def test_entries_of_another_plan_are_not_this_one_s(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("mug-0001", "mug-0f01"),
+        ("'000000000001'", "'000000000f01'"),
+        ("number: 1\n", "number: 9\n"),
+    ],
+)
+def test_entries_of_another_plan_are_not_this_one_s(tmp_path: Path, old: str, new: str) -> None:
+    """They are of a trial of the same number, grasp and content; one of these differs."""
     path = write_sheet(tmp_path)
+    before = path.read_text()
     TrialBook(path).record(1, outcome="lifted")
-    path.write_text(path.read_text().replace("mug-0001", "mug-0f01"))
-    assert TrialBook(path).missing_values() == []
+    path.write_text(before)
+    assert [found.number for found in TrialBook(path).missing_values()] == [1]
+    assert before.count(old) == 1
+    path.write_text(before.replace(old, new))
+    book = TrialBook(path)
+    assert book.missing_values() == book.restore() == book.keep() == []
+    assert path.read_text() == before.replace(old, new) and len(book.entries()) == 1
+
+
+def test_each_step_is_on_the_disk_before_the_next_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the power supply's end leaves is what has been synchronised, and in this order."""
+    book = TrialBook(write_sheet(tmp_path))
+    steps: list[str] = []
+    real = {name: getattr(os, name) for name in ("write", "fsync", "replace")}
+
+    def name_of(file: int) -> str:
+        """Of an open file; the one that is not renamed yet is the new one."""
+        status = os.fstat(file)
+        if os.path.samestat(status, tmp_path.stat()):
+            return "folder"
+        names = [p.name for p in tmp_path.iterdir() if os.path.samestat(status, p.stat())]
+        return "new file" if UNFINISHED.fullmatch(names[0]) else names[0]
+
+    def logged(name: str) -> Callable[..., object]:
+        def call(*arguments: Any) -> object:
+            what = name_of(arguments[0]) if name != "replace" else Path(arguments[1]).name
+            steps.append(f"{name} {what}")
+            return real[name](*arguments)
+
+        return call
+
+    for name in real:
+        monkeypatch.setattr(os, name, logged(name))
+    book.record(1, outcome="lifted")
+    journal = "trials.entries.jsonl"
+    assert steps == [
+        *(f"write {journal}", f"fsync {journal}", "fsync folder"),
+        *("fsync new file", "replace trials.yaml", "fsync folder"),
+    ]
 
 
 TEXTS = st.text(st.characters(exclude_categories=("Cs",), exclude_characters="\0"), max_size=40)

@@ -41,6 +41,8 @@ IDLE = 30.0
 take an answer, too."""
 REQUEST_TIMEOUT = 10.0
 """Time for a whole request, head and body, and for the first one to begin [s]."""
+BROWSER_CONNECTIONS = 6
+"""That a browser opens to one server at most."""
 MOST_REFUSALS = 8
 """Connections beyond those that are told so at a time; more are closed without a word."""
 REFUSED_WITHIN = 2.0
@@ -60,8 +62,9 @@ class PageServer(ThreadingHTTPServer):
         handler: answers requests.
         host: address to listen on.
         port: to listen on; the first free one from `first_port` on if None, any if 0.
-        connections: that are served at a time, half as many for one address of another machine;
-            where all are admitted the next ones are told so, with status 503.
+        connections: that are served at a time, half as many for one address of another machine
+            (but what a browser needs); where all are admitted the next ones are told so, with
+            status 503.
 
     Attributes:
         first_port: the first port that is tried.
@@ -167,7 +170,8 @@ class PageServer(ThreadingHTTPServer):
         """Whether one more connection from an address can be served, after another one has been
         closed that is not admitted, if there are too many."""
         own = [c for c, of in self._served.items() if of == address]
-        most = self.connections if address == LOOPBACK else max(1, self.connections // 2)
+        share = max(BROWSER_CONNECTIONS, self.connections // 2)
+        most = self.connections if address == LOOPBACK else share
         if len(own) < most and len(self._served) < self.connections:
             return True
         among = own if len(own) >= most else list(self._served)
