@@ -30,8 +30,8 @@ from burg_drake.experiment.trials.book import TrialBook
 from burg_drake.experiment.trials.entries import journal_path, read_entries
 from burg_drake.experiment.trials.sheet import load_trials
 from tests.experiment.pages.conftest import made as made, trials as trials
+from tests.hang_guard import HANG_GUARD
 
-TIMEOUT = 60.0
 TIME = "2026-05-05T10:02:11+02:00"
 
 
@@ -49,7 +49,7 @@ def request(
     port: int, method: str, path: str, body: str | None = None, **headers: str
 ) -> tuple[int, dict[str, str], bytes]:
     """Status, headers and body of an answer; `_` in names of headers stands for `-`."""
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=TIMEOUT)
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=HANG_GUARD)
     try:
         given = {key.replace("_", "-"): value for key, value in headers.items()}
         connection.request(method, path, body, given)
@@ -184,11 +184,11 @@ def test_slow_connections_lock_nobody_out(trials: Path) -> None:
     with served_to_all(trials) as server, contextlib.ExitStack() as stack:
         port = server.server_address[1]
         cookie = f"burg_drake_{port}={'s' * 40}"
-        tablet = http.client.HTTPConnection("127.0.0.1", port, timeout=TIMEOUT)
+        tablet = http.client.HTTPConnection("127.0.0.1", port, timeout=HANG_GUARD)
         stack.callback(tablet.close)
         for _ in range(3):
             for _ in range(MOST_CONNECTIONS + 2):
-                slow = socket.create_connection(("127.0.0.1", port), timeout=TIMEOUT)
+                slow = socket.create_connection(("127.0.0.1", port), timeout=HANG_GUARD)
                 stack.callback(slow.close)
                 slow.sendall(HEAD[:20])
             tablet.request("GET", "/states", headers={"Cookie": cookie})  # stays connected
@@ -205,13 +205,13 @@ def test_a_request_has_to_be_whole_in_time(
     if sent == b"body":
         head = HEAD.replace(b"GET /states", b"POST /entry") + b"Content-Type: application/json\r\n"
         sent = head + b"Content-Length: 9999\r\n\r\n"
-    kept = http.client.HTTPConnection("127.0.0.1", port, timeout=TIMEOUT)
+    kept = http.client.HTTPConnection("127.0.0.1", port, timeout=HANG_GUARD)
     kept.request("GET", "/states")
     assert kept.getresponse().read()
     used = kept.sock
     monkeypatch.setattr("burg_drake.apps.web.server.REQUEST_TIMEOUT", 0.3)
     rest = b"X-Slow: " if sent == HEAD else b""
-    with socket.create_connection(("127.0.0.1", port), timeout=TIMEOUT) as slow:
+    with socket.create_connection(("127.0.0.1", port), timeout=HANG_GUARD) as slow:
         slow.sendall(sent + rest)
         ended = threading.Event()
         threading.Thread(target=_drip, args=(slow, ended, bool(sent)), daemon=True).start()
@@ -238,7 +238,7 @@ def test_an_address_has_its_share_of_the_connections(trials: Path) -> None:
         def come(address: str) -> socket.socket:
             ours, theirs = socket.socketpair()
             stack.callback(ours.close)
-            ours.settimeout(TIMEOUT)
+            ours.settimeout(HANG_GUARD)
             server.process_request(theirs, (address, 1))
             return ours
 
@@ -258,7 +258,7 @@ def test_a_token_that_is_no_text_is_a_wrong_one(trials: Path) -> None:
         port = server.server_address[1]
         for path, cookie in ((b"/?token=\xe4", b""), (b"/?token=%ff", b""), (b"/", b"\xe4\xff")):
             head = b"GET %s HTTP/1.1\r\nHost: localhost\r\nCookie: burg_drake_%d=%s\r\n\r\n"
-            with socket.create_connection(("127.0.0.1", port), timeout=TIMEOUT) as connection:
+            with socket.create_connection(("127.0.0.1", port), timeout=HANG_GUARD) as connection:
                 connection.sendall(head % (path, port, cookie))
                 assert connection.recv(100).startswith(b"HTTP/1.1 403")
     token = BrowserToken("name", "s" * 40)
@@ -291,7 +291,7 @@ def start(trials: Path, port: int) -> subprocess.Popen[str]:
 
 def kill(process: subprocess.Popen[str]) -> None:
     os.kill(process.pid, signal.SIGKILL)
-    process.wait(TIMEOUT)
+    process.wait(HANG_GUARD)
     if process.stdout is not None:
         process.stdout.close()
 
@@ -310,7 +310,7 @@ def test_no_entry_is_lost_or_doubled_when_the_server_is_killed(trials: Path) -> 
     unanswered = threading.Thread(target=_careless, args=(port, sent[2]))
     unanswered.start()
     kill(process)  # somewhere in the middle of the second entry
-    unanswered.join(TIMEOUT)
+    unanswered.join(HANG_GUARD)
     assert load_trials(trials).trial(1).outcome is RealOutcome.LIFTED
     server = serve_again(trials, port)
     try:
@@ -318,7 +318,7 @@ def test_no_entry_is_lost_or_doubled_when_the_server_is_killed(trials: Path) -> 
         for client in clients:
             client.start()
         for client in clients:
-            client.join(TIMEOUT)
+            client.join(HANG_GUARD)
         outcomes = [t.outcome for t in load_trials(trials).trials[:3]]
         assert outcomes == [RealOutcome.LIFTED, RealOutcome.SLIPPED, None]
         told = [e.number for e in read_entries(journal_path(trials)) if e.before != e.after]

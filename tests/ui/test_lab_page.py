@@ -123,7 +123,7 @@ def test_what_is_refused_for_good_can_be_dropped(page: Page, trials: Path) -> No
         expect(page.locator("#saved")).to_contain_text("holds other trials by now")
         expect(troubles).to_be_hidden()  # it may pass
         page.clock.fast_forward(10_000)
-        expect(troubles).to_contain_text("Trial 1, slipped, is refused: ", timeout=15_000)
+        expect(troubles).to_contain_text("Trial 1, slipped, is refused: ")
         expect(troubles).to_contain_text("start the page again. It is sent again until")
         troubles.get_by_role("button", name="Drop it").click()
         expect(troubles).to_be_hidden()
