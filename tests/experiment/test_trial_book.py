@@ -24,6 +24,7 @@ from burg_drake.core.files import UNFINISHED
 from burg_drake.core.grasps.outcome import RealOutcome
 from burg_drake.experiment.trials.book import TrialBook, TrialChanged
 from burg_drake.experiment.trials.evidence import keep_evidence
+from burg_drake.experiment.trials.file_lock import exclusive
 from burg_drake.experiment.trials.sheet import ObjectPlace, RobotReport, TrialSheet, load_trials
 from burg_drake.experiment.trials.sheet_text import SheetText
 from tests.experiment.trial_sheets import make_sheet, write_sheet
@@ -111,6 +112,14 @@ def test_all_links_to_a_file_share_its_lock_and_journal(tmp_path: Path) -> None:
     photo.write_bytes(b"a photo")
     assert keep_evidence(link, 3, photo=photo) == "photos/003.png"
     assert (path.parent / "photos" / "003.png").exists()
+
+
+def test_a_lock_that_is_kept_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    book = TrialBook(write_sheet(tmp_path))
+    monkeypatch.setattr("burg_drake.experiment.trials.file_lock.WAIT", 0.05)
+    with exclusive(book.path), pytest.raises(InvalidInputError, match="locked by another process"):
+        book.record(1, outcome="lifted")
+    assert book.entries() == [] and book.record(1, outcome="lifted").number == 1
 
 
 def test_a_file_system_without_locks_is_named(
@@ -306,6 +315,7 @@ def test_any_note_survives_any_layout(
         text = SheetText.read(text, "text").with_trial(wanted).text
         found = parse_document(text, TrialSheet, "text")
         assert found.trials == (sheet.trial(1), wanted, sheet.trial(3))
+        assert newline == "\n" or "\n" not in text.replace(newline, "")
         end = newline.join(["", *lines[at + blank :], ""])  # all from the comment on
         assert text.endswith(end) and text.count(end) == 1
 
@@ -364,7 +374,9 @@ def test_an_entry_is_read_and_written_by_itself(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Neither what this program has written nor what another one writes is read all over."""
-    book, other = TrialBook(write_sheet(tmp_path, 60)), TrialBook(tmp_path / "trials.yaml")
+    path = write_sheet(tmp_path, 60)
+    path.write_text(f"{path.read_text()}notes: [a word on the choice]\n")
+    book, other = TrialBook(path), TrialBook(path)
     lengths: list[int] = []
 
     def counted(text: str, *more: str) -> yaml.Node:
