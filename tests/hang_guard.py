@@ -15,14 +15,15 @@ HANG_GUARD = 900.0
 """After this a test counts as hanging [s]."""
 
 
-def until(condition: Callable[[], T], what: str = "") -> T:
+def until(condition: Callable[[], T], what: str = "", seconds: float = HANG_GUARD) -> T:
     """Waits until a condition is true, and returns what it is then.
 
     Args:
         condition: asked again and again.
         what: is waited for, for the message.
+        seconds: less where a test tries again what may have been too early.
     """
-    end = time.monotonic() + HANG_GUARD
+    end = time.monotonic() + seconds
     while not (found := condition()):
         assert time.monotonic() < end, f"waited in vain: {what}"
         time.sleep(0.005)
