@@ -76,6 +76,15 @@ GROUPS: dict[str, Modules] = {
         "simulation/trials/grip_motion": ("simulation/test_limits_in_hand",),
         "simulation/rest/body_motions": ("simulation/test_body_motions",),
     },
+    "trials": {
+        "experiment/trials/book": ("experiment/test_trial_book",),
+        "experiment/trials/entries": ("experiment/test_trial_book",),
+        "experiment/trials/file_lock": ("experiment/test_trial_book",),
+        "experiment/trials/given_entry": ("experiment/test_trial_book",),
+        "experiment/trials/sheet_text": ("experiment/test_trial_book",),
+        "evaluation/run/balancing": ("evaluation/test_balanced",),
+        "evaluation/results/balance": ("evaluation/test_balanced",),
+    },
     "frames": {
         "core/frames": ("core/test_frames",),
         "formats/common/rigid": ("formats/test_rigid",),

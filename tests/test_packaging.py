@@ -18,6 +18,7 @@ import pytest
 
 import burg_drake
 from burg_drake.core.paths.resources import data_root
+from tests.hang_guard import HANG_GUARD
 from tests.imports import HOUSE
 
 CHECKOUT = Path(__file__).resolve().parents[1]
@@ -60,7 +61,7 @@ wheel_only = pytest.mark.skipif(
 
 def run_python(code: str, **options: object) -> str:
     finished = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, **options
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=HANG_GUARD, **options
     )
     assert finished.returncode == 0, finished.stderr
     return finished.stdout
@@ -152,7 +153,9 @@ def test_workers_start_without_scipys_rotations() -> None:
 @installed_only
 def test_console_script() -> None:
     script = Path(sysconfig.get_path("scripts")) / "burg-drake"
-    finished = subprocess.run([script, "--help"], capture_output=True, text=True, timeout=60)
+    finished = subprocess.run(
+        [script, "--help"], capture_output=True, text=True, timeout=HANG_GUARD
+    )
     assert finished.returncode == 0, finished.stderr
     for verb in ("library", "scene", "evaluate", "replay"):
         assert verb in finished.stdout

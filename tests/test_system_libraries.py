@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from burg_drake import system_libraries
+from tests.hang_guard import HANG_GUARD
 
 RENDER = """
 from pydrake.geometry import (
@@ -37,7 +38,9 @@ def pretend_only(monkeypatch: pytest.MonkeyPatch, *present: str) -> None:
 @pytest.mark.skipif(sys.platform != "linux", reason="asks for system libraries on Linux only")
 def test_nothing_missing_means_that_drake_renders() -> None:
     """The oracle is Drake in a process of its own: without a driver it ends by a signal."""
-    rendered = subprocess.run([sys.executable, "-c", RENDER], capture_output=True, timeout=120)
+    rendered = subprocess.run(
+        [sys.executable, "-c", RENDER], capture_output=True, timeout=HANG_GUARD
+    )
     assert (rendered.returncode == 0) == (not system_libraries.missing_render_libraries())
 
 

@@ -29,7 +29,9 @@ from burg_drake.evaluation.run import (
     GraspsLike,
     Request,
     evaluate_scenes,
+    extend_run,
     finish_run,
+    grow,
     open_grasps,
     open_run,
     require_judged,
@@ -137,10 +139,19 @@ def evaluate(
         executor = LocalExecutor.of_this_machine(workers)
     elif workers is not None:
         raise InvalidInputError("give workers or an executor, which has its own, not both")
+    if settings.until_balanced is not None and grasps is not None:
+        raise InvalidInputError(
+            "until_balanced goes on sampling, and grasps are given; leave out either"
+        ).about("until_balanced", "grasps")
     request = Request.of(station, settings, grasps, retry_failed=retry_failed)
     require_writer(request.settings.table)
     if isinstance(scene, (Scene, str, Path)):
         return _evaluate_one(scene, request, Path(out), executor, progress)
+    if settings.until_balanced is not None:
+        raise InvalidInputError(
+            "until_balanced is for one scene at a time, and several are given; evaluate each by"
+            " itself: `trials plan` takes the runs together"
+        ).about("until_balanced")
     return evaluate_scenes(scene, request, Path(out), executor, progress)
 
 
@@ -165,10 +176,17 @@ def _evaluate_one(
         run = open_run(folder, scene, request, given, lambda: reporter.show(Progress("sampling")))
         make_judge = StationJudgeFactory(scene, station, request.engine, mode, request.phases)
         remove_unfinished(folder)
-        left = open_grasps(run, retry_failed=request.retry_failed)
-        if left:
-            run = _judge(run, Job(scene.name, make_judge, left), journal, executor, reporter)
-            require_judged(run)
+        retry_failed = request.retry_failed
+        while True:
+            left = open_grasps(run, retry_failed=retry_failed)
+            if left:
+                run = _judge(run, Job(scene.name, make_judge, left), journal, executor, reporter)
+                require_judged(run)
+            more = grow(run)
+            if more is None:
+                break
+            reporter.show(Progress("sampling"))
+            run, retry_failed = extend_run(run, more, scene, station), False
         run = finish_run(run, request.settings.table)
         keep_parts(run)
         return run

@@ -16,7 +16,7 @@ from pathlib import Path
 import trimesh
 
 from burg_drake.core import InvalidInputError
-from burg_drake.core.files import try_lock, writable_folder
+from burg_drake.core.files import try_lock, without_locks, writable_folder
 from burg_drake.objects.library import LIBRARY_FILE
 from burg_drake.pipeline.record import is_object_folder
 from burg_drake.pipeline.source import NAME_PATTERN, ObjectSource
@@ -111,7 +111,7 @@ def _locked(root: Path) -> Iterator[None]:
         except FileNotFoundError:
             current = False
         except OSError as error:
-            raise InvalidInputError(f"cannot lock {path}: {error.strerror}") from error
+            raise without_locks(root, error) from error
         if not current:  # held, or its holder removed it just now
             raise InvalidInputError(
                 f"{root} is being written by another build; wait for it, or choose another"

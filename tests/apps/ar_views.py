@@ -15,7 +15,6 @@ from tests.cameras.synthetic import board_image
 
 CAMERA = Intrinsics(width=320, height=240, focal=(300.0, 300.0), center=(159.5, 119.5))
 X_SC = make_pose(np.diag([1.0, -1.0, -1.0]), (0.3, 0.21, 0.6))
-TIMEOUT = 30.0
 
 
 @cache

@@ -26,7 +26,8 @@ from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.cameras.optics.intrinsics_file import save_intrinsics
 from burg_drake.cameras.sources.opencv_log import quiet
 from burg_drake.scene.document.scene import load_scene
-from tests.apps.ar_views import CAMERA, TIMEOUT, Camera, photo
+from tests.apps.ar_views import CAMERA, Camera, photo
+from tests.hang_guard import HANG_GUARD
 
 TWO = """\
 version: 1
@@ -158,7 +159,7 @@ def test_the_end_finishes_the_recording(files: Path, tmp_path: Path) -> None:
         if "54 of 54" in line:
             break
     process.send_signal(signal.SIGTERM)
-    _, rest = process.communicate(timeout=TIMEOUT)
+    _, rest = process.communicate(timeout=HANG_GUARD)
     assert process.returncode == 0, rest
     assert "Traceback" not in rest and f"recorded {take}" in rest
     assert cv2.VideoCapture(str(take)).read()[0]

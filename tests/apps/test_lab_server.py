@@ -20,6 +20,8 @@ import pytest
 
 from burg_drake.apps.trials.lab_page.server import PAGES, LabServer
 from burg_drake.apps.trials.serve import _kept_secret as kept_secret
+from burg_drake.apps.web import MOST_CONNECTIONS
+from burg_drake.core import BrowserToken
 from burg_drake.core.grasps.outcome import RealOutcome
 from burg_drake.experiment.pages.lab_book import LabBook
 from burg_drake.experiment.pages.picture_cache import PictureCache
@@ -28,8 +30,8 @@ from burg_drake.experiment.trials.book import TrialBook
 from burg_drake.experiment.trials.entries import journal_path, read_entries
 from burg_drake.experiment.trials.sheet import load_trials
 from tests.experiment.pages.conftest import made as made, trials as trials
+from tests.hang_guard import HANG_GUARD
 
-TIMEOUT = 60.0
 TIME = "2026-05-05T10:02:11+02:00"
 
 
@@ -47,7 +49,7 @@ def request(
     port: int, method: str, path: str, body: str | None = None, **headers: str
 ) -> tuple[int, dict[str, str], bytes]:
     """Status, headers and body of an answer; `_` in names of headers stands for `-`."""
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=TIMEOUT)
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=HANG_GUARD)
     try:
         given = {key.replace("_", "-"): value for key, value in headers.items()}
         connection.request(method, path, body, given)
@@ -162,6 +164,107 @@ def test_other_machines_need_the_token(trials: Path) -> None:
         server.close()
 
 
+@contextlib.contextmanager
+def served_to_all(trials: Path) -> Iterator[LabServer]:
+    """To browsers that have the token."""
+    runs = TriedRuns(trials)
+    server = LabServer(LabBook(runs), PictureCache(runs), host="0.0.0.0", port=0, secret="s" * 40)
+    server.start()
+    try:
+        yield server
+    finally:
+        server.close()
+
+
+HEAD = b"GET /states HTTP/1.1\r\nHost: localhost\r\n"
+
+
+def test_slow_connections_lock_nobody_out(trials: Path) -> None:
+    """Neither those that are there first, nor those that come and go all the time."""
+    with served_to_all(trials) as server, contextlib.ExitStack() as stack:
+        port = server.server_address[1]
+        cookie = f"burg_drake_{port}={'s' * 40}"
+        tablet = http.client.HTTPConnection("127.0.0.1", port, timeout=HANG_GUARD)
+        stack.callback(tablet.close)
+        for _ in range(3):
+            for _ in range(MOST_CONNECTIONS + 2):
+                slow = socket.create_connection(("127.0.0.1", port), timeout=HANG_GUARD)
+                stack.callback(slow.close)
+                slow.sendall(HEAD[:20])
+            tablet.request("GET", "/states", headers={"Cookie": cookie})  # stays connected
+            assert tablet.getresponse().read().startswith(b"{")
+            assert request(port, "GET", "/states", Cookie=cookie)[0] == 200
+
+
+@pytest.mark.parametrize("sent", [b"", HEAD[:10], HEAD, b"body"])
+def test_a_request_has_to_be_whole_in_time(
+    server: LabServer, monkeypatch: pytest.MonkeyPatch, sent: bytes
+) -> None:
+    """Whatever comes meanwhile, byte by byte; after an answer a connection may rest for longer."""
+    port = server.server_address[1]
+    if sent == b"body":
+        head = HEAD.replace(b"GET /states", b"POST /entry") + b"Content-Type: application/json\r\n"
+        sent = head + b"Content-Length: 9999\r\n\r\n"
+    kept = http.client.HTTPConnection("127.0.0.1", port, timeout=HANG_GUARD)
+    kept.request("GET", "/states")
+    assert kept.getresponse().read()
+    used = kept.sock
+    monkeypatch.setattr("burg_drake.apps.web.server.REQUEST_TIMEOUT", 0.3)
+    rest = b"X-Slow: " if sent == HEAD else b""
+    with socket.create_connection(("127.0.0.1", port), timeout=HANG_GUARD) as slow:
+        slow.sendall(sent + rest)
+        ended = threading.Event()
+        threading.Thread(target=_drip, args=(slow, ended, bool(sent)), daemon=True).start()
+        with contextlib.suppress(ConnectionError):  # closed while bytes were on their way
+            assert slow.recv(1) == b""
+        ended.set()
+    kept.request("GET", "/states")  # it has rested for longer than a request may take
+    assert kept.getresponse().read() and kept.sock is used
+    kept.close()
+
+
+def _drip(slow: socket.socket, ended: threading.Event, is_sending: bool) -> None:
+    """A byte every now and then."""
+    while is_sending and not ended.wait(0.05):
+        with contextlib.suppress(OSError):
+            slow.sendall(b"x")
+
+
+def test_an_address_has_its_share_of_the_connections(trials: Path) -> None:
+    """Half of them, in its last connections; one of IPv6 with its network; this machine has all."""
+    with contextlib.ExitStack() as stack:
+        server = stack.enter_context(served_to_all(trials))
+
+        def come(address: str) -> socket.socket:
+            ours, theirs = socket.socketpair()
+            stack.callback(ours.close)
+            ours.settimeout(HANG_GUARD)
+            server.process_request(theirs, (address, 1))
+            return ours
+
+        ours = [come("192.0.2.1") for _ in range(MOST_CONNECTIONS // 2 + 3)]
+        assert [connection.recv(1) for connection in ours[:3]] == [b""] * 3
+        others = [come("192.0.2.2"), come("2001:db8::1"), come("::ffff:127.0.0.1")]
+        for number in range(MOST_CONNECTIONS):
+            come(f"2001:db8::{number:x}")
+        for connection in (*ours[-8:], others[0], others[2]):  # are served still
+            connection.sendall(HEAD + b"\r\n")
+            assert connection.recv(100).startswith(b"HTTP/1.1 403")
+        assert others[1].recv(1) == b""
+
+
+def test_a_token_that_is_no_text_is_a_wrong_one(trials: Path) -> None:
+    with served_to_all(trials) as server:
+        port = server.server_address[1]
+        for path, cookie in ((b"/?token=\xe4", b""), (b"/?token=%ff", b""), (b"/", b"\xe4\xff")):
+            head = b"GET %s HTTP/1.1\r\nHost: localhost\r\nCookie: burg_drake_%d=%s\r\n\r\n"
+            with socket.create_connection(("127.0.0.1", port), timeout=HANG_GUARD) as connection:
+                connection.sendall(head % (path, port, cookie))
+                assert connection.recv(100).startswith(b"HTTP/1.1 403")
+    token = BrowserToken("name", "s" * 40)
+    assert not token.use("\udce4") and not token.admits("name=\udce4") and not token.use("ä")
+
+
 def test_the_secret_is_kept_also_after_one_that_was_never_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -188,7 +291,7 @@ def start(trials: Path, port: int) -> subprocess.Popen[str]:
 
 def kill(process: subprocess.Popen[str]) -> None:
     os.kill(process.pid, signal.SIGKILL)
-    process.wait(TIMEOUT)
+    process.wait(HANG_GUARD)
     if process.stdout is not None:
         process.stdout.close()
 
@@ -207,7 +310,7 @@ def test_no_entry_is_lost_or_doubled_when_the_server_is_killed(trials: Path) -> 
     unanswered = threading.Thread(target=_careless, args=(port, sent[2]))
     unanswered.start()
     kill(process)  # somewhere in the middle of the second entry
-    unanswered.join(TIMEOUT)
+    unanswered.join(HANG_GUARD)
     assert load_trials(trials).trial(1).outcome is RealOutcome.LIFTED
     server = serve_again(trials, port)
     try:
@@ -215,7 +318,7 @@ def test_no_entry_is_lost_or_doubled_when_the_server_is_killed(trials: Path) -> 
         for client in clients:
             client.start()
         for client in clients:
-            client.join(TIMEOUT)
+            client.join(HANG_GUARD)
         outcomes = [t.outcome for t in load_trials(trials).trials[:3]]
         assert outcomes == [RealOutcome.LIFTED, RealOutcome.SLIPPED, None]
         told = [e.number for e in read_entries(journal_path(trials)) if e.before != e.after]

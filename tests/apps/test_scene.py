@@ -13,6 +13,7 @@ import pytest
 from burg_drake.apps.cli import main
 from burg_drake.core.paths.resources import builtin_names, resolve
 from burg_drake.scene.document.scene import load_scene
+from tests.hang_guard import HANG_GUARD
 
 Capture = pytest.CaptureFixture[str]
 
@@ -173,5 +174,5 @@ def test_live_view_ends_with_ctrl_c() -> None:
         assert "http://localhost:" in process.stdout.readline()
         assert process.stdout.readline() == "Press Ctrl-C to end.\n"
         process.send_signal(signal.SIGINT)
-        assert process.wait(timeout=30) == 0
+        assert process.wait(timeout=HANG_GUARD) == 0
         assert process.stderr.read() == ""

@@ -15,10 +15,10 @@ from pathlib import Path
 import pytest
 
 from burg_drake.apps.cli import main
+from tests.hang_guard import HANG_GUARD
 
 pytest.importorskip("viser", reason="the page needs viser: pip install 'burg-drake[ui]'")
 
-TIMEOUT = 120
 MUG = """\
 version: 1
 name: breakfast
@@ -58,12 +58,12 @@ def test_a_new_scene(tmp_path: Path) -> None:
         assert line.startswith(
             f"new_scene (no objects yet, not saved yet, to be saved in {tmp_path}):"
         )
-        with urllib.request.urlopen(url_in(line), timeout=TIMEOUT) as page:
+        with urllib.request.urlopen(url_in(line), timeout=HANG_GUARD) as page:
             assert page.status == 200
         assert process.stdout is not None and process.stderr is not None
         assert process.stdout.readline() == "Press Ctrl-C to end.\n"
         process.send_signal(signal.SIGINT)
-        assert process.wait(TIMEOUT) == 0
+        assert process.wait(HANG_GUARD) == 0
         assert (process.stdout.read(), process.stderr.read()) == ("", "\n")
     assert list(tmp_path.iterdir()) == []
 
@@ -80,7 +80,7 @@ def test_an_address_for_one_browser_after_the_other(
         port = url_in(line).partition("?")[0].rstrip("/").rpartition(":")[2]
         assert process.stdout is not None and "Ctrl-C" in process.stdout.readline()
         local = f"http://127.0.0.1:{port}/?token="
-        with urllib.request.urlopen(local + token, timeout=TIMEOUT) as page:
+        with urllib.request.urlopen(local + token, timeout=HANG_GUARD) as page:
             assert page.status == 200
         line = process.stdout.readline()
         assert re.match(r"opened by 127\.0\.0\.1; another browser: open http://\S+\?token=", line)
@@ -89,7 +89,7 @@ def test_an_address_for_one_browser_after_the_other(
         said = capsys.readouterr().err
         assert f":{port}/; go there" in said and "token" not in said
         process.send_signal(signal.SIGTERM)
-        assert process.wait(TIMEOUT) == 0
+        assert process.wait(HANG_GUARD) == 0
 
 
 def test_a_taken_port(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

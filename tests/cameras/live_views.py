@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-
 import numpy as np
 
 from burg_drake.cameras.live.event_log import EventLog
@@ -13,20 +10,11 @@ from burg_drake.cameras.sources.frame import Frame, FrameSource
 from burg_drake.core.frames import make_pose
 
 CAMERA = Intrinsics(width=320, height=240, focal=(300.0, 300.0), center=(159.5, 119.5))
-TIMEOUT = 30.0
 
 
 def camera_at(x: float) -> np.ndarray:
     """Straight above the board."""
     return make_pose(np.diag([1.0, -1.0, -1.0]), (x, 0.21, 0.6))
-
-
-def until(condition: Callable[[], object]) -> None:
-    """Waits for other threads; a test that waits in vain fails."""
-    end = time.monotonic() + TIMEOUT
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.005)
 
 
 def lines(log: EventLog) -> list[str]:

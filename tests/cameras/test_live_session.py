@@ -26,8 +26,9 @@ from burg_drake.cameras.sources.opencv_log import quiet
 from burg_drake.cameras.sources.opening import open_source
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.scene.document.scene import Scene, load_scene
-from tests.cameras.live_views import CAMERA, TIMEOUT, Pictures, camera_at, lines, until
+from tests.cameras.live_views import CAMERA, Pictures, camera_at, lines
 from tests.cameras.synthetic import board_image
+from tests.hang_guard import HANG_GUARD, until
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +85,7 @@ def test_every_frame_of_a_video_is_looked_at(
     with pytest.raises(InvalidInputError, match="is being recorded; stop that first"):
         actions.start_recording()
     running.start()
-    running.wait(seconds=TIMEOUT)
+    running.wait(seconds=HANG_GUARD)
     assert running.counts.frames == 6 and running.counts.valid == 4
     assert actions.stop_recording() == tmp_path / "take.avi"
     assert actions.stop_recording() is None
@@ -122,7 +123,7 @@ def test_a_camera_that_nobody_looks_at_is_left_alone(
     given_at_rest()
     old = running.picture
     assert old is not None
-    seen = running.next_picture(0, TIMEOUT)
+    seen = running.next_picture(0, HANG_GUARD)
     assert seen is not None and seen.number > old.number
     given_at_rest()
     newest = running.picture
@@ -138,7 +139,7 @@ def test_a_camera_that_nobody_looks_at_is_left_alone(
 def test_so_many_frames(live: Callable[..., LiveSession], video: Path) -> None:
     running = live(open_source(video), paced=False)
     running.start(frames=2)
-    running.wait(seconds=TIMEOUT)
+    running.wait(seconds=HANG_GUARD)
     assert running.counts.frames == 2
 
 
@@ -147,10 +148,10 @@ def test_settings_draw_the_same_frame_again(
 ) -> None:
     running = live(Pictures(image))
     running.start()
-    first = running.next_picture(0, TIMEOUT)
+    first = running.next_picture(0, HANG_GUARD)
     assert first is not None
     running.change(opacity=0.0, names=False)
-    second = running.next_picture(first.number, TIMEOUT)
+    second = running.next_picture(first.number, HANG_GUARD)
     assert second is not None and second.located is first.located
     assert (second.overlay != first.overlay).any()
     assert running.counts.frames == 1
@@ -166,12 +167,12 @@ def test_frozen(live: Callable[..., LiveSession], image: np.ndarray) -> None:
     source = Pictures(*[image] * 12)
     running = live(source, settings=ViewSettings(frozen=True), paced=False)
     running.start()
-    assert running.next_picture(0, TIMEOUT) is not None  # there must be one to freeze
+    assert running.next_picture(0, HANG_GUARD) is not None  # there must be one to freeze
     running.change(opacity=0.1)
-    assert running.next_picture(1, TIMEOUT) is not None
+    assert running.next_picture(1, HANG_GUARD) is not None
     assert running.counts.frames == 1 and source.given <= 3
     running.change(frozen=False)
-    running.wait(seconds=TIMEOUT)
+    running.wait(seconds=HANG_GUARD)
     assert running.counts.frames == 12
 
 
@@ -193,7 +194,7 @@ def test_one_image_of_another_size_is_left_out(
     log = EventLog()
     running = live(Pictures(image, image[:-2], image), events=log, paced=False)
     running.start()
-    running.wait(seconds=TIMEOUT)
+    running.wait(seconds=HANG_GUARD)
     assert running.counts.frames == 3 and running.counts.valid == 2
     (told,) = [line for line in lines(log) if "left out" in line]
     assert told.startswith("picture 2 has 320 x 238 pixels, the intrinsics are of 320 x 240")
@@ -230,7 +231,7 @@ def test_a_lost_camera_is_told_once_and_comes_back(
     before = running.picture
     assert before is not None
     running.change(opacity=0.2)  # the view goes on with its last picture
-    assert running.next_picture(before.number, TIMEOUT) is not None
+    assert running.next_picture(before.number, HANG_GUARD) is not None
     time.sleep(0.3)  # some more vain attempts
     assert len([line for line in lines(log) if "waiting for it" in line]) == 1
     gone[0] = False
@@ -247,4 +248,4 @@ def test_what_ends_a_thread_is_raised(live: Callable[..., LiveSession], image: n
     running = live(Broken(image))
     running.start()
     with pytest.raises(ZeroDivisionError, match="in the driver"):
-        running.wait(seconds=TIMEOUT)
+        running.wait(seconds=HANG_GUARD)

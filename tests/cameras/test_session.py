@@ -26,7 +26,6 @@ from burg_drake.scene.document.scene import Board, Scene, load_scene
 from tests.cameras.synthetic import board_image
 
 CAMERA = Intrinsics(width=320, height=240, focal=(300.0, 300.0), center=(159.5, 119.5))
-TIMEOUT = 30.0
 
 
 def camera_at(x: float) -> np.ndarray:

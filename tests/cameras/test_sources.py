@@ -28,6 +28,7 @@ from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose
 from burg_drake.scene.document.scene import load_scene
 from burg_drake.station.document.station_document import load_station
+from tests.hang_guard import HANG_GUARD
 
 
 def picture(number: int = 0, size: tuple[int, int] = (64, 48)) -> Image:
@@ -333,17 +334,19 @@ def test_closing_wakes_who_waits_for_a_camera(streamer: Streamer) -> None:
     reader.start()
     time.sleep(0.1)
     source.close()
-    reader.join(10.0)
+    reader.join(HANG_GUARD)
     assert found == [None] and source.read() is None
 
 
 def test_a_slow_reader_sees_the_newest_image(streamer: Streamer) -> None:
     with open_source(streamer.address) as source:
         source.read()
+        begun = time.monotonic()
         time.sleep(0.5)
+        slept = time.monotonic() - begun
         first, second = source.read(), source.read()
         assert first is not None and second is not None
-        assert second.time - first.time < 0.3  # not half a second old
+        assert second.time - first.time < 0.8 * slept  # not as old as that
 
 
 def test_a_vanished_device_is_lost_and_a_new_one_found(tmp_path: Path, impatient: None) -> None:

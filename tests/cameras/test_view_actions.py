@@ -29,8 +29,9 @@ from burg_drake.cameras.sources.frame import FrameSource
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.scene.document.scene import Scene, load_scene
-from tests.cameras.live_views import CAMERA, TIMEOUT, Pictures, camera_at, lines
+from tests.cameras.live_views import CAMERA, Pictures, camera_at, lines
 from tests.cameras.synthetic import board_image
+from tests.hang_guard import HANG_GUARD
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +74,7 @@ def test_snapshot_of_the_picture(
     with pytest.raises(InvalidInputError, match="needs a picture that shows where the board is"):
         actions.start_check()
     running.start()
-    picture = running.next_picture(0, TIMEOUT)
+    picture = running.next_picture(0, HANG_GUARD)
     assert picture is not None
     places = [actions.snapshot(), actions.snapshot()]
     assert [p.name for p in places] == ["tabletop_six_snapshot_001", "tabletop_six_snapshot_002"]
@@ -94,12 +95,12 @@ def test_check_of_an_empty_board(scene: Scene, image: np.ndarray, tmp_path: Path
     running = LiveSession(session, Pictures(image), events=EventLog())
     actions = ViewActions(running, tmp_path)
     running.start()
-    picture = running.next_picture(0, TIMEOUT)
+    picture = running.next_picture(0, HANG_GUARD)
     assert picture is not None and picture.placement is None
     actions.start_check()
-    actions.wait_for_check(TIMEOUT)
+    actions.wait_for_check(HANG_GUARD)
     assert not actions.checking
-    shown = running.next_picture(picture.number, TIMEOUT)
+    shown = running.next_picture(picture.number, HANG_GUARD)
     assert shown is not None and shown.placement is running.placement is not None
     assert set(shown.placement.instances) == set(running.processor.scene.instances)
     assert {placed.status for placed in shown.placement.instances.values()} <= {
@@ -153,7 +154,7 @@ def test_a_recording_that_fails_is_finished_and_the_view_goes_on(
     monkeypatch.setattr(Recording, "add", fail_in_the_end)
     take = actions.start_recording(tmp_path / "take.avi")
     running.start()
-    running.wait(seconds=TIMEOUT)
+    running.wait(seconds=HANG_GUARD)
     assert running.counts.frames == 5 and actions.recording is None
     ended, saved = lines(log)[-2:]
     assert ended == "recording ended: [Errno 28] No space left on device"
@@ -171,7 +172,7 @@ def test_a_still_photo_is_recorded_from_the_start_or_not_at_all(
     actions = ViewActions(running, tmp_path)
     take = actions.start_recording(tmp_path / "take.avi")
     running.start()
-    running.wait(seconds=TIMEOUT)
+    running.wait(seconds=HANG_GUARD)
     assert actions.stop_recording() == take
     assert len(read_poses(take.with_suffix(".csv")).times) == 1
     before = sorted(tmp_path.iterdir())

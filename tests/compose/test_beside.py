@@ -27,9 +27,7 @@ from burg_drake.core.paths.resources import resolve
 from burg_drake.objects.library.document import LIBRARY_FILE, load_library
 from burg_drake.scene.document.scene import load_scene
 from burg_drake.station.document.station_document import Station
-
-PATIENCE = 120.0
-"""For a worker process on a busy machine [s]."""
+from tests.hang_guard import HANG_GUARD
 
 
 def test_settling_is_a_proposal(session: ComposeSession) -> None:
@@ -40,7 +38,7 @@ def test_settling_is_a_proposal(session: ComposeSession) -> None:
     hovering = session.do(MoveObjects({"box": X_SO}))
     views: list[SessionView] = []
     session.on_change(views.append)
-    proposal = session.settle().wait(PATIENCE)
+    proposal = session.settle().wait(HANG_GUARD)
     assert session.view.proposal is proposal and session.view.document == hovering.document
     assert any(view.working for view in views) and session.view.working is None
     assert 0.029 < proposal.displacements["box"].distance < 0.031
@@ -56,7 +54,7 @@ def test_settling_is_a_proposal(session: ComposeSession) -> None:
     job = session.settle()
     job.cancel()
     with pytest.raises(TaskCancelled):
-        job.wait(PATIENCE)
+        job.wait(HANG_GUARD)
     job = session.settle()
     while job.progress[1] == "waiting":
         time.sleep(0.001)
@@ -64,7 +62,7 @@ def test_settling_is_a_proposal(session: ComposeSession) -> None:
     assert process is not None
     os.kill(process, signal.SIGKILL)
     with pytest.raises(SimulationError, match=r"ended from outside by SIGKILL; the scene is as"):
-        job.wait(PATIENCE)
+        job.wait(HANG_GUARD)
     assert "cannot settle the scene" in session.view.notices[0]
 
 

@@ -21,9 +21,8 @@ from burg_drake.core.workers.allocator import (
     installed_allocators,
     worker_preload,
 )
+from tests.hang_guard import HANG_GUARD
 
-PATIENCE = 60.0
-"""For a process on a busy machine [s]."""
 linux = pytest.mark.skipif(sys.platform != "linux", reason="nothing is preloaded elsewhere")
 
 
@@ -226,8 +225,8 @@ def test_workers_have_it_and_what_they_start_does_not(
     if preloaded:
         monkeypatch.setenv(PRELOAD, maths)
     with WorkerPool(1) as pool:
-        assert str(library) in pool.submit(jobs.mapped_files).result(PATIENCE)
-        preload, files = pool.submit(jobs.preloaded_in_a_child).result(PATIENCE)
+        assert str(library) in pool.submit(jobs.mapped_files).result(HANG_GUARD)
+        preload, files = pool.submit(jobs.preloaded_in_a_child).result(HANG_GUARD)
     assert preload == (maths if preloaded else None)
     assert str(library) not in files
 
@@ -238,15 +237,15 @@ def test_results_are_the_same_without(library: Path, monkeypatch: pytest.MonkeyP
     for given in (str(library), "none"):
         monkeypatch.setenv(VARIABLE, given)
         with WorkerPool(1) as pool:
-            files = pool.submit(jobs.mapped_files).result(PATIENCE)
+            files = pool.submit(jobs.mapped_files).result(HANG_GUARD)
             assert (str(library) in files) is (given != "none")
-            found.append(pool.submit(jobs.sums_of_many_arrays).result(PATIENCE))
+            found.append(pool.submit(jobs.sums_of_many_arrays).result(HANG_GUARD))
     assert len(set(found)) == 1
 
 
 @linux
 def test_a_process_that_is_no_worker_keeps_its_own(library: Path) -> None:
     with WorkerPool(1) as pool:
-        pool.submit(jobs.square, 2).result(PATIENCE)
+        pool.submit(jobs.square, 2).result(HANG_GUARD)
     assert str(library) not in jobs.mapped_files()
     assert PRELOAD not in subprocess.run(["env"], capture_output=True, text=True).stdout

@@ -52,6 +52,25 @@ def test_permissions_are_those_of_an_ordinary_new_file(tmp_path: Path):
     assert (tmp_path / "written").stat().st_mode == (tmp_path / "plain").stat().st_mode
 
 
+def test_a_file_that_is_replaced_keeps_its_permissions_and_its_links(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    real = tmp_path / "there" / "file"
+    real.write_text("old")
+    for mode in (0o600, 0o664, 0o444):
+        real.chmod(mode)
+        atomic_write(real, f"{mode:o}")
+        assert real.read_text() == f"{mode:o}" and real.stat().st_mode & 0o777 == mode
+    link = tmp_path / "link"
+    link.symlink_to("there/file")
+    atomic_write(link, "through the link")
+    assert link.is_symlink() and real.read_text() == "through the link"
+    assert list(real.parent.iterdir()) == [real]
+    dangling = tmp_path / "dangling"
+    dangling.symlink_to("there/new")
+    atomic_write(dangling, "new")
+    assert dangling.is_symlink() and (tmp_path / "there" / "new").read_text() == "new"
+
+
 def test_permissions_of_the_process_are_never_touched(tmp_path, monkeypatch):
     """They are of all threads: what others write at that moment would be open to everyone."""
 

@@ -20,9 +20,7 @@ import worker_jobs as jobs
 from burg_drake.core.errors import InvalidInputError, SimulationError, TaskCancelled, WorkerDied
 from burg_drake.core.workers import Session, Task, TimeLimit, WorkerPool, map_unordered
 from burg_drake.core.workers.prefetch import Prefetcher
-
-PATIENCE = 60.0
-"""For a process on a busy machine [s]."""
+from tests.hang_guard import HANG_GUARD, until
 
 
 def is_alive(pid: int) -> bool:
@@ -35,16 +33,13 @@ def is_alive(pid: int) -> bool:
 
 
 def ends(pid: int) -> bool:
-    end = time.monotonic() + 10.0
-    while is_alive(pid) and time.monotonic() < end:
-        time.sleep(0.05)
-    return not is_alive(pid)
+    return until(lambda: not is_alive(pid))
 
 
 def test_it_is_an_executor() -> None:
     with WorkerPool(2) as pool:
         assert isinstance(pool, Executor)
-        assert pool.submit(jobs.square, 3).result(PATIENCE) == 9
+        assert pool.submit(jobs.square, 3).result(HANG_GUARD) == 9
         assert list(pool.map(jobs.slow, [1, 2, 3, 4], [0.2, 0.0, 0.1, 0.0])) == [1, 2, 3, 4]
         futures = {pool.submit(jobs.square, x): x for x in range(20)}
         assert all(future.result() == futures[future] ** 2 for future in as_completed(futures))
@@ -64,7 +59,7 @@ def test_no_task_starts_no_process() -> None:
     with WorkerPool(4) as pool:
         assert list(pool.map(jobs.square, [])) == []
         assert pool.submit_tasks([]) == []
-        pool.submit(jobs.square, 2).result(PATIENCE)
+        pool.submit(jobs.square, 2).result(HANG_GUARD)
         assert len(pool.processes) == 1
     with pytest.raises(InvalidInputError, match="workers is 0; give 1 or more"):
         WorkerPool(0)
@@ -72,10 +67,10 @@ def test_no_task_starts_no_process() -> None:
 
 def test_errors_come_as_they_were_raised() -> None:
     with WorkerPool(1) as pool:
-        error = pool.submit(jobs.refuse, "this").exception(PATIENCE)
+        error = pool.submit(jobs.refuse, "this").exception(HANG_GUARD)
         assert isinstance(error, InvalidInputError) and str(error) == "this cannot be used"
         assert "worker_jobs.py" in str(error.__cause__)
-        unusual = pool.submit(jobs.raise_unusual).exception(PATIENCE)
+        unusual = pool.submit(jobs.raise_unusual).exception(HANG_GUARD)
         assert isinstance(unusual, SimulationError)
         assert str(unusual) == "NeedsTwo: this and that"
         (process,) = pool.processes
@@ -84,9 +79,9 @@ def test_errors_come_as_they_were_raised() -> None:
             pool.submit(jobs.square, lambda: None),
             pool.submit(jobs.unpicklable_result),
         ):
-            assert isinstance(bad.exception(PATIENCE), (pickle.PicklingError, AttributeError))
-        assert isinstance(pool.submit(jobs.evil_result).exception(PATIENCE), ValueError)
-        assert pool.submit(jobs.square, 2).result(PATIENCE) == 4
+            assert isinstance(bad.exception(HANG_GUARD), (pickle.PicklingError, AttributeError))
+        assert isinstance(pool.submit(jobs.evil_result).exception(HANG_GUARD), ValueError)
+        assert pool.submit(jobs.square, 2).result(HANG_GUARD) == 4
         assert pool.processes == [process]
 
 
@@ -99,12 +94,12 @@ def test_a_death_costs_the_task_that_causes_it(number: signal.Signals, outside: 
         futures = [pool.submit(jobs.square, x) for x in range(10)]
         deadly = pool.submit(jobs.die, number)
         futures += [pool.submit(jobs.square, x) for x in range(10)]
-        error = deadly.exception(PATIENCE)
+        error = deadly.exception(HANG_GUARD)
         assert isinstance(error, WorkerDied) and error.from_outside is outside
         where = " from outside" if outside else ""
         assert str(error) == f"the worker process was ended{where} by {number.name}"
-        assert [f.result(PATIENCE) for f in futures] == [x * x for x in range(10)] * 2
-        gave_up = pool.submit(jobs.give_up).exception(PATIENCE)
+        assert [f.result(HANG_GUARD) for f in futures] == [x * x for x in range(10)] * 2
+        gave_up = pool.submit(jobs.give_up).exception(HANG_GUARD)
         assert str(gave_up) == "the worker process ended: SystemExit: abort: Failure at plant.cc"
 
 
@@ -112,24 +107,24 @@ def test_who_is_suspect_is_tried_again_alone_in_a_fresh_process(tmp_path: Path) 
     log = tmp_path / "log"
     with WorkerPool(1) as pool:
         futures = pool.submit_tasks([Task(jobs.die_at, (2, x, log)) for x in range(5)])
-        assert isinstance(futures[2].exception(PATIENCE), WorkerDied)
-        assert [f.result(PATIENCE) for k, f in enumerate(futures) if k != 2] == [0, 1, 3, 4]
+        assert isinstance(futures[2].exception(HANG_GUARD), WorkerDied)
+        assert [f.result(HANG_GUARD) for k, f in enumerate(futures) if k != 2] == [0, 1, 3, 4]
     tried = [line.split() for line in log.read_text().splitlines()]
     assert [x for x, _ in tried] == ["0", "1", "2", "2", "3", "4"]
     processes = [process for _, process in tried]
     assert len(set(processes[:3])) == len(set(processes[4:])) == 1
     assert len(set(processes)) == 3
     with WorkerPool(1) as pool:
-        assert pool.submit(jobs.die_once, tmp_path / "once").result(PATIENCE) > 0
+        assert pool.submit(jobs.die_once, tmp_path / "once").result(HANG_GUARD) > 0
         once = Task(jobs.die_once, (tmp_path / "never again",), retries=0)
-        assert isinstance(pool.submit_task(once).exception(PATIENCE), WorkerDied)
+        assert isinstance(pool.submit_task(once).exception(HANG_GUARD), WorkerDied)
 
 
 @pytest.mark.thorough
 def test_a_worker_that_is_ended_by_others_is_replaced() -> None:
     """As the system does when memory runs out: while it is idle, and while it works."""
     with WorkerPool(1) as pool:
-        pool.submit(jobs.square, 1).result(PATIENCE)
+        pool.submit(jobs.square, 1).result(HANG_GUARD)
         (idle,) = pool.processes
         os.kill(idle, signal.SIGKILL)
         assert ends(idle)
@@ -139,7 +134,7 @@ def test_a_worker_that_is_ended_by_others_is_replaced() -> None:
         while not (set(pool.processes) - {idle}):
             time.sleep(0.01)
         os.kill(next(iter(set(pool.processes) - {idle})), signal.SIGKILL)
-        assert future.result(PATIENCE) == 3
+        assert future.result(HANG_GUARD) == 3
 
 
 class KillsWhenPickled:
@@ -157,10 +152,10 @@ class KillsWhenPickled:
 @pytest.mark.parametrize("worker", [None, 0])
 def test_work_given_to_a_worker_that_has_just_died_is_done(worker: int | None) -> None:
     with WorkerPool(1) as pool:
-        pool.submit(jobs.square, 1).result(PATIENCE)
+        pool.submit(jobs.square, 1).result(HANG_GUARD)
         (idle,) = pool.processes
         task = Task(jobs.square, (KillsWhenPickled(idle),), retries=0)
-        assert pool.submit_tasks([task], worker)[0].result(PATIENCE) == 25
+        assert pool.submit_tasks([task], worker)[0].result(HANG_GUARD) == 25
         assert idle not in pool.processes
 
 
@@ -168,14 +163,14 @@ def test_what_takes_too_long_is_ended_once() -> None:
     with WorkerPool(2) as pool:
         spinning = Task(jobs.spin, limit=TimeLimit(cpu=0.3, wall=30.0))
         hanging = Task(jobs.slow, (1,), limit=TimeLimit(cpu=30.0, wall=0.5))
-        errors = [pool.submit_task(task).exception(PATIENCE) for task in (spinning, hanging)]
+        errors = [pool.submit_task(task).exception(HANG_GUARD) for task in (spinning, hanging)]
         assert [str(error) for error in errors] == [
             "took longer than 0.3 s of CPU time",
             "took longer than 0.5 s",
         ]
         assert not any(error.from_outside for error in errors if isinstance(error, WorkerDied))
         quick = Task(jobs.slow, (7, 0.6), limit=TimeLimit(cpu=0.5, wall=30.0))
-        assert pool.submit_task(quick).result(PATIENCE) == 7
+        assert pool.submit_task(quick).result(HANG_GUARD) == 7
 
 
 def test_sessions_are_built_once_a_worker_and_a_few_are_kept(tmp_path: Path) -> None:
@@ -183,7 +178,7 @@ def test_sessions_are_built_once_a_worker_and_a_few_are_kept(tmp_path: Path) -> 
     a, b, c = (Session(name, partial(jobs.Counter, log, name)) for name in "abc")
 
     def add(pool: WorkerPool, session: Session) -> tuple[str, int, int]:
-        return pool.submit_task(Task(jobs.add, (1,), session=session)).result(PATIENCE)
+        return pool.submit_task(Task(jobs.add, (1,), session=session)).result(HANG_GUARD)
 
     with WorkerPool(1, kept_sessions=2) as pool:
         assert [add(pool, session)[:2] for session in (a, b, a, b)] == [
@@ -199,7 +194,7 @@ def test_sessions_are_built_once_a_worker_and_a_few_are_kept(tmp_path: Path) -> 
     assert [line.split()[0] for line in log.read_text().splitlines()] == ["a", "b", "c", "b"]
     with WorkerPool(2) as pool:
         tasks = [Task(jobs.add, (1,), session=s) for _ in range(30) for s in (a, b)]
-        found = [future.result(PATIENCE) for future in [pool.submit_task(t) for t in tasks]]
+        found = [future.result(HANG_GUARD) for future in [pool.submit_task(t) for t in tasks]]
     assert [name for name, _, _ in found] == ["a", "b"] * 30
     assert len(log.read_text().splitlines()) <= 4 + 4  # not once a task
 
@@ -211,18 +206,18 @@ def test_sessions_that_cannot_be_built(tmp_path: Path) -> None:
         for _ in range(2):
             task = Task(jobs.add, (1,), session=refused)
             with pytest.raises(InvalidInputError, match="no such scene"):
-                pool.submit_task(task).result(PATIENCE)
+                pool.submit_task(task).result(HANG_GUARD)
         deadly = Session("deadly", partial(jobs.build_and_die, log), attempts=3)
         futures = [pool.submit_task(Task(jobs.add, (1,), session=deadly)) for _ in range(4)]
-        assert {str(f.exception(PATIENCE)) for f in futures} == {
+        assert {str(f.exception(HANG_GUARD)) for f in futures} == {
             "the worker process was ended by SIGSEGV"
         }
         assert deadly.error is futures[0].exception()
         assert len(log.read_text().split()) == 3
         slow = Session("slow", jobs.spin, limit=TimeLimit(0.2, 30.0), attempts=1)
-        error = pool.submit_task(Task(jobs.add, (1,), session=slow)).exception(PATIENCE)
+        error = pool.submit_task(Task(jobs.add, (1,), session=slow)).exception(HANG_GUARD)
         assert str(error) == "took longer than 0.2 s of CPU time"
-        assert pool.submit(jobs.square, 2).result(PATIENCE) == 4
+        assert pool.submit(jobs.square, 2).result(HANG_GUARD) == 4
     with pytest.raises((pickle.PicklingError, AttributeError)):
         Session("unpicklable", lambda: None)
 
@@ -231,10 +226,10 @@ def test_tasks_report_progress() -> None:
     told: list[int] = []
     with WorkerPool(1) as pool:
         task = Task(jobs.count_to, (5,), on_progress=told.append)
-        assert pool.submit_task(task).result(PATIENCE) == 5
+        assert pool.submit_task(task).result(HANG_GUARD) == 5
         assert told == [0, 1, 2, 3, 4]
         fails = Task(jobs.count_to, (3,), on_progress=lambda k: 1 // 0)
-        assert pool.submit_task(fails).result(PATIENCE) == 3
+        assert pool.submit_task(fails).result(HANG_GUARD) == 3
     assert jobs.count_to(3) == 3  # where nobody listens
 
 
@@ -243,24 +238,24 @@ def test_tasks_that_nobody_waits_for() -> None:
         begun = threading.Event()
         task = Task(jobs.report_for_ever, on_progress=lambda _: begun.set())
         running, queued = pool.submit_task(task), pool.submit(jobs.square, 2)
-        assert begun.wait(PATIENCE)
+        assert begun.wait(HANG_GUARD)
         (process,) = pool.processes
         queued.interrupt()
         with pytest.raises(CancelledError):
             queued.result()
         running.interrupt()
         with pytest.raises(TaskCancelled):
-            running.result(PATIENCE)
-        assert pool.submit(jobs.square, 3).result(PATIENCE) == 9
+            running.result(HANG_GUARD)
+        assert pool.submit(jobs.square, 3).result(HANG_GUARD) == 9
         assert pool.processes == [process]
         hanging = pool.submit(jobs.slow, 1)
         while not hanging.running():
             time.sleep(0.01)
         hanging.terminate()
         with pytest.raises(TaskCancelled):
-            hanging.result(PATIENCE)
+            hanging.result(HANG_GUARD)
         hanging.terminate()
-        assert pool.submit(jobs.square, 4).result(PATIENCE) == 16
+        assert pool.submit(jobs.square, 4).result(HANG_GUARD) == 16
         assert pool.processes != [process]
 
 
@@ -268,7 +263,7 @@ def test_shutdown_finishes_or_gives_up_what_waits() -> None:
     pool = WorkerPool(1)
     futures = [pool.submit(jobs.slow, k, 0.1) for k in range(4)]
     pool.shutdown(wait=False)
-    assert [future.result(PATIENCE) for future in futures] == [0, 1, 2, 3]
+    assert [future.result(HANG_GUARD) for future in futures] == [0, 1, 2, 3]
     pool = WorkerPool(1)
     futures = [pool.submit(jobs.slow, k, 0.5) for k in range(4)]
     while not futures[0].running():
@@ -284,10 +279,10 @@ def test_ended_workers_end_what_they_were_at() -> None:
     while len(pool.processes) < 2:
         time.sleep(0.01)
     processes = pool.processes
-    pool.kill_workers(PATIENCE)
+    pool.kill_workers(HANG_GUARD)
     assert not any(map(is_alive, processes))
     for future in futures:
-        assert isinstance(future.exception(1.0), TaskCancelled)
+        assert isinstance(future.exception(HANG_GUARD), TaskCancelled)
     with pytest.raises(ZeroDivisionError), WorkerPool(1) as pool:
         pool.submit(jobs.slow, 1)
         1 // 0  # noqa: B018
@@ -340,7 +335,7 @@ def test_what_a_worker_starts_ends_with_it(tmp_path: Path) -> None:
     while not (tmp_path / "child").exists() or not (tmp_path / "child").read_text():
         time.sleep(0.01)
     child = int((tmp_path / "child").read_text())
-    pool.kill_workers(PATIENCE)
+    pool.kill_workers(HANG_GUARD)
     assert ends(child)
 
 

@@ -31,6 +31,7 @@ from burg_drake.evaluation.report.sections.reproduction import reproduce_command
 from burg_drake.evaluation.store.run_folder import Run, load_run
 from burg_drake.scene.document.scene import Scene
 from burg_drake.station.document.station_document import Station
+from tests.hang_guard import HANG_GUARD, until
 
 
 def same_results(a: Run, b: Run) -> bool:
@@ -129,10 +130,7 @@ def start(scene: Scene, run: Path, log: Path) -> subprocess.Popen[str]:
 
 
 def wait_for_lines(path: Path, count: int) -> None:
-    deadline = time.monotonic() + 60
-    while not path.exists() or path.read_bytes().count(b"\n") < count:
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    until(lambda: path.exists() and path.read_bytes().count(b"\n") >= count)
 
 
 def test_a_killed_run_goes_on_where_it_was(
@@ -224,7 +222,7 @@ def test_an_interrupt_keeps_what_is_done(scene: Scene, tmp_path: Path) -> None:
     process = start(scene, tmp_path / "run", tmp_path / "log")
     wait_for_lines(tmp_path / "run" / "journal.jsonl", 10)
     os.killpg(process.pid, signal.SIGINT)  # as the terminal does
-    _, errors = process.communicate(timeout=30)
+    _, errors = process.communicate(timeout=HANG_GUARD)
     assert process.returncode == -signal.SIGINT and errors.count("Traceback") == 1
     run = load_run(tmp_path / "run")
     assert run.document.stretches[0].judged == len(run.results["id"]) >= 10

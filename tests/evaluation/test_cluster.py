@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +43,7 @@ from burg_drake.evaluation.cluster.versions import (  # noqa: E402
     require_same,
     software,
 )
+from tests.hang_guard import HANG_GUARD, until  # noqa: E402
 
 LIMITS = WorkerLimits(cpu=0.25)
 
@@ -52,7 +53,9 @@ class Cluster:
 
     def __init__(self) -> None:
         self.nodes = LocalNodes(2)
-        self.client = distributed.Client(self.nodes.address, set_as_default=False, timeout=30)
+        self.client = distributed.Client(
+            self.nodes.address, set_as_default=False, timeout=HANG_GUARD
+        )
         self.executor = DaskExecutor(self.client, LIMITS, self.nodes.restart_workers)
 
     @property
@@ -163,7 +166,7 @@ def test_leaving_early_ends_the_children(cluster: Cluster, tmp_path: Path) -> No
     children = [int(line.split()[1]) for line in log.read_text().splitlines()]
     assert children
     judged.close()
-    wait_for(lambda: not any(map(is_alive, children)))
+    until(lambda: not any(map(is_alive, children)))
 
 
 def test_other_versions_are_refused(
@@ -187,7 +190,7 @@ def test_other_versions_are_refused(
         node.kill()
         node.wait()
         connection.close()
-    wait_for(lambda: address not in cluster.workers)
+    until(lambda: address not in cluster.workers)
 
 
 def test_all_that_decides_about_verdicts_is_compared(tmp_path: Path) -> None:
@@ -215,7 +218,7 @@ def test_a_worker_that_can_be_reached_from_elsewhere_is_refused(cluster: Cluster
             list(cluster.executor.judge([Job("job", Make(KnownJudge()), grasps(3))]))
     finally:
         cluster.client.sync(worker.close)
-    wait_for(lambda: "tcp://203.0.113.9:40000" not in cluster.workers)
+    until(lambda: "tcp://203.0.113.9:40000" not in cluster.workers)
 
 
 def test_a_scheduler_that_can_be_reached_from_elsewhere_is_refused(cluster: Cluster) -> None:
@@ -264,7 +267,7 @@ def test_a_killed_driver_leaves_nothing_behind(tmp_path: Path) -> None:
         processes = [int(pid) for pid in (*nodes, *children)]
         assert len(nodes) == 2
         driver.send_signal(signal.SIGKILL)
-    wait_for(lambda: not any(map(is_alive, processes)))
+    until(lambda: not any(map(is_alive, processes)))
 
 
 @pytest.mark.thorough
@@ -329,10 +332,3 @@ def is_alive(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
-
-
-def wait_for(true: Callable[[], bool], limit: float = 10.0) -> None:
-    end = time.monotonic() + limit
-    while not true():
-        assert time.monotonic() < end
-        time.sleep(0.05)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import hashlib
 import io
 import shutil
-import time
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +30,7 @@ from burg_drake.evaluation.cluster.calls import ClusterCall, make_call  # noqa: 
 from burg_drake.evaluation.cluster.delivery import send_bundle  # noqa: E402
 from burg_drake.evaluation.cluster.local_nodes import LocalNodes  # noqa: E402
 from burg_drake.evaluation.cluster.members import threads_by_address  # noqa: E402
+from tests.hang_guard import HANG_GUARD, until  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -44,9 +44,9 @@ def nodes() -> Iterator[LocalNodes]:
 @pytest.fixture
 def executor(nodes: LocalNodes, monkeypatch: pytest.MonkeyPatch) -> Iterator[DaskExecutor]:
     monkeypatch.setattr("burg_drake.evaluation.cluster.cluster_map.LOOK", 0.2)
-    client = distributed.Client(nodes.address, set_as_default=False, timeout=30)
+    client = distributed.Client(nodes.address, set_as_default=False, timeout=HANG_GUARD)
     nodes.restart_workers()  # those that another test has killed
-    wait_for(lambda: len(threads_by_address(client)) == 2)
+    until(lambda: len(threads_by_address(client)) == 2)
     yield DaskExecutor(client, maintain=nodes.restart_workers)
     client.close(timeout=2)
 
@@ -125,10 +125,10 @@ def test_leaving_early_ends_the_children(executor: DaskExecutor, tmp_path: Path)
     work = [Known(0, log=log), Known(1, pause=60.0, log=log)]
     made = map_on_cluster(executor, square, work, bundle(), same)
     assert next(made) == (work[0], (0, "known"))
-    wait_for(lambda: len(log.read_text().splitlines()) == 2)
+    until(lambda: len(log.read_text().splitlines()) == 2)
     made.close()
     children = [int(line.split()[1]) for line in log.read_text().splitlines()]
-    wait_for(lambda: not any(map(is_alive, children)))
+    until(lambda: not any(map(is_alive, children)))
 
 
 @pytest.mark.thorough
@@ -148,7 +148,7 @@ def test_children_without_work_end(
     ):
         assert squares(DaskExecutor(client), [Known(3, log=log)]) == {3: (9, "known")}
         (child,) = (int(line.split()[1]) for line in log.read_text().splitlines())
-        wait_for(lambda: not is_alive(child))
+        until(lambda: not is_alive(child))
 
 
 def test_other_versions_are_refused(
@@ -171,7 +171,7 @@ def test_other_versions_are_refused(
         node.kill()
         node.wait()
         connection.close()
-    wait_for(lambda: address not in threads_by_address(executor.client))
+    until(lambda: address not in threads_by_address(executor.client))
 
 
 @pytest.mark.thorough
@@ -210,7 +210,9 @@ def test_a_call_without_its_run_is_not_made(executor: DaskExecutor) -> None:
     assert squares(executor, [Known(1)]) == {1: (1, "known")}  # the bundle is there
     call = ClusterCall("a run that is over", bundle().name, b"")
     answers = [
-        executor.client.submit(make_call, call, pure=False, workers=[address]).result(timeout=30)
+        executor.client.submit(make_call, call, pure=False, workers=[address]).result(
+            timeout=HANG_GUARD
+        )
         for address in threads_by_address(executor.client)
     ]
     assert any(answer.ended for answer in answers)
@@ -221,10 +223,3 @@ def is_alive(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
-
-
-def wait_for(true: Callable[[], bool], limit: float = 30.0) -> None:
-    end = time.monotonic() + limit
-    while not true():
-        assert time.monotonic() < end
-        time.sleep(0.05)

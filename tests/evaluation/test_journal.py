@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import math
 import os
+from pathlib import Path
 
 import pytest
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.grasps import Verdict
 from burg_drake.core.grasps.outcome import Outcome, Stage
+from burg_drake.evaluation.records.folder_lock import Lock, is_locked, unchanged
 from burg_drake.evaluation.records.journal import Journal, decode, encode, read_journal
 
 LIFTED = Verdict(
@@ -115,3 +119,25 @@ def test_a_full_disk_is_said_in_one_line() -> None:
     with pytest.raises(InvalidInputError, match="No space left on device; what is in it is kept"):
         journal.append("a", LIFTED)
     journal.close()
+
+
+def test_a_file_system_without_locks_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Writers are refused with the reason; nothing there is being written, and all can be read."""
+
+    def no_locks(file: int, kind: int) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    path = tmp_path / "journal.jsonl"
+    with Journal(path):
+        assert is_locked(path)
+    monkeypatch.setattr(fcntl, "flock", no_locks)
+    expected = f"{tmp_path} is on a file system without locks (No locks available), where two"
+    for writer in (Journal, Lock):
+        with pytest.raises(InvalidInputError) as refused:
+            writer(path)
+        assert str(refused.value).startswith(expected)
+    assert not is_locked(path)
+    with unchanged(path):
+        pass

@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
 from hypothesis import example, given, settings, strategies as st
 
-from burg_drake.core.documents.schema import Pose, parse_document, plain_data
+from burg_drake.core.documents.schema import Pose, dump_document, parse_document, plain_data
+from burg_drake.core.documents.yaml_nodes import parse_nodes
 from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownNameError
+from burg_drake.core.files import UNFINISHED
 from burg_drake.core.grasps.outcome import RealOutcome
 from burg_drake.experiment.trials.book import TrialBook, TrialChanged
+from burg_drake.experiment.trials.evidence import keep_evidence
+from burg_drake.experiment.trials.file_lock import exclusive
 from burg_drake.experiment.trials.sheet import ObjectPlace, RobotReport, TrialSheet, load_trials
-from burg_drake.experiment.trials.sheet_text import with_trial
+from burg_drake.experiment.trials.sheet_text import SheetText
 from tests.experiment.trial_sheets import make_sheet, write_sheet
 
 PLACE = ObjectPlace(
@@ -64,7 +72,7 @@ def test_what_was_told_before_a_kill_is_there(tmp_path: Path) -> None:
     book.record(60, outcome="lifted")  # the lock is free
 
 
-@pytest.mark.parametrize("step", ["append_entry", "with_trial", "atomic_write"])
+@pytest.mark.parametrize("step", ["append_entry", "SheetText.with_trial", "atomic_write"])
 def test_a_kill_between_two_steps_leaves_a_sound_file(tmp_path: Path, step: str) -> None:
     path = write_sheet(tmp_path)
     where = "burg_drake.experiment.trials.book"
@@ -81,6 +89,54 @@ def test_a_kill_between_two_steps_leaves_a_sound_file(tmp_path: Path, step: str)
     assert book.record(2, outcome="slipped").outcome is RealOutcome.SLIPPED
 
 
+def test_all_links_to_a_file_share_its_lock_and_journal(tmp_path: Path) -> None:
+    """Two writers by two names lose nothing, and what an editor overwrites is restored by both."""
+    (tmp_path / "real").mkdir()
+    path = write_sheet(tmp_path / "real", 24)
+    path.chmod(0o640)
+    (tmp_path / "links").symlink_to("real")
+    link = tmp_path / "linked.yaml"
+    link.symlink_to(tmp_path / "links" / "trials.yaml")
+    before = path.read_text()
+    writers = [start(link, *range(1, 25, 2)), start(path, *range(2, 25, 2))]
+    assert [writer.wait() for writer in writers] == [0] * 2
+    assert [trial.note for trial in load_trials(path).trials] == [f"by {n}" for n in range(1, 25)]
+    assert link.is_symlink() and path.stat().st_mode & 0o777 == 0o640
+    assert {p.name for p in tmp_path.iterdir()} == {"real", "links", "linked.yaml"}
+    names = {"trials.yaml", ".trials.yaml.lock", "trials.entries.jsonl"}
+    assert {p.name for p in path.parent.iterdir()} == names
+    path.write_text(before)
+    assert len(TrialBook(path).missing_values()) == 24
+    assert len(TrialBook(link).restore()) == 24 and TrialBook(path).missing_values() == []
+    photo = tmp_path / "p.png"
+    photo.write_bytes(b"a photo")
+    assert keep_evidence(link, 3, photo=photo) == "photos/003.png"
+    assert (path.parent / "photos" / "003.png").exists()
+
+
+def test_a_lock_that_is_kept_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    book = TrialBook(write_sheet(tmp_path))
+    monkeypatch.setattr("burg_drake.experiment.trials.file_lock.WAIT", 0.05)
+    with exclusive(book.path), pytest.raises(InvalidInputError, match="locked by another process"):
+        book.record(1, outcome="lifted")
+    assert book.entries() == [] and book.record(1, outcome="lifted").number == 1
+
+
+def test_a_file_system_without_locks_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    book = TrialBook(write_sheet(tmp_path))
+    monkeypatch.setattr(fcntl, "flock", no_locks)
+    with pytest.raises(InvalidInputError, match=r"trials.yaml is on a file system without locks"):
+        book.record(1, outcome="lifted")
+    assert book.entries() == [] and book.sheet() == make_sheet()
+
+
+def no_locks(file: int, kind: int) -> None:
+    """What the system says on some network drives."""
+    raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+
 def test_a_torn_line_of_the_journal_is_left_behind(tmp_path: Path) -> None:
     book = TrialBook(write_sheet(tmp_path))
     book.record(1, outcome="lifted")
@@ -88,6 +144,11 @@ def test_a_torn_line_of_the_journal_is_left_behind(tmp_path: Path) -> None:
         file.write(b'{"number": 2, "gra')
     book.record(3, outcome="lifted")
     assert [entry.number for entry in book.entries()] == [1, 3]
+    assert "trials.entries.jsonl: line 2 cannot be read" in book.damage()
+    with (tmp_path / "trials.entries.jsonl").open("r+b") as file:
+        file.write(b"\xff")
+    assert "lines 1, 2 cannot be read" in book.damage()
+    assert [entry.number for entry in book.entries()] == [3]
 
 
 def test_comments_and_layout_of_people_stay(tmp_path: Path) -> None:
@@ -162,11 +223,60 @@ def test_an_old_buffer_loses_nothing_and_an_edit_is_kept(tmp_path: Path) -> None
     assert book.sheet().trial(3).outcome is RealOutcome.DROPPED
 
 
-def test_entries_of_another_plan_are_not_this_one_s(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("mug-0001", "mug-0f01"),
+        ("'000000000001'", "'000000000f01'"),
+        ("number: 1\n", "number: 9\n"),
+    ],
+)
+def test_entries_of_another_plan_are_not_this_one_s(tmp_path: Path, old: str, new: str) -> None:
+    """They are of a trial of the same number, grasp and content; one of these differs."""
     path = write_sheet(tmp_path)
+    before = path.read_text()
     TrialBook(path).record(1, outcome="lifted")
-    path.write_text(path.read_text().replace("mug-0001", "mug-0f01"))
-    assert TrialBook(path).missing_values() == []
+    path.write_text(before)
+    assert [found.number for found in TrialBook(path).missing_values()] == [1]
+    assert before.count(old) == 1
+    path.write_text(before.replace(old, new))
+    book = TrialBook(path)
+    assert book.missing_values() == book.restore() == book.keep() == []
+    assert path.read_text() == before.replace(old, new) and len(book.entries()) == 1
+
+
+def test_each_step_is_on_the_disk_before_the_next_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the power supply's end leaves is what has been synchronised, and in this order."""
+    book = TrialBook(write_sheet(tmp_path))
+    steps: list[str] = []
+    real = {name: getattr(os, name) for name in ("write", "fsync", "replace")}
+
+    def name_of(file: int) -> str:
+        """Of an open file; the one that is not renamed yet is the new one."""
+        status = os.fstat(file)
+        if os.path.samestat(status, tmp_path.stat()):
+            return "folder"
+        names = [p.name for p in tmp_path.iterdir() if os.path.samestat(status, p.stat())]
+        return "new file" if UNFINISHED.fullmatch(names[0]) else names[0]
+
+    def logged(name: str) -> Callable[..., object]:
+        def call(*arguments: Any) -> object:
+            what = name_of(arguments[0]) if name != "replace" else Path(arguments[1]).name
+            steps.append(f"{name} {what}")
+            return real[name](*arguments)
+
+        return call
+
+    for name in real:
+        monkeypatch.setattr(os, name, logged(name))
+    book.record(1, outcome="lifted")
+    journal = "trials.entries.jsonl"
+    assert steps == [
+        *(f"write {journal}", f"fsync {journal}", "fsync folder"),
+        *("fsync new file", "replace trials.yaml", "fsync folder"),
+    ]
 
 
 TEXTS = st.text(st.characters(exclude_categories=("Cs",), exclude_characters="\0"), max_size=40)
@@ -202,11 +312,83 @@ def test_any_note_survives_any_layout(
         replace(sheet.trial(2), note="", robot=RobotReport(width_mm=1.5)),
         make_sheet(3).trial(2),
     ):
-        text = with_trial(text, "text", parse_document(text, TrialSheet, "text"), wanted)
+        text = SheetText.read(text, "text").with_trial(wanted).text
         found = parse_document(text, TrialSheet, "text")
         assert found.trials == (sheet.trial(1), wanted, sheet.trial(3))
+        assert newline == "\n" or "\n" not in text.replace(newline, "")
         end = newline.join(["", *lines[at + blank :], ""])  # all from the comment on
         assert text.endswith(end) and text.count(end) == 1
+
+
+PIECES = (
+    "  - number: 4\n",
+    "    outcome: lifted\n",
+    "    outcome: lifte\n",
+    "    note: |+\n      a\n\n",
+    '    note: "a\n',
+    '  b"\n',
+    "    note: &a x\n",
+    "    operator: *a\n",
+    "# a comment\n",
+    "\n",
+    "%TAG ! x\n",
+    "---\n",
+    "notes: [a]\n",
+    "  ",
+    "x",
+    "\u2028",
+)
+
+
+@settings(max_examples=100, deadline=None)
+@given(data=st.data())
+def test_what_is_read_of_a_changed_text_is_what_is_read_of_all_of_it(data: st.DataObject) -> None:
+    """Whatever an editor does to the text, also where trials are no list of mappings any more."""
+    text = dump_document(make_sheet(5))
+    known = SheetText.read(text, "text")
+    for _ in range(data.draw(st.integers(1, 3))):
+        breaks = [0, *(k + 1 for k, c in enumerate(text) if c == "\n")]
+        anywhere = st.sampled_from(breaks[-60:]) | st.integers(0, len(text))
+        at, end = data.draw(anywhere), data.draw(anywhere)
+        end = at if data.draw(st.booleans()) else end
+        piece = "".join(data.draw(st.lists(st.sampled_from(PIECES), max_size=2)))
+        text = text[: min(at, end)] + piece + text[max(at, end) :]
+        found, expected = _sheet_or_error(known.after, text), _sheet_or_error(_all_of, text)
+        assert found == expected
+        if not isinstance(found, str):
+            known = known.after(text)
+
+
+def _all_of(text: str) -> SheetText:
+    return SheetText.read(text, "text")
+
+
+def _sheet_or_error(read: Callable[[str], SheetText], text: str) -> TrialSheet | str:
+    try:
+        return read(text).sheet
+    except DocumentError as error:
+        return str(error)
+
+
+def test_an_entry_is_read_and_written_by_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither what this program has written nor what another one writes is read all over."""
+    path = write_sheet(tmp_path, 60)
+    path.write_text(f"{path.read_text()}notes: [a word on the choice]\n")
+    book, other = TrialBook(path), TrialBook(path)
+    lengths: list[int] = []
+
+    def counted(text: str, *more: str) -> yaml.Node:
+        lengths.append(len(text))
+        return parse_nodes(text, *more)
+
+    monkeypatch.setattr("burg_drake.experiment.trials.sheet_text.parse_nodes", counted)
+    for number in range(1, 61):
+        writer = other if number % 2 else book
+        writer.record(number, outcome="lifted", note="so", placement={"mug": PLACE})
+    assert len(lengths) <= 60 * 4 and max(lengths) < 1000
+    assert load_trials(book.path) == book.sheet() == other.sheet()
 
 
 def test_flow_style_can_be_changed_and_an_alias_is_refused(tmp_path: Path) -> None:

@@ -91,7 +91,7 @@ def test_shortfalls_of_a_kind_are_one_line_and_a_class_that_is_missing_is_said(
     assert planned(run, per_object=4).notes == (
         "box, mug of run two: 0 of 2 with failure; others make up for it",
         "0 of 8 are failures in simulation: almost nothing here measures how well failures are"
-        " predicted",
+        " predicted; evaluate with until_balanced finds more",
     )
     verdicts = {"mug": [*lifted, ended("slipped")], "box": lifted}
     uneven = make_run(tmp_path / "uneven", make_scene(tmp_path), verdicts)
@@ -101,6 +101,13 @@ def test_shortfalls_of_a_kind_are_one_line_and_a_class_that_is_missing_is_said(
     verdicts = {"mug": lifted, "box": [ended("slipped")]}
     mixed = make_run(tmp_path / "mixed", make_scene(tmp_path), verdicts)
     assert not any("almost nothing" in note for note in planned(mixed, per_object=4).notes)
+
+
+def test_predicted_collisions_can_be_chosen(hand: Run) -> None:
+    sheet = planned(hand, per_object=22, among="all")
+    assert counts(sheet)["mug", "collision_table"] == 5
+    (failures,) = (s for s in sheet.strata.values() if (s.object, s.label) == ("mug", "failure"))
+    assert failures.population == 3 + 3 + 5  # slipped, disturbed, collided
 
 
 def test_strata_by_outcome_and_without_any(hand: Run) -> None:
@@ -222,7 +229,7 @@ def test_a_sheet_is_not_written_over_once_it_has_entries(hand: Run, tmp_path: Pa
     [
         ({"balance": "outcomes"}, "no balance 'outcomes'; did you mean 'outcome'"),
         ({"balance": "margin:clearanse"}, "no margin 'clearanse'; did you mean 'clearance'"),
-        ({"among": "all"}, "no among 'all'; known: clear"),
+        ({"among": "any"}, "no among 'any'"),
         ({"per_object": 0}, "per_object is 0"),
         ({"blocks": 0}, "blocks is 0"),
     ],

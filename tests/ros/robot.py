@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 
 PERIOD = 0.25
-PATIENCE = 40.0
+PATIENCE = 600.0  # only tells a hang from a slow machine [s]
 
 
 def master():

@@ -25,11 +25,11 @@ from burg_drake.cameras.overlay.renderer import Overlay
 from burg_drake.core.arrays import Array
 from burg_drake.core.frames import inverse, make_pose, rotation_angle, rotation_from_quaternion
 from burg_drake.scene.document.scene import Scene
+from tests.hang_guard import HANG_GUARD
 
 ROBOT = Path(__file__).with_name("robot.py")
 DEBIAN = "/usr/bin/python3"
 NEEDED = "rospy, rosmaster.master, cv_bridge.boost.cv_bridge_boost, tf2_msgs.msg"
-PATIENCE = 120.0
 CAMERA = "wrist_camera_optical_frame"
 
 
@@ -162,12 +162,15 @@ def play(folder: Path, picture: NDArray[np.uint8], intrinsics: Intrinsics) -> Tr
                 second,
             )
             subprocess.run(
-                [DEBIAN, ROBOT, "show", folder / "plan.json"], env=ros, check=True, timeout=PATIENCE
+                [DEBIAN, ROBOT, "show", folder / "plan.json"],
+                env=ros,
+                check=True,
+                timeout=HANG_GUARD,
             )
             children["first"].send_signal(signal.SIGINT)
             children["second"].send_signal(signal.SIGTERM)
             nodes = {
-                name: Ended(children[name].wait(PATIENCE), (folder / f"{name}.log").read_text())
+                name: Ended(children[name].wait(HANG_GUARD), (folder / f"{name}.log").read_text())
                 for name in ("first", "second")
             }
     finally:

@@ -11,6 +11,8 @@ from typing import Any
 
 import pytest
 
+from tests.hang_guard import HANG_GUARD
+
 viser = pytest.importorskip("viser", reason="pages need viser: pip install 'burg-drake[ui]'")
 sync_api = pytest.importorskip("playwright.sync_api", reason="driven by playwright")
 
@@ -22,8 +24,7 @@ ARGUMENTS = (
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 )
-PATIENCE_MS = 60_000
-"""For what a page has to say, on a busy machine."""
+PATIENCE_MS = 1000.0 * HANG_GUARD
 SIZE = {"width": 1280, "height": 800}
 
 
@@ -76,6 +77,7 @@ def lamps_alone() -> Iterator[None]:
 def page(browser: sync_api.Browser) -> Iterator[sync_api.Page]:
     """A fresh tab of a fresh profile; the test fails if a script of the page does."""
     with browser.new_context(viewport=SIZE) as context:
+        sync_api.expect.set_options(timeout=PATIENCE_MS)
         context.set_default_timeout(PATIENCE_MS)
         context.set_default_navigation_timeout(PATIENCE_MS)
         page = context.new_page()

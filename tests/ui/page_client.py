@@ -6,8 +6,6 @@ It costs next to nothing where a real browser draws every frame in software.
 from __future__ import annotations
 
 import threading
-import time
-from collections.abc import Callable
 from types import TracebackType
 from typing import Any
 
@@ -19,9 +17,8 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
 from burg_drake.ui.server.door import ServedPage
+from tests.hang_guard import HANG_GUARD
 
-PATIENCE = 60.0
-"""For what a page has to say, on a busy machine [s]."""
 CAMERA = {
     "wxyz": (1.0, 0.0, 0.0, 0.0),
     "position": (0.0, 0.0, 1.0),
@@ -33,14 +30,6 @@ CAMERA = {
     "look_at": (0.0, 0.0, 0.0),
     "up_direction": (0.0, 1.0, 0.0),
 }
-
-
-def until(true: Callable[[], Any], what: str, patience: float = PATIENCE) -> None:
-    """Waits for a state."""
-    end = time.monotonic() + patience
-    while not true():
-        assert time.monotonic() < end, f"waited in vain: {what}"
-        time.sleep(0.02)
 
 
 def coming_in(door: ServedPage) -> ClientConnection:
@@ -87,7 +76,7 @@ class PageClient:
         self._thread = threading.Thread(target=self._listen, daemon=True)
         self._thread.start()
         send(self._connection, "ViewerCameraMessage", **CAMERA)
-        assert self._complete.wait(PATIENCE)
+        assert self._complete.wait(HANG_GUARD)
 
     def __enter__(self) -> PageClient:
         return self
@@ -99,7 +88,7 @@ class PageClient:
         trace: TracebackType | None,
     ) -> None:
         self._connection.close()
-        self._thread.join(PATIENCE)
+        self._thread.join(HANG_GUARD)
 
     def value(self, folder: str, label: str) -> Any:
         """What stands in a field of a folder."""

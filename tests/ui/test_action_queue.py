@@ -6,8 +6,7 @@ import threading
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.ui.widgets.action_queue import ActionQueue
-
-PATIENCE = 30.0
+from tests.hang_guard import HANG_GUARD
 
 
 def test_actions_run_in_order_and_errors_reach_who_asked() -> None:
@@ -26,7 +25,7 @@ def test_actions_run_in_order_and_errors_reach_who_asked() -> None:
         if i == 20:
             queue.submit(refuse, "a page")
             queue.submit(stumble, "another")
-    assert queue.idle(PATIENCE)
+    assert queue.idle(HANG_GUARD)
     assert done == list(range(50))
     assert said[0] == ("a page", "no")
     assert said[1][0] == "another" and "oops" in said[1][1]
@@ -43,7 +42,7 @@ def test_of_actions_with_a_key_only_the_newest_that_waits_is_done() -> None:
     queue.submit(lambda: done.append(100))
     queue.submit(lambda: done.append(200), key="drag")
     gate.set()
-    assert queue.idle(PATIENCE)
+    assert queue.idle(HANG_GUARD)
     assert done == [9, 100, 200]
     queue.close()
 
@@ -55,7 +54,7 @@ def test_what_is_typed_waits_for_more_but_holds_up_nobody() -> None:
     queue.submit(lambda: done.append("25"), key="field", after=3600.0)
     assert not queue.idle(0.05)
     queue.submit(lambda: done.append("save"))
-    assert queue.idle(PATIENCE)
+    assert queue.idle(HANG_GUARD)
     assert done == ["25", "save"]
     queue.submit(lambda: done.append("last"), key="field", after=3600.0)
     queue.close()
@@ -69,10 +68,10 @@ def test_what_only_shows_runs_at_once_and_does_not_end_typing() -> None:
     queue.submit(lambda: done.append("2"), key="field", after=3600.0)
     queue.submit(lambda: done.append("shown"), key="refresh", wait_for_typing=True)
     queue.submit(shown.set, key="other", wait_for_typing=True)
-    assert shown.wait(PATIENCE)
+    assert shown.wait(HANG_GUARD)
     queue.submit(lambda: done.append("25"), key="field", after=3600.0)
     assert not queue.idle(0.05)
     queue.submit(lambda: done.append("save"))
-    assert queue.idle(PATIENCE)
+    assert queue.idle(HANG_GUARD)
     assert done == ["shown", "25", "save"]
     queue.close()

@@ -17,6 +17,7 @@ from burg_drake.core.errors import InvalidInputError, MissingDependencyError
 from burg_drake.ui.server import admission
 from burg_drake.ui.server.access_test import require_guarded
 from burg_drake.ui.server.door import ServedPage, serve
+from tests.hang_guard import HANG_GUARD
 
 HANDSHAKE = {
     "Connection": "Upgrade",
@@ -57,7 +58,7 @@ def answer(
     door: ServedPage, path: str = "/", *headers: tuple[str, str], host: str | None = "127.0.0.1"
 ) -> tuple[int, dict[str, str], str]:
     """Status, headers and text of the answer to a request that is sent as it is given."""
-    connection = http.client.HTTPConnection("127.0.0.1", door.port, timeout=60)
+    connection = http.client.HTTPConnection("127.0.0.1", door.port, timeout=HANG_GUARD)
     try:
         connection.putrequest("GET", path, skip_host=True)
         if host is not None:
@@ -215,6 +216,16 @@ def test_without_a_token_nothing_opens(open_to_all: ServedPage) -> None:
         assert answer(open_to_all, "/", own, *given, *HANDSHAKE.items())[0] == 403
     for query in ("?token=", "?token=x", "?token=%C3%A4", "?token"):
         assert answer(open_to_all, f"/{query}")[0] == 403
+
+
+def test_a_token_that_is_no_text_is_a_wrong_one(open_to_all: ServedPage) -> None:
+    for path, cookie in ((b"/?token=\xe4", b""), (b"/", b"\xe4")):
+        head = b"GET %s HTTP/1.1\r\nHost: localhost\r\nCookie: burg_drake_%d=%s\r\n\r\n"
+        with socket.create_connection(
+            ("127.0.0.1", open_to_all.port), timeout=HANG_GUARD
+        ) as connection:
+            connection.sendall(head % (path, open_to_all.port, cookie))
+            assert connection.recv(100).startswith(b"HTTP/1.1 403")
 
 
 def test_browsers_are_counted(door: ServedPage, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,8 +18,7 @@ from burg_drake.station.document.station_document import load_station  # noqa: E
 from burg_drake.ui.server.door import serve  # noqa: E402
 from burg_drake.ui.setup_page import SetupPage  # noqa: E402
 from burg_drake.ui.widgets.typed_field import TypedField  # noqa: E402
-
-PATIENCE = 60.0
+from tests.hang_guard import HANG_GUARD  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -41,11 +40,11 @@ def press(field: TypedField, value: Any) -> None:
     event = viser.GuiEvent(client=None, client_id=0, target=handle)
     for callback in handle._impl.update_cb:
         loop = handle._impl.gui_api._event_loop
-        asyncio.run_coroutine_threadsafe(callback(event), loop).result(PATIENCE)
+        asyncio.run_coroutine_threadsafe(callback(event), loop).result(HANG_GUARD)
 
 
 def settle(page: SetupPage) -> None:
-    assert page.actions.queue.idle(PATIENCE)
+    assert page.actions.queue.idle(HANG_GUARD)
 
 
 def test_a_scene_is_saved_to_its_file_whatever_the_scene_is_called(page: SetupPage) -> None:

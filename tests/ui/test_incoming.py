@@ -20,9 +20,8 @@ from burg_drake.ui.server import guarded_viser
 from burg_drake.ui.server.door import ServedPage, serve
 from burg_drake.ui.server.messages import BURST, LARGEST_MESSAGE, RATE
 from burg_drake.ui.server.uploads import ALL_UPLOADS, LARGEST_UPLOAD
+from tests.hang_guard import HANG_GUARD
 from tests.ui.page_client import CAMERA, coming_in, send, unpacked
-
-TIMEOUT = 60.0
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +66,7 @@ def closed(client: ClientConnection) -> tuple[int, str]:
     """Code and reason by which the door closes the connection."""
     with pytest.raises(ConnectionClosed) as caught:
         while True:
-            client.recv(timeout=TIMEOUT)
+            client.recv(timeout=HANG_GUARD)
     assert caught.value.rcvd is not None
     return caught.value.rcvd.code, caught.value.rcvd.reason
 
@@ -89,7 +88,7 @@ def test_a_browser_uploads_what_is_small_enough(
     page.get_by_role("button", name="Close").click()
     assert page.get_by_text("film.png").count() == 0
     page.set_input_files("input[type=file]", photo)
-    assert arrived.wait(TIMEOUT)
+    assert arrived.wait(HANG_GUARD)
     assert button.value.name == "photo.png" and button.value.content == photo.read_bytes()
     assert door.server.gui._current_file_upload_states == {}
 
@@ -140,7 +139,7 @@ def test_who_goes_away_leaves_nothing_behind(door: ServedPage, button) -> None:
             announce(client, button, transfer_uuid=key, size_bytes=LARGEST_UPLOAD, part_count=64)
             part(client, button, bytes(1000), transfer_uuid=key)
             wait_for(client, key)
-    end = time.monotonic() + TIMEOUT
+    end = time.monotonic() + HANG_GUARD
     while door.server.gui._current_file_upload_states:  # the server hears of it in a moment
         assert time.monotonic() < end
         time.sleep(0.01)
@@ -158,7 +157,7 @@ def told(caplog: pytest.LogCaptureFixture) -> list[str]:
 def wait_for(client: ClientConnection, key: str) -> None:
     """Waits until viser has taken a part of this file."""
     taken = msgspec.msgpack.encode("transfer_uuid") + msgspec.msgpack.encode(key)
-    while taken not in unpacked(client.recv(timeout=TIMEOUT)):
+    while taken not in unpacked(client.recv(timeout=HANG_GUARD)):
         pass
 
 
@@ -171,7 +170,7 @@ def test_new_pages_hear_of_no_old_uploads(
     with coming_in(door) as other:
         replay = b""
         while b"ReplayDoneMessage" not in replay:
-            replay += unpacked(other.recv(timeout=TIMEOUT))
+            replay += unpacked(other.recv(timeout=HANG_GUARD))
         assert b"Load a photo" in replay and b"FileTransferPartAck" not in replay
 
 
@@ -229,7 +228,7 @@ def test_errors_of_a_page_are_told(
         raise ZeroDivisionError("of the page")
 
     send(client, "GuiUpdateMessage", uuid=slider._impl.uuid, updates={"value": 0.25})
-    end = time.monotonic() + TIMEOUT
+    end = time.monotonic() + HANG_GUARD
     while not told(caplog):
         assert time.monotonic() < end
         time.sleep(0.01)

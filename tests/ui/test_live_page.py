@@ -23,7 +23,8 @@ from burg_drake.cameras.placement.document import (
 from burg_drake.core.documents.schema import Pose
 from burg_drake.scene.document.scene import load_scene
 from tests.apps.ar_views import photo
-from tests.cameras.live_views import CAMERA, TIMEOUT, Pictures
+from tests.cameras.live_views import CAMERA, Pictures
+from tests.hang_guard import HANG_GUARD
 
 
 @pytest.fixture
@@ -39,7 +40,7 @@ def server(tmp_path: Path) -> Iterator[ViewServer]:
 
 
 def test_a_doubtful_object_looks_doubtful(page: Page, server: ViewServer) -> None:
-    assert server.live.next_picture(0, TIMEOUT) is not None
+    assert server.live.next_picture(0, HANG_GUARD) is not None
     sure = Placement(
         object="mug",
         status="measured",

@@ -23,7 +23,8 @@ from burg_drake.ui.setup_page import SetupPage
 from burg_drake.ui.view.board import sheet_picture
 from burg_drake.ui.view.object_pictures import ObjectPictures
 from burg_drake.ui.widgets.status_colors import STATUS_STYLES
-from tests.ui.page_client import PATIENCE, PageClient, until
+from tests.hang_guard import HANG_GUARD, until
+from tests.ui.page_client import PageClient
 
 FILL, BOARD, DISPLAY, GRASPS = "Random configuration", "Board", "Display", "Grasps"
 REACH, BACKDROP = "Reach", "Real board"
@@ -49,7 +50,7 @@ def page(opened: tuple[SetupPage, ServedPage]) -> SetupPage:
     page, _ = opened
     page.actions.session.new("household", discard=True)
     page.actions.session.restrict_movement(True)
-    assert page.actions.queue.idle(PATIENCE)
+    assert page.actions.queue.idle(HANG_GUARD)
     return page
 
 
@@ -116,9 +117,9 @@ def test_the_board_has_the_size_that_was_chosen(
     assert saved() == (0.594, 0.42)
     client.give(BOARD, "Lies", "upright")
     until(lambda: session.view.document.board.size == (0.42, 0.594), "A2 upright")
-    assert page.actions.queue.idle(PATIENCE)
+    assert page.actions.queue.idle(HANG_GUARD)
     busy = threading.Event()  # what is chosen meanwhile waits, and is not lost
-    page.actions.submit(lambda: busy.wait(PATIENCE))
+    page.actions.submit(lambda: busy.wait(HANG_GUARD))
     page.actions.submit(page._refresh, wait_for_typing=True)
     client.give(BOARD, "Lies", "across")
     until(lambda: page._board_panel._orientation.value == "across", "the choice has arrived")

@@ -21,6 +21,7 @@ from burg_drake.ui.view.outlines import footprint
 from burg_drake.ui.widgets.scene_files import scene_names
 from burg_drake.ui.widgets.shortcuts import SHORTCUTS, overlay_text
 from burg_drake.ui.widgets.texts import all_of, notice, table
+from tests.hang_guard import HANG_GUARD
 
 
 def test_a_footprint_is_the_outline_with_a_rounded_margin() -> None:
@@ -60,7 +61,7 @@ def test_a_live_picture_is_the_board_rectified_until_there_is_no_more(tmp_path: 
     cv2.imwrite(str(tmp_path / "photo.png"), photo)
     found: list[BoardPicture | str] = []
     live = LivePicture(str(tmp_path / "photo.png"), board, found.append)
-    live.wait(60.0)
+    live.wait(HANG_GUARD)
     live.close()
     assert len(found) == 1 and isinstance(found[0], BoardPicture), found
     assert found[0].error < 1e-3 and len(found[0].ids) == len(board.layout.ids)

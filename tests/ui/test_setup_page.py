@@ -20,7 +20,7 @@ from burg_drake.station.document.station_document import load_station
 from burg_drake.ui.pointing.pointer import PageCamera
 from burg_drake.ui.server.door import ServedPage, serve
 from burg_drake.ui.setup_page import SetupPage
-from tests.ui.page_client import until
+from tests.hang_guard import until
 
 ONE_TRY = 0.7
 

@@ -45,8 +45,8 @@ def require_sampled(arguments: argparse.Namespace) -> None:
     Raises:
         InvalidInputError: names the option.
     """
-    for name in ("blind", "approach_angle"):
-        if getattr(arguments, name) and arguments.grasps is not None:
+    for name in ("blind", "approach_angle", "until_balanced"):
+        if getattr(arguments, name, None) and arguments.grasps is not None:
             raise InvalidInputError(
                 f"--{name.replace('_', '-')} is for sampled grasps; leave out either it or --grasps"
             )

@@ -59,6 +59,7 @@ def add_to(verbs: Any) -> None:
         "burg-drake evaluate tabletop_six --grasps-per-object 100 -o runs/first",
         "burg-drake evaluate my_scene.yaml --station my_station.yaml --table parquet -o runs/mine",
         "burg-drake evaluate tabletop_six --only mug --only bowl -n 500 -o runs/two",
+        "burg-drake evaluate tabletop_six --until-balanced 10 -o runs/lab",
         "burg-drake evaluate my_scene.yaml --grasps my_grasps.npz --mode hand",
         "burg-drake evaluate tabletop_six --grasps-per-object 20 --mode arm -o runs/arm",
         "burg-drake evaluate my_scene.yaml --station panda_shelf --least-lift-mm 20",
@@ -96,6 +97,11 @@ def _add_options(parser: Parser) -> None:
     which = parser.add_mutually_exclusive_group()
     add_sampling(parser, DEFAULT_GRASPS, which)
     add_given(parser, which)
+    add_options(
+        parser,
+        EvaluationSettings,
+        *("until_balanced", "balanced_among", "max_grasps_per_object"),
+    )
     add_options(parser, EvaluationSettings, "engine")
     add_rejudge_contested(parser)
     who = parser.add_mutually_exclusive_group()

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import sys
+from typing import TYPE_CHECKING
 
 from burg_drake.apps.options import Parser
 from burg_drake.core import quoted
+
+if TYPE_CHECKING:
+    from burg_drake.experiment.trials import TrialBook
 
 
 def add_sheet(parser: Parser) -> None:
@@ -38,6 +43,14 @@ def add_show_simulated(parser: Parser, more: str = "") -> None:
         action="store_true",
         help=f"show the simulated outcomes{more}; hidden by default, so that operators are blind",
     )
+
+
+def print_damage(book: TrialBook) -> bool:
+    """Says on standard error which lines of the journal cannot be read; whether there are any."""
+    damage = book.damage()
+    if damage:
+        print(f"burg-drake: {damage}", file=sys.stderr)
+    return bool(damage)
 
 
 def _moved(text: str) -> tuple[str, str]:

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from burg_drake.apps.options import add_verb, positive_int
-from burg_drake.apps.trials.arguments import add_sheet
+from burg_drake.apps.trials.arguments import add_sheet, print_damage
 
 
 def add_to(group: Any) -> None:
@@ -39,7 +39,7 @@ def add_to(group: Any) -> None:
 
 
 def run_restore(arguments: argparse.Namespace) -> int:
-    """Restores, and says what."""
+    """Restores, and says what; 1 if the journal is damaged."""
     from burg_drake.experiment.trials import TrialBook
 
     book = TrialBook(arguments.trials)
@@ -52,4 +52,4 @@ def run_restore(arguments: argparse.Namespace) -> int:
         print(f"trial {trial.number}: {what}, {outcome}")
     if not done:
         print("nothing to restore")
-    return 0
+    return 1 if print_damage(book) else 0

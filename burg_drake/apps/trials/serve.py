@@ -19,7 +19,12 @@ from burg_drake.apps.options import (
     print_scale,
 )
 from burg_drake.apps.terminal import terminated_as_interrupted, wait_for_interrupt
-from burg_drake.apps.trials.arguments import add_moved, add_sheet, add_show_simulated
+from burg_drake.apps.trials.arguments import (
+    add_moved,
+    add_sheet,
+    add_show_simulated,
+    print_damage,
+)
 
 if TYPE_CHECKING:
     from burg_drake.experiment.pages import LabBook, LabCamera
@@ -68,6 +73,7 @@ def run_serve(arguments: argparse.Namespace) -> int:
 
     runs = TriedRuns(arguments.trials, dict(arguments.moved))
     lab = LabBook(runs, show_simulated=arguments.show_simulated)
+    print_damage(lab.book)
     with terminated_as_interrupted(), contextlib.ExitStack() as closing:
         camera = _camera(arguments, lab) if arguments.camera else None
         if camera is not None:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import add_verb
-from burg_drake.apps.trials.arguments import add_sheet, add_show_simulated
+from burg_drake.apps.trials.arguments import add_sheet, add_show_simulated, print_damage
 
 if TYPE_CHECKING:
     from burg_drake.experiment.trials import MissingValues, RealTrial, TrialSheet
@@ -25,7 +25,8 @@ def add_to(group: Any) -> None:
         "burg-drake trials show trials.yaml --all",
         "",
         "Exit code 1 if the file lacks entries that its journal has, as after an editor has",
-        "written it from an old buffer; `trials restore` enters them again.",
+        "written it from an old buffer; `trials restore` enters them again. Also 1 if lines of the",
+        "journal cannot be read.",
     )
     add_sheet(parser)
     parser.add_argument("--all", action="store_true", help="print a line for each trial as well")
@@ -33,7 +34,7 @@ def add_to(group: Any) -> None:
 
 
 def run_show(arguments: argparse.Namespace) -> int:
-    """Prints; 1 if entries are missing."""
+    """Prints; 1 if entries are missing, or the journal is damaged."""
     from burg_drake.experiment.trials import TrialBook
 
     book = TrialBook(arguments.trials)
@@ -50,7 +51,8 @@ def run_show(arguments: argparse.Namespace) -> int:
         print(f"next is {sheet.next.number}: {sheet.next.grasp}")
     lacking = book.missing_values()
     _print_lacking(arguments.trials, lacking)
-    return 1 if any(found.values for found in lacking) else 0
+    damage = print_damage(book)
+    return 1 if damage or any(found.values for found in lacking) else 0
 
 
 def _print_progress(sheet: TrialSheet, simulated: bool) -> None:

@@ -6,11 +6,16 @@ this machine as their host (which stops DNS rebinding), and what acts must come 
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import io
+import ipaddress
 import json
 import socket
 import sys
 import threading
+import time
+from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import partial
 from http import HTTPStatus
@@ -32,7 +37,12 @@ from burg_drake.core import (
 PORTS = 50
 """How many ports are tried if none is given."""
 IDLE = 30.0
-"""A connection without requests is closed after this [s]."""
+"""A connection that was admitted is closed after this without a request [s]; a client that does not
+take an answer, too."""
+REQUEST_TIMEOUT = 10.0
+"""Time for a whole request, head and body, and for the first one to begin [s]."""
+BROWSER_CONNECTIONS = 6
+"""That a browser opens to one server at most."""
 MOST_REFUSALS = 8
 """Connections beyond those that are told so at a time; more are closed without a word."""
 REFUSED_WITHIN = 2.0
@@ -45,11 +55,16 @@ Handler = Callable[[Any], None]
 class PageServer(ThreadingHTTPServer):
     """Serves a page until it is closed.
 
+    A connection is admitted with its first request that is not refused. Where there are too many
+    connections, those that are not admitted yet make room, so that they lock nobody out.
+
     Args:
         handler: answers requests.
         host: address to listen on.
         port: to listen on; the first free one from `first_port` on if None, any if 0.
-        connections: that are served at a time; the next ones are told so, with status 503.
+        connections: that are served at a time, half as many for one address of another machine
+            (but what a browser needs); where all are admitted the next ones are told so, with
+            status 503.
 
     Attributes:
         first_port: the first port that is tried.
@@ -63,6 +78,7 @@ class PageServer(ThreadingHTTPServer):
 
     daemon_threads = True
     allow_reuse_address = sys.platform != "win32"
+    request_queue_size = 64
     first_port: int
     title = "page"
     poll = 0.5
@@ -77,7 +93,9 @@ class PageServer(ThreadingHTTPServer):
     ) -> None:
         self.host, self.connections = host, connections
         self._lock = threading.Lock()
-        self._served: set[socket.socket] = set()
+        self._served: dict[socket.socket, str] = {}  # with their addresses, in order
+        self._admitted: set[socket.socket] = set()
+        self._ending: set[socket.socket] = set()
         self._refused: set[socket.socket] = set()
         if ":" in host:
             self.address_family = socket.AF_INET6
@@ -117,26 +135,105 @@ class PageServer(ThreadingHTTPServer):
         """Whether a connection is one too many, and is to be told so."""
         return connection in self._refused
 
+    def admit(self, connection: socket.socket) -> None:
+        """Notes that a connection has asked for something that it may have."""
+        with self._lock:
+            if connection in self._served:
+                self._admitted.add(connection)
+
+    def is_admitted(self, connection: socket.socket) -> bool:
+        """Whether it has."""
+        return connection in self._admitted
+
     def process_request(self, request: Any, client_address: Any) -> None:
         """Answers a connection in a thread of its own, as long as there are not too many."""
+        address = _address(str(client_address[0]))
         with self._lock:
-            served = len(self._served) < self.connections
-            if not served and len(self._refused) >= MOST_REFUSALS:
-                self.shutdown_request(request)
+            if self._make_room(address):
+                self._served[request] = address
+            elif len(self._refused) + len(self._ending) < MOST_REFUSALS:
+                self._refused.add(request)
+            else:
+                super().shutdown_request(request)
                 return
-            (self._served if served else self._refused).add(request)
         super().process_request(request, client_address)
 
     def shutdown_request(self, request: Any) -> None:
         """Closes a connection, which makes room for the next one."""
-        self._served.discard(request)
-        self._refused.discard(request)
+        with self._lock:
+            self._served.pop(request, None)
+            for some in (self._admitted, self._ending, self._refused):
+                some.discard(request)
         super().shutdown_request(request)
+
+    def _make_room(self, address: str) -> bool:
+        """Whether one more connection from an address can be served, after another one has been
+        closed that is not admitted, if there are too many."""
+        own = [c for c, of in self._served.items() if of == address]
+        share = max(BROWSER_CONNECTIONS, self.connections // 2)
+        most = self.connections if address == LOOPBACK else share
+        if len(own) < most and len(self._served) < self.connections:
+            return True
+        among = own if len(own) >= most else list(self._served)
+        waiting = [c for c in among if c not in self._admitted]
+        if not waiting or len(self._ending) >= MOST_REFUSALS:
+            return False
+        counts = Counter(self._served[c] for c in waiting)
+        oldest = max(waiting, key=lambda c: counts[self._served[c]])  # of those alike the first
+        del self._served[oldest]
+        self._ending.add(oldest)
+        with contextlib.suppress(OSError):
+            oldest.shutdown(socket.SHUT_RDWR)  # its thread ends with it
+        return True
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """A browser that goes away in the middle of an answer is no error."""
         if not isinstance(sys.exception(), (ConnectionError, TimeoutError)):
             super().handle_error(request, client_address)
+
+
+LOOPBACK = "this machine"
+
+
+def _address(host: str) -> str:
+    """What connections are counted by: an address, of IPv6 the network that one site has."""
+    ip = ipaddress.ip_address(host.partition("%")[0])
+    mapped = getattr(ip, "ipv4_mapped", None) or ip
+    if mapped.is_loopback:
+        return LOOPBACK
+    return str(mapped) if mapped.version == 4 else ip.exploded[:19]
+
+
+class _TimedStream(io.RawIOBase):
+    """What a connection sends, until a deadline."""
+
+    def __init__(self, connection: socket.socket, seconds: float) -> None:
+        self._connection = connection
+        self.expect_within(seconds)
+
+    def expect_within(self, seconds: float) -> None:
+        """Puts the deadline so many seconds from now."""
+        self._deadline = time.monotonic() + seconds
+
+    def readable(self) -> bool:
+        """Nothing else."""
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        """Reads what there is.
+
+        Raises:
+            TimeoutError: the deadline has passed.
+        """
+        left = self._deadline - time.monotonic()
+        if left <= 0.0:
+            raise TimeoutError("the request takes too long")
+        before = self._connection.gettimeout()
+        self._connection.settimeout(left)
+        try:
+            return self._connection.recv_into(buffer)
+        finally:
+            self._connection.settimeout(before)
 
 
 class PageHandler(BaseHTTPRequestHandler):
@@ -161,10 +258,28 @@ class PageHandler(BaseHTTPRequestHandler):
     new_cookie = ""
 
     def setup(self) -> None:
-        """Waits less long for the request of a connection that is refused."""
+        """Bounds the time that requests take, and not only that between two bytes."""
         super().setup()
-        if self.server.refuses(self.connection):
-            self.connection.settimeout(REFUSED_WITHIN)
+        self._stream = _TimedStream(self.connection, self._request_timeout)
+        self.rfile.close()
+        self.rfile = self._received = io.BufferedReader(self._stream)
+
+    def handle_one_request(self) -> None:
+        """Waits for a request, and answers it."""
+        if self.server.is_admitted(self.connection):
+            self._stream.expect_within(IDLE)
+            try:
+                self._received.peek(1)
+            except TimeoutError:
+                self.close_connection = True
+                return
+        self._stream.expect_within(self._request_timeout)
+        super().handle_one_request()
+
+    @property
+    def _request_timeout(self) -> float:
+        """Time for a request [s]."""
+        return REFUSED_WITHIN if self.server.refuses(self.connection) else REQUEST_TIMEOUT
 
     def admitted(self) -> tuple[str, dict[str, str]]:
         """Path and query of a request.
@@ -201,6 +316,7 @@ class PageHandler(BaseHTTPRequestHandler):
                     f" {self.server.title} serves at a time; close it in another browser, or allow"
                     " more when it is started",
                 )
+            self.server.admit(self.connection)
             found = self.find(routes, path)
             found(json_body(self.headers, self.rfile) if self.command == "POST" else query)
         except RequestError as error:

@@ -13,9 +13,11 @@ from .reader import Reader as Reader
 from .schema import (
     Pose as Pose,
     dump_document as dump_document,
+    empty_document as empty_document,
     load_document as load_document,
     parse_document as parse_document,
     plain_data as plain_data,
+    read_document as read_document,
     save_document as save_document,
 )
 from .vectors import Vector3 as Vector3

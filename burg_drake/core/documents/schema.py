@@ -105,7 +105,16 @@ def load_document(path: str | Path, schema: type[T]) -> T:
 
 def parse_document(text: str, schema: type[T], name: str) -> T:
     """As `load_document`, from text; `name` stands for the file in messages."""
-    node = parse_nodes(text, name, f"the document is empty; expected keys {_keys(schema)}")
+    return read_document(parse_nodes(text, name, empty_document(schema)), schema, name)
+
+
+def empty_document(schema: type) -> str:
+    """What to say of a text without content."""
+    return f"the document is empty; expected keys {_keys(schema)}"
+
+
+def read_document(node: yaml.Node, schema: type[T], name: str) -> T:
+    """As `parse_document`, from the root node of the text."""
     reader = Reader(name)
     if isinstance(node, yaml.MappingNode):
         reader.check_version(node, schema)

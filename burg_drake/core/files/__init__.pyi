@@ -2,6 +2,7 @@ from .atomic import (
     UNFINISHED as UNFINISHED,
     atomic_write as atomic_write,
     atomic_write_all as atomic_write_all,
+    keep_mode as keep_mode,
     open_regular as open_regular,
     remove_unfinished as remove_unfinished,
     require_writable as require_writable,
@@ -29,6 +30,7 @@ from .hdf5 import (
 from .lock import (
     FolderLock as FolderLock,
     try_lock as try_lock,
+    without_locks as without_locks,
 )
 from .numpy_file import (
     NpzFile as NpzFile,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import re
@@ -42,6 +43,8 @@ def _open_at_once(path: str, flags: int) -> int:
 def atomic_write(path: str | Path, content: str | bytes) -> None:
     """Writes `content` beside `path` and renames it into place; parent folders are made.
 
+    A file that is replaced keeps its permissions, and a link to it stays one.
+
     Args:
         path: file to write or replace.
         content: text (stored as UTF-8) or bytes.
@@ -53,7 +56,8 @@ def atomic_write(path: str | Path, content: str | bytes) -> None:
 
 
 def atomic_write_all(contents: Mapping[Path, str | bytes]) -> None:
-    """Writes several files, and renames them into place only when all of them are on the disk.
+    """Writes several files, and renames them into place only when all of them are on the disk; see
+    `atomic_write`.
 
     Args:
         contents: text (stored as UTF-8) or bytes by file.
@@ -67,10 +71,12 @@ def atomic_write_all(contents: Mapping[Path, str | bytes]) -> None:
     try:
         for path, content in contents.items():
             _require_regular_file(path)
-            path.parent.mkdir(parents=True, exist_ok=True)
-            temporary = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
+            target = Path(os.path.realpath(path))
+            target.parent.mkdir(parents=True, exist_ok=True)
+            temporary = target.with_name(f".{target.name}.{secrets.token_hex(8)}")
             with temporary.open("xb") as stream:  # with the permissions that the umask leaves
-                written[path] = temporary
+                written[target] = temporary
+                keep_mode(target, stream.fileno())
                 stream.write(content.encode() if isinstance(content, str) else content)
                 stream.flush()
                 os.fsync(stream.fileno())
@@ -83,6 +89,12 @@ def atomic_write_all(contents: Mapping[Path, str | bytes]) -> None:
     finally:
         for temporary in written.values():
             temporary.unlink(missing_ok=True)
+
+
+def keep_mode(path: Path, file: int) -> None:
+    """Gives an open file the permissions of the one that it is to replace, if there is one."""
+    with contextlib.suppress(FileNotFoundError):
+        os.fchmod(file, stat.S_IMODE(path.stat().st_mode))
 
 
 def remove_unfinished(folder: Path) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import fcntl
 import os
-from contextlib import suppress
 from pathlib import Path
 
 from burg_drake.core.errors import InvalidInputError
@@ -32,23 +31,40 @@ def try_lock(file: int, *, shared: bool = False) -> bool:
     return True
 
 
+def without_locks(path: Path, error: OSError) -> InvalidInputError:
+    """The error about a file or folder on a file system that has no locks.
+
+    Args:
+        path: the file or folder.
+        error: of `try_lock`.
+    """
+    return InvalidInputError(
+        f"{path} is on a file system without locks ({error.strerror}), where two programs could"
+        " write at once and lose data; use a place on another one"
+    )
+
+
 class FolderLock:
     """A folder that one process at a time writes, locked itself: no file is left in it."""
 
     def __init__(self, folder: Path) -> None:
-        """Locks a folder that is there; a file system without locks counts as one that others have.
+        """Locks a folder that is there.
 
         Raises:
-            InvalidInputError: another process is writing it, or it cannot be opened.
+            InvalidInputError: another process is writing it, it cannot be opened, or its file
+                system has no locks.
         """
         try:
             file = os.open(folder, os.O_RDONLY)
         except OSError as error:
             raise InvalidInputError(f"cannot open {folder}: {error.strerror}") from error
-        with suppress(OSError):
+        try:
             if try_lock(file):
                 self._file: int | None = file
                 return
+        except OSError as error:
+            os.close(file)
+            raise without_locks(folder, error).about("folder") from error
         os.close(file)
         raise InvalidInputError(
             f"{folder} is being written by another process; wait for it, or choose another folder"

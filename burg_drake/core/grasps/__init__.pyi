@@ -23,7 +23,9 @@ from .mode import (
     Mode as Mode,
 )
 from .outcome import (
+    STAGES_AMONG as STAGES_AMONG,
     UNTRIED as UNTRIED,
+    Among as Among,
     Outcome as Outcome,
     RealOutcome as RealOutcome,
     Stage as Stage,

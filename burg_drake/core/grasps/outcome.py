@@ -6,6 +6,7 @@ Results files store their values: add new ones, rename none.
 from __future__ import annotations
 
 from enum import StrEnum
+from typing import Literal
 
 
 class Stage(StrEnum):
@@ -15,6 +16,18 @@ class Stage(StrEnum):
     REACHABLE = "reachable"
     PLANNED = "planned"
     EXECUTED = "executed"
+
+
+Among = Literal["all", "clear", "reachable", "executed"]
+"""Which judged grasps count, by how far they came: all, those at which the hand is clear, those of
+them that the arm can be at, or those that were tried in simulation."""
+STAGES_AMONG: dict[Among, tuple[Stage, ...]] = {
+    "all": tuple(Stage),
+    "clear": (Stage.REACHABLE, Stage.PLANNED, Stage.EXECUTED),
+    "reachable": (Stage.PLANNED, Stage.EXECUTED),
+    "executed": (Stage.EXECUTED,),
+}
+"""Stages that have decided about these grasps."""
 
 
 class Outcome(StrEnum):

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from burg_drake.core import DocumentError, InvalidInputError, shown
-from burg_drake.core.files import open_regular
+from burg_drake.core.files import keep_mode, open_regular
 from burg_drake.dataset.samples.record import SampleRecord
 from burg_drake.dataset.samples.sample import Sample
 from burg_drake.dataset.samples.sample_files import (
@@ -232,6 +232,7 @@ def _renamed_when_whole(path: Path) -> Iterator[BinaryIO]:
             path.parent.mkdir(parents=True, exist_ok=True)
             stream = beside.open("xb")
         try:
+            keep_mode(path, stream.fileno())
             yield stream
             with _reporting(path):
                 stream.flush()

@@ -2,7 +2,9 @@ from .candidates import (
     INSTANCE as INSTANCE,
     Candidate as Candidate,
     Candidates as Candidates,
+    distinct as distinct,
     given_candidates as given_candidates,
+    join_candidates as join_candidates,
     require_instances as require_instances,
 )
 from .instance_names import (

@@ -144,6 +144,7 @@ def require_instances(scene: Scene, names: Iterable[str], path: str = "") -> Non
 
 
 def join_candidates(by_instance: dict[str, GraspSet]) -> Candidates:
+    """Candidates from grasps by the name of their instance; provenances are kept by instance."""
     if not by_instance:
         return Candidates(GraspSet.create(np.empty((0, 4, 4)), object=""), np.empty(0, dtype=str))
     names = [name for name, grasps in by_instance.items() for _ in range(len(grasps))]
@@ -155,5 +156,6 @@ def join_candidates(by_instance: dict[str, GraspSet]) -> Candidates:
 
 
 def distinct(grasps: GraspSet) -> GraspSet:
+    """The first one of equal grasps, in the order that there is."""
     _, first = np.unique(grasps.id, return_index=True)
     return grasps.select(np.sort(first))

@@ -27,6 +27,7 @@ from burg_drake.evaluation.candidates.candidates import Candidates, distinct, jo
 from burg_drake.evaluation.candidates.instance_names import chosen_instances
 from burg_drake.evaluation.candidates.sampling_settings import (
     DEFAULT_APPROACH_ANGLE_DEG,
+    SLIPPERY_FRICTION_FACTOR,
     SamplingSettings,
 )
 from burg_drake.grasping.sampling import ApproachCone
@@ -206,17 +207,19 @@ class ObjectSampler:
             pad=self._pad,
             diverse=settings.diverse,
         )
-        return distinct(
-            sample_antipodal(
-                self.surface(object),
-                self._n,
-                rng_from("antipodal", self._seed, self._library.entry(object).build),
-                antipodal,
-                weights=settings.weights.get(object),
-                accept=accept,
-                object=object,
-            )
+        grasps = sample_antipodal(
+            self.surface(object),
+            self._n,
+            rng_from("antipodal", self._seed, self._library.entry(object).build),
+            antipodal,
+            weights=settings.weights.get(object),
+            accept=accept,
+            object=object,
         )
+        if settings.slippery:  # scores are shares of the sampler's friction: of the object's, then
+            score = 1.0 - SLIPPERY_FRICTION_FACTOR * (1.0 - grasps.score)
+            grasps = dataclasses.replace(grasps, score=score).select(score < 0.0)
+        return distinct(grasps)
 
     def clear(
         self,
@@ -245,7 +248,8 @@ class ObjectSampler:
 
     def _friction(self, object: str) -> float:
         given = self._settings.friction
-        return self._library.entry(object).friction if given is None else given
+        friction = self._library.entry(object).friction if given is None else given
+        return friction * (SLIPPERY_FRICTION_FACTOR if self._settings.slippery else 1.0)
 
 
 def _check_count(n: int) -> None:

@@ -8,29 +8,37 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from burg_drake.core import InvalidInputError
-from burg_drake.core.files import try_lock
+from burg_drake.core.files import try_lock, without_locks
 
 TRIES = 5
 PAUSE = 0.02
 """Between two tries [s]: who looks whether a folder is being written holds it for a moment."""
 
 
-def lock(file: int) -> bool:
-    """Locks an open file; whether that went well."""
-    for k in range(TRIES):
-        with suppress(OSError):
+def lock(file: int, path: Path) -> None:
+    """Locks an open file, whose path is for messages; closes it if that fails.
+
+    Raises:
+        InvalidInputError: another process has it, or its file system has no locks.
+    """
+    try:
+        for k in range(TRIES):
             if try_lock(file):
-                return True
-        time.sleep(PAUSE if k + 1 < TRIES else 0.0)
-    return False
+                return
+            time.sleep(PAUSE if k + 1 < TRIES else 0.0)
+    except OSError as error:
+        os.close(file)
+        raise without_locks(path.parent, error) from error
+    os.close(file)
+    raise being_written(path.parent)
 
 
 def is_locked(path: Path) -> bool:
-    """Whether a process holds the lock of a file."""
+    """Whether a process holds the lock of a file; none does where the file system has no locks."""
     try:
         file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     except OSError:
@@ -38,7 +46,7 @@ def is_locked(path: Path) -> bool:
     try:
         return not try_lock(file, shared=True)
     except OSError:
-        return True
+        return False
     finally:
         os.close(file)
 
@@ -48,7 +56,8 @@ def unchanged(path: Path, *, make: bool = False) -> Iterator[None]:
     """Keeps others from writing the folder that a file stands for; they may read it.
 
     Args:
-        path: the file. Where there is none nothing is locked.
+        path: the file. Where there is none nothing is locked; nor on a file system without locks,
+            where nothing writes.
         make: make it if need be and possible.
 
     Raises:
@@ -63,7 +72,7 @@ def unchanged(path: Path, *, make: bool = False) -> Iterator[None]:
         try:
             shared = try_lock(file, shared=True)
         except OSError:
-            shared = False
+            shared = True
         if not shared:
             raise being_written(path.parent)
         yield
@@ -92,15 +101,14 @@ class Lock:
         """Makes the file if need be, and locks it.
 
         Raises:
-            InvalidInputError: it cannot be written, or another process has it.
+            InvalidInputError: it cannot be written, another process has it, or its file system has
+                no locks.
         """
         try:
             self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
         except OSError as error:
             raise InvalidInputError(f"cannot write {path}: {error.strerror}") from error
-        if not lock(self._file):
-            os.close(self._file)
-            raise being_written(path.parent)
+        lock(self._file, path)
 
     def __enter__(self) -> Lock:
         return self

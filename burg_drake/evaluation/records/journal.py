@@ -18,7 +18,7 @@ from burg_drake.core import InvalidInputError
 from burg_drake.core.documents import parse_json
 from burg_drake.core.files import open_regular
 from burg_drake.core.grasps import VERDICT_FIELDS, Verdict
-from burg_drake.evaluation.records.folder_lock import being_written, lock
+from burg_drake.evaluation.records.folder_lock import lock
 
 JOURNAL_FILE = "journal.jsonl"
 ORIGINAL = frozenset(
@@ -36,16 +36,15 @@ class Journal:
         """Opens or creates the file and cuts off a torn last line.
 
         Raises:
-            InvalidInputError: not writable, or another process is writing it.
+            InvalidInputError: not writable, another process is writing it, or its file system has
+                no locks.
         """
         self._path = path
         try:
             self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
         except OSError as error:
             raise InvalidInputError(f"cannot write {path}: {error.strerror}") from error
-        if not lock(self._file):
-            os.close(self._file)
-            raise being_written(path.parent)
+        lock(self._file, path)
         if not stat.S_ISREG(os.fstat(self._file).st_mode):
             os.close(self._file)
             raise InvalidInputError(f"cannot write {path}: it is not a file; choose another folder")

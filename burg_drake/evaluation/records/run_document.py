@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal, Protocol
 
 from burg_drake.core import InvalidInputError, content_hash
-from burg_drake.core.grasps import Mode
+from burg_drake.core.grasps import Among, Mode
 from burg_drake.core.paths import data_root
 from burg_drake.evaluation.records.limit_numbers import (
     APPROACH,
@@ -71,6 +71,10 @@ class Grasps:
         blind: whether they were sampled without regard to the hand, as they were in runs that do
             not say.
         only: instances that grasps were sampled on; all if empty.
+        until_balanced, balanced_among, max_per_object: as `EvaluationSettings` has them; 0 where
+            grasps were sampled once.
+        asked: with `until_balanced`, how many grasps were sampled so far for each instance of an
+            object: ordinary and slippery ones.
         count: how many there are.
         objects: how many there are by object; 0 where an object has none.
         content: hash of them all.
@@ -82,6 +86,10 @@ class Grasps:
     approach_angle_deg: float | None = None
     blind: bool = True
     only: tuple[str, ...] = ()
+    until_balanced: int = 0
+    balanced_among: Among = "executed"
+    max_per_object: int = 0
+    asked: dict[str, tuple[int, int]] = field(default_factory=dict)
     count: int
     objects: dict[str, int]
     content: str
@@ -210,7 +218,13 @@ def request_identity(document: RunRequestFields) -> dict[str, str]:
 def _sampled(grasps: Grasps) -> str:
     how = "sampled blind" if grasps.blind else "clear of the scene"
     where = f", on {', '.join(grasps.only)}" if grasps.only else ""
-    return f"{grasps.per_object} an object, {how}{where}"
+    balance = (
+        f", more until {grasps.until_balanced} of each object are lifted and as many are not, among"
+        f" {grasps.balanced_among}, {grasps.max_per_object} at most"
+        if grasps.until_balanced
+        else ""
+    )
+    return f"{grasps.per_object} an object, {how}{where}{balance}"
 
 
 def run_hash(document: RunDocument) -> str:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
-from burg_drake.core import LARGEST_SEED, InvalidInputError, setting
-from burg_drake.core.grasps import MODES
+from burg_drake.core import LARGEST_SEED, InvalidInputError, nearest, quoted, setting
+from burg_drake.core.grasps import MODES, Among
 from burg_drake.evaluation.candidates import DEFAULT_APPROACH_ANGLE_DEG
 from burg_drake.simulation.trials import DEFAULT_TRIAL
 from burg_drake.station.document import DEFAULT_ENGINE, ENGINES
@@ -31,6 +31,12 @@ class EvaluationSettings:
         grasps_per_object: antipodal grasps to sample for each free instance, unless grasps are
             given; the same ones as those of `sample_grasps` with these settings. Of an object that
             has fewer, `Summary.notes` says why.
+        until_balanced: go on sampling until so many grasps of each object are lifted, and so many
+            are not: first the grasps of a longer sampling with the same seed, then, where failures
+            are missing, slippery ones (see `SamplingSettings`). `Summary.notes` says what is still
+            missing. Of one scene only. None samples `grasps_per_object` alone.
+        balanced_among: which grasps count for that, as in `trials.SelectionSettings`.
+        max_grasps_per_object: with `until_balanced`, sample no more for each free instance.
         approach_angle_deg: largest angle between the approach of sampled grasps and straight down,
             above 0; 90 is as far as from the side, 180 from anywhere.
         blind: sample without regard to the hand; otherwise it is clear of the scene at all grasps,
@@ -64,6 +70,22 @@ class EvaluationSettings:
         " with nothing, and its pads meet the object within the friction cones",
         flags=("-n",),
         low=1,
+    )
+    until_balanced: int | None = setting(
+        None,
+        "go on sampling until each object has N grasps that are lifted and N that are not, so that"
+        " trials on the robot can be balanced; of one scene",
+        low=1,
+    )
+    balanced_among: Among = setting(
+        "executed",
+        "with {until_balanced}, count the grasps that were tried in simulation, those that the arm"
+        " can be at, those at which the hand is clear, or all, as `trials plan` chooses among them"
+        " (default: executed)",
+        choices=get_args(Among),
+    )
+    max_grasps_per_object: int = setting(
+        1000, "with {until_balanced}, sample no more than N grasps on each object", low=1
     )
     approach_angle_deg: float = setting(
         DEFAULT_APPROACH_ANGLE_DEG,
@@ -136,6 +158,8 @@ class EvaluationSettings:
             raise InvalidInputError(
                 f"grasps_per_object is {self.grasps_per_object}; give 1 or more"
             )
+        if self.until_balanced is not None:
+            self._require_balance()
         if not 0.0 < self.tilt_limit_deg <= 180.0:
             raise InvalidInputError(
                 f"tilt_limit_deg is {self.tilt_limit_deg:g}; give more than 0, and 180 for no limit"
@@ -144,3 +168,24 @@ class EvaluationSettings:
             raise InvalidInputError(
                 f"slip_limit_mm is {self.slip_limit_mm:g}; give more than 0, and inf for no limit"
             )
+
+    def _require_balance(self) -> None:
+        """Refuses what cannot be had with `until_balanced`."""
+        assert self.until_balanced is not None
+        if self.until_balanced < 1:
+            raise InvalidInputError(f"until_balanced is {self.until_balanced}; give 1 or more")
+        if self.balanced_among not in get_args(Among):
+            known = nearest(str(self.balanced_among), get_args(Among))
+            raise InvalidInputError(
+                f"there is no balanced_among {quoted(self.balanced_among)}; {known}"
+            )
+        if self.max_grasps_per_object < self.grasps_per_object:
+            raise InvalidInputError(
+                f"grasps_per_object is {self.grasps_per_object}, and max_grasps_per_object"
+                f" {self.max_grasps_per_object}; give a larger maximum"
+            ).about("max_grasps_per_object")
+        if self.shard is not None:
+            raise InvalidInputError(
+                "a shard judges some of the grasps, and whether more are needed depends on all of"
+                " them; leave out until_balanced or shard"
+            ).about("until_balanced", "shard")

@@ -1,3 +1,4 @@
+from .balance import lifted_and_failed as lifted_and_failed
 from .best_grasps import (
     RankedGrasps as RankedGrasps,
     best_of_each as best_of_each,

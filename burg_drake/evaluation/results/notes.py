@@ -12,6 +12,7 @@ from burg_drake.core import listing
 from burg_drake.core.grasps import Outcome, Stage
 from burg_drake.evaluation.candidates import SELF, TABLE, shortfall
 from burg_drake.evaluation.records import Columns, motion_in
+from burg_drake.evaluation.results.balance import unbalanced_notes
 from burg_drake.evaluation.store import Run
 from burg_drake.station.document import GraspMotion
 
@@ -34,9 +35,14 @@ NO_RETREAT = (Outcome.HAND_COLLISION_RETREAT, Outcome.RETREAT_LINE)
 
 def run_notes(run: Run) -> tuple[str, ...]:
     """A sentence for each instance with fewer grasps than asked, or for those that no grasps were
-    given for, and for each object of which nothing could be executed, once all of its grasps are
-    judged."""
-    return (*_without_grasps(run), *shortfalls(run), *_unexecuted(run))
+    given for, and, once all of its grasps are judged, for each object of which nothing could be
+    executed, or that has too few lifted or failing ones for a run that is to be balanced."""
+    return (
+        *_without_grasps(run),
+        *shortfalls(run),
+        *_unexecuted(run),
+        *unbalanced_notes(run),
+    )
 
 
 def missing_grasps_note(objects: Iterable[str], given: Iterable[str]) -> str:

@@ -1,6 +1,8 @@
+from .balancing import grow as grow
 from .completeness import require_judged as require_judged
 from .many_scenes import evaluate_scenes as evaluate_scenes
 from .preparation import (
+    extend_run as extend_run,
     finish_run as finish_run,
     open_grasps as open_grasps,
     open_run as open_run,

@@ -12,9 +12,7 @@ from burg_drake.core.grasps import Mode
 from burg_drake.evaluation.candidates import (
     Candidate,
     Candidates,
-    SamplingSettings,
     given_candidates,
-    sample_candidates,
 )
 from burg_drake.evaluation.records import (
     RunDocument,
@@ -24,9 +22,11 @@ from burg_drake.evaluation.records import (
     write_table,
 )
 from burg_drake.evaluation.report import write_report
+from burg_drake.evaluation.run.balancing import sample_asked
 from burg_drake.evaluation.run.request import ByInstance, Request
 from burg_drake.evaluation.stages import require_scene_for
 from burg_drake.evaluation.store import (
+    GRASPS_FILE,
     JOURNAL_FILE,
     RUN_FILE,
     Run,
@@ -82,19 +82,30 @@ def open_run(
         run = load_run(folder)
         require_same_run(folder, run.document, document)
         write_copies(folder, scene, request.station)
+        if document.grasps.until_balanced and run.candidates.content != run.document.grasps.content:
+            return extend_run(run, run.document, scene, request.station)  # killed between two files
         return run
     if candidates is None:
         sampling()
         start = time.process_time()
-        asked = document.grasps
-        assert asked.per_object is not None
-        settings = SamplingSettings(approach_angle_deg=asked.approach_angle_deg, blind=asked.blind)
-        candidates = sample_candidates(
-            scene, request.station, asked.per_object, document.seed, settings, asked.only or None
-        )
+        candidates = sample_asked(scene, request.station, document)
         document = _with_grasps(document, scene, candidates, time.process_time() - start)
     document = replace(document, hash=run_hash(document))
     return create_run(folder, document, scene, request.station, candidates)
+
+
+def extend_run(run: Run, document: RunDocument, scene: Scene, station: Station) -> Run:
+    """Samples the grasps that a run's new document asks for, those that it has among them.
+
+    The candidates come before run.yaml, so that a call that is killed between them is found out by
+    their hash: `open_run` then samples those of the document again.
+    """
+    start = time.process_time()
+    candidates = sample_asked(scene, station, document)
+    cpu = document.grasps.cpu + time.process_time() - start
+    document = _with_grasps(document, scene, candidates, cpu)
+    candidates.save(run.path / GRASPS_FILE)
+    return save_run(Run(run.path, replace(document, hash=run_hash(document))))
 
 
 def _with_grasps(

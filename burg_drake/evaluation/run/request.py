@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -169,6 +169,16 @@ class Request:
         chosen = chosen_instances(scene, self.only)
         return replace(requested, only=() if chosen == tuple(scene.instances) else chosen)
 
+    def _balance(self) -> dict[str, Any]:
+        """What a run that grows says of its grasps; nothing where they are sampled once."""
+        if self.settings.until_balanced is None:
+            return {}
+        return {
+            "until_balanced": self.settings.until_balanced,
+            "balanced_among": self.settings.balanced_among,
+            "max_per_object": self.settings.max_grasps_per_object,
+        }
+
     def requested_of_all(self) -> Grasps:
         """The same, whatever the scene."""
         if self.grasps is not None:
@@ -179,6 +189,7 @@ class Request:
             approach_angle_deg=float(self.settings.approach_angle_deg),
             blind=self.settings.blind,
             only=self.only,
+            **self._balance(),
             count=0,
             objects={},
             content="",

@@ -12,17 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import InvalidInputError, listing
-from burg_drake.core.grasps import MODES, Outcome, Stage
+from burg_drake.core.grasps import MODES, STAGES_AMONG, Among, Outcome
 from burg_drake.core.paths import name_from
 from burg_drake.evaluation.store import Campaign, Run, load_runs
-from burg_drake.experiment.trials import Among, grasp_content
+from burg_drake.experiment.trials import grasp_content
 
-PASSED: dict[Among, tuple[Stage, ...]] = {
-    "clear": (Stage.REACHABLE, Stage.PLANNED, Stage.EXECUTED),
-    "reachable": (Stage.PLANNED, Stage.EXECUTED),
-    "executed": (Stage.EXECUTED,),
-}
-"""Stages that decide about grasps that there are to choose from."""
 SHORTEST = 4
 """Digits of a hash in a key, at least."""
 
@@ -137,12 +131,12 @@ def _runs(one: Run | Campaign | str | Path) -> Sequence[Run]:
 def _pool(key: str, run: Run, among: Among, notes: list[str]) -> EligibleGrasps:
     if among == "reachable" and run.document.mode == "hand":
         raise InvalidInputError(
-            f"{run.path} is of mode hand, which asks no arm what it can reach; choose among clear"
-            " or executed grasps"
+            f"{run.path} is of mode hand, which asks no arm what it can reach; choose among"
+            " all, clear or executed grasps"
         )
     results = run.results
     failed = results["outcome"] == Outcome.SIMULATION_FAILED.value
-    passed = np.isin(results["stage"], [stage.value for stage in PASSED[among]])
+    passed = np.isin(results["stage"], [stage.value for stage in STAGES_AMONG[among]])
     if failed.any():
         notes.append(f"{failed.sum()} grasps of run {key} could not be simulated; left out")
     count, judged = run.document.grasps.count, len(results["id"])

@@ -6,6 +6,7 @@ Chance comes from hashes of the seed and of the grasp, never from a position; se
 
 from __future__ import annotations
 
+import os
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
@@ -78,7 +79,7 @@ def plan_trials(
             f"{', '.join(str(run.path) for run in gathered.values())}: there is no grasp to choose"
             f" among those that are {selection.among}"
         )
-    folder = None if out is None else Path(out).absolute().parent
+    folder = None if out is None else Path(os.path.realpath(out)).parent
     used = {pool.key: pool.run for pool, _, _ in chosen}
     sheet = TrialSheet(
         created=datetime.now().astimezone().isoformat(timespec="seconds"),

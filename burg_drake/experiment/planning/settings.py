@@ -6,7 +6,8 @@ from dataclasses import asdict, dataclass
 from typing import get_args
 
 from burg_drake.core import LARGEST_SEED, InvalidInputError, nearest, quoted, setting
-from burg_drake.experiment.trials import Among, Balance, Selection, Success
+from burg_drake.core.grasps import Among
+from burg_drake.experiment.trials import Balance, Selection, Success
 
 MARGIN = "margin:"
 """Begins the name of a margin to balance by."""
@@ -25,7 +26,8 @@ class SelectionSettings:
         bins: their number.
         among: what is chosen from: `executed`, grasps that were tried in simulation, which in mode
             `hand` all are at which the hand is clear; `reachable`, those that the arm can be at;
-            `clear`, all those at which the hand is clear, though no arm may come there.
+            `clear`, all those at which the hand is clear, though no arm may come there; `all`, also
+            those at which simulation has the hand collide.
         success: what counts: `lifted`, or `held`, also where it turned in the hand or another
             object was moved.
         scenes: how many scenes to draw at random; 0 for all.
@@ -52,8 +54,9 @@ class SelectionSettings:
     )
     among: Among = setting(
         "executed",
-        "choose among grasps at which the hand is clear, that the arm can be at, or that were"
-        " tried in simulation (default: executed; without an arm that is the same as clear)",
+        "choose among all grasps, also those at which the hand collides in simulation, those at"
+        " which it is clear, those that the arm can be at, or those that were tried in simulation"
+        " (default: executed; without an arm that is the same as clear)",
         choices=get_args(Among),
     )
     success: Success = setting(

@@ -23,7 +23,6 @@ from .export import (
 )
 from .given_entry import real_outcome as real_outcome
 from .sheet import (
-    Among as Among,
     Balance as Balance,
     ObjectPlace as ObjectPlace,
     RealTrial as RealTrial,

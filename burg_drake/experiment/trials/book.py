@@ -6,6 +6,7 @@ the disk, in the file and in its journal, see `experiment.trials.entries`.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
@@ -14,15 +15,16 @@ from typing import Any, Literal
 
 from burg_drake.core import (
     InvalidInputError,
+    listing,
     quoted,
 )
-from burg_drake.core.documents import parse_document
 from burg_drake.core.files import atomic_write, read_text
 from burg_drake.experiment.trials.entries import (
     Entry,
     How,
     MissingValues,
     append_entry,
+    damaged_lines,
     entered,
     journal_path,
     missing_values,
@@ -33,7 +35,7 @@ from burg_drake.experiment.trials.entries import (
 from burg_drake.experiment.trials.file_lock import exclusive
 from burg_drake.experiment.trials.given_entry import EMPTY, checked, includes, merged
 from burg_drake.experiment.trials.sheet import RealTrial, TrialSheet
-from burg_drake.experiment.trials.sheet_text import with_trial
+from burg_drake.experiment.trials.sheet_text import SheetText
 
 
 class TrialChanged(InvalidInputError):
@@ -62,11 +64,12 @@ class TrialBook:
             DocumentError: it cannot be read, or does not fit the schema.
         """
         self.path = Path(path)
+        self._known: SheetText | None = None
         self.sheet()
 
     def sheet(self) -> TrialSheet:
         """What the file holds now; see `load_trials`."""
-        return self._read()[1]
+        return self._read().sheet
 
     def trial(self, number: int | Literal["next"]) -> RealTrial:
         """The trial of a number, or the first one without an outcome.
@@ -79,6 +82,18 @@ class TrialBook:
     def entries(self) -> list[Entry]:
         """All that was ever recorded, in order."""
         return read_entries(journal_path(self.path))
+
+    def damage(self) -> str:
+        """Which lines of the journal cannot be read, and what that means; "" if all can be."""
+        journal = journal_path(self.path)
+        lines = damaged_lines(journal)
+        if not lines:
+            return ""
+        are, they = ("line", "it has") if len(lines) == 1 else ("lines", "they have")
+        return (
+            f"{journal}: {are} {listing([str(line) for line in lines])} cannot be read, and what"
+            f" {they} cannot be restored; remove what cannot be read when the file is right"
+        )
 
     def missing_values(self) -> list[MissingValues]:
         """What the file lacks of that; see `entries.missing_values`."""
@@ -203,21 +218,21 @@ class TrialBook:
     ) -> RealTrial:
         with exclusive(self.path):
             while True:
-                text, sheet = self._read()
-                old = self._chosen(sheet, number)
+                before = self._read()
+                old = self._chosen(before.sheet, number)
                 new = change(old)
                 if new == old and how != "kept":
                     return old
-                content = with_trial(text, str(self.path), sheet, new)
-                if read_text(self.path) == text:  # no editor has written it meanwhile
+                after = before.with_trial(new)
+                if read_text(self.path) == before.text:  # no editor has written it meanwhile
                     break
             now = _now()
             names = (old.number, old.grasp, old.content, now, how)
             append_entry(journal_path(self.path), Entry(*names, entered(old), entered(new)))
             if new != old:
-                target = self.path.resolve()  # of a link
-                atomic_write(target, content.encode())
-                sync_folder(target.parent)
+                atomic_write(self.path, after.text.encode())
+                sync_folder(Path(os.path.realpath(self.path)).parent)
+                self._known = after
         return new
 
     def _chosen(self, sheet: TrialSheet, number: int | Literal["next"]) -> RealTrial:
@@ -230,9 +245,12 @@ class TrialBook:
             raise InvalidInputError(f"{self.path}: all trials have an outcome; there is no next")
         return sheet.next
 
-    def _read(self) -> tuple[str, TrialSheet]:
-        text = read_text(self.path)
-        return text, parse_document(text, TrialSheet, str(self.path))
+    def _read(self) -> SheetText:
+        """What the file holds now; read anew is only what has changed since the last look."""
+        text, known, name = read_text(self.path), self._known, str(self.path)
+        known = SheetText.read(text, name) if known is None else known.after(text)
+        self._known = known
+        return known
 
 
 def _now() -> str:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -89,26 +89,41 @@ def with_values(trial: RealTrial, values: Mapping[str, Any]) -> RealTrial:
 
 
 def journal_path(path: Path) -> Path:
-    """The journal of a trials file."""
-    return path.with_name(f"{path.stem}.entries.jsonl")
+    """The journal of a trials file: beside the file itself, also where the path is a link to it."""
+    real = Path(os.path.realpath(path))
+    return real.with_name(f"{real.stem}.entries.jsonl")
 
 
 def read_entries(path: Path) -> list[Entry]:
-    """All lines of a journal, in order, but for a torn one, that of a killed writer.
+    """All lines of a journal, in order, but for damaged ones; see `damaged_lines`.
 
     Raises:
         InvalidInputError: it cannot be read.
     """
+    return [entry for _, entry in _lines(path) if entry is not None]
+
+
+def damaged_lines(path: Path) -> list[int]:
+    """Numbers, from 1, of the lines of a journal that cannot be read: a killed writer's, whose
+    entry was never acknowledged, or those that something else has damaged.
+
+    Raises:
+        InvalidInputError: it cannot be read at all.
+    """
+    return [number for number, entry in _lines(path) if entry is None]
+
+
+def _lines(path: Path) -> Iterator[tuple[int, Entry | None]]:
+    """The lines of a journal with their numbers; None for one that cannot be read."""
     if not path.exists():
-        return []
-    entries = []
+        return
     with open_regular(path) as stream:
-        for line in iter(lambda: stream.readline(LONGEST_LINE), b""):
+        lines = iter(lambda: stream.readline(LONGEST_LINE), b"")
+        for number, line in enumerate(lines, 1):
             try:
-                entries.append(Entry(**parse_json(line.decode(), "a line")))
+                yield number, Entry(**parse_json(line.decode(), "a line"))
             except (ValueError, TypeError):
-                continue
-    return entries
+                yield number, None
 
 
 def append_entry(path: Path, entry: Entry) -> None:

@@ -9,6 +9,7 @@ Nothing is written over: what comes second is 017_2.
 from __future__ import annotations
 
 import math
+import os
 from itertools import count
 from pathlib import Path
 
@@ -115,7 +116,7 @@ def keep_evidence(
     Raises:
         InvalidInputError: the photo cannot be read, or nothing be written.
     """
-    folder = Path(sheet_path).parent
+    folder = Path(os.path.realpath(sheet_path)).parent
     content = None if photo is None else read_bytes(photo, IMAGE_SIZE)
     copy = ""
     with exclusive(Path(sheet_path)):  # no other one takes the same name

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from burg_drake.core import InvalidInputError
-from burg_drake.core.files import try_lock
+from burg_drake.core.files import try_lock, without_locks
 
 WAIT = 30.0
 """Time to wait for other writers, each of which takes some hundredths of a second [s]."""
@@ -27,7 +27,8 @@ def exclusive(sheet_path: Path) -> Iterator[None]:
     Raises:
         InvalidInputError: the lock cannot be made, or another process keeps it.
     """
-    path = sheet_path.with_name(f".{sheet_path.name}.lock")
+    real = Path(os.path.realpath(sheet_path))  # all links to a file share its lock
+    path = real.with_name(f".{real.name}.lock")
     try:
         file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
     except OSError as error:
@@ -46,10 +47,7 @@ def _wait_for(file: int, sheet_path: Path) -> None:
             if try_lock(file):
                 return
         except OSError as error:
-            raise InvalidInputError(
-                f"{sheet_path} is on a file system without locks ({error.strerror}), where two"
-                " writers could lose entries; move it to another one"
-            ) from error
+            raise without_locks(sheet_path, error) from error
         if time.monotonic() > until:
             raise InvalidInputError(
                 f"{sheet_path} has been locked by another process for {WAIT:g} s; nothing"

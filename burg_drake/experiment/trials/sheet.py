@@ -12,7 +12,7 @@ from typing import ClassVar, Literal
 
 from burg_drake.core import FieldError, InvalidInputError
 from burg_drake.core.documents import Pose, load_document, save_document
-from burg_drake.core.grasps import Mode, Outcome, RealOutcome
+from burg_drake.core.grasps import Among, Mode, Outcome, RealOutcome
 from burg_drake.core.paths import require_names
 from burg_drake.evaluation.records import Input
 from burg_drake.experiment.trials.checks import require_known, require_least, require_time
@@ -23,9 +23,6 @@ Success = Literal["lifted", "held"]
 """What counts: `lifted` alone, or also where another object was disturbed (`lifted_disturbed`)
 or the object turned in the hand (`lifted_turned`)."""
 Balance = Literal["outcome", "stage", "margin", "probability", "none"]
-Among = Literal["clear", "reachable", "executed"]
-"""What was chosen from: grasps at which the hand is clear, those of them that the arm can be at,
-or those that were tried in simulation."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,57 +1,213 @@
-"""Changes one trial in the text of a trials file, and leaves all else as people wrote it.
+"""The text of a trials file: one trial of it changes, and all else stays as people wrote it.
 
 Of the trial itself only those keys change whose value does, so that comments within it stay, too.
 """
 
 from __future__ import annotations
 
+import bisect
 import dataclasses
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import yaml
 
 from burg_drake.core import DocumentError, InvalidInputError
-from burg_drake.core.documents import dump_document, parse_document, parse_nodes, plain_data
+from burg_drake.core.documents import (
+    Reader,
+    dump_document,
+    empty_document,
+    parse_nodes,
+    plain_data,
+    read_document,
+)
 from burg_drake.experiment.trials.sheet import RealTrial, TrialSheet
 
 _BREAK = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
 """What YAML counts as the end of a line."""
 _SPACE = " \t\n\r\x85\u2028\u2029"
 """What YAML counts as space around a value: a no-break space is part of it."""
+_HYPHEN = re.compile("( *)- +")
+"""Before a trial, on the line where it begins."""
+_DIRECTIVE = re.compile("^%", re.MULTILINE)
+_ANCHOR = re.compile(r"(^|[\s\[{,:-])[&!]", re.MULTILINE)
+"""What may be an anchor or a tag, whose meaning the lines of others can change."""
 
 Edit = tuple[int, int, str]
 """Text from one offset to another, and what it becomes."""
 
 
-def with_trial(text: str, name: str, sheet: TrialSheet, new: RealTrial) -> str:
-    """The text with another trial in the place of that of the same number.
+@dataclass(frozen=True, eq=False)
+class SheetText:
+    """The text of a trials file, and what it holds.
 
-    Args:
-        text: of the trials file.
+    Where each trial has lines of its own, as in files that this project writes, one that has
+    changed is read by itself, and reading and writing it takes the same time in a file of any size.
+
+    Attributes:
         name: of the file, for messages.
+        text: of the file.
         sheet: what the text holds.
-        new: the trial as it is to be.
-
-    Raises:
-        DocumentError: the trial is written in a way that cannot be changed in its place, such as
-            by an alias.
+        starts: where the lines of each trial begin, in order, and where those of the last one end;
+            empty where trials are written in another way.
+        column: of the hyphens before trials.
     """
-    place = sheet.index(new.number)
-    old = sheet.trials[place]
-    trials = (*sheet.trials[:place], new, *sheet.trials[place + 1 :])
-    node = _trials(parse_nodes(text, name)).value[place]
+
+    name: str
+    text: str
+    sheet: TrialSheet
+    starts: tuple[int, ...] = ()
+    column: int = 0
+
+    @classmethod
+    def read(cls, text: str, name: str) -> SheetText:
+        """Reads all of a text.
+
+        Raises:
+            DocumentError: it does not fit the schema.
+        """
+        root = parse_nodes(text, name, empty_document(TrialSheet))
+        sheet = read_document(root, TrialSheet, name)
+        return cls(name, text, sheet, *_places(root, text))
+
+    def after(self, text: str) -> SheetText:
+        """Reads another text, of which this one may be an earlier state.
+
+        Raises:
+            DocumentError: it does not fit the schema.
+        """
+        if text == self.text:
+            return self
+        place = self._changed(text)
+        found = None if place is None else self._after_change_of(place, text)
+        return found or SheetText.read(text, self.name)
+
+    def with_trial(self, new: RealTrial) -> SheetText:
+        """The text with another trial in the place of that of the same number.
+
+        Raises:
+            DocumentError: the trial is written in a way that cannot be changed in its place, such
+                as by an alias.
+        """
+        place = self.sheet.index(new.number)
+        old, trials = self.sheet.trials[place], list(self.sheet.trials)
+        trials[place] = new
+        if self.starts:
+            start, end = self.starts[place : place + 2]
+            (node,) = parse_nodes(self.text[start:end], self.name).value
+            line = self.text.count("\n", 0, start) + node.start_mark.line
+        else:
+            start, end = 0, len(self.text)
+            node = _trials(parse_nodes(self.text, self.name)).value[place]
+            line = node.start_mark.line
+        own = self.text[start:end]
+        try:
+            changed = _edited(own, _edits(_Text(own), node, old, new))
+            text = self.text[:start] + changed + self.text[end:]
+            found = self._after_change_of(place, text) or SheetText.read(text, self.name)
+            if found.sheet == dataclasses.replace(self.sheet, trials=tuple(trials)):
+                return found
+        except (InvalidInputError, yaml.YAMLError):
+            pass
+        raise DocumentError(
+            f"{self.name}:{line + 1}: trial {new.number} is written in a way that a program"
+            " cannot change; write it as 'key: value' lines, without aliases"
+        )
+
+    def _after_change_of(self, place: int, text: str) -> SheetText | None:
+        """Another text that differs in the lines of one trial; None if all of it has to be read."""
+        if not self.starts:
+            return None
+        longer = len(text) - len(self.text)
+        starts = *self.starts[: place + 1], *(at + longer for at in self.starts[place + 1 :])
+        trial = _trial_in(text[starts[place] : starts[place + 1]], self.name, self.column)
+        if trial is None:
+            return None
+        trials = (*self.sheet.trials[:place], trial, *self.sheet.trials[place + 1 :])
+        try:
+            sheet = dataclasses.replace(self.sheet, trials=trials)
+        except InvalidInputError:  # such as a number that another trial has
+            return None
+        return SheetText(self.name, text, sheet, starts, self.column)
+
+    def _changed(self, text: str) -> int | None:
+        """The place of the one trial within whose lines another text differs; None if it may differ
+        elsewhere."""
+        if not self.starts:
+            return None
+        longest = min(len(text), len(self.text))
+        tail = _last_true(longest, lambda n: text[-n:] == self.text[-n:])
+        same = _last_true(longest - tail, lambda n: text[:n] == self.text[:n])
+        place = bisect.bisect_right(self.starts, same) - 1
+        if not 0 <= place < len(self.sheet.trials):
+            return None
+        last = len(self.text) - tail
+        return place if last <= self.starts[place + 1] else None
+
+
+def _last_true(most: int, holds: Callable[[int], bool]) -> int:
+    """The largest number from 0 to `most` that something holds of, if it does of all below."""
+    return bisect.bisect_left(range(1, most + 1), True, key=lambda n: not holds(n))
+
+
+def _places(root: yaml.Node, text: str) -> tuple[tuple[int, ...], int]:
+    """Where trials are whose lines can be read by themselves, see `SheetText`, and their column."""
+    nothing: tuple[tuple[int, ...], int] = ((), 0)
+    at = next((k for k, (key, _) in enumerate(root.value) if key.value == "trials"), None)
+    if _DIRECTIVE.search(text) or at is None or _has_alias(root):
+        return nothing
+    items = root.value[at][1].value
+    lines = _Text(text)
+    starts, columns = [], set()
+    for item in items:
+        start = lines.starts[item.start_mark.line]
+        hyphen = _HYPHEN.fullmatch(text, start, lines.offset(item.start_mark))
+        if hyphen is None or not isinstance(item, yaml.MappingNode) or item.flow_style:
+            return nothing
+        starts.append(start)
+        columns.add(len(hyphen[1]))
+    end = len(text)
+    if at + 1 < len(root.value):
+        after = root.value[at + 1][0].start_mark
+        end = lines.starts[after.line]
+        if text[end : lines.offset(after)].strip(_SPACE):
+            return nothing
+    return ((*starts, end), columns.pop()) if len(columns) == 1 else nothing
+
+
+def _has_alias(node: yaml.Node) -> bool:
+    """Whether a node is in a tree twice, which is what an alias makes."""
+    seen: set[int] = set()
+    left = [node]
+    while left:
+        node = left.pop()
+        if id(node) in seen:
+            return True
+        seen.add(id(node))
+        if isinstance(node, yaml.MappingNode):
+            left += [part for pair in node.value for part in pair]
+        elif isinstance(node, yaml.SequenceNode):
+            left += node.value
+    return False
+
+
+def _trial_in(lines: str, name: str, column: int) -> RealTrial | None:
+    """The trial that these lines of a file hold, if they mean by themselves what they mean there:
+    a single entry of a list with its hyphen in this column, whole lines, no anchor."""
+    if not lines.endswith("\n") or _ANCHOR.search(lines):
+        return None
     try:
-        changed = _edited(text, _edits(_Text(text), node, old, new))
-        if parse_document(changed, TrialSheet, name) == dataclasses.replace(sheet, trials=trials):
-            return changed
-    except (InvalidInputError, yaml.YAMLError):
-        pass
-    raise DocumentError(
-        f"{name}:{node.start_mark.line + 1}: trial {new.number} is written in a way that a program"
-        " cannot change; write it as 'key: value' lines, without aliases"
-    )
+        node = parse_nodes(lines, name)
+        if not isinstance(node, yaml.SequenceNode) or node.flow_style or len(node.value) != 1:
+            return None
+        if node.start_mark.column != column or node.value[0].flow_style:
+            return None
+        trial: RealTrial = Reader(name).read(node.value[0], RealTrial, "")
+    except InvalidInputError:
+        return None
+    return trial
 
 
 class _Text:

@@ -109,7 +109,8 @@ def _row_of(run: Run) -> dict[str, int]:
 
 
 def _load(key: str, source: SourceRun, path: Path, moved: Moved) -> Run:
-    folder = Path(moved[key]) if key in moved else path.parent / source.path
+    beside = Path(os.path.realpath(path)).parent
+    folder = Path(moved[key]) if key in moved else beside / source.path
     if not folder.is_dir():
         raise InvalidInputError(
             f"{path}: run {key!r} is not in {folder}; write its folder into runs.{key}.path, or"

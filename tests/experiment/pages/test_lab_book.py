@@ -32,6 +32,7 @@ from burg_drake.experiment.pages.tried_runs import TriedRuns
 from burg_drake.experiment.trials.book import TrialBook
 from burg_drake.experiment.trials.sheet import RealTrial, load_trials
 from tests.cameras.synthetic import board_image
+from tests.hang_guard import HANG_GUARD
 
 TIME = "2026-05-05T10:02:11+02:00"
 
@@ -216,7 +217,7 @@ def test_an_outcome_that_comes_while_a_check_is_at_work(
     entered, check = threading.Event(), FrameProcessor.check
 
     def slow(session: FrameProcessor, sight: LocatedFrame) -> PlacementCheck:
-        assert entered.wait(30.0)
+        assert entered.wait(HANG_GUARD)
         return check(session, sight)
 
     monkeypatch.setattr(FrameProcessor, "check", slow)

@@ -69,6 +69,12 @@ def _sampling(document: RunDocument | CampaignDocument) -> list[str]:
         approach_angle_deg=grasps.approach_angle_deg,
         blind=grasps.blind,
     )
+    if grasps.until_balanced:
+        words += _words(
+            until_balanced=grasps.until_balanced,
+            balanced_among=grasps.balanced_among,
+            max_grasps_per_object=grasps.max_per_object,
+        )
     return words + [word for name in grasps.only for word in ("--only", name)]
 
 

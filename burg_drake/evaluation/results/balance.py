@@ -1,0 +1,41 @@
+"""Lifted and failing grasps of each object, for runs that are to have enough of both."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from burg_drake.core.grasps import STAGES_AMONG, Outcome
+from burg_drake.evaluation.store import Run
+
+
+def lifted_and_failed(run: Run) -> dict[str, tuple[int, int]]:
+    """Numbers of judged grasps that are lifted, and that are not, by object; of those that the run
+    counts, see `EvaluationSettings.balanced_among`."""
+    columns, grasps = run.results, run.document.grasps
+    counted = np.isin(columns["stage"], [s.value for s in STAGES_AMONG[grasps.balanced_among]])
+    counted &= columns["outcome"] != Outcome.SIMULATION_FAILED.value
+    lifted = columns["outcome"] == Outcome.LIFTED.value
+    own = {name: counted & (columns["object"] == name) for name in grasps.objects}
+    return {name: (int((m & lifted).sum()), int((m & ~lifted).sum())) for name, m in own.items()}
+
+
+def unbalanced_notes(run: Run) -> list[str]:
+    """A sentence for each object that has fewer of either than the run was to have, once all of its
+    grasps are judged."""
+    grasps = run.document.grasps
+    if not grasps.until_balanced or not run.complete:
+        return []
+    notes = []
+    for name, counts in lifted_and_failed(run).items():
+        parts = [
+            f"{n} of {grasps.until_balanced} grasps that {what}"
+            for n, what in zip(counts, ("are lifted", "fail"), strict=True)
+            if n < grasps.until_balanced
+        ]
+        if parts:
+            notes.append(
+                f"{name}: {' and '.join(parts)}, among {grasps.balanced_among} ones, after"
+                f" {grasps.objects[name]:,} grasps; no more were to be sampled"
+                f" (max_grasps_per_object {grasps.max_per_object:,})"
+            )
+    return notes
