@@ -46,9 +46,9 @@ def main() -> None:
     parser.add_argument("--heaps", type=int, default=4)
     parser.add_argument("--drift", type=int, default=0, help="simulate so many of each kind")
     arguments = parser.parse_args()
-    for stage in ("build_station_diagram", "fall", "creep", "relax"):
+    for stage in ("build_station_diagram", "fall", "predict_drift", "relax"):
         setattr(settling, stage, timed(stage, getattr(settling, stage)))
-    for stage in ("land", "build_station_diagram", "creep", "relax"):
+    for stage in ("drop_onto_scene", "build_station_diagram", "predict_drift", "relax"):
         setattr(heaps, stage, timed(stage, getattr(heaps, stage)))
     library = load_library("household")
     shapes = ObjectShapes(library)

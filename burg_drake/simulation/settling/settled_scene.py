@@ -12,6 +12,7 @@ from burg_drake.core import InvalidInputError, SimulationError
 from burg_drake.scene.document import TOUCH_TOLERANCE, Scene, SceneLike, as_scene
 from burg_drake.simulation.rest import (
     RELAXING,
+    RELAXING_ON_TRIANGLES,
     BodySpeed,
     Displacement,
     displacement_from_document,
@@ -106,7 +107,11 @@ def settle_scene(
         falling = fall(built, time_limit, progress)
         settled, moving = placed_scene(built, falling.X_WO), falling.moving
         if not moving:
-            settled, moving = _at_rest(settled, station, progress)
+            landed = settled
+            for engine in (RELAXING, RELAXING_ON_TRIANGLES):
+                settled, moving = _at_rest(landed, station, engine, progress)
+                if not moving:
+                    break
     except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
         raise SimulationError(
             f"{scene.path}: the scene cannot be simulated: {' '.join(str(error).split())}"
@@ -124,13 +129,16 @@ def settle_scene(
 
 
 def _at_rest(
-    scene: Scene, station: Station, progress: Callable[[float, int], None] | None
+    scene: Scene,
+    station: Station,
+    engine: Engine,
+    progress: Callable[[float, int], None] | None,
 ) -> tuple[Scene, Mapping[str, BodySpeed]]:
     """The scene once it is at rest in the world of its own diagram, and what will not rest."""
     suspects: frozenset[str] | None = None
     pace = np.inf
     for rounds in itertools.count():
-        built = build_station_diagram(scene, station, robot="none", engine=RELAXING)
+        built = build_station_diagram(scene, station, robot="none", engine=engine)
         predicted = predict_drift(built, among=suspects, once=rounds == 0)
         if progress is not None:
             progress(0.0, len(predicted.moving))
