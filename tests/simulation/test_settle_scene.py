@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from trial_world import GRAVITY, from_above, make_station
 
 from burg_drake.core.documents.schema import Pose
@@ -16,7 +17,7 @@ from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
 from burg_drake.simulation.settling.landing import drop_onto_scene
 from burg_drake.simulation.settling.settled_scene import SettledScene, settle_scene
 from burg_drake.simulation.trials.hand_trial import HandTrial
-from burg_drake.station.checks.scene_issues import overlaps
+from burg_drake.station.checks.scene_issues import check_scene, overlaps
 from burg_drake.station.diagram.builder import build_station_diagram
 from burg_drake.station.document.engine import ENGINES
 from burg_drake.station.document.station_document import load_station
@@ -143,6 +144,39 @@ def test_what_sinks_into_the_table_is_let_go_unless_it_is_deep(make_scene) -> No
     assert settled.scene.X_SO("low")[2, 3] == pytest.approx(0.0, abs=2e-4)
     with pytest.raises(InvalidInputError, match="'low' and 'table' overlap by"):
         settle_scene(make_scene(placed("low", "block", 0.3, 0.2, -0.008)), make_station())
+
+
+@pytest.mark.parametrize("pose", range(3))
+def test_what_sinks_in_on_tips_is_lifted_out_of_the_table(pose: int, tmp_path) -> None:
+    """The airplane sinks in by 1.7 to 2.4 mm on its wheels and its wing tips."""
+    library = load_library("household")
+    X_SO = library.entry("airplane").stable_poses[pose].X_SO.matrix()
+    X_SO[:2, 3] += (0.3, 0.2)
+    airplane = Instance(object="airplane", X_SO=Pose.readable(X_SO))
+    document = SceneDocument(name="airplane", library="household", instances=(airplane,))
+    scene = Scene(document, library, tmp_path / "airplane.yaml")
+    settled = settle_scene(scene, make_station())
+    assert settled.at_rest
+    surface = library.surface("airplane").vertices @ settled.scene.X_SO("airplane")[2, :3]
+    lowest = surface.min() + settled.scene.X_SO("airplane")[2, 3]
+    assert lowest == pytest.approx(0.0, abs=6e-4)
+    assert check_scene(settled.scene, make_station()) == ()
+    again = settle_scene(settled.scene, make_station())
+    assert again.at_rest and again.displacements["airplane"].distance < 2e-4
+
+
+@pytest.mark.parametrize("tilt", [(90.0, 0.0, 0.0), (80.0, 0.0, 20.0), (30.0, 20.0, 0.0)])
+def test_the_depth_in_the_table_is_that_of_validate(make_scene, tilt) -> None:
+    """A can whose lower rim was put 8.7 mm deep, by the closed form of its tilted ends."""
+    down = np.abs(Rotation.from_euler("xyz", tilt, degrees=True).as_matrix()[2, 2])
+    reach = 0.03 * np.sqrt(max(0.0, 1.0 - down**2)) + 0.05 * down
+    center = Rotation.from_euler("xyz", tilt, degrees=True).apply((0.0, 0.0, 0.05))[2]
+    can = placed("low", "can", 0.3, 0.2, reach - center - 0.0087, rpy_deg=tilt)
+    scene = make_scene(can)
+    (issue,) = check_scene(scene, make_station())
+    assert issue.amount == pytest.approx(0.0087, abs=1e-4)
+    with pytest.raises(InvalidInputError, match=r"overlap by 8\.7 mm"):
+        settle_scene(scene, make_station())
 
 
 def test_background_stays_and_carries(make_scene) -> None:

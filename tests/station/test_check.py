@@ -172,7 +172,7 @@ def test_what_was_sound_is_looked_at_again_once_a_model_was_edited(
 
 
 @pytest.mark.parametrize(
-    "depth, kinds", [(0.0045, []), (0.0052, ["in_ground"])], ids=["borne", "pressed in"]
+    "depth, kinds", [(0.0045, ["sunken"]), (0.0052, ["in_ground"])], ids=["borne", "pressed in"]
 )
 def test_what_stands_on_a_tip_sinks_into_the_table(
     library: Path, panda: Station, tmp_path: Path, depth: float, kinds: list[str]

@@ -41,8 +41,10 @@ def make_bottle() -> Shape:
         tube(ellipses(line, SEGMENTS)), BRICK, (lambda p, n: p[:, 2] > CAP - 1e-6, IVORY)
     )
     k = equal_area_factor(PIECE_SEGMENTS)
+    # A face, and no ridge, is where the bottle rests when it lies.
     body, nozzle = (
-        ellipses(profile(rows, 2) * (k, k, 1.0), PIECE_SEGMENTS) for rows in (BODY, NOZZLE)
+        ellipses(profile(rows, 2) * (k, k, 1.0), PIECE_SEGMENTS, first=0.5)
+        for rows in (BODY, NOZZLE)
     )
     # Each rounded corner has three rings here: cut after the shoulder's, within the neck's, and
     # where the nozzle leaves the cap.

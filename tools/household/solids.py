@@ -25,10 +25,16 @@ def circles(profile: ArrayLike, segments: int) -> Array:
     return ellipses(line[:, [0, 0, 1]], segments)
 
 
-def ellipses(profile: ArrayLike, segments: int) -> Array:
-    """Turn (K, 3) rows of half axes along x and y and height [m] into rings (K, segments, 3)."""
+def ellipses(profile: ArrayLike, segments: int, first: float = 0.0) -> Array:
+    """Turn (K, 3) rows of half axes along x and y and height [m] into rings (K, segments, 3).
+
+    Args:
+        profile: the rows.
+        segments: points of a ring.
+        first: where its first point is, in segments from the x axis.
+    """
     line = np.asarray(profile, dtype=float)
-    t = angles(segments)
+    t = angles(segments) + first * 2.0 * np.pi / segments
     x = line[:, :1] * np.cos(t)
     y = line[:, 1:2] * np.sin(t)
     z = np.broadcast_to(line[:, 2:3], x.shape)

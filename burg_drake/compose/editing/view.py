@@ -23,6 +23,7 @@ WORST_FIRST: tuple[InstanceStatus, ...] = ("collision", "in_ground", "out_of_bou
 STATUS: Mapping[str, InstanceStatus] = {
     "overlap": "collision",
     "in_ground": "in_ground",
+    "sunken": "in_ground",
     "out_of_bounds": "out_of_bounds",
     "hovering": "hovering",
 }

@@ -32,6 +32,9 @@ tip sinks in deeper, which a station's table can bear."""
 SINK_TOLERANCE = 2.5e-3
 """How deep an object may be in a box of the station [m]: they yield as the table does, and what
 leans on them with an edge or a tip sinks in by up to 2 mm."""
+SUNKEN_TOLERANCE = 5e-4
+"""How deep an object may stand in the table [m] before that is worth a word: in other simulators,
+and in the world, tables yield by less."""
 STANDING_TOLERANCE = 1e-4
 """How far a surface that stands on the ground may be below it [m]: rounding of documents."""
 HOVER_TOLERANCE = 1e-3
@@ -43,7 +46,7 @@ at."""
 MILLIMETRES_SUSPECTED = 5.0
 """A coordinate on a table of this size [m] or more was probably meant in millimetres."""
 
-IssueKind = Literal["out_of_bounds", "in_ground", "hovering", "overlap"]
+IssueKind = Literal["out_of_bounds", "in_ground", "sunken", "hovering", "overlap"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +55,8 @@ class SceneIssue:
 
     Attributes:
         instance: name of the instance it is about.
-        kind: what is wrong. `hovering` is a warning, all else are errors.
+        kind: what is wrong. `hovering` and `sunken` (in the table, which bears it there) are
+            warnings, all else are errors.
         amount: how far beyond, below, above or into something [m].
         message: one clear line.
         other: what it overlaps: another instance, the table, or a body of the station.
@@ -67,7 +71,7 @@ class SceneIssue:
     @property
     def is_error(self) -> bool:
         """Grasps of this scene would be judged in a world other than the document's."""
-        return self.kind != "hovering"
+        return self.kind not in ("hovering", "sunken")
 
 
 @dataclass(frozen=True, eq=False)

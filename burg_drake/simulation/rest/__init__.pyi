@@ -12,6 +12,7 @@ from .falling import fall as fall
 from .neighbours import Neighbours as Neighbours
 from .relaxation import (
     RELAXING as RELAXING,
+    RELAXING_ON_TRIANGLES as RELAXING_ON_TRIANGLES,
     relax as relax,
 )
 from .still_check import (

@@ -19,6 +19,7 @@ from burg_drake.simulation.rest.contact_islands import freeze, islands
 from burg_drake.simulation.rest.criterion import BodySpeed, body_place, mean_speed
 from burg_drake.simulation.rest.displacement import Displacement, displacement_from_document
 from burg_drake.simulation.rest.falling import is_below
+from burg_drake.simulation.rest.rolling_resistance import resist_rolling
 from burg_drake.simulation.rest.still_check import (
     STILL_ANGLE,
     STILL_DISTANCE,
@@ -96,6 +97,7 @@ class _Watch:
         self._simulator = Simulator(built.diagram)
         self._root = self._simulator.get_mutable_context()
         self._context = self._plant.GetMyContextFromRoot(self._root)
+        resist_rolling(built, self._simulator)
 
         self._islands = islands(built)
         self._names = {index: name for name, index in built.free.items()}

@@ -9,7 +9,7 @@ form finding of nets and membranes). Steps are long.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.multibody.math import SpatialVelocity
@@ -21,11 +21,15 @@ from burg_drake.core import Array
 from burg_drake.simulation.rest.contact_islands import freeze, islands
 from burg_drake.simulation.rest.criterion import BodySpeed, body_place, mean_speed
 from burg_drake.simulation.rest.falling import is_below
+from burg_drake.simulation.rest.rolling_resistance import resist_rolling
 from burg_drake.station.diagram import StationDiagram
 from burg_drake.station.document import Engine
 
 RELAXING = Engine(name="relaxing", time_step=0.01)
 """How time is stepped."""
+RELAXING_ON_TRIANGLES = replace(RELAXING, contact_surface="triangle")
+"""How it is stepped where a wide, flat body starts to rock by itself: a step knows how a force
+grows with depth in each face alone, and polygons give such a body few, large faces."""
 WINDOW = 10
 """Steps between two looks."""
 WINDOW_TIME = WINDOW * RELAXING.time_step
@@ -34,6 +38,8 @@ CALM_SPEED = BodySpeed(speed=3e-5, turning=float(np.deg2rad(0.02)))
 """What moves [m/s] and turns [rad/s] by less during a window, from rest or in creep, stays."""
 GROUP_CALM_SPEED = BodySpeed(speed=1e-4, turning=float(np.deg2rad(0.1)))
 """The same of objects that touch each other, which creep, slower and slower, for long."""
+ROLLING_SHARE = 0.5
+"""Of the rolling resistance: what comes to rest with less of it stays."""
 CALM_WINDOWS = 2
 """So many windows in succession."""
 STOPPED = SpatialVelocity(np.zeros(3), np.zeros(3))
@@ -96,6 +102,7 @@ class _Relaxation:
         self._simulator = Simulator(built.diagram)
         self._root = self._simulator.get_mutable_context()
         self.context = self._plant.GetMyMutableContextFromRoot(self._root)
+        resist_rolling(built, self._simulator, share=ROLLING_SHARE)
         found = islands(built)
         self._islands = [_Island(bodies) for bodies in found if not loose.isdisjoint(bodies)]
         self._alone = {bodies[0] for bodies in found if len(bodies) == 1}

@@ -11,6 +11,7 @@ from pydrake.systems.framework import Context
 from burg_drake.core import Array, InvalidInputError, SimulationError
 from burg_drake.scene.document import SceneLike, as_scene
 from burg_drake.simulation.rest.displacement import Displacement, displacement_from_document
+from burg_drake.simulation.rest.rolling_resistance import resist_rolling
 from burg_drake.station.diagram import StationDiagram, build_station_diagram
 from burg_drake.station.document import ENGINES, Engine, StationLike, as_station
 
@@ -52,6 +53,7 @@ def stillness(
     scene, station = as_scene(scene), as_station(station)
     built = build_station_diagram(scene, station, robot="none", engine=engine)
     simulator = Simulator(built.diagram)
+    resist_rolling(built, simulator)
     try:
         simulator.AdvanceTo(duration)
     except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit

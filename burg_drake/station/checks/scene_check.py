@@ -20,6 +20,7 @@ from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.document import (
     GROUND_TOLERANCE,
     SINK_TOLERANCE,
+    SUNKEN_TOLERANCE,
     TOUCH_TOLERANCE,
     Extent,
     Instance,
@@ -121,8 +122,12 @@ class SceneCheck:
         buried = {issue.instance for issue in issues if issue.kind == "in_ground"}
         beside = (self._table_issue(name) for name in scene.instances)
         issues += [issue for issue in beside if issue is not None]
-        for a, b, depth in self._overlaps(scene):
-            if b == "table" and a in buried:
+        overlapping = self._overlaps(scene)
+        buried |= {a for a, b, _ in overlapping if b == "table"}
+        sunken = (self._sunken_issue(name) for name in scene.instances if name not in buried)
+        issues += [issue for issue in sunken if issue is not None]
+        for a, b, depth in overlapping:
+            if b == "table" and any(i.instance == a and i.kind == "in_ground" for i in issues):
                 continue
             message = _overlap_issue(a, b, depth, self._parts, self._station.path)
             issues.append(
@@ -250,6 +255,22 @@ class SceneCheck:
                 raise obstacle_name_error(self._station, name)
             if name in ROBOT_MODELS or self._around.plant.HasModelInstanceNamed(name):
                 raise name_taken_error(scene, name)
+
+    def _sunken_issue(self, name: str) -> SceneIssue | None:
+        """Whether an object stands in the table, as deep as the table bears it in simulation."""
+        placed = self._placed[name]
+        depth = -max(placed.surface, placed.support)
+        if depth <= SUNKEN_TOLERANCE:
+            return None
+        return SceneIssue(
+            instance=name,
+            kind="sunken",
+            amount=depth,
+            message=(
+                f"{name!r} stands {length_text(depth)} deep in the table, which yields to it;"
+                f" lift it by {length_text(depth)}"
+            ),
+        )
 
     def _table_issue(self, name: str) -> SceneIssue | None:
         """Whether the centre of mass is beside the table, so that the object cannot stay."""
