@@ -14,6 +14,7 @@ from burg_drake.compose.document import (
     bounds,
     free_offset,
     free_spot,
+    missing_objects,
     name_of,
     named,
     object_bounds,
@@ -27,6 +28,9 @@ from burg_drake.core.documents import Pose
 from burg_drake.scene.arrangement import convex_polygon
 from burg_drake.scene.document import Instance
 from burg_drake.station.document import boxes_in_scene
+
+GAP = 0.01
+"""Between copies that have no place on the board and what is there [m]."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +117,7 @@ class Duplicate:
     Attributes:
         names: of what is copied; several keep their places to one another.
         offset: from each to its copy along x and y [m]; to the nearest place where all of them are
-            on the board and free if None. It is refused if there is none.
+            on the board and free if None, or to the right of all that is there.
     """
 
     names: tuple[str, ...]
@@ -223,13 +227,15 @@ def _obstacles(surroundings: Surroundings, lower: float, upper: float) -> list[A
 def _beside(
     state: State, surroundings: Surroundings, names: tuple[str, ...]
 ) -> tuple[float, float]:
-    """Offset of copies: the shortest to where they are free."""
+    """Offset of copies: the shortest to where they are free on the board, or to the right of all
+    that is there."""
     heights = [bounds(state, name)[:, 2] for name in names]
     obstacles = _obstacles(surroundings, float(np.min(heights)), float(np.max(heights)))
-    offset = free_offset([shadow(state, name) for name in names], state, obstacles)
+    polygons = [shadow(state, name) for name in names]
+    offset = free_offset(polygons, state, obstacles)
     if offset is None:
-        what = "a copy" if len(names) == 1 else f"{len(names)} copies"
-        raise InvalidInputError(
-            f"there is no free place for {what} on the board; make room, or choose a larger board"
-        )
+        lost = missing_objects(state)
+        others = [shadow(state, name) for name in state.instances if name not in lost]
+        right = max(float(polygon[:, 0].max()) for polygon in (*others, *obstacles))
+        return right + GAP - min(float(polygon[:, 0].min()) for polygon in polygons), 0.0
     return float(offset[0]), float(offset[1])
