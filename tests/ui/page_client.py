@@ -22,6 +22,7 @@ from burg_drake.ui.server.door import ServedPage
 
 PATIENCE = 60.0
 """For what a page has to say, on a busy machine [s]."""
+POSING = ("SetSceneNodeVisibilityMessage", "SetPositionMessage", "SetOrientationMessage")
 CAMERA = {
     "wxyz": (1.0, 0.0, 0.0, 0.0),
     "position": (0.0, 0.0, 1.0),
@@ -75,11 +76,13 @@ class PageClient:
     Attributes:
         nodes: properties of what is in the scene, by its name; `visible` and `position` as well.
         told: titles and lines of notifications, and titles of dialogs.
+        notes: notifications that have not been taken away.
     """
 
     def __init__(self, door: ServedPage) -> None:
         self.nodes: dict[str, dict[str, Any]] = {}
         self.told: list[str] = []
+        self.notes: dict[str, str] = {}
         self._controls: dict[str, dict[str, Any]] = {}
         self._commands: dict[tuple[str, str | None], str] = {}
         self._complete = threading.Event()
@@ -184,7 +187,10 @@ class PageClient:
             self._complete.set()
         elif kind == "NotificationShowMessage":
             props = message["props"]
-            self.told.append(f"{props['title']}: {props['body']}")
+            self.notes[message["uuid"]] = f"{props['title']}: {props['body']}"
+            self.told.append(self.notes[message["uuid"]])
+        elif kind == "RemoveNotificationMessage":
+            self.notes.pop(message["uuid"], None)
         elif kind == "GuiModalMessage":
             self.told.append(message["title"])
         elif kind == "RegisterCommandMessage":
@@ -198,7 +204,7 @@ class PageClient:
             self.nodes.pop(name, None)
         elif kind == "SceneNodeUpdateMessage":
             self.nodes[name].update(message["updates"])
-        elif kind in ("SetSceneNodeVisibilityMessage", "SetPositionMessage"):
+        elif kind in POSING:
             self.nodes.setdefault(name, {}).update(message)
         elif kind.startswith("Gui") and "uuid" in message:
             self._controls[message["uuid"]] = {**message, **message.get("props", {})}
