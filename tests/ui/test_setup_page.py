@@ -96,14 +96,14 @@ class Setup:
         """Presses a button, of which there is one of that name."""
         self.tab.get_by_role("button", name=name, exact=True).click()
 
-    def field(self, label: str) -> Any:
-        """The input of a label, the last on the page that can be seen."""
+    def field(self, label: str, which: int = -1) -> Any:
+        """An input of a label, of those that can be seen; the last if nothing is said."""
         row = f"//label[normalize-space()='{label}']/ancestor::div[.//input][1]//input"
-        return self.tab.locator(f"xpath={row}").locator("visible=true").last
+        return self.tab.locator(f"xpath={row}").locator("visible=true").nth(which)
 
-    def fill(self, label: str, text: str) -> None:
+    def fill(self, label: str, text: str, which: int = -1) -> None:
         """Types into a field."""
-        self.field(label).fill(text)
+        self.field(label, which).fill(text)
 
     def value(self, label: str) -> str:
         """What stands in a field."""
@@ -174,6 +174,7 @@ def test_a_scene_is_composed_checked_and_saved(setup: Setup, tmp_path: Path) -> 
     assert Path(download.value.path()).read_bytes().startswith(b"%PDF")
 
     setup.click("Clear scene")
+    setup.click("Clear it")
     until(lambda: not setup.view.instances, "an empty board")
     setup.click("Load scene")
     setup.click("Discard them")
@@ -192,7 +193,7 @@ def test_two_pages_show_the_same_and_come_back_after_a_kill(setup: Setup, tmp_pa
     setup.fill("Name", "box/2")  # refused, and the field says again what is so
     setup.tab.get_by_text("That cannot be done").wait_for()
     until(lambda: setup.value("Name") == "box", "the name is set back")
-    setup.fill("x, y, z [mm]", "0")
+    setup.fill("x, y, z [mm]", "180", 1)
     until(lambda: setup.view.X_SO("box")[1, 3] == 0.18, "moved by a number")
     setup.session.restrict_movement(False)
     X_SO = setup.view.X_SO("box")
