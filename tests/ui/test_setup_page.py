@@ -49,7 +49,7 @@ class Setup:
         self.tab.goto(self.door.url)
         self.tab.get_by_text("click one to add it").wait_for()
         until(self.door.server.get_clients, "a browser")
-        until(lambda: self.page._views._fitted, "the board is in view")
+        until(lambda: any(v.arrived for v in self.page._views._fitted.values()), "a view")
 
     def on_screen(self, p_SQ: Any) -> tuple[float, float]:
         """Where a point of the scene is on the tab [pixel]."""

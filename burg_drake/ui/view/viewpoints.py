@@ -7,6 +7,7 @@ the scene gets another size, until somebody moves the camera.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -65,6 +66,21 @@ def viewpoint(board: Board, back: Array, fov: float, aspect: float) -> tuple[Arr
     return target + distance * back, target
 
 
+@dataclass(eq=False)
+class _Fitted:
+    """A view that was given to a page.
+
+    Attributes:
+        position: (3,) of the camera in S [m].
+        aspect: width over height that it was made for.
+        arrived: the page has reported it; reports from before may come later than it was given.
+    """
+
+    position: Array
+    aspect: float
+    arrived: bool = False
+
+
 class PageViews:
     """Keeps the board in view on every page.
 
@@ -78,7 +94,7 @@ class PageViews:
         self, server: viser.ViserServer, board: Callable[[], Board], submit: Callable[..., Any]
     ) -> None:
         self._server, self._board, self._submit = server, board, submit
-        self._fitted: dict[int, tuple[Array, float]] = {}
+        self._fitted: dict[int, _Fitted] = {}
         self._shown = board().size
         camera = server.initial_camera
         camera.position, camera.look_at = viewpoint(
@@ -114,13 +130,13 @@ class PageViews:
         known = self._fitted.get(client.client_id)
         if known is None:
             return
-        (position, aspect), camera = known, client.camera
-        resized = abs(camera.aspect - aspect) > SAME_VIEW
-        moved = np.linalg.norm(camera.position - position) > SAME_VIEW
-        if moved and not resized:
-            del self._fitted[client.client_id]
-        elif resized:
+        camera = client.camera
+        if abs(camera.aspect - known.aspect) > SAME_VIEW:
             self._fit(client)
+        elif np.linalg.norm(camera.position - known.position) <= SAME_VIEW:
+            known.arrived = True
+        elif known.arrived:
+            del self._fitted[client.client_id]
 
     def _fit(self, client: viser.ClientHandle) -> None:
         back = client.camera.position - client.camera.look_at
@@ -132,7 +148,7 @@ class PageViews:
     def _set(self, client: viser.ClientHandle, back: Array, fov: float) -> None:
         camera = client.camera
         position, target = viewpoint(self._board(), back, fov, camera.aspect)
-        self._fitted[client.client_id] = position, camera.aspect
+        self._fitted[client.client_id] = _Fitted(position, camera.aspect)
         with client.atomic():
             camera.up_direction = np.array([0.0, 0.0, 1.0])
             camera.fov = fov
