@@ -71,14 +71,17 @@ class _Fitted:
     """A view that was given to a page.
 
     Attributes:
-        position: (3,) of the camera in S [m].
+        position, target: (3,) of the camera, and what it looks at, in S [m].
         aspect: width over height that it was made for.
         arrived: the page has reported it; reports from before may come later than it was given.
+        repeats: how often it may be given again until then.
     """
 
     position: Array
+    target: Array
     aspect: float
     arrived: bool = False
+    repeats: int = 3
 
 
 class PageViews:
@@ -137,6 +140,10 @@ class PageViews:
             known.arrived = True
         elif known.arrived:
             del self._fitted[client.client_id]
+        elif known.repeats:  # a page that is still loading may put its first view over this one
+            known.repeats -= 1
+            with client.atomic():
+                camera.position, camera.look_at = known.position, known.target
 
     def _fit(self, client: viser.ClientHandle) -> None:
         back = client.camera.position - client.camera.look_at
@@ -148,7 +155,7 @@ class PageViews:
     def _set(self, client: viser.ClientHandle, back: Array, fov: float) -> None:
         camera = client.camera
         position, target = viewpoint(self._board(), back, fov, camera.aspect)
-        self._fitted[client.client_id] = _Fitted(position, camera.aspect)
+        self._fitted[client.client_id] = _Fitted(position, target, camera.aspect)
         with client.atomic():
             camera.up_direction = np.array([0.0, 0.0, 1.0])
             camera.fov = fov
