@@ -35,11 +35,12 @@ from burg_drake.ui.view import (
     BoardLayers,
     BoardView,
     GhostView,
+    HeightView,
     ObjectMeshes,
     ObjectPictures,
+    PageViews,
     SceneView,
     ShownInstance,
-    set_initial_view,
 )
 from burg_drake.ui.widgets import ActionCall, PageActions, register, show_overlay, style
 
@@ -71,14 +72,15 @@ class SetupPage:
         view = session.view
         self._pictures = self._pictures_of(view.library)
         self._shapes = ObjectMeshes(view.library)
-        self._set_stage(view)
+        self._set_stage()
         self._board = BoardView(server.scene, session.station)
         self._layers = BoardLayers(server.scene)
-        self._drags = ObjectDrags(self.actions)
-        self._picking = Picking(server.scene, self.actions)
+        self._gizmo = Gizmo(server.scene, self.actions)
+        self._drags = ObjectDrags(self.actions, self._gizmo)
+        self._picking = Picking(server.scene, self.actions, self._drags)
         self._scene = SceneView(server.scene, self._shapes, self._attach)
         self._ghosts = GhostView(server.scene)
-        self._gizmo = Gizmo(server.scene, self.actions)
+        self._heights = HeightView(server.scene)
         self._build()
         self.actions.on_refused = self._refresh
         self._unsubscribe = session.on_change(lambda view: self._changed())
@@ -93,7 +95,7 @@ class SetupPage:
         self._backdrop.close()
         self._pictures.close()
 
-    def _set_stage(self, view: SessionView) -> None:
+    def _set_stage(self) -> None:
         scene, gui = self._server.scene, self._server.gui
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
@@ -101,7 +103,9 @@ class SetupPage:
             show_share_button=False, show_logo=False, control_width="large", brand_color=BLUE
         )
         gui.set_panel_label("Setup")
-        set_initial_view(self._server, view.document.board)
+        self._views = PageViews(
+            self._server, lambda: self._session.view.document.board, self.actions.submit
+        )
 
     def _build(self) -> None:
         gui, actions = self._server.gui, self.actions
@@ -115,7 +119,7 @@ class SetupPage:
         self._summary = SummaryPanel(gui, actions)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Object", viser.Icon.CUBE):
-            self._object = ObjectPanel(gui, actions)
+            self._object = ObjectPanel(gui, actions, self._gizmo.switch_axes)
             self._poses = PosePanel(gui, actions)
             self._arrange = ArrangePanel(gui, actions)
         with tabs.add_tab("Scene", viser.Icon.LAYOUT_GRID):
@@ -127,7 +131,7 @@ class SetupPage:
             self._settle = SettlePanel(gui, actions)
             self._grasps = GraspPanel(gui, actions)
         with tabs.add_tab("View", viser.Icon.EYE):
-            self._display = DisplayPanel(gui, actions, self._refresh)
+            self._display = DisplayPanel(gui, actions, self._views, self._refresh)
             self._reach = ReachPanel(gui, actions, self._layers)
             self._backdrop = BackdropPanel(gui, actions, self._layers)
         gui.main_panel.dock_right()
@@ -158,6 +162,7 @@ class SetupPage:
             "none": self._release_drags,
             "save": self._files.save,
             "settle": anywhere(self._session.settle),
+            "axes": anywhere(self._gizmo.switch_axes),
             "snap": anywhere(self._arrange.snap),
             "top": self._display.look_from_above,
             "front": self._display.look_from_front,
@@ -202,16 +207,19 @@ class SetupPage:
             self._board.show(view.document.board, markers=self._display.markers)
             self._scene.show(_shown(view), self._display.coloring)
             self._ghosts.show(view.proposal, self._shapes)
+            self._heights.show(view)
             self._gizmo.show(view)
             for panel in self._panels:
                 panel.show(view)
             self._library.show(view, self._pictures)
             self._poses.show(view, self._pictures)
+            self._views.show()
         self._server.flush()
 
     async def _on_disconnect(self, client: viser.ClientHandle) -> None:
         self._drags.drop(client.client_id)
         self._gizmo.drop(client.client_id)
+        self._views.drop(client.client_id)
 
 
 def _shown(view: SessionView) -> dict[str, ShownInstance]:

@@ -118,7 +118,7 @@ def test_a_library_that_loses_an_object_is_told(station: Station, library: Path)
 
 
 def test_another_library_is_a_step(session: ComposeSession, library: Path) -> None:
-    session.do(AddObject("can"))
+    session.do(AddObject("can", position=(0.1, 0.1)))
     view = session.use_library("mine")
     assert set(view.library.objects) == {"can", "marble"}
     assert view.undo_label == "use library household"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,9 +29,11 @@ from burg_drake.compose import (
 )
 from burg_drake.compose.editing.view import SessionView
 from burg_drake.core.arrays import Array
-from burg_drake.core.errors import BurgError
+from burg_drake.core.documents.schema import Pose
+from burg_drake.core.errors import BurgError, InvalidInputError
 from burg_drake.core.frames import make_pose, rotation_from_rpy
 from burg_drake.scene.document.scene import Board
+from burg_drake.station.document.station_document import Obstacle, Station
 
 ROUNDED = 2e-6
 """Of poses as people read them [m]."""
@@ -146,6 +150,9 @@ def test_planar_movement_takes_place_and_yaw_alone(three: ComposeSession) -> Non
     X_SO = three.do(MoveObjects({"box": tilt @ yaw @ before})).X_SO("box")
     assert X_SO[2, 3] == before[2, 3]
     np.testing.assert_allclose(X_SO[2, :3], before[2, :3], atol=2e-6)  # tilt
+    raised = three.do(MoveObjects({"box": tilt @ yaw @ before}, raises=True)).X_SO("box")
+    assert raised[2, 3] == pytest.approx((tilt @ yaw @ before)[2, 3], abs=1e-6)
+    np.testing.assert_array_equal(raised[2, :3], X_SO[2, :3])
     turn = X_SO[:3, :3] @ before[:3, :3].T
     assert np.arctan2(turn[1, 0], turn[0, 0]) == pytest.approx(0.5, abs=2e-3)
 
@@ -161,6 +168,38 @@ def test_copies_stand_beside_and_keep_their_places_to_one_another(three: Compose
         view.X_SO("can_2")[:3, 3] - view.X_SO("can")[:3, 3],
         atol=ROUNDED,
     )
+
+
+def test_what_is_added_overlaps_nothing_and_is_refused_without_room(
+    station: Station, tmp_path: Path
+) -> None:
+    post = Obstacle(size=(0.06, 0.06, 0.2), X_WB=Pose(translation=(0.21, 0.15, 0.1)))
+    posted = replace(station, document=replace(station.document, background={"post": post}))
+    with ComposeSession.open("household", posted, folder=tmp_path) as session:
+        added = 0
+        with pytest.raises(InvalidInputError, match=r"there is no free place for '.*' on the"):
+            for name in 3 * ("box", "mug", "can", "marble", "banana"):
+                assert set(session.do(AddObject(name)).status.values()) == {"ok"}
+                added += 1
+        assert added >= 4
+        for names in (("marble",), tuple(session.view.instances)):
+            assert "collision" not in session.do(Duplicate(names)).status.values()
+
+
+def test_how_far_a_selected_object_is_above_what_is_below(three: ComposeSession) -> None:
+    """A box above the board, and a marble above it."""
+    assert three.select(("box",)).gaps == {}
+    box = three.view.X_SO("box")
+    box[2, 3] += 0.1
+    assert three.do(MoveObjects({"box": box}, raises=True)).gaps == {
+        "box": pytest.approx(0.1, abs=2e-4)
+    }
+    (x, y, _), top = span(three.view, "box").mean(axis=0), span(three.view, "box")[1, 2]
+    marble = three.view.X_SO("marble")
+    marble[:3, 3] = x, y, top + marble[2, 3] + 0.03
+    view = three.do(MoveObjects({"marble": marble}, raises=True))
+    assert view.gaps == {"marble": pytest.approx(0.03, abs=1e-3)}
+    assert three.select(()).gaps == {}
 
 
 def test_a_random_configuration_is_that_of_its_seed(three: ComposeSession) -> None:

@@ -79,7 +79,7 @@ def test_all_steps_are_undone_and_redone_and_recovered(
     journal = journal_path(view.path or session.folder / f"{view.document.name}.yaml")
     if len(steps.documents) > 1:
         found = recover(journal)
-        assert found is not None and found.history is not None and found.aside is None
+        assert found is not None and found.history is not None and not found.damage
         assert [step.state.document for step in found.history.steps] == steps.documents
         assert found.history.position == steps.at
         assert found.history.undo_label == view.undo_label

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.compose import AddObject, ComposeSession
+from burg_drake.compose import AddObject, ComposeSession, Delete
 from burg_drake.compose.storage.scene_file import FileChanged
 from burg_drake.compose.storage.scene_lock import SceneInUse
 from burg_drake.core.paths.resources import resolve
@@ -89,18 +89,78 @@ def test_a_torn_last_line_is_left_out(station: Station, left: Path) -> None:
         assert list(session.view.instances) == ["mug", "marble"]
 
 
-def test_a_damaged_journal_is_kept_aside(station: Station, left: Path) -> None:
-    lines = left.read_text().splitlines()
-    lines[-1] = lines[-1].replace('"box"', '["box"]')
-    left.write_text("\n".join(lines) + "\n")
-    damaged = left.read_bytes()
+def damaged(journal: Path, line: int, old: str, new: str) -> bytes:
+    """Replaces a text in one line of a journal; gives what the file holds then."""
+    lines = journal.read_text().splitlines()
+    assert old in lines[line]
+    lines[line] = lines[line].replace(old, new)
+    journal.write_text("\n".join(lines) + "\n")
+    return journal.read_bytes()
+
+
+DEEP = "[" * 3000 + "]" * 3000
+
+
+@pytest.mark.parametrize("value", ["null", DEEP, "[1e999,0,0]", "[1e999]", '["box"]', "{}", "NaN"])
+def test_of_a_damaged_journal_nothing_is_lost_that_can_be_read(
+    station: Station, left: Path, value: str
+) -> None:
+    kept = damaged(left, -2, "[0.", f"{value},[0.")  # an entry before the marble's position
     with ComposeSession.open(left.with_name("breakfast.yaml"), station) as session:
         aside = left.with_name(".breakfast.yaml.journal.damaged_1")
-        assert session.view.notices[0] == (
-            f"the journal of the last session is damaged; it is kept as {aside}"
+        assert session.view.notices == (
+            "the journal of the last session is damaged (line 6 of 7 cannot be read); all that"
+            f" can be read of it is recovered, and it is kept as {aside}",
+            "recovered what was not saved of 'breakfast', with its history",
         )
-        assert list(session.view.instances) == ["mug", "marble"]
-    assert aside.read_bytes() == damaged
+        assert list(session.view.instances) == ["mug", "box"]
+        session.do(AddObject("can"))
+        assert session.save().saved
+    assert aside.read_bytes() == kept
+
+
+def test_steps_behind_a_damaged_line_are_recovered(station: Station, left: Path) -> None:
+    path = left.with_name("breakfast.yaml")
+    with ComposeSession.open(path, station) as session:
+        after = session.do(Delete(("marble",))).document
+        session.undo()
+        before = session.do(AddObject("can")).document
+    lines = left.read_text().splitlines()
+    last = json.loads(lines[-1])
+    assert last["step"] == "add can" and last["at"] == 4
+    damaged(left, 3, '"selection":', '"selection":null,"":')
+    with ComposeSession.open(path, station) as session:
+        assert "(line 4 of " in session.view.notices[0]
+        assert session.view.document == before
+        assert session.undo().undo_label != "delete marble" and session.view.document != after
+
+
+def test_the_damaged_journal_of_a_scene_without_a_file_is_recovered(
+    station: Station, tmp_path: Path
+) -> None:
+    with ComposeSession.open("household", station, folder=tmp_path) as session:
+        session.do(AddObject("mug"))
+    journal = tmp_path / ".new_scene.yaml.journal"
+    kept = damaged(journal, 0, "household", '"')
+    with ComposeSession.open("tabletop_six", station, folder=tmp_path) as session:
+        assert len(session.view.instances) == 6
+    assert journal.read_bytes() == kept
+    with ComposeSession.open("household", station, folder=tmp_path) as session:
+        assert list(session.view.instances) == ["mug"]
+        assert "(line 1 of 5 cannot be read)" in session.view.notices[0]
+    with ComposeSession.open("household", station, folder=tmp_path) as session:
+        assert list(session.view.instances) == ["mug"]
+        assert "damaged" not in session.view.notices[0]
+
+
+def test_a_journal_that_cannot_be_read_is_no_obstacle(station: Station, left: Path) -> None:
+    left.unlink()
+    left.mkdir()
+    with ComposeSession.open(left.with_name("breakfast.yaml"), station) as session:
+        assert "is damaged (" in session.view.notices[0]
+        assert list(session.do(AddObject("can")).instances) == ["mug", "can"]
+    with ComposeSession.open(left.with_name("breakfast.yaml"), station) as session:
+        assert list(session.view.instances) == ["mug", "can"]
 
 
 @pytest.mark.parametrize("content", [b"", b"\xff\xfe\n", b"[]\n", b"{}\nnull\n", b'{"at": 3}\n'])
@@ -109,6 +169,25 @@ def test_what_is_no_journal_is_no_obstacle(station: Station, left: Path, content
     with ComposeSession.open(left.with_name("breakfast.yaml"), station) as session:
         assert list(session.view.instances) == ["mug"]
         assert "is damaged" in session.view.notices[0]
+
+
+def test_a_journal_of_the_version_before_is_read(station: Station, left: Path) -> None:
+    """It says neither which numbers a line gives nor where among the steps it is."""
+    lines = []
+    for line in map(json.loads, left.read_text().splitlines()):
+        line.pop("from", None)
+        if "step" in line:
+            line.pop("at")
+        lines.append(json.dumps(line))
+    left.write_text("\n".join(lines) + "\n")
+    with ComposeSession.open(left.with_name("breakfast.yaml"), station) as session:
+        assert session.view.notices == (
+            "recovered what was not saved of 'breakfast', with its history",
+        )
+        assert list(session.view.instances) == ["mug", "marble", "box"]
+        for _ in range(3):
+            session.undo()
+        assert not session.view.instances
 
 
 def test_steps_whose_library_is_gone_hinder_no_new_scene(station: Station, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,8 +12,10 @@ import pytest
 from burg_drake import load_scene
 from burg_drake.compose import AddObject, ComposeSession, Delete, MoveObjects, Rename
 from burg_drake.compose.document import amending
+from burg_drake.compose.storage import scene_lock
 from burg_drake.compose.storage.journal import journal_path, recover
 from burg_drake.compose.storage.scene_file import FileChanged, UnsavedChanges
+from burg_drake.compose.storage.scene_lock import SceneInUse, SceneLock
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.frames import make_pose
 from burg_drake.generation.sample import sample_scene
@@ -202,3 +205,52 @@ def test_a_scene_with_unknown_objects_is_refused_and_the_open_one_stays(
     assert session.view.document == kept.document and session.view.undo_label == "add mug"
     assert list(session.do(AddObject("can")).instances) == ["mug", "can"]
     assert session.save(overwrite=True).saved
+
+
+def test_two_editors_never_hold_one_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first editor lets go, and so removes its lock file, after the second has opened that
+    file and before it locks it: the lock of a file that is gone keeps no third editor out."""
+    scene = tmp_path / "breakfast.yaml"
+    first = [SceneLock(scene)]
+    lock_file = scene_lock.try_lock
+
+    def lock_late(file: int) -> bool:
+        if first:
+            first.pop().release()
+        return lock_file(file)
+
+    monkeypatch.setattr(scene_lock, "try_lock", lock_late)
+    second = SceneLock(scene, "http://127.0.0.1:7200")
+    with pytest.raises(SceneInUse, match=r"is open already at http://127.0.0.1:7200"):
+        SceneLock(scene)
+    second.release()
+    SceneLock(scene).release()
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_several_pages_do_at_once_is_all_done_and_saved(session: ComposeSession) -> None:
+    """Each step is of the scene that the step before has left, on the disk as well."""
+    session.do(AddObject("mug"))
+    session.save("breakfast")
+    failures: list[BaseException] = []
+
+    def work(row: int) -> None:
+        try:
+            for k in range(6):
+                session.do(AddObject("marble", position=(0.05 + 0.05 * k, 0.05 + 0.05 * row)))
+                session.save()
+        except BaseException as error:
+            failures.append(error)
+
+    pages = [threading.Thread(target=work, args=(row,)) for row in range(4)]
+    for page in pages:
+        page.start()
+    for page in pages:
+        page.join()
+    assert failures == []
+    view = session.view
+    assert len(view.instances) == 25 and view.saved and view.path is not None
+    assert load_scene(view.path).document == view.document
+    found = recover(journal_path(view.path))
+    assert found is not None and found.history is not None and not found.damage
+    assert [len(s.state.instances) for s in found.history.steps] == list(range(26))

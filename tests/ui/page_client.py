@@ -19,6 +19,7 @@ from websockets.typing import Origin, Subprotocol
 from burg_drake.ui.server.door import ServedPage
 from tests.hang_guard import HANG_GUARD
 
+POSING = ("SetSceneNodeVisibilityMessage", "SetPositionMessage", "SetOrientationMessage")
 CAMERA = {
     "wxyz": (1.0, 0.0, 0.0, 0.0),
     "position": (0.0, 0.0, 1.0),
@@ -64,11 +65,13 @@ class PageClient:
     Attributes:
         nodes: properties of what is in the scene, by its name; `visible` and `position` as well.
         told: titles and lines of notifications, and titles of dialogs.
+        notes: notifications that have not been taken away.
     """
 
     def __init__(self, door: ServedPage) -> None:
         self.nodes: dict[str, dict[str, Any]] = {}
         self.told: list[str] = []
+        self.notes: dict[str, str] = {}
         self._controls: dict[str, dict[str, Any]] = {}
         self._commands: dict[tuple[str, str | None], str] = {}
         self._complete = threading.Event()
@@ -173,7 +176,10 @@ class PageClient:
             self._complete.set()
         elif kind == "NotificationShowMessage":
             props = message["props"]
-            self.told.append(f"{props['title']}: {props['body']}")
+            self.notes[message["uuid"]] = f"{props['title']}: {props['body']}"
+            self.told.append(self.notes[message["uuid"]])
+        elif kind == "RemoveNotificationMessage":
+            self.notes.pop(message["uuid"], None)
         elif kind == "GuiModalMessage":
             self.told.append(message["title"])
         elif kind == "RegisterCommandMessage":
@@ -187,7 +193,7 @@ class PageClient:
             self.nodes.pop(name, None)
         elif kind == "SceneNodeUpdateMessage":
             self.nodes[name].update(message["updates"])
-        elif kind in ("SetSceneNodeVisibilityMessage", "SetPositionMessage"):
+        elif kind in POSING:
             self.nodes.setdefault(name, {}).update(message)
         elif kind.startswith("Gui") and "uuid" in message:
             self._controls[message["uuid"]] = {**message, **message.get("props", {})}

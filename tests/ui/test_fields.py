@@ -72,9 +72,9 @@ def test_what_is_typed_is_one_step_and_what_is_refused_is_set_back(page: SetupPa
     page.actions.submit(lambda: None)  # as Enter does
     settle(page)
     assert session.view.selection == ("glass",) and field.handle.value == "glass"
-    position = page._object._planar._position
-    y = position.handle.value[1]
-    press(position, (210.0, y))
+    position = page._object._numbers._position
+    _, y, z = position.handle.value
+    press(position, (210.0, y, z))
     page.actions.submit(lambda: None)
     settle(page)
     assert session.view.X_SO("glass")[0, 3] == pytest.approx(0.21)

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
+import pytest
 
 from burg_drake.core.frames import inverse, make_pose, rotation_from_rpy
+from burg_drake.scene.document.scene import Board
+from burg_drake.ui.pointing.handles import Handle, handle_under
 from burg_drake.ui.pointing.pointer import PageCamera
+from burg_drake.ui.view.viewpoints import FRONT_FOV, TOP_FOV, direction_from, viewpoint
 
 WIDTH, HEIGHT = 1200.0, 800.0
 FOV = 0.8
@@ -43,3 +49,68 @@ def test_rays_that_graze_or_miss_the_plane_hit_nothing() -> None:
     assert eye().on_plane(p_SC + np.array([0.0, 1.0, 0.5]), (0.0, 0.0, 0.0), up) is None
     assert eye().on_plane(p_SC, (0.0, 0.0, 0.0), up) is None
     assert np.isnan(eye().on_screen(p_SC - eye().X_SC[:3, 2])).all()
+
+
+def seen_through(p_SQ: np.ndarray) -> np.ndarray:
+    """Another point on the ray from the camera through a point."""
+    p_SC = eye().X_SC[:3, 3]
+    return np.asarray(p_SC + 0.6 * (p_SQ - p_SC))
+
+
+X_SG = make_pose(rotation_from_rpy((0.3, -0.2, 0.4)), (0.25, 0.15, 0.05))
+PLACES = {
+    "arrow": lambda along, u, v: 0.09 * along,
+    "square": lambda along, u, v: 0.025 * (u + v),
+    "ring": lambda along, u, v: 0.65 * 0.11 * (np.cos(0.6) * u + np.sin(0.6) * v),
+}
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("kind", ["arrow", "square", "ring"])
+def test_a_handle_is_found_where_it_is_drawn_and_follows_the_pointer(kind: Any, axis: int) -> None:
+    """The pointer goes to where a motion along or about the handle brings the point that it holds;
+    what is found is that motion."""
+    R = X_SG[:3, :3]
+    along, u, v = R[:, axis], R[:, (axis + 1) % 3], R[:, (axis + 2) % 3]
+    grabbed = X_SG[:3, 3] + PLACES[kind](along, u, v)
+    parts = [Handle(k, X_SG, i) for k in ("arrow", "square", "ring") for i in range(3)]
+    found = handle_under(parts, eye(), seen_through(grabbed))
+    assert found is not None
+    handle = Handle(kind, X_SG, axis)
+    assert handle.distance(eye(), seen_through(grabbed)) is not None
+    truth = {
+        "arrow": make_pose(p_AB=0.03 * along),
+        "square": make_pose(p_AB=0.02 * u - 0.03 * v),
+        "ring": X_SG @ make_pose(cv2.Rodrigues(0.4 * np.eye(3)[axis])[0]) @ inverse(X_SG),
+    }[kind]
+    there = (truth @ (*grabbed, 1.0))[:3]
+    motion = handle.motion(eye(), seen_through(grabbed), seen_through(there))
+    assert motion is not None
+    np.testing.assert_allclose(motion, truth, atol=1e-9)
+
+
+def test_no_handle_is_found_beside_them_and_none_in_the_middle() -> None:
+    parts = [Handle(k, X_SG, i) for k in ("arrow", "square", "ring") for i in range(3)]
+    assert handle_under(parts, eye(), X_SG[:3, 3]) is None
+    assert handle_under(parts, eye(), X_SG[:3, 3] - 0.06 * X_SG[:3, 0]) is None
+
+
+@pytest.mark.parametrize("aspect", [0.46, 0.65, 1.0, 2.2])
+@pytest.mark.parametrize("above", [True, False])
+@pytest.mark.parametrize("size", [(0.297, 0.21), (0.42, 0.594), (1.189, 0.841)])
+def test_a_view_has_all_of_the_board(aspect: float, above: bool, size: tuple[float, float]) -> None:
+    """The corners by OpenCV's pinhole camera; where the page is a phone's, above the sheet."""
+    board, fov = Board(size=size), FRONT_FOV if not above else TOP_FOV
+    position, target = viewpoint(board, direction_from(above=above), fov, aspect)
+    z = (target - position) / np.linalg.norm(target - position)
+    x = np.cross(z, (0.0, 0.0, 1.0))
+    x /= np.linalg.norm(x)
+    R_CS = np.stack([x, np.cross(z, x), z])
+    corners = np.array([[a, b, 0.0] for a in (0.0, size[0]) for b in (0.0, size[1])])
+    focal = HEIGHT / 2.0 / np.tan(fov / 2.0)
+    K = np.array([[focal, 0.0, HEIGHT * aspect / 2], [0.0, focal, HEIGHT / 2], [0.0, 0.0, 1.0]])
+    rotation, _ = cv2.Rodrigues(R_CS)
+    pixels, _ = cv2.projectPoints(corners, rotation, -R_CS @ position, K, None)
+    shown = 0.55 if aspect < 0.6 else 1.0
+    assert (pixels > 0.0).all()
+    assert (pixels[:, 0] < (HEIGHT * aspect, HEIGHT * shown)).all()

@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 import yaml
 
+from burg_drake.compose.commands.board import SetBoard
 from burg_drake.compose.commands.moving import MoveObjects
 from burg_drake.compose.commands.placing import AddObject
 from burg_drake.compose.editing.view import SessionView
 from burg_drake.compose.session import ComposeSession
+from burg_drake.scene.document.scene import Board
 from burg_drake.station.document.station_document import load_station
 from burg_drake.ui.pointing.pointer import PageCamera
 from burg_drake.ui.server.door import ServedPage, serve
@@ -23,6 +25,10 @@ from burg_drake.ui.setup_page import SetupPage
 from tests.hang_guard import until
 
 ONE_TRY = 0.7
+UNDER_POINTER = """([x, y]) => {
+  const element = document.elementFromPoint(x, y);
+  return element?.closest(".mantine-Notifications-root") ? "MESSAGE" : element?.tagName;
+}"""
 
 
 @dataclass
@@ -43,6 +49,7 @@ class Setup:
         self.tab.goto(self.door.url)
         self.tab.get_by_text("click one to add it").wait_for()
         until(self.door.server.get_clients, "a browser")
+        until(lambda: any(v.arrived for v in self.page._views._fitted.values()), "a view")
 
     def on_screen(self, p_SQ: Any) -> tuple[float, float]:
         """Where a point of the scene is on the tab [pixel]."""
@@ -89,14 +96,14 @@ class Setup:
         """Presses a button, of which there is one of that name."""
         self.tab.get_by_role("button", name=name, exact=True).click()
 
-    def field(self, label: str) -> Any:
-        """The input of a label, the last on the page that can be seen."""
+    def field(self, label: str, which: int = -1) -> Any:
+        """An input of a label, of those that can be seen; the last if nothing is said."""
         row = f"//label[normalize-space()='{label}']/ancestor::div[.//input][1]//input"
-        return self.tab.locator(f"xpath={row}").locator("visible=true").last
+        return self.tab.locator(f"xpath={row}").locator("visible=true").nth(which)
 
-    def fill(self, label: str, text: str) -> None:
+    def fill(self, label: str, text: str, which: int = -1) -> None:
         """Types into a field."""
-        self.field(label).fill(text)
+        self.field(label, which).fill(text)
 
     def value(self, label: str) -> str:
         """What stands in a field."""
@@ -112,7 +119,7 @@ def setup(page: Any, tmp_path: Path) -> Iterator[Setup]:
     session = ComposeSession.open("household", load_station("panda_tabletop"), folder=tmp_path)
     with serve(port=0) as door:
         built = SetupPage(door.server, session)
-        page.set_viewport_size({"width": 1000, "height": 640})
+        page.set_viewport_size({"width": 1120, "height": 640})
         yield Setup(session, built, door, page)
         built.close()
 
@@ -167,6 +174,7 @@ def test_a_scene_is_composed_checked_and_saved(setup: Setup, tmp_path: Path) -> 
     assert Path(download.value.path()).read_bytes().startswith(b"%PDF")
 
     setup.click("Clear scene")
+    setup.click("Clear it")
     until(lambda: not setup.view.instances, "an empty board")
     setup.click("Load scene")
     setup.click("Discard them")
@@ -185,7 +193,7 @@ def test_two_pages_show_the_same_and_come_back_after_a_kill(setup: Setup, tmp_pa
     setup.fill("Name", "box/2")  # refused, and the field says again what is so
     setup.tab.get_by_text("That cannot be done").wait_for()
     until(lambda: setup.value("Name") == "box", "the name is set back")
-    setup.fill("x, y [mm]", "180")
+    setup.fill("x, y, z [mm]", "180", 1)
     until(lambda: setup.view.X_SO("box")[1, 3] == 0.18, "moved by a number")
     setup.session.restrict_movement(False)
     X_SO = setup.view.X_SO("box")
@@ -269,3 +277,147 @@ def test_the_mouse_selects_and_keys_change_what_is_selected(setup: Setup) -> Non
     )
     keys.press("h")
     setup.tab.get_by_role("dialog").get_by_text("Ctrl+click").wait_for()
+
+
+def press_until_held(setup: Setup, x: float, y: float, direction: tuple[float, float]) -> None:
+    """Presses at a place of the tab and moves a little, until something is held there."""
+    mouse = setup.tab.mouse
+    for _ in range(20):
+        mouse.move(x, y)
+        mouse.down()
+        for step in (6, 9, 12):
+            mouse.move(x + step * direction[0], y + step * direction[1])
+        try:
+            until(lambda: setup.view.dragging, "hold", ONE_TRY)
+            return
+        except AssertionError:
+            mouse.up()
+
+
+def test_an_arrow_over_another_object_moves_what_is_selected(setup: Setup) -> None:
+    """The can stands behind the box, so that the can's arrow along x is drawn over the box; what
+    counts is who moves and along which axis, whatever the browser takes hold of."""
+    setup.session.do(SetBoard(Board(size=(0.594, 0.42))))
+    setup.session.do(AddObject("can", position=(0.25, 0.3)))
+    setup.session.do(AddObject("box", position=(0.3, 0.22)))
+    setup.session.select(("can",))
+    setup.session.restrict_movement(False)
+    setup.open()
+    start, box = setup.view.X_SO("can"), setup.view.X_SO("box")
+    middle = setup.middle("can")
+    over = middle + np.array([0.095, 0.0, 0.0])  # beyond the rings
+    assert nearest_object(setup, over) == "box"
+    (x, y), (x1, y1) = setup.on_screen(over), setup.on_screen(over + np.array([0.1, 0.0, 0.0]))
+    length = np.hypot(x1 - x, y1 - y)
+    press_until_held(setup, x, y, ((x1 - x) / length, (y1 - y) / length))
+    assert setup.view.dragging == ("can",)
+    setup.tab.mouse.move(x1, y1, steps=3)
+    until(lambda: setup.view.X_SO("can")[0, 3] > start[0, 3] + 0.09, "the can has moved")
+    setup.let_go()
+    moved = setup.view.X_SO("can")
+    np.testing.assert_allclose(moved[1:3, 3], start[1:3, 3], atol=2e-6)
+    assert abs(moved[0, 3] - start[0, 3] - 0.1) < 5e-3
+    assert np.array_equal(setup.view.X_SO("box"), box) and setup.view.selection == ("can",)
+
+
+def nearest_object(setup: Setup, p_SQ: Any) -> str:
+    """The instance that a ray from the camera through a point meets first, by trimesh."""
+    camera = next(iter(setup.door.server.get_clients().values())).camera
+    ray = np.subtract(p_SQ, camera.position)
+    first = {}
+    for name, instance in setup.view.instances.items():
+        mesh = setup.view.library.surface(instance.object)
+        mesh.apply_transform(setup.view.X_SO(name))
+        hits, _, _ = mesh.ray.intersects_location([camera.position], [ray])
+        if len(hits):
+            first[name] = float(np.linalg.norm(hits - camera.position, axis=1).min())
+    return min(first, key=lambda name: first[name])
+
+
+def test_turning_with_shift_keeps_the_selection(setup: Setup) -> None:
+    setup.session.do(AddObject("box", position=(0.1, 0.15)))
+    setup.session.do(AddObject("can", position=(0.3, 0.15)))
+    setup.session.select(("box", "can"))
+    setup.open()
+    before = setup.view.X_SO("can")
+    setup.drag("can", np.array([0.02, -0.06, 0.0]), key="Shift")
+    until(lambda: not np.allclose(setup.view.X_SO("can"), before), "turned")
+    setup.let_go(key="Shift")
+    setup.tab.keyboard.press("PageUp")  # it comes after whatever the page says of the rectangle
+    until(lambda: setup.view.X_SO("can")[2, 3] > before[2, 3], "a later action")
+    assert setup.view.selection == ("box", "can")
+
+
+@pytest.mark.parametrize(
+    ("width", "height"),
+    [
+        pytest.param(1280, 800, marks=pytest.mark.thorough),
+        (1024, 600),
+        pytest.param(390, 844, marks=pytest.mark.thorough),
+    ],
+)
+def test_all_of_the_board_is_in_view_beside_the_panels(
+    setup: Setup, width: int, height: int
+) -> None:
+    """From the beginning, and again when the board has got another size: what the browser finds at
+    the board's corners is the scene and no panel."""
+    setup.tab.set_viewport_size({"width": width, "height": height})
+    setup.tab.goto(setup.door.url)
+    setup.tab.locator("canvas").first.wait_for()
+
+    def covered() -> list[str]:
+        if not setup.page._views._fitted:
+            return ["no page yet"]
+        found = []
+        for x in (0.0, setup.view.document.board.size[0]):
+            for y in (0.0, setup.view.document.board.size[1]):
+                place = setup.on_screen((x, y, 0.0))
+                found.append(setup.tab.evaluate(UNDER_POINTER, list(place)))
+        return [tag for tag in found if tag not in ("CANVAS", "MESSAGE")]
+
+    until(lambda: covered() == [], "all four corners of the first board", 20.0)
+    setup.session.do(SetBoard(Board(size=(0.841, 1.189))))
+    until(lambda: covered() == [], "all four corners of a board that is larger", 20.0)
+
+
+@pytest.mark.thorough
+def test_a_finger_selects_moves_and_raises(setup: Setup, browser: Any) -> None:
+    setup.session.do(AddObject("can", position=(0.2, 0.15)))
+    setup.session.select(())
+    with browser.new_context(viewport={"width": 1024, "height": 768}, has_touch=True) as context:
+        setup.tab = context.new_page()
+        setup.tab.goto(setup.door.url)
+        setup.tab.locator("canvas").first.wait_for()
+        until(setup.door.server.get_clients, "a browser")
+        finger = context.new_cdp_session(setup.tab)
+
+        def touch(kind: str, *place: float) -> None:
+            points = [{"x": place[0], "y": place[1]}] if place else []
+            finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+        def swipe(start: Any, end: Any) -> None:
+            """Moves a finger from a point of the scene to another, until that takes hold."""
+            for _ in range(20):
+                a, b = np.array(setup.on_screen(start)), np.array(setup.on_screen(end))
+                touch("touchStart", *a)
+                for share in np.linspace(0.1, 1.0, 8):
+                    touch("touchMove", *(a + share * (b - a)))
+                try:
+                    until(lambda: setup.view.dragging, "hold", ONE_TRY)
+                    break
+                except AssertionError:
+                    touch("touchEnd")
+            touch("touchEnd")
+            until(lambda: not setup.view.dragging, "let go")
+
+        start = setup.view.X_SO("can")
+        middle = setup.middle("can")
+        swipe(middle, middle + np.array([0.08, 0.05, 0.0]))
+        moved = setup.view.X_SO("can")
+        assert setup.view.selection == ("can",)
+        np.testing.assert_allclose(moved[:3, 3] - start[:3, 3], [0.08, 0.05, 0.0], atol=0.02)
+        arrow = setup.page._gizmo._arrows.X_SG
+        assert arrow is not None
+        swipe(arrow[:3, 3] + [0.0, 0.0, 0.08], arrow[:3, 3] + [0.0, 0.0, 0.16])
+        raised = setup.view.X_SO("can")
+        np.testing.assert_allclose(raised[:3, 3] - moved[:3, 3], [0.0, 0.0, 0.08], atol=0.01)

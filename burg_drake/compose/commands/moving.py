@@ -30,9 +30,11 @@ class MoveObjects:
     Attributes:
         X_SO: (4, 4) poses by instance. Where movement is planar, their height and tilt are not
             taken.
+        raises: their height is taken even then.
     """
 
     X_SO: Mapping[str, ArrayLike] = field(default_factory=dict)
+    raises: bool = False
 
     @property
     def label(self) -> str:
@@ -42,7 +44,9 @@ class MoveObjects:
         require_some(self.X_SO, state)
         X_SO = {name: _checked(X, name) for name, X in self.X_SO.items()}
         if surroundings.planar:
-            X_SO = {name: planar(state.X_SO(name), X) for name, X in X_SO.items()}
+            X_SO = {
+                name: upright(state.X_SO(name), X, raises=self.raises) for name, X in X_SO.items()
+            }
         return state.moved(X_SO).select(X_SO)
 
 
@@ -166,11 +170,12 @@ def stable_pose_matrix(state: State, object: str, stable_pose: int) -> Array:
         raise InvalidInputError(f"{object!r}: {error}") from error
 
 
-def planar(X_SO: Array, X_new: Array) -> Array:
-    """(4, 4) `X_new` with height and tilt of `X_SO`: only x, y and yaw are taken."""
+def upright(X_SO: Array, X_new: Array, *, raises: bool) -> Array:
+    """(4, 4) `X_new` with the tilt of `X_SO`, and with its height unless that is to be taken."""
     R_SO = X_SO[:3, :3]
     yaw = yaw_between(R_SO, X_new[:3, :3])
-    return make_pose(rot_z(yaw) @ R_SO, (*X_new[:2, 3], X_SO[2, 3]))
+    height = (X_new if raises else X_SO)[2, 3]
+    return make_pose(rot_z(yaw) @ R_SO, (*X_new[:2, 3], height))
 
 
 def _checked(X_SO: ArrayLike, name: str) -> Array:

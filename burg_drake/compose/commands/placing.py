@@ -11,11 +11,13 @@ from burg_drake.compose.commands.moving import stable_pose_matrix, standing
 from burg_drake.compose.document import (
     State,
     Surroundings,
+    bounds,
     free_offset,
     free_spot,
-    middle_of_board,
+    missing_objects,
     name_of,
     named,
+    object_bounds,
     object_shadow,
     require_some,
     shadow,
@@ -23,10 +25,12 @@ from burg_drake.compose.document import (
 )
 from burg_drake.core import Array, InvalidInputError, make_pose
 from burg_drake.core.documents import Pose
+from burg_drake.scene.arrangement import convex_polygon
 from burg_drake.scene.document import Instance
+from burg_drake.station.document import boxes_in_scene
 
 GAP = 0.01
-"""Between a duplicate and what it was made of [m]."""
+"""Between copies that have no place on the board and what is there [m]."""
 
 
 @dataclass(frozen=True)
@@ -35,13 +39,14 @@ class AddObject:
 
     Attributes:
         object: its name in the library.
-        stable_pose: that it stands in.
-        position: x and y of its centre of mass [m]; a free place near the middle if None.
+        stable_pose: that it stands in; the most probable one in which there is room if None.
+        position: x and y of its centre of mass [m]; a free place near the middle if None. It is
+            refused if there is none.
         yaw_deg: by which it is turned; not at all if None, unless there is room only if it is.
     """
 
     object: str
-    stable_pose: int = 0
+    stable_pose: int | None = None
     position: tuple[float, float] | None = None
     yaw_deg: float | None = None
 
@@ -50,11 +55,11 @@ class AddObject:
         return f"add {self.object}"
 
     def apply(self, state: State, surroundings: Surroundings) -> State:
-        X_SO = stable_pose_matrix(state, self.object, self.stable_pose)
+        X_SO = stable_pose_matrix(state, self.object, self.stable_pose or 0)
         yaw_deg = require_number(self.yaw_deg or 0.0, "yaw", -360.0, 360.0, "degrees")
         position = self.position
         if position is None:
-            yaw_deg, position = self._free_place(state, X_SO, yaw_deg)
+            X_SO, yaw_deg, position = self._free_place(state, surroundings, yaw_deg)
         yaw = np.deg2rad(yaw_deg)
         x, y = (
             require_number(value, f"{axis} of the new {self.object!r}", -FARTHEST, FARTHEST, "m")
@@ -69,18 +74,25 @@ class AddObject:
         return state.added([instance], fixed=_without_mass(state, [instance]))
 
     def _free_place(
-        self, state: State, X_SO: Array, yaw_deg: float
-    ) -> tuple[float, tuple[float, float]]:
-        """Yaw and position where there is room; the middle of the board if there is none."""
-        for turn in (0.0, 90.0, 45.0, 135.0) if self.yaw_deg is None else (0.0,):
-            X_turned = standing(X_SO, (0.0, 0.0), np.deg2rad(yaw_deg + turn))
-            spot = free_spot(object_shadow(state.library, self.object, X_turned), state)
-            if spot is not None:
-                return yaw_deg + turn, spot
-        X_turned = standing(X_SO, (0.0, 0.0), np.deg2rad(yaw_deg))
-        polygon = object_shadow(state.library, self.object, X_turned)
-        x, y = np.round(middle_of_board(polygon, state), 6)
-        return yaw_deg, (float(x), float(y))
+        self, state: State, surroundings: Surroundings, yaw_deg: float
+    ) -> tuple[Array, float, tuple[float, float]]:
+        """Stable pose (4, 4), yaw [degrees] and position [m] where there is room."""
+        library = state.library
+        poses = range(max(1, len(library.entry(self.object).stable_poses)))
+        for k in poses if self.stable_pose is None else (self.stable_pose,):
+            X_SO = stable_pose_matrix(state, self.object, k)
+            lower, upper = object_bounds(library, self.object, X_SO)[:, 2]
+            obstacles = _obstacles(surroundings, lower, upper)
+            for turn in (0.0, 90.0, 45.0, 135.0) if self.yaw_deg is None else (0.0,):
+                X_turned = standing(X_SO, (0.0, 0.0), np.deg2rad(yaw_deg + turn))
+                polygon = object_shadow(library, self.object, X_turned)
+                spot = free_spot(polygon, state, obstacles)
+                if spot is not None:
+                    return X_SO, yaw_deg + turn, spot
+        raise InvalidInputError(
+            f"there is no free place for {self.object!r} on the board; make room, or choose a"
+            " larger board"
+        )
 
 
 @dataclass(frozen=True)
@@ -105,7 +117,7 @@ class Duplicate:
     Attributes:
         names: of what is copied; several keep their places to one another.
         offset: from each to its copy along x and y [m]; to the nearest place where all of them are
-            on the board and free if None.
+            on the board and free if None, or to the right of all that is there.
     """
 
     names: tuple[str, ...]
@@ -117,7 +129,7 @@ class Duplicate:
 
     def apply(self, state: State, surroundings: Surroundings) -> State:
         names = require_some(self.names, state)
-        offset = _beside(state, names) if self.offset is None else self.offset
+        offset = _beside(state, surroundings, names) if self.offset is None else self.offset
         x, y = (
             require_number(value, f"offset along {axis}", -FARTHEST, FARTHEST, "m")
             for axis, value in zip("xy", offset, strict=True)
@@ -203,10 +215,27 @@ def _without_mass(state: State, instances: list[Instance]) -> set[str]:
     return {name_of(i) for i in instances if state.library.entry(i.object).is_fixed}
 
 
-def _beside(state: State, names: tuple[str, ...]) -> tuple[float, float]:
-    """Offset of copies: the shortest to where they are free, or to the right if that is nowhere."""
+def _obstacles(surroundings: Surroundings, lower: float, upper: float) -> list[Array]:
+    """(N, 2) what the station's boxes that reach between two heights [m] cover of the board [m]."""
+    return [
+        convex_polygon(p_SV[:, :2])
+        for p_SV in boxes_in_scene(surroundings.station)
+        if p_SV[:, 2].min() < upper and p_SV[:, 2].max() > max(lower, 0.0)
+    ]
+
+
+def _beside(
+    state: State, surroundings: Surroundings, names: tuple[str, ...]
+) -> tuple[float, float]:
+    """Offset of copies: the shortest to where they are free on the board, or to the right of all
+    that is there."""
+    heights = [bounds(state, name)[:, 2] for name in names]
+    obstacles = _obstacles(surroundings, float(np.min(heights)), float(np.max(heights)))
     polygons = [shadow(state, name) for name in names]
-    offset = free_offset(polygons, state)
+    offset = free_offset(polygons, state, obstacles)
     if offset is None:
-        return float(np.ptp(np.concatenate(polygons)[:, 0])) + GAP, 0.0
+        lost = missing_objects(state)
+        others = [shadow(state, name) for name in state.instances if name not in lost]
+        right = max(float(polygon[:, 0].max()) for polygon in (*others, *obstacles))
+        return right + GAP - min(float(polygon[:, 0].min()) for polygon in polygons), 0.0
     return float(offset[0]), float(offset[1])

@@ -18,7 +18,6 @@ from .checker import (
 from .free_place import (
     free_offset as free_offset,
     free_spot as free_spot,
-    middle_of_board as middle_of_board,
 )
 from .history import (
     History as History,

@@ -6,10 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from burg_drake.compose.document.bounds_on_board import bounds
 from burg_drake.compose.document.state import State
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.arrangement import ObjectShapes
-from burg_drake.scene.document import Scene, SceneDocument, SceneIssue
+from burg_drake.scene.document import TOUCH_TOLERANCE, Scene, SceneDocument, SceneIssue
 from burg_drake.station.document import StationLike, as_station
 
 if TYPE_CHECKING:
@@ -47,6 +48,26 @@ class SceneChecker:
         issues = self.check(state).issues(known_scene(state, path))
         self._state, self._issues = state, issues
         return issues
+
+    def gaps(self, state: State, path: Path) -> dict[str, float]:
+        """Free way straight down of each selected instance that touches nothing below it [m].
+
+        Args:
+            state: scene, library and selection.
+            path: of the scene's file, for messages.
+
+        Raises:
+            BurgError: see `issues`.
+        """
+        found, missing = {}, missing_objects(state)
+        for name in state.selection:
+            if name in missing or (height := float(bounds(state, name)[0, 2])) <= TOUCH_TOLERANCE:
+                continue
+            down = (0.0, 0.0, -1.0)
+            gap = self.check(state).travel(known_scene(state, path), (name,), down, height)
+            if gap > TOUCH_TOLERANCE:
+                found[name] = gap
+        return found
 
     def check(self, state: State) -> SceneCheck:
         """What knows of the objects of a state's library, and of contact between them."""

@@ -18,37 +18,38 @@ CLEARANCE = 0.005
 """Between the new objects and others, seen from above [m]."""
 
 
-def free_spot(polygon: Array, state: State) -> tuple[float, float] | None:
+def free_spot(
+    polygon: Array, state: State, obstacles: Sequence[Array] = ()
+) -> tuple[float, float] | None:
     """The place nearest to the board's middle where an object is beside all others.
 
     Args:
         polygon: (N, 2) what it covers, its centre of mass above the origin [m].
         state: what is there already.
+        obstacles: (N, 2) convex polygons of what else is in the way [m].
 
     Returns:
         x and y of its centre of mass [m]; None if there is no room.
     """
-    middle = middle_of_board(polygon, state)
-    offset = free_offset([polygon + middle], state)
+    middle = np.array(state.document.board.size) / 2
+    middle -= (polygon.min(axis=0) + polygon.max(axis=0)) / 2
+    offset = free_offset([polygon + middle], state, obstacles)
     if offset is None:
         return None
     x, y = np.round(middle + offset, 6)
     return float(x), float(y)
 
 
-def middle_of_board(polygon: Array, state: State) -> Array:
-    """(2,) where an object is in the middle of the board, free or not; see `free_spot`."""
-    middle = (polygon.min(axis=0) + polygon.max(axis=0)) / 2
-    return np.asarray(np.array(state.document.board.size) / 2 - middle)
-
-
-def free_offset(polygons: Sequence[Array], state: State) -> Array | None:
+def free_offset(
+    polygons: Sequence[Array], state: State, obstacles: Sequence[Array] = ()
+) -> Array | None:
     """The shortest way by which objects can be shifted to be on the board and beside all that is
     there.
 
     Args:
         polygons: (N, 2) what each covers now [m].
         state: what is there already.
+        obstacles: (N, 2) convex polygons of what else is in the way [m].
 
     Returns:
         (2,) the way [m]; None if there is no room.
@@ -62,10 +63,8 @@ def free_offset(polygons: Sequence[Array], state: State) -> Array | None:
     lower, upper = corners.min(axis=0) + offsets, corners.max(axis=0) + offsets
     offsets = offsets[((lower >= 0.0) & (upper <= size)).all(axis=1)]
     missing = missing_objects(state)
-    for name in state.instances:
-        if name in missing:
-            continue
-        other = shadow(state, name)
+    others = [shadow(state, name) for name in state.instances if name not in missing]
+    for other in (*others, *obstacles):
         for polygon in polygons:
             if len(offsets):
                 distance = distances(no_fit_polygon(other, polygon), offsets)

@@ -20,7 +20,7 @@ class Surroundings:
 
     Attributes:
         station: where the scene stands.
-        planar: objects that are moved keep their height and tilt; only x, y and yaw change.
+        planar: objects that are moved keep their tilt, and their height unless they are raised.
         path: of the scene's file, for messages.
         checker: knows what touches what.
     """

@@ -125,7 +125,7 @@ class Editor:
             return self._show(self._state.select(names))
 
     def restrict_movement(self, planar: bool) -> SessionView:
-        """Whether what is moved from now on keeps its height and tilt."""
+        """Whether what is moved from now on keeps its tilt, and its height unless it is raised."""
         with self._exclusive():
             self._planar = planar
             return self._publish()
@@ -284,6 +284,12 @@ class Editor:
         self._check_problem = None
         return issues
 
+    def _gaps(self) -> dict[str, float]:
+        try:
+            return self._checker.gaps(self._state, self._storage.place)
+        except BurgError:
+            return {}  # `_issues` tells
+
     def _publish(self) -> SessionView:
         self._serial += 1
         issues = self._issues()
@@ -300,6 +306,7 @@ class Editor:
                 changed=self._changed,
                 path=self._storage.path,
                 planar=self._planar,
+                gaps=self._gaps(),
                 dragging=self._drag.names if self._drag else (),
                 notices=self._all_notices(),
             )

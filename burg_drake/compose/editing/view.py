@@ -45,7 +45,8 @@ class SessionView:
         saved: the file holds the scene as it is.
         changed: there are changes that are in no file.
         path: the file; None if the scene was never saved.
-        planar: objects that are moved keep their height and tilt.
+        planar: objects that are moved keep their tilt, and their height unless they are raised.
+        gaps: of selected instances that touch nothing below, how far they are above it [m].
         dragging: instances that are being dragged.
         notices: what the user should know, one line each, until `ComposeSession.dismiss`.
         working: what is being done beside, and how far it is; None if nothing is.
@@ -67,6 +68,7 @@ class SessionView:
     changed: bool
     path: Path | None
     planar: bool
+    gaps: Mapping[str, float] = field(default_factory=dict)
     dragging: tuple[str, ...] = ()
     notices: tuple[str, ...] = ()
     working: str | None = None

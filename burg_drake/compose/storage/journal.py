@@ -33,14 +33,14 @@ class Recovered:
         saved: what the scene's file held; None if there was none.
         known: fingerprint of that file.
         origin: what the session was opened with, where that was no file of its own.
-        aside: where a damaged journal was put; what was before the damage is recovered.
+        damage: what of the journal could not be read; empty if all of it was.
     """
 
-    history: History | None
-    saved: SceneDocument | None
-    known: str | None
-    origin: str
-    aside: Path | None = None
+    history: History | None = None
+    saved: SceneDocument | None = None
+    known: str | None = None
+    origin: str = ""
+    damage: str = ""
 
 
 def journal_path(scene: Path) -> Path:
@@ -68,7 +68,8 @@ class SessionJournal:
 
     def step(self, history: History, saved: SceneDocument | None, known: str | None) -> None:
         """The history has one more step, and is there; the rest is as in `JournalWriter.saved`."""
-        self._record(lambda w: w.step(history.steps[history.position]), history, saved, known)
+        position = history.position
+        self._record(lambda w: w.step(history.steps[position], position), history, saved, known)
 
     def at(self, history: History, saved: SceneDocument | None, known: str | None) -> None:
         """The history is at another step."""
@@ -78,7 +79,7 @@ class SessionJournal:
         """Writes all of it anew."""
         writer = JournalWriter()
         lines = [writer.begin(self.origin)]
-        lines += [writer.step(step) for step in history.steps]
+        lines += [writer.step(step, position) for position, step in enumerate(history.steps)]
         lines += [writer.at(history.position), writer.saved(saved, known)]
         try:
             atomic_write(self.path, "".join(lines))
@@ -113,19 +114,21 @@ class SessionJournal:
 def recover(path: Path) -> Recovered | None:
     """Reads a journal that a session left.
 
-    A last line that was not written to its end is left out. Of a journal that is damaged, what is
-    before the damage is recovered, and the file is put aside.
+    A last line that was not written to its end is left out. Of a journal that is damaged, all that
+    can be read is recovered; see `set_aside`.
 
     Returns:
         What it holds; None if there is none.
 
     Raises:
-        LibraryGone: the library of its last steps is not there.
-        InvalidInputError: it cannot be read.
+        LibraryMissing: the library of its last steps is not there.
     """
     if not path.exists():
         return None
-    text = read_bytes(path, LARGEST).decode("utf-8", errors="replace")
+    try:
+        text = read_bytes(path, LARGEST).decode("utf-8", errors="replace")
+    except InvalidInputError as error:
+        return Recovered(damage=str(error))
     whole, _, _ = text.rpartition("\n")
     lines = whole.split("\n") if whole else []
     try:
@@ -135,15 +138,39 @@ def recover(path: Path) -> Recovered | None:
             f"{error}; the last session of this scene, whose steps are in {path}, used it: bring it"
             " back, or delete that file"
         ) from error
-    damaged = not lines
-    for line in lines:
-        try:
-            reader.take(line)
-        except (BurgError, ValueError, KeyError, TypeError, IndexError, AttributeError):
-            damaged = True
-            break
-    aside = _set_aside_damaged(path) if damaged else None
-    return Recovered(reader.history, reader.saved, reader.known, reader.origin, aside)
+    damaged = [number for number, line in enumerate(lines, 1) if not reader.take(line)]
+    return Recovered(
+        reader.history, reader.saved, reader.known, reader.origin, _damage(damaged, len(lines))
+    )
+
+
+def set_aside(path: Path) -> Path:
+    """Renames a damaged journal, so that no other one takes its place.
+
+    Returns:
+        Where it is; `path` itself where nothing can be renamed, and so nothing be written.
+    """
+    number = 1
+    while (aside := path.with_name(f"{path.name}.damaged_{number}")).exists():
+        number += 1
+    try:
+        os.replace(path, aside)
+    except OSError:
+        return path
+    return aside
+
+
+def _damage(damaged: list[int], count: int) -> str:
+    if not count:
+        return "it has no whole line"
+    if not damaged:
+        return ""
+    lines = f"line {damaged[0]}"
+    if len(damaged) > 1:
+        lines = f"lines {', '.join(map(str, damaged[:-1]))} and {damaged[-1]}"
+    if len(damaged) > 5:
+        lines = f"{len(damaged)} lines, the first of them {damaged[0]},"
+    return f"{lines} of {count} cannot be read"
 
 
 def _libraries(lines: list[str]) -> dict[str, ObjectLibrary]:
@@ -176,11 +203,3 @@ def _append(path: Path, line: bytes) -> None:
             with contextlib.suppress(OSError):
                 os.truncate(path, end)
             raise
-
-
-def _set_aside_damaged(path: Path) -> Path:
-    number = 1
-    while (aside := path.with_name(f"{path.name}.damaged_{number}")).exists():
-        number += 1
-    os.replace(path, aside)
-    return aside

@@ -1,21 +1,29 @@
 """Steps of a session as lines of JSON, and back.
 
 An instance is written out in the first line that has it, and goes by its number from then on, as a
-step leaves nearly all of them alone.
+step leaves nearly all of them alone. Lines say which numbers they give and where among the steps
+they are, so that those behind a damaged line can still be read.
 """
 
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from typing import Any
 
-from burg_drake.compose.document import History, HistoryStep, State
-from burg_drake.core.documents import Pose, dump_document, parse_document
+from burg_drake.compose.document import History, HistoryStep, State, name_of
+from burg_drake.core import BurgError
+from burg_drake.core.documents import Pose, dump_document, parse_document, parse_json
+from burg_drake.core.files import Limits
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.document import Instance, SceneDocument
 
 VERSION = 1
+UNREADABLE = (BurgError, ValueError, KeyError, TypeError, AttributeError, OverflowError)
+"""What reading a damaged line ends in."""
+LINE = Limits(size=1 << 26, values=1_000_000, depth=8)
+"""Of one line; the deepest has a list of instances, each with a list of numbers."""
 
 
 class JournalWriter:
@@ -34,9 +42,10 @@ class JournalWriter:
         """
         return _line({"journal": VERSION, "origin": origin})
 
-    def step(self, step: HistoryStep) -> str:
-        """A step that was taken."""
-        values: dict[str, Any] = {"step": step.label, "selection": list(step.state.selection)}
+    def step(self, step: HistoryStep, position: int) -> str:
+        """A step that was taken, and its number in the history."""
+        values: dict[str, Any] = {"step": step.label, "at": position}
+        values["selection"] = list(step.state.selection)
         library = str(step.state.library.root)
         if library != self._library:
             values["library"] = self._library = library
@@ -56,11 +65,6 @@ class JournalWriter:
         values = {} if document is None else self._document(document)
         return _line({"saved": document is not None, "known": known} | values)
 
-    def named(self, name: str, reference: str, library: ObjectLibrary) -> str:
-        """The scene has another name, and refers to a library by something else."""
-        self._head = ""
-        return _line({"named": name, "reference": reference, "root": str(library.root)})
-
     def _document(self, document: SceneDocument) -> dict[str, Any]:
         values: dict[str, Any] = {}
         head = dump_document(replace(document, instances=(), background=()))
@@ -68,10 +72,11 @@ class JournalWriter:
             values["head"] = self._head = head
         placed = (*document.instances, *document.background)
         new = [i for i in dict.fromkeys(placed) if i not in self._numbers]
+        if new:
+            values["from"] = len(self._numbers)
+            values["new"] = [_written(instance) for instance in new]
         for instance in new:
             self._numbers[instance] = len(self._numbers)
-        if new:
-            values["new"] = [_written(instance) for instance in new]
         values["instances"] = [self._numbers[i] for i in document.instances]
         if document.background:
             values["background"] = [self._numbers[i] for i in document.background]
@@ -98,76 +103,128 @@ class JournalReader:
         self.known: str | None = None
         self._libraries = libraries
         self._library: ObjectLibrary | None = None
-        self._instances: list[Instance] = []
+        self._instances: dict[int, Instance] = {}
+        self._next: int | None = 0
+        self._positions: list[int] = []
         self._head: SceneDocument | None = None
+        self._damaged = False
+        self._whole_line = True
 
-    def take(self, line: str) -> None:
-        """Takes the next line.
+    def take(self, line: str) -> bool:
+        """Takes what can be read of the next line.
 
-        Raises:
-            ValueError, KeyError, TypeError, IndexError, AttributeError: it is none.
+        An instance that cannot be read is left out, of this line and of later ones.
+
+        Returns:
+            Whether that is all of the line.
         """
-        values = json.loads(line)
+        self._whole_line = True
+        try:
+            self._take(parse_json(line, "journal", LINE))
+        except UNREADABLE:
+            self._whole_line = False
+            self._next = None  # how many instances the line had is not known
+        self._damaged |= not self._whole_line
+        return self._whole_line
+
+    def _take(self, values: dict[str, Any]) -> None:
         if "journal" in values:
             if values["journal"] != VERSION:
                 raise ValueError(f"version {values['journal']!r}")
-            self.origin = str(values["origin"])
+            self.origin = _text(values["origin"])
         elif "step" in values:
             self._step(values)
         elif "at" in values:
-            self._require_history().go_to(int(values["at"]))
+            self._go_to(_whole(values["at"]))
         elif "saved" in values:
-            self.saved = self._document(values) if values["saved"] else None
-            self.known = values["known"]
-        elif "named" in values:
-            library = self._libraries[values["root"]]
-            history = self._require_history()
-            history.rename(str(values["named"]), str(values["reference"]), library)
-            self._head = None
+            saved = self._document(values) if values["saved"] else None
+            known = values["known"]
+            if not isinstance(known, str | None):
+                raise TypeError("known")
+            self.saved, self.known = saved, known
         else:
             raise ValueError("unknown line")
 
     def _step(self, values: dict[str, Any]) -> None:
-        if "library" in values:
-            self._library = self._libraries[values["library"]]
-        if self._library is None:
+        library = self._libraries[values["library"]] if "library" in values else self._library
+        if library is None:
             raise ValueError("no library")
-        selection = tuple(str(name) for name in values["selection"])
-        state = State(self._document(values), self._library, selection)
-        step = HistoryStep(str(values["step"]), state)
+        state = State(self._document(values), library)
+        label, there = _text(values["step"]), state.instances
+        state = state.select(name for name in values["selection"] if name in there)
+        last = self._positions[self.history.position] if self.history else -1
+        position = _whole(values.get("at", last + 1))
+        self._library = library
         if self.history is None:
             self.history = History(state)
-        else:
-            self.history.add(step)
+            self._positions = [position]
+            return
+        if position <= self._positions[0]:
+            raise ValueError(f"step {position} of a history that begins later")
+        self._go_to(position - 1)
+        self.history.add(HistoryStep(label, state))
+        self._positions[self.history.position :] = [position]
+
+    def _go_to(self, position: int) -> None:
+        """Goes to a step by its number; to the one before it that was read if it was not."""
+        if self.history is None or position < self._positions[0]:
+            raise ValueError(f"no step {position}")
+        self.history.go_to(sum(known <= position for known in self._positions) - 1)
 
     def _document(self, values: dict[str, Any]) -> SceneDocument:
+        head = self._head
         if "head" in values:
-            self._head = parse_document(values["head"], SceneDocument, "journal")
-        if self._head is None:
+            head = parse_document(values["head"], SceneDocument, "journal")
+        if head is None:
             raise ValueError("no head")
-        self._instances += [_read(one) for one in values.get("new", ())]
-        return replace(
-            self._head,
-            instances=tuple(self._instances[i] for i in values["instances"]),
-            background=tuple(self._instances[i] for i in values.get("background", ())),
+        new, written = {}, values.get("new", [])
+        if written:
+            first = values.get("from", self._next)
+            new = self._read_instances(written, _whole(first))
+        instances = self._instances | new
+        document = replace(
+            head,
+            instances=self._known(values["instances"], instances),
+            background=self._known(values.get("background", []), instances),
         )
+        placed = (*document.instances, *document.background)
+        if len({name_of(instance) for instance in placed}) < len(placed):
+            raise ValueError("a name appears twice")
+        self._head, self._instances = head, instances
+        if written and self._next is not None:
+            self._next += len(written)
+        return document
 
-    def _require_history(self) -> History:
-        if self.history is None:
-            raise ValueError("no step")
-        return self.history
+    def _read_instances(self, written: list[Any], first: int) -> dict[int, Instance]:
+        """Instances by their numbers."""
+        found = {}
+        for number, values in enumerate(written, first):
+            try:
+                found[number] = _read(values)
+            except UNREADABLE:
+                self._whole_line = False
+        return found
+
+    def _known(self, numbers: list[Any], instances: dict[int, Instance]) -> tuple[Instance, ...]:
+        """The instances of these numbers, without those that could not be read."""
+        missing = [number for number in map(_whole, numbers) if number not in instances]
+        if missing and self._whole_line and not self._damaged:
+            raise KeyError(missing[0])
+        return tuple(instances[number] for number in numbers if number in instances)
 
 
 def library_roots(lines: list[str]) -> list[str]:
     """Folders of the libraries that lines name, in their order; damaged lines are left out."""
     roots: dict[str, None] = {}
     for line in lines:
-        try:
-            values = json.loads(line)
-            if isinstance(values, dict) and isinstance(values.get("library"), str):
-                roots[values["library"]] = None
-        except ValueError:
+        if '"library"' not in line:
             continue
+        try:
+            values = parse_json(line, "journal", LINE)
+        except BurgError:
+            continue
+        if isinstance(values, dict) and isinstance(values.get("library"), str):
+            roots[values["library"]] = None
     return list(roots)
 
 
@@ -182,9 +239,8 @@ def _written(instance: Instance) -> list[Any]:
 
 def _read(values: list[Any]) -> Instance:
     name, object, translation, rpy_deg, quaternion = values
-    x, y, z = map(float, translation)
     X_SO = Pose(
-        (x, y, z),
+        _floats(translation, 3),  # type: ignore[arg-type]
         None if rpy_deg is None else _floats(rpy_deg, 3),  # type: ignore[arg-type]
         None if quaternion is None else _floats(quaternion, 4),  # type: ignore[arg-type]
     )
@@ -192,6 +248,18 @@ def _read(values: list[Any]) -> Instance:
 
 
 def _floats(values: list[Any], count: int) -> tuple[float, ...]:
-    if len(values) != count:
-        raise ValueError(f"{len(values)} numbers in place of {count}")
-    return tuple(map(float, values))
+    numbers = tuple(map(float, values))
+    if len(numbers) != count or not all(map(math.isfinite, numbers)):
+        raise ValueError(f"{values!r} in place of {count} numbers")
+    return numbers
+
+
+def _text(value: Any) -> str:
+    value.encode()  # a half of a surrogate pair could not be shown
+    return str(value)
+
+
+def _whole(value: Any) -> int:
+    if not isinstance(value, int) or isinstance(value, bool):
+        raise TypeError(f"{value!r} in place of a whole number")
+    return value

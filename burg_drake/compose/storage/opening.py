@@ -10,7 +10,13 @@ from pathlib import Path
 
 from burg_drake.compose.commands import board_size
 from burg_drake.compose.document import History, State
-from burg_drake.compose.storage.journal import LibraryMissing, Recovered, journal_path, recover
+from burg_drake.compose.storage.journal import (
+    LibraryMissing,
+    Recovered,
+    journal_path,
+    recover,
+    set_aside,
+)
 from burg_drake.compose.storage.scene_file import fingerprint
 from burg_drake.compose.storage.scene_lock import SceneInUse, SceneLock
 from burg_drake.compose.storage.scene_storage import Storage
@@ -66,7 +72,7 @@ def open_scene_file(path: Path, address: str = "") -> Opened:
     lock = SceneLock(path, address)
     try:
         found = recover(journal_path(path))
-        notices = _damage(found)
+        notices = _keep_damaged(found, path)
         known = fingerprint(path)
         if found and found.history and found.history.state.document != found.saved:
             if found.known != known:
@@ -126,12 +132,15 @@ def _unsaved(
             continue
         try:
             found = recover(journal_path(place))
-            notices += _damage(found)
+            first = make(place.stem)
             if found is None or found.history is None:
-                return Opened(
-                    History(make(place.stem)), Storage(place, lock, origin=origin), notices
-                )
-            if found.origin == origin and found.saved is None:
+                notices += _keep_damaged(found, place)
+                return Opened(History(first), Storage(place, lock, origin=origin), notices)
+            same_library = found.history.state.library.root == first.library.root
+            lost_origin = not found.origin and bool(found.damage) and same_library
+            if (found.origin == origin or lost_origin) and found.saved is None:
+                notices += _keep_damaged(found, place)
+                found = replace(found, origin=origin)
                 return _recovered(place, None, found, lock, notices)
         except LibraryMissing as error:
             notices += (str(error),)
@@ -162,10 +171,14 @@ def _recovered(
     return Opened(history, storage, notices)
 
 
-def _damage(found: Recovered | None) -> tuple[str, ...]:
-    if found is None or found.aside is None:
+def _keep_damaged(found: Recovered | None, scene: Path) -> tuple[str, ...]:
+    """Puts a damaged journal aside, and says so."""
+    if found is None or not found.damage:
         return ()
-    return (f"the journal of the last session is damaged; it is kept as {found.aside}",)
+    return (
+        f"the journal of the last session is damaged ({found.damage}); all that can be read of it"
+        f" is recovered, and it is kept as {set_aside(journal_path(scene))}",
+    )
 
 
 def _folder(folder: str | Path | None) -> Path:

@@ -50,7 +50,7 @@ class Travel:
 
     def __init__(self, world: CollisionWorld) -> None:
         self._world = world
-        self._fixed = [_convex_shapes(shapes) for shapes in world.fixed.values()]
+        self._fixed = [_convex_shapes(shapes) for shapes in world.fixed.values() if shapes]
         self._known: dict[str, ConvexShapes] = {}
 
     def free_distance(self, names: Sequence[str], direction: Array, limit: float) -> float:

@@ -10,7 +10,15 @@ import viser
 from burg_drake.compose.editing import SessionView
 from burg_drake.core import InvalidInputError
 from burg_drake.ui.view import LETS_GO, BoardLayers, BoardOverlay, LivePicture
-from burg_drake.ui.widgets import PageActions, all_of, box, quiet, quiet_button, upload_button
+from burg_drake.ui.widgets import (
+    PageActions,
+    all_of,
+    box,
+    counted,
+    quiet,
+    quiet_button,
+    upload_button,
+)
 
 if TYPE_CHECKING:
     from burg_drake.cameras.rectification import BoardPicture
@@ -115,7 +123,7 @@ class BackdropPanel:
         self._show_picture(board_picture(image, self._actions.session.view.document.board), name)
 
     def _show_picture(self, found: BoardPicture, name: str) -> None:
-        words = f"{name}: {len(found.ids)} markers, off by {1e3 * found.error:.1f} mm"
+        words = f"{name}: {counted(len(found.ids), 'marker')}, off by {1e3 * found.error:.1f} mm"
         sheet = BoardOverlay(found.image, found.lower, found.upper, float(self._opacity.value))
         self._show_sheet(sheet, f"{words}. {found.note}" if found.note else words)
 

@@ -7,8 +7,7 @@ from typing import Any
 
 import viser
 
-from burg_drake.compose import ComposeSession
-from burg_drake.ui.view import Coloring, set_view
+from burg_drake.ui.view import Coloring, PageViews
 from burg_drake.ui.widgets import PageActions, quiet_button
 
 COLORINGS: dict[str, Coloring] = {
@@ -24,13 +23,18 @@ class DisplayPanel:
     Args:
         gui: of viser, in whose container the panel goes.
         actions: what it may do.
+        views: of all pages.
         on_change: called when something is to be drawn differently.
     """
 
     def __init__(
-        self, gui: viser.GuiApi, actions: PageActions, on_change: Callable[[], None]
+        self,
+        gui: viser.GuiApi,
+        actions: PageActions,
+        views: PageViews,
+        on_change: Callable[[], None],
     ) -> None:
-        self._session: ComposeSession = actions.session
+        self._views = views
         self._on_change = on_change
         icon = viser.Icon
         with gui.add_folder("Display"):
@@ -68,9 +72,9 @@ class DisplayPanel:
     def look_from_above(self, client: viser.ClientHandle | None) -> None:
         """Brings a page's camera above the board."""
         if client is not None:
-            set_view(client, self._session.view.document.board, from_above=True)
+            self._views.look(client, above=True)
 
     def look_from_front(self, client: viser.ClientHandle | None) -> None:
         """Brings a page's camera in front of the board."""
         if client is not None:
-            set_view(client, self._session.view.document.board, from_above=False)
+            self._views.look(client, above=False)

@@ -9,7 +9,7 @@ import viser
 from burg_drake.compose.commands import MOST, Clear, RandomConfiguration
 from burg_drake.compose.editing import SessionView
 from burg_drake.scene.document import LAYOUTS
-from burg_drake.ui.widgets import PageActions, quiet_button
+from burg_drake.ui.widgets import PageActions, confirm, counted, quiet_button
 
 LARGEST_SEED = 2**31 - 1
 
@@ -36,14 +36,27 @@ class FillPanel:
             actions.clicked(
                 quiet_button(gui, "Shuffle", width=6, icon=icon.ARROWS_SHUFFLE), self._shuffle
             )
-            self._clear = actions.clicked(
-                quiet_button(gui, "Clear scene", width=6, icon=icon.TRASH),
-                lambda: actions.session.do(Clear()),
+            self._clear = actions.clicked_by(
+                quiet_button(gui, "Clear scene", width=6, icon=icon.TRASH), self._ask_to_clear
             )
 
     def show(self, view: SessionView) -> None:
         """Brings the panel to a view."""
         self._clear.disabled = not view.instances
+
+    def _ask_to_clear(self, client: viser.ClientHandle | None) -> None:
+        session = self._actions.session
+        count = len(session.view.instances)
+        if client is not None and count:
+            confirm(
+                self._actions,
+                client,
+                "Clear the scene?",
+                f"This takes {counted(count, 'object')} off the board. Undo (Ctrl+Z) brings"
+                " everything back.",
+                "Clear it",
+                lambda: session.do(Clear()),
+            )
 
     def _shuffle(self) -> None:
         seed = self._seed.value

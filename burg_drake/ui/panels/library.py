@@ -15,6 +15,7 @@ from burg_drake.ui.widgets import (
     PageActions,
     all_of,
     box,
+    counted,
     picture_button,
     quiet,
     show_picture,
@@ -63,16 +64,6 @@ class LibraryPanel:
         """Shows the pictures that are there by now."""
         self._draw()
 
-    def _add(self, name: str, client: viser.ClientHandle | None) -> None:
-        view = self._actions.session.do(AddObject(name))
-        (added,) = view.selection
-        if view.status[added] in ("collision", "out_of_bounds"):
-            self._actions.show_warning(
-                client,
-                f"There is no free place for {added!r}: it is in the middle of the board; move it,"
-                " make room, or choose a larger board.",
-            )
-
     def _fill(self, library: ObjectLibrary) -> None:
         for button in self._buttons.values():
             button.remove()
@@ -82,7 +73,7 @@ class LibraryPanel:
                 hint = entry.description or name
                 weight = "background only" if entry.is_fixed else f"{1e3 * entry.mass:.0f} g"
                 button = picture_button(self._gui, name, None, hint=f"{hint} ({weight})")
-                self._actions.clicked_by(button, partial(self._add, name))
+                self._actions.clicked(button, partial(self._actions.session.do, AddObject(name)))
                 self._buttons[name] = button
         self._filter(self._search.value)
 
@@ -101,7 +92,9 @@ class LibraryPanel:
         library = self._library
         assert library is not None
         total = len(library.objects)
-        count = f"{total} objects" if found == total else f"{found} of {total} objects"
+        count = f"{found} of {counted(total, 'object')}"
+        if found == total:
+            count = counted(total, "object")
         why = self._pictures.missing if self._pictures else ""
         content = all_of(
             box(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 import viser
@@ -33,9 +33,12 @@ class ObjectPanel:
     Args:
         gui: of viser, in whose container the panel goes.
         actions: what it may do.
+        switch_axes: makes arrows lie along the board or along the object.
     """
 
-    def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
+    def __init__(
+        self, gui: viser.GuiApi, actions: PageActions, switch_axes: Callable[[], None]
+    ) -> None:
         self._actions = actions
         self._text = gui.add_html("")
         self._one = gui.add_folder(None)
@@ -47,16 +50,25 @@ class ObjectPanel:
                 ),
                 self._fix,
             )
-            self._planar = _Numbers(gui, actions, free=False)
-            self._free = _Numbers(gui, actions, free=True)
+            self._numbers = _Numbers(gui, actions)
         self._restrict = actions.chosen(
             gui.add_checkbox(
-                "x, y, yaw only",
+                "Keep upright",
                 True,
-                hint="Objects keep their height and tilt while they are moved; without it they are"
-                " free, and have handles for all six directions",
+                hint="Objects keep their tilt while they are moved, and their height unless they"
+                " are raised; without it they have handles for all six directions",
             ),
             lambda planar: actions.session.restrict_movement(planar),
+        )
+        self._axes = actions.clicked(
+            quiet_button(
+                gui,
+                "Arrows: board or object",
+                icon=viser.Icon.AXIS_X,
+                hint="Arrows lie along the axes of the board, or of the object (X); rings always"
+                " lie about those of the object",
+            ),
+            switch_axes,
         )
         self._some = gui.add_folder(None)
         with self._some:
@@ -68,12 +80,12 @@ class ObjectPanel:
         self._restrict.value = view.planar
         self._one.visible = len(names) == 1
         self._some.visible = bool(names)
+        self._axes.visible = len(names) == 1 and not view.planar
         self._text.content = _description(view)
         if len(names) == 1:
             self._name.show(names[0])
             self._fixed.value = view.instances[names[0]] in view.document.background
-            for numbers, shown in ((self._planar, view.planar), (self._free, not view.planar)):
-                numbers.show(view.X_SO(names[0]), shown)
+            self._numbers.show(view.X_SO(names[0]), free=not view.planar)
 
     def _rename(self, new: str) -> None:
         names = self._actions.session.view.selection
@@ -86,65 +98,71 @@ class ObjectPanel:
     def _buttons(self, gui: viser.GuiApi, actions: PageActions) -> None:
         icon, selected = viser.Icon, actions.with_selection
         actions.clicked(
-            quiet_button(gui, "−90°", width=3, hint="Turn clockwise"),
+            quiet_button(gui, "−90°", width=2, hint="Turn clockwise"),
             selected(lambda names: Turn(names, -QUARTER_DEG)),
         )
         actions.clicked(
-            quiet_button(gui, "+90°", width=3, hint="Turn counter-clockwise"),
+            quiet_button(gui, "+90°", width=2, hint="Turn counter-clockwise"),
             selected(lambda names: Turn(names, QUARTER_DEG)),
         )
         actions.clicked(
-            quiet_button(gui, "Copy", width=3, icon=icon.COPY, hint="Duplicate (Ctrl+D)"),
+            quiet_button(gui, "Copy", width=4, icon=icon.COPY, hint="Duplicate (Ctrl+D)"),
             selected(Duplicate),
         )
         actions.clicked(
-            quiet_button(gui, "Delete", width=3, icon=icon.TRASH, hint="Delete (Del)"),
+            quiet_button(gui, "Delete", width=4, icon=icon.TRASH, hint="Delete (Del)"),
             selected(Delete),
         )
 
 
 class _Numbers:
-    """Fields of a pose: x, y and yaw, or all six."""
+    """Fields of a pose: position, and yaw or all three angles."""
 
-    def __init__(self, gui: viser.GuiApi, actions: PageActions, *, free: bool) -> None:
-        self._actions, self._free = actions, free
-        limit = LARGEST_MM
-        if free:
-            position: Any = gui.add_vector3("x, y, z [mm]", (0.0, 0.0, 0.0), step=0.01)
-            angles: Any = gui.add_vector3("roll, pitch, yaw [°]", (0.0, 0.0, 0.0), step=0.01)
-        else:
-            position = gui.add_vector2("x, y [mm]", (0.0, 0.0), step=0.01)
-            angles = gui.add_number("yaw [°]", 0.0, step=0.01, min=-limit, max=limit)
-        self._position = actions.typed(position, self._place)
-        self._angles = actions.typed(angles, self._turn)
+    def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
+        self._actions = actions
+        zeros = (0.0, 0.0, 0.0)
+        self._position = actions.typed(
+            gui.add_vector3("x, y, z [mm]", zeros, step=0.01), self._place
+        )
+        self._yaw = actions.typed(
+            gui.add_number("yaw [°]", 0.0, step=0.01, min=-LARGEST_MM, max=LARGEST_MM),
+            self._turn,
+        )
+        self._angles = actions.typed(
+            gui.add_vector3("roll, pitch, yaw [°]", zeros, step=0.01), self._turn_freely
+        )
 
-    def show(self, X_SO: Array, visible: bool) -> None:
-        """Shows a pose (4, 4), or nothing."""
+    def show(self, X_SO: Array, *, free: bool) -> None:
+        """Shows a pose (4, 4)."""
         position, angles = _numbers(X_SO)
-        self._position.handle.visible = self._angles.handle.visible = visible
-        self._position.show(position if self._free else position[:2])
-        self._angles.show(angles if self._free else angles[2])
+        self._yaw.handle.visible, self._angles.handle.visible = not free, free
+        self._position.show(position)
+        self._yaw.show(angles[2])
+        self._angles.show(angles)
 
     def _place(self, typed_mm: tuple[float, ...]) -> None:
         """Moves the selected object; numbers that were left alone stay exact."""
         if (X_SO := self._selected()) is None:
             return
         shown_mm, _ = _numbers(X_SO)
-        typed_mm = (*typed_mm, shown_mm[2])[:3]
         exact_mm = 1e3 * X_SO[:3, 3]
         p_mm = [e if t == s else t for t, s, e in zip(typed_mm, shown_mm, exact_mm, strict=True)]
         X_SO[:3, 3] = 1e-3 * np.array(p_mm)
         self._move(X_SO, "position")
 
-    def _turn(self, typed: Any) -> None:
+    def _turn(self, yaw_deg: float) -> None:
+        """Turns the selected object about the vertical."""
+        if (X_SO := self._selected()) is not None:
+            self._turn_freely((*_numbers(X_SO)[1][:2], yaw_deg))
+
+    def _turn_freely(self, typed_deg: tuple[float, ...]) -> None:
         """Turns the selected object; angles that were left alone stay exact."""
         if (X_SO := self._selected()) is None:
             return
         _, shown_deg = _numbers(X_SO)
-        typed_deg = tuple(typed) if self._free else (*shown_deg[:2], typed)
         exact_deg = np.rad2deg(rpy_from_rotation(X_SO[:3, :3]))
         rpy = [e if t == s else t for t, s, e in zip(typed_deg, shown_deg, exact_deg, strict=True)]
-        if typed_deg != shown_deg:
+        if tuple(typed_deg) != shown_deg:
             X_SO[:3, :3] = rotation_from_rpy(np.deg2rad(rpy))
         self._move(X_SO, "angles")
 
@@ -155,7 +173,8 @@ class _Numbers:
 
     def _move(self, X_SO: Array, field: str) -> None:
         session = self._actions.session
-        session.do(MoveObjects({session.view.selection[0]: X_SO}), field=field)
+        name = session.view.selection[0]
+        session.do(MoveObjects({name: X_SO}, raises=True), field=field)
 
 
 def _numbers(X_SO: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -184,4 +203,6 @@ def _description(view: SessionView) -> str:
     if entry is not None and not entry.is_fixed:
         kind = f"{kind}, {1e3 * entry.mass:.0f} g"
     look = style_of(status)
-    return all_of(box(title(names[0]), quiet(kind), dot(look.hex), look.words))
+    gap = view.gaps.get(names[0])
+    height = quiet(f"{1e3 * gap:.1f} mm above what is below") if gap else None
+    return all_of(box(title(names[0]), quiet(kind), dot(look.hex), look.words, height))

@@ -1,15 +1,18 @@
-"""Handles at the selection while it may move freely: arrows and rings for all six directions.
+"""Handles at the selection, which move it and turn it.
 
-Where movement is restricted to the plane there are none; the mouse drags objects themselves there.
+While movement is restricted there are an arrow upwards beside what is selected and a ring about the
+vertical; otherwise there are arrows, squares and rings for all six directions.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import viser
 
+from burg_drake.compose.document import bounds, missing_objects
 from burg_drake.compose.editing import Drag, SessionView
 from burg_drake.core import (
     Array,
@@ -19,10 +22,30 @@ from burg_drake.core import (
     rotation_from_quaternion,
 )
 from burg_drake.ui.pointing.centers import mean_center
+from burg_drake.ui.pointing.handles import GIZMO_SIZE, Handle, handle_under
+from burg_drake.ui.pointing.pointer import PageCamera
 from burg_drake.ui.widgets import PageActions
 
-SIZE = 0.11
-"""Length of the arrows [m]."""
+BESIDE = 0.02
+"""From what is selected to the arrow upwards, which must not cover it from above [m]."""
+EVERY_AXIS = (True, True, True)
+UP_ALONE, LEVEL = (False, False, True), (True, True, False)
+"""Axes of the arrow upwards, and those that a ring about the vertical lies along."""
+
+
+@dataclass(eq=False)
+class _Part:
+    """Arrows, or rings.
+
+    Attributes:
+        name: of the node.
+        node: of viser, once it was needed.
+        X_SG: (4, 4) where it is shown.
+    """
+
+    name: str
+    node: viser.TransformControlsHandle | None = None
+    X_SG: Array | None = None
 
 
 class Gizmo:
@@ -35,27 +58,61 @@ class Gizmo:
 
     def __init__(self, scene: viser.SceneApi, actions: PageActions) -> None:
         self._scene, self._actions = scene, actions
-        self._handle: viser.TransformControlsHandle | None = None
+        self._arrows, self._rings = _Part("/gizmo/arrows"), _Part("/gizmo/rings")
+        self._along_object = False
+        self._planar = True
         self._drag: Drag | None = None
         self._who: int | None = None
+        self._held: _Part | None = None
         self._X_SGi = np.eye(4)
         self._start: dict[str, Array] = {}
 
     def show(self, view: SessionView) -> None:
-        """Brings the handles to a view; while they are dragged they are the pointer's."""
-        if self._drag is not None and not self._drag.is_over:
-            return
-        if not view.selection or view.planar:
-            if self._handle is not None:
-                self._handle.visible = False
-            return
-        if self._handle is None:
-            self._handle = self._made()
-        alone = len(view.selection) == 1
-        R_SG = view.X_SO(view.selection[0])[:3, :3] if alone else np.eye(3)
-        self._handle.position = mean_center(view, view.selection)
-        self._handle.wxyz = quaternion_from_rotation(R_SG)
-        self._handle.visible = True
+        """Brings the handles to a view; those that are dragged are the pointer's."""
+        self._planar = view.planar
+        going_on = self._drag is not None and not self._drag.is_over
+        lost = missing_objects(view.state)
+        names = tuple(name for name in view.selection if name not in lost)
+        for part, X_SG in (
+            (self._arrows, self._arrows_pose(view, names) if names else None),
+            (self._rings, self._rings_pose(view, names) if names else None),
+        ):
+            if going_on and part is self._held:
+                continue
+            part.X_SG = X_SG
+            if X_SG is None:
+                if part.node is not None:
+                    part.node.visible = False
+                continue
+            if part.node is None:
+                part.node = self._made(part)
+            axes = EVERY_AXIS
+            if view.planar:
+                axes = UP_ALONE if part is self._arrows else LEVEL
+            if part.node.active_axes != axes:
+                part.node.active_axes = axes
+                part.node.disable_sliders = view.planar or part is self._rings
+            part.node.position = X_SG[:3, 3]
+            part.node.wxyz = quaternion_from_rotation(X_SG[:3, :3])
+            part.node.visible = True
+
+    def switch_axes(self) -> None:
+        """Arrows along the object's own axes in place of the board's, or the other way round."""
+        self._along_object = not self._along_object
+        self.show(self._actions.session.view)
+
+    def handle_under(self, camera: PageCamera, p_SQ: Array) -> Handle | None:
+        """The handle that is drawn at a pointer, if any is; see `handles.handle_under`."""
+        parts: list[Handle] = []
+        if (X_SG := self._arrows.X_SG) is not None:
+            axes = (2,) if self._planar else (0, 1, 2)
+            parts += [Handle("arrow", X_SG, axis) for axis in axes]
+            if not self._planar:
+                parts += [Handle("square", X_SG, axis) for axis in axes]
+        if (X_SG := self._rings.X_SG) is not None:
+            axes = (2,) if self._planar else (0, 1, 2)
+            parts += [Handle("ring", X_SG, axis) for axis in axes]
+        return handle_under(parts, camera, p_SQ)
 
     def drop(self, client_id: int) -> None:
         """A page is gone; what it held stays where it is."""
@@ -68,32 +125,49 @@ class Gizmo:
         self._drag.cancel()
         return True
 
-    def _made(self) -> viser.TransformControlsHandle:
-        handle = self._scene.add_transform_controls(
-            "/gizmo",
-            scale=SIZE,
+    def _arrows_pose(self, view: SessionView, names: tuple[str, ...]) -> Array:
+        middle = mean_center(view, names)
+        if view.planar:
+            right = max(float(bounds(view.state, name)[1, 0]) for name in names)
+            return make_pose(p_AB=(right + BESIDE, middle[1], middle[2]))
+        R_SO = view.X_SO(names[0])[:3, :3]
+        alone = len(names) == 1
+        return make_pose(R_SO if alone and self._along_object else np.eye(3), middle)
+
+    def _rings_pose(self, view: SessionView, names: tuple[str, ...]) -> Array:
+        own = len(names) == 1 and not view.planar
+        R_SG = view.X_SO(names[0])[:3, :3] if own else np.eye(3)
+        return make_pose(R_SG, mean_center(view, names))
+
+    def _made(self, part: _Part) -> viser.TransformControlsHandle:
+        node = self._scene.add_transform_controls(
+            part.name,
+            scale=GIZMO_SIZE,
             line_width=3.0,
+            disable_axes=part is self._rings,
+            disable_sliders=part is self._rings,
+            disable_rotations=part is self._arrows,
             depth_test=False,
             opacity=0.9,
         )
 
-        @handle.on_update
+        @node.on_update
         async def _(event: Any) -> None:
             X_SG = make_pose(
                 rotation_from_quaternion(event.target.wxyz), np.array(event.target.position)
             )
             who, client = event.client_id, event.client
             if event.phase == "start":
-                self._actions.submit(lambda: self._begin(who, X_SG), client)
+                self._actions.submit(lambda: self._begin(who, part, X_SG), client)
             elif event.phase == "update":
                 self._actions.submit(lambda: self._move(who, X_SG), client, key=f"gizmo {who}")
             else:
                 self._actions.submit(lambda: self._end(who), client)
 
-        return handle
+        return node
 
-    def _begin(self, who: int | None, X_SG: Array) -> None:
-        self._who = who
+    def _begin(self, who: int | None, part: _Part, X_SG: Array) -> None:
+        self._who, self._held = who, part
         view = self._actions.session.view
         self._X_SGi = X_SG
         self._start = {name: view.X_SO(name) for name in view.selection}
@@ -103,12 +177,12 @@ class Gizmo:
         if who != self._who or self._drag is None or self._drag.is_over:
             return
         X = X_SG @ inverse(self._X_SGi)
-        self._drag.move({name: X @ X_SO for name, X_SO in self._start.items()})
+        self._drag.move({name: X @ X_SO for name, X_SO in self._start.items()}, raises=True)
 
     def _end(self, who: int | None) -> None:
         if who != self._who:
             return
-        drag, self._drag, self._who = self._drag, None, None
+        drag, self._drag, self._who, self._held = self._drag, None, None, None
         if drag is not None and not drag.is_over:
             drag.end()
         self.show(self._actions.session.view)

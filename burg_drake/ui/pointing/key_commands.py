@@ -18,10 +18,12 @@ STEP, FINE_STEP = 5e-3, 1e-3
 TURN_DEG = 15.0
 
 DIRECTIONS = {
-    "left": (-1.0, 0.0),
-    "right": (1.0, 0.0),
-    "far": (0.0, 1.0),
-    "near": (0.0, -1.0),
+    "left": (-1.0, 0.0, 0.0),
+    "right": (1.0, 0.0, 0.0),
+    "far": (0.0, 1.0, 0.0),
+    "near": (0.0, -1.0, 0.0),
+    "up": (0.0, 0.0, 1.0),
+    "down": (0.0, 0.0, -1.0),
 }
 
 
@@ -42,9 +44,9 @@ def selection_calls(session: ComposeSession) -> dict[str, Callable[[], Any]]:
         "turn_right": lambda: session.do(Turn(selected(), -TURN_DEG)),
         "next_pose": lambda: next_pose(session),
     }
-    for name, (x, y) in DIRECTIONS.items():
+    for name, direction in DIRECTIONS.items():
         for kind, step in ((name, STEP), (f"{name}_finely", FINE_STEP)):
-            offset = step * np.array([x, y, 0.0])
+            offset = step * np.array(direction)
             calls[kind] = partial(shift, session, offset)
     return calls
 
@@ -55,7 +57,7 @@ def shift(session: ComposeSession, offset: Any) -> None:
     X_SO = {name: view.X_SO(name) for name in view.selection}
     for X in X_SO.values():
         X[:3, 3] += offset
-    session.do(MoveObjects(X_SO))
+    session.do(MoveObjects(X_SO, raises=True))
 
 
 def next_pose(session: ComposeSession) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import viser
 
 from burg_drake.ui.pointing.centers import center
+from burg_drake.ui.pointing.object_drags import ObjectDrags
 from burg_drake.ui.pointing.pointer import PageCamera
 from burg_drake.ui.widgets import PageActions
 
@@ -23,10 +24,11 @@ class Picking:
     Args:
         scene: of viser.
         actions: what may be done with the session.
+        drags: with Shift they are no rectangles.
     """
 
-    def __init__(self, scene: viser.SceneApi, actions: PageActions) -> None:
-        self._actions = actions
+    def __init__(self, scene: viser.SceneApi, actions: PageActions, drags: ObjectDrags) -> None:
+        self._actions, self._drags = actions, drags
         self._last: tuple[int, tuple[float, float]] | None = None
 
         async def beside(event: Any) -> None:
@@ -55,6 +57,8 @@ class Picking:
     async def _rectangle(self, event: Any) -> None:
         camera = PageCamera.of(event.client.camera)
         lower, upper = np.array(event.screen_min), np.array(event.screen_max)
+        if self._drags.is_end_of_turn(event.client_id, np.stack([lower, upper])):
+            return
         more = ADD in (event.modifier or "")
         self._actions.submit(lambda: self._within(camera, lower, upper, more), event.client)
 

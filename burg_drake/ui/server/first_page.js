@@ -116,4 +116,25 @@
     if (!byPointer || !(isTicked || event.target.closest?.("[role=option]"))) return;
     setTimeout(() => document.activeElement?.blur(), 0);
   });
+
+  // Where the window is narrow, panels begin folded: the library, and on still narrower ones both;
+  // on phones they are a sheet, whose head folds it.
+  const FOLDED_AT = { left: 1100, right: 800 }; // width of the window [pixel]
+  const PHONE = 576;
+  const LOOK_EVERY = 200; // for panels that are not there yet [ms]
+  const toFold = Object.keys(FOLDED_AT).filter((side) => innerWidth < FOLDED_AT[side]);
+  const fold = setInterval(() => {
+    const sheet = document.querySelector(".mantine-Paper-root[style*='position: fixed']");
+    if (innerWidth <= PHONE && sheet !== null) {
+      sheet.querySelector("[style*='cursor: pointer'][style*='3.5em']")?.click();
+      toFold.length = 0;
+    }
+    for (const side of [...toFold]) {
+      const handle = document.querySelector(`[data-dock-region-collapse=${side}]`);
+      if (handle === null) continue;
+      if (handle.getAttribute("aria-expanded") === "true") handle.click();
+      toFold.splice(toFold.indexOf(side), 1);
+    }
+    if (toFold.length === 0) clearInterval(fold);
+  }, LOOK_EVERY);
 })();

@@ -4,6 +4,7 @@ from .board_layers import (
     BoardOverlay as BoardOverlay,
 )
 from .ghosts import GhostView as GhostView
+from .heights import HeightView as HeightView
 from .live_picture import (
     LETS_GO as LETS_GO,
     LivePicture as LivePicture,
@@ -15,7 +16,4 @@ from .objects import (
     SceneView as SceneView,
     ShownInstance as ShownInstance,
 )
-from .viewpoints import (
-    set_initial_view as set_initial_view,
-    set_view as set_view,
-)
+from .viewpoints import PageViews as PageViews

@@ -22,6 +22,7 @@ from .status_colors import (
 from .texts import (
     all_of as all_of,
     box as box,
+    counted as counted,
     dot as dot,
     head as head,
     listing as listing,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import viser
 
@@ -14,6 +15,8 @@ from burg_drake.ui.widgets.typed_field import TYPING, TypedField
 
 SHORT, LONG = 5.0, 12.0
 """Messages stay for that time [s]: those that tell what was done, those that tell what failed."""
+MAX_MESSAGES = 3
+"""On a page at a time: older ones make room, so that a new one is never out of view."""
 
 
 class PageActions:
@@ -33,6 +36,7 @@ class PageActions:
         self.queue = ActionQueue(self._refused)
         self.on_refused: Callable[[], None] = lambda: None
         self._server = server
+        self._told: WeakKeyDictionary[viser.ClientHandle, list[Any]] = WeakKeyDictionary()
 
     def submit(
         self,
@@ -108,4 +112,12 @@ class PageActions:
     ) -> None:
         clients = [client] if client is not None else self._server.get_clients().values()
         for each in clients:
-            each.add_notification(title, line, auto_close_seconds=seconds, color=color)
+            shown = self._told.setdefault(each, [])
+            for same in [note for note in shown if note.body == line]:
+                same.remove()
+                shown.remove(same)
+            shown.append(
+                each.add_notification(title, line, auto_close_seconds=seconds, color=color)
+            )
+            while len(shown) > MAX_MESSAGES:
+                shown.pop(0).remove()

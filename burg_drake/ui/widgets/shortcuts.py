@@ -48,6 +48,8 @@ _SPOKEN = {
     "arrowright": "→",
     "arrowup": "↑",
     "arrowdown": "↓",
+    "pageup": "Page↑",
+    "pagedown": "Page↓",
 }
 
 SHORTCUTS: tuple[Shortcut, ...] = (
@@ -68,9 +70,14 @@ SHORTCUTS: tuple[Shortcut, ...] = (
     Shortcut("right_finely", "arrowright", "shift", "Move 1 mm to the right"),
     Shortcut("far_finely", "arrowup", "shift", "Move 1 mm away"),
     Shortcut("near_finely", "arrowdown", "shift", "Move 1 mm nearer"),
+    Shortcut("up", "pageup", None, "Move 5 mm up"),
+    Shortcut("down", "pagedown", None, "Move 5 mm down"),
+    Shortcut("up_finely", "pageup", "shift", "Move 1 mm up"),
+    Shortcut("down_finely", "pagedown", "shift", "Move 1 mm down"),
     Shortcut("turn_left", "Q", None, "Turn by 15° counter-clockwise"),
     Shortcut("turn_right", "E", None, "Turn by 15° clockwise"),
     Shortcut("next_pose", "P", None, "Next stable pose"),
+    Shortcut("axes", "X", None, "Arrows along the board, or along the object"),
     Shortcut("snap", "G", None, "Snap to the grid"),
     Shortcut("put_down", "B", None, "Put down until it stands"),
     Shortcut("settle", "S", "shift", "Settle in physics"),
@@ -86,6 +93,7 @@ MOUSE: tuple[tuple[str, str], ...] = (
     ("Shift+drag on free space", "Select all in a rectangle"),
     ("Drag an object", "Move it, and all that is selected with it, over the board"),
     ("Shift+drag an object", "Turn it about the vertical"),
+    ("Drag an arrow or a ring", "Move or turn what is selected along it or about it"),
     ("Drag on free space, wheel, right drag", "Rotate, zoom and shift the view"),
 )
 

@@ -92,6 +92,11 @@ def picture(png: bytes | None, kind: str) -> str:
     return str(element("img", class_=kind, src=source))
 
 
+def counted(count: int, noun: str) -> str:
+    """Such as `1 object` and `2 objects`."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def all_of(*children: Child) -> str:
     """Pieces one after the other."""
     return str(join(*children))
