@@ -21,8 +21,8 @@ VERSION = 3
 """Raise it when a stage gives other results for the same input; everything is then built anew."""
 
 POSES_VERSION = 2
-"""Raise it when only the stable poses come out otherwise: geometry is then built again from the same
-pieces. It is no part of `build`, which seeds the sampling of grasps on the same surface."""
+"""Raise it when only the stable poses come out otherwise: geometry is then built again from the
+same pieces. It is no part of `build`, which seeds the sampling of grasps on the same surface."""
 
 
 @dataclass(frozen=True)

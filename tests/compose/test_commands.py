@@ -68,7 +68,7 @@ def test_objects_are_added_where_they_are_free(session: ComposeSession) -> None:
 
 def test_another_stable_pose_keeps_place_and_turn(three: ComposeSession) -> None:
     before = three.view
-    lying = three.do(SetPose(("box",), 2))
+    lying = three.do(SetPose(("box",), 0))
     np.testing.assert_allclose(
         center_of_mass(lying, "box")[:2], center_of_mass(before, "box")[:2], atol=ROUNDED
     )

@@ -35,13 +35,14 @@ class AddObject:
 
     Attributes:
         object: its name in the library.
-        stable_pose: that it stands in.
+        stable_pose: that it stands in; if None, as its mesh stands where that is stable, and else
+            the most probable one.
         position: x and y of its centre of mass [m]; a free place near the middle if None.
         yaw_deg: by which it is turned; not at all if None, unless there is room only if it is.
     """
 
     object: str
-    stable_pose: int = 0
+    stable_pose: int | None = None
     position: tuple[float, float] | None = None
     yaw_deg: float | None = None
 
@@ -50,7 +51,10 @@ class AddObject:
         return f"add {self.object}"
 
     def apply(self, state: State, surroundings: Surroundings) -> State:
-        X_SO = stable_pose_matrix(state, self.object, self.stable_pose)
+        pose = self.stable_pose
+        if pose is None:
+            pose = state.library.entry(self.object).proposed_pose
+        X_SO = stable_pose_matrix(state, self.object, pose)
         yaw_deg = require_number(self.yaw_deg or 0.0, "yaw", -360.0, 360.0, "degrees")
         position = self.position
         if position is None:

@@ -22,7 +22,7 @@ MAX_DEVIATION = 2e-4
 surfaces differ by more are two poses for physics."""
 
 MAX_DEVIATION_SHARE = 0.005
-"""The same as a share of the object's diagonal, which counts where it is less: for small objects."""
+"""The same as a share of the object's diagonal, for small objects: the smaller one counts."""
 
 COVERED = 0.98
 """Share of the surface that must be within the tolerance, for physics."""
@@ -80,7 +80,7 @@ class Symmetries:
 
         Args:
             direction: (3,) unit vector of O.
-            towards: (3,) unit vector; of all turns about `axis` the one that comes nearest is taken.
+            towards: (3,) unit vector; of all turns about `axis` the one that comes nearest counts.
 
         Returns:
             (M, 3) unit vectors.
@@ -161,12 +161,12 @@ class SymmetrySearch:
             for R in self._starts(a, b):
                 if _known(R, found):
                     continue
-                R = self._refined(R)
-                if R is None or _known(R, found) or not self.fits(R):
+                refined = self._refined(R)
+                if refined is None or _known(refined, found) or not self.fits(refined):
                     continue
                 if axis is not None:
-                    return Symmetries(np.stack([np.eye(3), R]), axis)
-                found = self._products([*found, R])
+                    return Symmetries(np.stack([np.eye(3), refined]), axis)
+                found = self._products([*found, refined])
         return Symmetries(np.stack(found), axis)
 
     def turns_about(self, axis: Array) -> bool:
@@ -260,11 +260,11 @@ class SymmetrySearch:
             for b in found[1:]:
                 if len(group) >= MAX_TURNS:
                     return group
-                product = b @ a
-                if not _known(product, group):
-                    product = self._refined(product)
-                    if product is not None and not _known(product, group) and self.fits(product):
-                        group.append(product)
+                if _known(b @ a, group):
+                    continue
+                product = self._refined(b @ a)
+                if product is not None and not _known(product, group) and self.fits(product):
+                    group.append(product)
         return group
 
 
@@ -275,7 +275,8 @@ def _second_moments(triangles: Array) -> Array:
     total = triangles.sum(axis=1)
     moments = np.einsum("f,fki,fkj->ij", area, triangles, triangles)
     moments += np.einsum("f,fi,fj->ij", area, total, total)
-    return moments / (12.0 * area.sum())
+    mean: Array = moments / (12.0 * area.sum())
+    return mean
 
 
 def _known(R: Array, found: Sequence[Array]) -> bool:
@@ -314,7 +315,8 @@ def _even_order(count: int) -> NDArray[np.int64]:
 def _triangle_normals(triangles: Array) -> Array:
     """(F, 3) unit normals of triangles (F, 3, 3); zero where one has no area."""
     cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    return cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
+    normals: Array = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
+    return normals
 
 
 def spread_over(surface: trimesh.Trimesh, count: int) -> tuple[Array, NDArray[np.int64]]:
