@@ -42,6 +42,11 @@ from burg_drake.station.document import (
     boxes_in_scene,
 )
 
+SAME_OBJECTS_SHARE = 0.8
+"""Share of the attempts in which a scene keeps the objects that were drawn for it: poses and places
+are drawn anew first, so that objects that are refused often do not get rare. Others are drawn for
+the last attempts, so that a set for which there is no room does not cost the scene."""
+
 NO_ROOM = "an object found no place"
 REASONS = {
     "out_of_bounds": "an object came to lie beyond the edge of board or table",
@@ -140,8 +145,11 @@ class SceneSampler:
     def _draw(self, number: int, attempt: int, folder: Path) -> tuple[Scene, tuple[str, ...], int]:
         """An attempt before it is settled, what is missing in it, and the tries that it took."""
         recipe = self.recipe
-        rng = rng_from("sampled scene", self._content, number, attempt)
+        first = 1 if attempt <= attempts_with_same_objects(recipe) else attempt
+        rng = rng_from("sampled scene", self._content, number, first)
         wanted = _chosen(recipe, self.library, self.station, rng)
+        if attempt != first:
+            rng = rng_from("sampled scene", self._content, number, attempt)
         laid_out = arrange(
             wanted,
             self._shapes,
@@ -188,6 +196,11 @@ class SceneSampler:
     def _with_origin(self, scene: Scene, number: int, attempt: int) -> Scene:
         origin = SceneOrigin(**vars(self.provenance), number=number, attempt=attempt)
         return Scene(replace(scene.document, origin=origin), scene.library, scene.path)
+
+
+def attempts_with_same_objects(recipe: SceneRecipe) -> int:
+    """Number of attempts in which a scene keeps the objects that were drawn for it."""
+    return max(1, round(SAME_OBJECTS_SHARE * recipe.attempts))
 
 
 def sample_scene(

@@ -20,6 +20,10 @@ from burg_drake.pipeline.source import ObjectSource, check_source
 VERSION = 3
 """Raise it when a stage gives other results for the same input; everything is then built anew."""
 
+POSES_VERSION = 2
+"""Raise it when only the stable poses come out otherwise: geometry is then built again from the
+same pieces. It is no part of `build`, which seeds the sampling of grasps on the same surface."""
+
 
 @dataclass(frozen=True)
 class StageKeys:
@@ -86,6 +90,7 @@ def stage_keys(source: ObjectSource, confirm: bool) -> StageKeys:
         *(["fixed"] if source.fixed else []),
     )
     in_memory = isinstance(source.mesh, trimesh.Trimesh)
+    rest = content_hash(rest, POSES_VERSION)
     file = mesh if in_memory else hashlib.sha256(Path(source.mesh).read_bytes()).hexdigest()
     return StageKeys(file, mesh, visual, pieces, rest, build)
 

@@ -12,7 +12,7 @@ from burg_drake.core import Array, InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.documents import Pose
 from burg_drake.formats.collections import BurgLibrary, BurgObject, YcbObject
 from burg_drake.objects.library import ObjectLibrary
-from burg_drake.objects.physics import SymmetryTest
+from burg_drake.objects.physics import SymmetrySearch
 from burg_drake.pipeline.source import ObjectSource, check_source, object_name
 
 SAME_POSE = np.deg2rad(10.0)
@@ -206,14 +206,15 @@ class _SamePose:
     """
 
     def __init__(self, surface: trimesh.Trimesh, p_OOcm: Array) -> None:
-        self.symmetry = SymmetryTest(surface, p_OOcm)
+        search = SymmetrySearch(surface, p_OOcm)
+        self.symmetries, self.tolerance = search.find(), search.tolerance
         self.points = surface.vertices - p_OOcm
 
     def same(self, a: Array, b: Array) -> bool:
         if float(a @ b) > np.cos(SAME_POSE):
             return True
         rise = abs(float((self.points @ a).max() - (self.points @ b).max()))
-        return rise < self.symmetry.tolerance and self.symmetry.same(a, b)
+        return rise <= self.tolerance and self.symmetries.same(a, b, SAME_POSE)
 
 
 def _by_identifier(

@@ -70,15 +70,25 @@ def test_objects_are_added_where_they_are_free(session: ComposeSession) -> None:
     np.testing.assert_allclose(center_of_mass(view, "can")[:2], (0.297, 0.21), atol=0.03)
 
 
+def test_objects_are_added_as_their_mesh_stands(three: ComposeSession) -> None:
+    """Dropped, a box comes to lie flat most often; its mesh stands upright, which is stable."""
+    box = three.view.library.entry("box")
+    assert box.X_SO(0)[2, 2] == pytest.approx(0.0, abs=1e-6)
+    added = three.do(AddObject("box"))
+    assert added.X_SO("box_2")[2, 2] == pytest.approx(1.0)
+    flat = three.do(AddObject("box", 0))
+    assert flat.X_SO("box_3")[2, 2] == pytest.approx(0.0, abs=1e-6)
+
+
 def test_another_stable_pose_keeps_place_and_turn(three: ComposeSession) -> None:
     before = three.view
-    lying = three.do(SetPose(("box",), 2))
+    lying = three.do(SetPose(("box",), 0))
     np.testing.assert_allclose(
         center_of_mass(lying, "box")[:2], center_of_mass(before, "box")[:2], atol=ROUNDED
     )
     assert span(lying, "box")[0, 2] == pytest.approx(0.0, abs=1e-5)
     assert span(lying, "box")[1, 2] != pytest.approx(span(before, "box")[1, 2], abs=1e-3)
-    back = three.do(SetPose(("box",), 0))
+    back = three.do(SetPose(("box",), 2))
     np.testing.assert_allclose(back.X_SO("box"), before.X_SO("box"), atol=2e-5)
 
 

@@ -12,6 +12,10 @@ import pytest
 from numpy.typing import NDArray
 
 from burg_drake.dataset.exchange import write_bop
+from burg_drake.dataset.exchange.bop_models import diameter
+from burg_drake.dataset.exchange.model_file import visual_model
+from burg_drake.dataset.exchange.symmetry import symmetries
+from burg_drake.objects.library import load_library
 from tests.dataset.exported_files import image, read_ply
 from tests.dataset.polyhedra import BOX_CORNERS, CAMERA, COLORS, InMemory, write_library
 
@@ -107,7 +111,7 @@ def test_bop_describes_its_models(bop: Path) -> None:
     assert gem["diameter"] == pytest.approx(90.0) and gem["size_z"] == pytest.approx(90.0)
     assert box["diameter"] == pytest.approx(np.linalg.norm([80, 60, 50]))
     assert [box[f"min_{x}"] for x in "xyz"] == pytest.approx([-10, -30, 0])
-    assert "symmetries_discrete" not in gem
+    assert len(gem["symmetries_discrete"]) == 23  # of an octahedron, besides the identity
     vertices, _ = read_ply(bop / "models/obj_000002.ply")
     assert [vertices[c][0] for c in ("red", "green", "blue")] == list(COLORS["box"])
     points = np.stack([vertices[k] for k in "xyz"])
@@ -119,6 +123,24 @@ def test_bop_describes_its_models(bop: Path) -> None:
         moved = (X @ np.vstack([points, np.ones(points.shape[1])]))[:3]
         gaps = np.linalg.norm(moved[:, :, None] - points[:, None], axis=0).min(axis=1)
         assert gaps.max() < 1e-6
+
+
+def test_symmetries_are_those_of_the_mesh_and_its_colours() -> None:
+    """A bowl turns by any angle, a bottle by half a turn about its height; the band around a can is
+    above its middle, so that it has an up and a down."""
+    library = load_library("household")
+    found = {}
+    for name in ("bowl", "bottle", "can", "mug"):
+        model = visual_model(library, name)
+        found[name] = symmetries(model, diameter(model.vertices))
+    assert found["mug"] == {}
+    assert found["bowl"].keys() == found["can"].keys() == {"symmetries_continuous"}
+    (axis,) = found["bowl"]["symmetries_continuous"]
+    assert np.abs(axis["axis"]) == pytest.approx([0.0, 0.0, 1.0], abs=1e-3)
+    assert axis["offset"][:2] == pytest.approx([0.0, 0.0], abs=0.1)
+    assert found["bottle"].keys() == {"symmetries_discrete"}
+    (turn,) = found["bottle"]["symmetries_discrete"]
+    assert np.reshape(turn, (4, 4)) == pytest.approx(np.diag([-1.0, -1.0, 1.0, 1.0]), abs=0.1)
 
 
 def test_bop_has_models_to_measure_errors_with(bop: Path) -> None:

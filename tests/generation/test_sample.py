@@ -11,7 +11,11 @@ from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.generation import rules
 from burg_drake.generation.reproduction import sample_again
-from burg_drake.generation.sample import SceneSampler, sample_scene
+from burg_drake.generation.sample import (
+    SceneSampler,
+    attempts_with_same_objects,
+    sample_scene,
+)
 from burg_drake.objects.library.document import ObjectLibrary
 from burg_drake.scene.document.board import Board
 from burg_drake.scene.document.recipe import SceneRecipe
@@ -79,6 +83,40 @@ def test_what_was_made_with_other_things_is_refused(
     assert sample_again(other, force=True).scene is not None
     with pytest.raises(InvalidInputError, match="has no `origin`: it was not sampled"):
         sample_again(Scene(replace(scene.document, origin=None), household, scene.path))
+
+
+def test_refusals_do_not_change_the_mix_of_objects(
+    household: ObjectLibrary, tabletop: Station
+) -> None:
+    """Attempts with an airplane are refused often; it is one of four that are drawn as often."""
+    recipe = replace(
+        PLACED,
+        count=2,
+        only=("airplane", "bowl", "can", "marble"),
+        board=Board(size=(0.38, 0.3)),
+        tries=2,
+        seed=2,
+    )
+    sampler = SceneSampler(recipe, household, tabletop)
+    scenes = [sampler.sample(number) for number in range(60)]
+    assert all(sampled.accepted for sampled in scenes)
+    airplanes = sum("airplane" in sampled.scene.instances for sampled in scenes)
+    assert abs(airplanes - 30) < 9  # 2.3 standard deviations
+    assert sum(sampled.attempts > 1 for sampled in scenes) > 10
+
+
+def test_objects_without_room_do_not_cost_the_scene(
+    household: ObjectLibrary, tabletop: Station
+) -> None:
+    """The board is smaller than an airplane."""
+    recipe = replace(
+        PLACED, count=1, only=("airplane", "marble"), board=Board(size=(0.1, 0.1)), attempts=20
+    )
+    sampler = SceneSampler(recipe, household, tabletop)
+    scenes = [sampler.sample(number) for number in range(8)]
+    assert all("marble" in sampled.scene.instances for sampled in scenes)
+    late = [s.attempts for s in scenes if s.attempts > 1]
+    assert late and min(late) > attempts_with_same_objects(recipe) == 16
 
 
 def test_too_small_a_board(household: ObjectLibrary, tabletop: Station) -> None:

@@ -119,6 +119,57 @@ def test_probabilities_are_those_of_trimesh() -> None:
             np.testing.assert_allclose(facet.down, -X_SO[2, :3], atol=1e-6)
 
 
+def thirty_shapes() -> list[trimesh.Trimesh]:
+    """A flat bar, boxes, tapered prisms and random hulls, of which many have equal poses."""
+    rng = np.random.default_rng(0)
+    shapes = [trimesh.creation.box((0.3, 0.022, 0.014))]
+    shapes += [trimesh.creation.box(rng.uniform(0.03, 0.1, 3)) for _ in range(9)]
+    for _ in range(10):
+        (low, wide), taper = np.sort(rng.uniform(0.03, 0.08, 2)), rng.uniform(0.6, 1.0)
+        outline = np.array([(-wide, 0), (wide, 0), (0.5 * wide, low), (-0.6 * wide, low)])
+        ends = [np.insert(outline, 2, 0.0, 1), np.insert(taper * outline, 2, low + wide, 1)]
+        shapes.append(trimesh.convex.convex_hull(np.vstack(ends)))
+    for _ in range(10):
+        shapes.append(trimesh.convex.convex_hull(rng.normal(size=(8, 3)) * [0.05, 0.04, 0.035]))
+    return shapes
+
+
+def test_probabilities_by_height_are_those_of_trimesh() -> None:
+    """trimesh does not merge poses, so that it has each height at least as probably as we have.
+
+    Symmetric poses are at one height, to rounding. What trimesh has at other heights are poses that
+    topple from a tilt of a few degrees; their probability is all that ours may have more.
+    """
+    lost = []
+    for mesh in thirty_shapes():
+        center = np.asarray(mesh.center_mass)
+        X, probability = compute_stable_poses(mesh, center_mass=center, n_samples=1)
+        theirs = X[:, 2, :3] @ center + X[:, 2, 3]
+        ours = _poses(mesh)
+        heights = [float(p.X_SO.matrix()[2] @ [*center, 1.0]) for p in ours]
+        at = np.abs(theirs[:, None] - np.array(heights)) < 1e-6
+        assert at.any(axis=0).all()
+        unknown = probability[~at.any(axis=1)].sum()
+        lost.append(unknown)
+        for height in heights:
+            here = sum(
+                p.probability for p, h in zip(ours, heights, strict=True) if abs(h - height) < 1e-6
+            )
+            same = probability[np.abs(theirs - height) < 1e-6].sum()
+            assert same - 1e-5 <= here <= same + unknown + 1e-5
+    assert sum(share < 0.01 for share in lost) >= 20
+
+
+def test_a_flat_bar_has_two_poses() -> None:
+    """By the solid angles of its sides; its ends are too rare."""
+    sizes = ((0.3, 0.022, 0.014), (0.3, 0.014, 0.022))
+    shares = np.array([_solid_angle_of_rectangle(a, b, 0.5 * c) for a, b, c in sizes])
+    poses = _poses(trimesh.creation.box((0.3, 0.022, 0.014)))
+    expected = shares / shares.sum()
+    assert [p.probability for p in poses] == pytest.approx(expected.tolist(), abs=2e-3)
+    assert [p.X_SO.matrix()[2, 3] for p in poses] == pytest.approx([0.007, 0.011])
+
+
 def test_poses_rest_on_the_plane_below_the_centre_of_mass() -> None:
     rng = np.random.default_rng(2)
     hull = trimesh.convex.convex_hull(rng.normal(size=(12, 3)) * 0.04 + [0.3, 0.2, 0.1])

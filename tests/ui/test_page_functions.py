@@ -309,7 +309,7 @@ def test_handles_move_and_tilt_what_is_free(
             expected = X_SG @ make_pose(p_AB=-middle) @ start.X_SO(name)
             np.testing.assert_allclose(session.view.X_SO(name), expected, atol=2e-5)
         assert session.undo().document == start.document
-        assert page.actions.queue.idle(PATIENCE)
+        assert page.actions.queue.idle(HANG_GUARD)
 
 
 def test_arrows_are_the_boards_and_rings_the_objects_until_a_key_switches(

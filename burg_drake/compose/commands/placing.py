@@ -39,7 +39,8 @@ class AddObject:
 
     Attributes:
         object: its name in the library.
-        stable_pose: that it stands in; the most probable one in which there is room if None.
+        stable_pose: that it stands in; if None, as its mesh stands where that is stable, else the
+            most probable one, or the next in which there is room.
         position: x and y of its centre of mass [m]; a free place near the middle if None. It is
             refused if there is none.
         yaw_deg: by which it is turned; not at all if None, unless there is room only if it is.
@@ -55,7 +56,9 @@ class AddObject:
         return f"add {self.object}"
 
     def apply(self, state: State, surroundings: Surroundings) -> State:
-        X_SO = stable_pose_matrix(state, self.object, self.stable_pose or 0)
+        proposed = state.library.entry(self.object).proposed_pose
+        pose = proposed if self.stable_pose is None else self.stable_pose
+        X_SO = stable_pose_matrix(state, self.object, pose)
         yaw_deg = require_number(self.yaw_deg or 0.0, "yaw", -360.0, 360.0, "degrees")
         position = self.position
         if position is None:
@@ -78,8 +81,9 @@ class AddObject:
     ) -> tuple[Array, float, tuple[float, float]]:
         """Stable pose (4, 4), yaw [degrees] and position [m] where there is room."""
         library = state.library
-        poses = range(max(1, len(library.entry(self.object).stable_poses)))
-        for k in poses if self.stable_pose is None else (self.stable_pose,):
+        entry = library.entry(self.object)
+        poses = [entry.proposed_pose, *range(len(entry.stable_poses))]
+        for k in dict.fromkeys(poses) if self.stable_pose is None else (self.stable_pose,):
             X_SO = stable_pose_matrix(state, self.object, k)
             lower, upper = object_bounds(library, self.object, X_SO)[:, 2]
             obstacles = _obstacles(surroundings, lower, upper)

@@ -48,8 +48,7 @@ def write_models(library: ObjectLibrary, objects: Sequence[str], folder: Path) -
         surface, _ = decimated(library.surface(name), EVALUATION_FACES)
         write_ply(model_of(surface), evaluation / file, unit=MILLIMETRE)
         infos[str(number)] = model_info(visual.vertices)
-        if visual.image is None:
-            infos[str(number)] |= symmetries(library.entry(name), diameter(visual.vertices))
+        infos[str(number)] |= symmetries(visual, diameter(visual.vertices))
     for place in (looks, evaluation):
         (place / "models_info.json").write_text(json.dumps(infos, indent=2), encoding="utf-8")
 

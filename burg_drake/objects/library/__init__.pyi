@@ -9,6 +9,7 @@ from .document import (
 from .entry import (
     CONTACT_KINDS as CONTACT_KINDS,
     DEFAULT_FRICTION as DEFAULT_FRICTION,
+    UPRIGHT_TOLERANCE as UPRIGHT_TOLERANCE,
     ContactGeometry as ContactGeometry,
     ContactKind as ContactKind,
     Decomposition as Decomposition,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar, Literal, get_args
 
@@ -10,6 +11,9 @@ from burg_drake.core.documents import Pose, Vector3, require_ranges
 
 DEFAULT_FRICTION = 0.24
 """Friction coefficient where none is given, as in BURG-Toolkit (Rudorfer et al., 2022)."""
+
+UPRIGHT_TOLERANCE = math.radians(10.0)
+"""An object that can stand within this angle of its own frame stands as its mesh does [rad]."""
 
 Inertia = tuple[float, float, float, float, float, float]
 """Ixx, Iyy, Izz, Ixy, Ixz, Iyz [kg m^2]."""
@@ -252,6 +256,15 @@ class ObjectEntry:
         """All files that the entry names, relative to the library's folder."""
         files = (self.mesh, self.surface, self.sdf, *self.pieces, self.contact.mesh)
         return tuple(file for file in files if file)
+
+    @property
+    def proposed_pose(self) -> int:
+        """Number of the stable pose in which the object stands as its mesh does, as a scan mostly
+        is; of the most probable one, 0, if it cannot stand so."""
+        up = [float(pose.X_SO.matrix()[2, 2]) for pose in self.stable_poses]
+        if not up or max(up) < math.cos(UPRIGHT_TOLERANCE):
+            return 0
+        return up.index(max(up))
 
     def X_SO(self, stable_pose: int = 0) -> Array:
         """(4, 4) object in its k-th stable pose, centre of mass above the origin of S."""

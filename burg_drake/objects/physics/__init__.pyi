@@ -11,7 +11,7 @@ from .pose_classes import PoseClasses as PoseClasses
 from .shell import solid_of_shell as solid_of_shell
 from .stability import stable_poses as stable_poses
 from .symmetry import (
-    SymmetryTest as SymmetryTest,
+    SymmetrySearch as SymmetrySearch,
     sample_surface as sample_surface,
     spread_over as spread_over,
 )

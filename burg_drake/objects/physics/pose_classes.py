@@ -16,7 +16,8 @@ from burg_drake.objects.physics.landscape import (
     NeutralEquilibrium,
     PotentialLandscape,
 )
-from burg_drake.objects.physics.symmetry import SymmetryTest
+from burg_drake.objects.physics.stability import same_minimum
+from burg_drake.objects.physics.symmetry import Symmetries, SymmetrySearch
 
 NEAR_ANGLE = TILT_MARGIN
 """What is tilted from a pose by less than this is in the pose [rad]; as for quasi-static poses, of
@@ -83,13 +84,19 @@ class PoseClasses:
             if angle_between(self.downs[k], lowest) < SAME_FACET:
                 return k, angles[k]
             near = abs(level - float(self.landscape.height(self.downs[k])))
-            if near < self._symmetry.tolerance and self._symmetry.same(lowest, self.downs[k]):
+            if near > self._search.tolerance:
+                continue
+            if same_minimum(self.landscape, self._symmetries, lowest, self.downs[k]):
                 return k, angle_between(lowest, down)
         return None
 
     @cached_property
-    def _symmetry(self) -> SymmetryTest:
-        return SymmetryTest(self._surface(), self._p_OOcm)
+    def _search(self) -> SymmetrySearch:
+        return SymmetrySearch(self._surface(), self._p_OOcm)
+
+    @cached_property
+    def _symmetries(self) -> Symmetries:
+        return self._search.find()
 
 
 def angle_between(a: Array, b: Array) -> float:

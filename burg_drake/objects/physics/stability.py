@@ -10,16 +10,14 @@ Two minima are one pose
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import trimesh
 
 from burg_drake.core import Array, make_pose
 from burg_drake.core.documents import Pose
 from burg_drake.objects.library import StablePose
-from burg_drake.objects.physics.landscape import PotentialLandscape, RestingFacet
-from burg_drake.objects.physics.symmetry import SymmetryTest
+from burg_drake.objects.physics.landscape import TILT_MARGIN, PotentialLandscape, RestingFacet
+from burg_drake.objects.physics.symmetry import Symmetries, SymmetrySearch
 
 MIN_PROBABILITY = 0.01
 """Rarer poses are left out, and the others scaled to a sum of one."""
@@ -37,7 +35,7 @@ def stable_poses(surface: trimesh.Trimesh, support: Array, p_OOcm: Array) -> tup
         At least one pose; probabilities sum to one.
     """
     landscape = PotentialLandscape(support, p_OOcm)
-    classes = _merge_symmetric(landscape.minima(), surface, p_OOcm)
+    classes = _merge_symmetric(landscape, surface, p_OOcm)
     most = max(c.probability for c in classes)
     kept = [c for c in classes if c.probability >= min(MIN_PROBABILITY, most)]
     total = sum(c.probability for c in kept)
@@ -60,14 +58,25 @@ def resting_pose(down: Array, height: float, p_OOcm: Array) -> Array:
 
 
 def _merge_symmetric(
-    facets: Sequence[RestingFacet], surface: trimesh.Trimesh, p_OOcm: Array
+    landscape: PotentialLandscape, surface: trimesh.Trimesh, p_OOcm: Array
 ) -> list[RestingFacet]:
-    if len(facets) < 2:
-        return list(facets)
-    test = SymmetryTest(surface, p_OOcm)
+    facets = landscape.minima()
+    search = SymmetrySearch(surface, p_OOcm)
+    heights = np.sort([facet.height for facet in facets])
+    if not (np.diff(heights) <= search.tolerance).any():
+        return facets
+    symmetries = search.find()
     classes: list[list[RestingFacet]] = []
     for facet in facets:
-        alike = [c for c in classes if any(_same(test, facet, known) for known in c)]
+        alike = [
+            c
+            for c in classes
+            if any(
+                abs(facet.height - known.height) <= search.tolerance
+                and same_minimum(landscape, symmetries, facet.down, known.down)
+                for known in c
+            )
+        ]
         classes = [c for c in classes if not any(c is a for a in alike)]
         classes.append(
             sorted([*(known for c in alike for known in c), facet], key=RestingFacet.rank)
@@ -75,8 +84,14 @@ def _merge_symmetric(
     return [RestingFacet(sum(f.probability for f in c), c[0].down, c[0].height) for c in classes]
 
 
-def _same(test: SymmetryTest, a: RestingFacet, b: RestingFacet) -> bool:
-    return abs(a.height - b.height) < test.tolerance and test.same(a.down, b.down)
+def same_minimum(landscape: PotentialLandscape, symmetries: Symmetries, a: Array, b: Array) -> bool:
+    """Whether a symmetry takes direction a (3,) to the minimum b (3,) of the landscape.
+
+    Several facets can belong to one minimum, of which b is one.
+    """
+    return any(
+        float(landscape.basin(image) @ b) > np.cos(TILT_MARGIN) for image in symmetries.images(a, b)
+    )
 
 
 def _shortest_rotation(a: Array, b: Array) -> Array:

@@ -1,117 +1,322 @@
-"""Whether a turn of an object about its centre of mass takes it onto itself, within a tolerance.
+"""Which turns about a point take an object onto itself, within a tolerance.
 
 Mirror images do not count: a left shoe on its side is not a right shoe.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+from trimesh.triangles import closest_point
 
 from burg_drake.core import Array, rot_z
 
-TOLERANCE = 0.025
-"""Largest deviation that still counts as the same shape, as a share of the object's diagonal."""
+MAX_DEVIATION = 2e-4
+"""Largest deviation that still counts as the same shape [m]. Two ways to rest whose heights or
+surfaces differ by more are two poses for physics."""
 
-DENSE = 16000
-"""Points that stand for the surface."""
-
-SPARSE = 500
-"""Points that are turned and compared with the surface."""
+MAX_DEVIATION_SHARE = 0.005
+"""The same as a share of the object's diagonal, for small objects: the smaller one counts."""
 
 COVERED = 0.98
-"""Share of the turned points that must be within the tolerance."""
+"""Share of the surface that must be within the tolerance, for physics."""
+
+SURFACE_POINTS, PROBE_POINTS, COARSE_POINTS = 16000, 1000, 100
+"""Points that stand for the surface; those of them that are turned and compared with it; and those
+that a turn is improved with before it is known to be worth more."""
+
+COARSE_GAP = 0.02
+"""Median distance, as a share of the diagonal, above which a turn is not improved further."""
+
+NORMAL_WEIGHT = 0.025
+"""Distance, as a share of the diagonal, that a difference of 1 between unit normals counts for in
+the search for the nearest point: it keeps the two sides of a thin wall apart."""
+
+NEAREST = 8
+"""Points of the surface whose triangles are compared with a turned point."""
 
 SECTORS = 72
-"""Resolution of the first search over the angle about the vertical."""
+"""Resolution of the first search over the angle about an axis."""
+
+PEAKS = 8
+"""Angles about an axis that are looked at more closely."""
+
+EQUAL_MOMENTS = 0.02
+"""Relative difference below which principal moments may be equal, so that they give no axes."""
+
+TURN_SHARES = (0.0382, 0.1459, 0.2361, 0.3090, 0.4271)
+"""Shares of a full turn that a body of revolution is tested with. They are no multiples of one
+another, so that prisms do not pass."""
+
+SAME_TURN = np.deg2rad(3.0)
+"""Rotations that differ by less are one [rad]."""
+
+MAX_TURNS = 120
+"""Rotations that are kept; polyhedra have at most 60."""
 
 
-class SymmetryTest:
-    """Compares an object with itself in two orientations.
+@dataclass(frozen=True, eq=False)
+class Symmetries:
+    """Rotations about a point that take an object onto itself.
+
+    Attributes:
+        rotations: (N, 3, 3) in O, the identity first; of a body of revolution one of each kind.
+        axis: (3,) unit vector about which any turn does; None if there is none.
+        sphere: any rotation does.
+    """
+
+    rotations: Array
+    axis: Array | None = None
+    sphere: bool = False
+
+    def images(self, direction: Array, towards: Array) -> Array:
+        """Where the symmetries take a direction.
+
+        Args:
+            direction: (3,) unit vector of O.
+            towards: (3,) unit vector; of all turns about `axis` the one that comes nearest counts.
+
+        Returns:
+            (M, 3) unit vectors.
+        """
+        if self.sphere:
+            return towards[None]
+        turned = self.rotations @ direction
+        if self.axis is None:
+            return turned
+        across = towards - (towards @ self.axis) * self.axis
+        length = float(np.linalg.norm(across))
+        if length < 1e-9:
+            return turned
+        along = turned @ self.axis
+        radius = np.sqrt(np.maximum(1.0 - along**2, 0.0))
+        return along[:, None] * self.axis + radius[:, None] * across / length
+
+    def same(self, a: Array, b: Array, max_angle: float) -> bool:
+        """Whether a symmetry takes direction a (3,) to within `max_angle` [rad] of b (3,)."""
+        return bool((self.images(a, b) @ b).max() >= np.cos(max_angle))
+
+
+class SymmetrySearch:
+    """Finds the rotations that take a surface onto itself.
 
     Args:
         surface: in O [m].
-        p_OOcm: (3,) centre of mass; all turns are about it [m].
+        p_OC: (3,) point that all turns are about, such as the centre of mass [m].
+        tolerance: largest deviation that counts as the same [m]; `MAX_DEVIATION` if None.
+        covered: share of the surface that must be within the tolerance.
+
+    Attributes:
+        tolerance: largest deviation that counts as the same [m].
     """
 
-    def __init__(self, surface: trimesh.Trimesh, p_OOcm: Array) -> None:
-        points, normals = sample_surface(surface, DENSE)
-        self.points = points - p_OOcm
-        self.normals = normals
-        self.tolerance = TOLERANCE * float(np.linalg.norm(np.ptp(self.points, axis=0)))
-        # with the normals among the coordinates the two sides of a thin wall lie apart
-        self.tree = cKDTree(np.hstack([self.points, self.tolerance * normals]))
-        self.probe = self.points[:: DENSE // SPARSE]
-        self.probe_normals = normals[:: DENSE // SPARSE]
-        self._profiles: dict[bytes, Array] = {}
+    def __init__(
+        self,
+        surface: trimesh.Trimesh,
+        p_OC: Array,
+        tolerance: float | None = None,
+        covered: float = COVERED,
+    ) -> None:
+        self._triangles = np.asarray(surface.triangles) - p_OC
+        self.diagonal = float(np.linalg.norm(np.ptp(self._triangles.reshape(-1, 3), axis=0)))
+        least = min(MAX_DEVIATION, MAX_DEVIATION_SHARE * self.diagonal)
+        self.tolerance = least if tolerance is None else tolerance
+        self._covered = covered
+        points, face = spread_over(surface, SURFACE_POINTS)
+        self._sample = points - p_OC
+        order = _even_order(SURFACE_POINTS)[:: SURFACE_POINTS // PROBE_POINTS]
+        normals = _triangle_normals(self._triangles)
+        self._probe, self._probe_normals = self._sample[order], normals[face[order]]
+        # centres of triangles stand for those that are too small to have a point
+        self._face = np.concatenate([face, np.arange(len(self._triangles))])
+        self._points = np.vstack([self._sample, self._triangles.mean(axis=1)])
+        self._normals = normals[self._face]
+        weight = NORMAL_WEIGHT * self.diagonal
+        self._tree = cKDTree(np.hstack([self._points, weight * self._normals]))
 
-    def same(self, down_a: Array, down_b: Array) -> bool:
-        """Whether some turn of the object onto itself takes direction a of O to direction b."""
-        profile_a, profile_b = self._profile(down_a), self._profile(down_b)
+    def find(self) -> Symmetries:
+        """All symmetries of the surface. The order depends on nothing but the surface."""
+        radius = np.linalg.norm(self._points, axis=1)
+        if np.ptp(radius) <= 2.0 * self.tolerance:
+            return Symmetries(np.eye(3)[None], sphere=True)
+        moments, axes = np.linalg.eigh(_second_moments(self._triangles))
+        unequal = [bool(moments[k + 1] - moments[k] > EQUAL_MOMENTS * moments[2]) for k in range(2)]
+        pairs = [(axis, sign * axis) for axis in axes.T for sign in (1.0, -1.0)]
+        candidates = list(axes.T)
+        if not any(unequal):
+            far = _spread_directions(self._points[np.argsort(-radius, kind="stable")], self)
+            pairs += [(far[0], b) for b in far]
+            candidates += [np.asarray(v) for v in far]
+        axis = next((a for a in candidates if self.turns_about(a)), None)
+        if axis is not None:
+            pairs = [(axis, -axis)]
+        found = [np.eye(3)]
+        for a, b in pairs:
+            for R in self._starts(a, b):
+                if _known(R, found):
+                    continue
+                refined = self._refined(R)
+                if refined is None or _known(refined, found) or not self.fits(refined):
+                    continue
+                if axis is not None:
+                    return Symmetries(np.stack([np.eye(3), refined]), axis)
+                found = self._products([*found, refined])
+        return Symmetries(np.stack(found), axis)
+
+    def turns_about(self, axis: Array) -> bool:
+        """Whether the surface is one of revolution about an axis (3,) through the point."""
+        return all(
+            self.fits(Rotation.from_rotvec(2.0 * np.pi * share * axis).as_matrix())
+            for share in TURN_SHARES
+        )
+
+    def fits(self, R: Array) -> bool:
+        """Whether a rotation (3, 3) lays the surface onto itself."""
+        few = self._share_near(R, COARSE_POINTS)
+        return few > self._covered - 0.1 and self._share_near(R, PROBE_POINTS) >= self._covered
+
+    def _share_near(self, R: Array, count: int) -> float:
+        """Share of the first `count` points that R (3, 3) takes to within the tolerance."""
+        turned, facing = self._probe[:count] @ R.T, self._probe_normals[:count] @ R.T
+        index = self._nearest(turned, facing, NEAREST)
+        corners = self._triangles[self._face[index]].reshape(-1, 3, 3)
+        foot = closest_point(corners, np.repeat(turned, NEAREST, axis=0))
+        gaps = np.linalg.norm(foot.reshape(-1, NEAREST, 3) - turned[:, None], axis=2)
+        alike = np.einsum("ij,ikj->ik", facing, self._normals[index]) > 0.0
+        near = (alike & (gaps <= self.tolerance)).any(axis=1)
+        return float(near.mean())
+
+    def _starts(self, a: Array, b: Array) -> Iterator[Array]:
+        """Rotations (3, 3) that take direction a to b, those that fit best by areas first."""
+        profile_a, profile_b = self._profile(a), self._profile(b)
         shape_a, shape_b = profile_a.sum(axis=0), profile_b.sum(axis=0)
         if np.abs(shape_a - shape_b).sum() > 0.5 * shape_a.sum():
-            return False
+            return
         match = np.fft.irfft(
             (np.fft.rfft(profile_b, axis=0) * np.conj(np.fft.rfft(profile_a, axis=0))).sum(axis=1),
             SECTORS,
         )
-        best = np.argsort(-match, kind="stable")
+        R_Ba, R_Bb = down_frame(a), down_frame(b)
         chosen: list[int] = []
-        for k in best.tolist():
+        for k in np.argsort(-match, kind="stable").tolist():
             if all(min((k - c) % SECTORS, (c - k) % SECTORS) > 2 for c in chosen):
                 chosen.append(k)
-            if len(chosen) == 6:
-                break
-        R_Ba, R_Bb = down_frame(down_a), down_frame(down_b)
-        return any(self._aligned(R_Ba, R_Bb, 2.0 * np.pi * k / SECTORS) for k in chosen)
+                yield R_Bb.T @ rot_z(2.0 * np.pi * k / SECTORS) @ R_Ba
+            if len(chosen) == PEAKS:
+                return
 
     def _profile(self, down: Array) -> Array:
         """(SECTORS, bins) area by azimuth, height and radius, about the vertical."""
-        key = down.tobytes()
-        if key not in self._profiles:
-            p = self.points @ down_frame(down).T
-            azimuth = (np.arctan2(p[:, 1], p[:, 0]) / (2.0 * np.pi) % 1.0) * SECTORS
-            size = np.linalg.norm(np.ptp(self.points, axis=0))
-            radius = np.hypot(p[:, 0], p[:, 1]) / size
-            height = p[:, 2] / size + 1.0
-            grid = (
-                azimuth.astype(int) % SECTORS,
-                (height * 8).astype(int),
-                (radius * 8).astype(int),
-            )
-            flat = np.ravel_multi_index(grid, (SECTORS, 17, 9))
-            count = np.bincount(flat, minlength=SECTORS * 17 * 9)
-            self._profiles[key] = count.reshape(SECTORS, -1).astype(float)
-        return self._profiles[key]
+        p = self._sample @ down_frame(down).T
+        azimuth = (np.arctan2(p[:, 1], p[:, 0]) / (2.0 * np.pi) % 1.0) * SECTORS
+        radius = np.hypot(p[:, 0], p[:, 1]) / self.diagonal
+        height = p[:, 2] / self.diagonal + 1.0
+        bins = (
+            azimuth.astype(int) % SECTORS,
+            np.clip((height * 8).astype(int), 0, 16),
+            np.clip((radius * 8).astype(int), 0, 8),
+        )
+        flat = np.ravel_multi_index(bins, (SECTORS, 17, 9))
+        return np.bincount(flat, minlength=SECTORS * 17 * 9).reshape(SECTORS, -1).astype(float)
 
-    def _aligned(self, R_Ba: Array, R_Bb: Array, angle: float) -> bool:
-        """Refines the angle by iterated closest points, and tells whether the turn fits."""
-        for _ in range(8):
-            R = R_Bb.T @ rot_z(angle) @ R_Ba
-            turned = self.probe @ R.T
-            facing = self.probe_normals @ R.T
-            _, index = self.tree.query(np.hstack([turned, self.tolerance * facing]))
-            p, q = turned @ R_Bb.T, self.points[index] @ R_Bb.T
-            cross = (p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum()
-            step = float(np.arctan2(cross, (p[:, :2] * q[:, :2]).sum()))
-            angle += step
-            if abs(step) < 2e-3:
-                break
-        alike = (facing * self.normals[index]).sum(axis=1) > 0.0
-        near = np.linalg.norm(turned - self.points[index], axis=1) < self.tolerance
-        return bool((near & alike).mean() >= COVERED)
+    def _refined(self, R: Array) -> Array | None:
+        """The rotation near R (3, 3) that lays the surface closest onto itself; None if that is
+        not near.
+
+        Iterated closest points, with distances along the normals.
+        """
+        for count, rounds in ((COARSE_POINTS, 8), (PROBE_POINTS // 2, 6)):
+            probe, normals = self._probe[:count], self._probe_normals[:count]
+            for _ in range(rounds):
+                turned = probe @ R.T
+                index = self._nearest(turned, normals @ R.T, 1)
+                facing = self._normals[index]
+                apart = self._points[index] - turned
+                slope = np.cross(turned, facing)
+                # what slides along itself, as a cylinder does about its axis, is not turned
+                step = np.linalg.lstsq(slope, (apart * facing).sum(axis=1), rcond=1e-3)[0]
+                R = Rotation.from_rotvec(step).as_matrix() @ R
+                if float(np.linalg.norm(step)) < 1e-5:
+                    break
+            if np.median(np.linalg.norm(apart, axis=1)) > COARSE_GAP * self.diagonal:
+                return None
+        return R
+
+    def _nearest(self, points: Array, normals: Array, count: int) -> NDArray[np.int64]:
+        """(N,) or (N, count) numbers of the surface's points that are nearest."""
+        weight = NORMAL_WEIGHT * self.diagonal
+        return np.asarray(self._tree.query(np.hstack([points, weight * normals]), k=count)[1])
+
+    def _products(self, found: Sequence[Array]) -> list[Array]:
+        """The rotations with their products, which are symmetries as well."""
+        group = list(found)
+        for a in group:  # grows meanwhile
+            for b in found[1:]:
+                if len(group) >= MAX_TURNS:
+                    return group
+                if _known(b @ a, group):
+                    continue
+                product = self._refined(b @ a)
+                if product is not None and not _known(product, group) and self.fits(product):
+                    group.append(product)
+        return group
+
+
+def _second_moments(triangles: Array) -> Array:
+    """(3, 3) mean of p p^T over triangles (F, 3, 3), by area."""
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    area = np.linalg.norm(cross, axis=1)
+    total = triangles.sum(axis=1)
+    moments = np.einsum("f,fki,fkj->ij", area, triangles, triangles)
+    moments += np.einsum("f,fi,fj->ij", area, total, total)
+    mean: Array = moments / (12.0 * area.sum())
+    return mean
+
+
+def _known(R: Array, found: Sequence[Array]) -> bool:
+    """Whether a rotation is near one of those found."""
+    traces = np.einsum("kij,ij->k", np.stack(found), R)
+    return bool(traces.max() >= 1.0 + 2.0 * np.cos(SAME_TURN))
+
+
+def _spread_directions(points: Array, search: SymmetrySearch) -> list[Array]:
+    """Unit vectors to the farthest of points (N, 3), which come farthest first, none near
+    another."""
+    limit = np.linalg.norm(points[0]) - 2.0 * search.tolerance - 0.01 * search.diagonal
+    directions: list[Array] = []
+    for point in points:
+        length = float(np.linalg.norm(point))
+        if length < limit or len(directions) == MAX_TURNS:
+            break
+        direction = point / length
+        if all(direction @ other < np.cos(np.deg2rad(8.0)) for other in directions):
+            directions.append(direction)
+    return directions
 
 
 def sample_surface(surface: trimesh.Trimesh, count: int) -> tuple[Array, Array]:
     """Points (count, 3) evenly spread over a surface, and its normals there; no randomness."""
     points, face = spread_over(surface, count)
-    triangles = surface.triangles
+    order = _even_order(count)
+    return points[order], _triangle_normals(np.asarray(surface.triangles))[face][order]
+
+
+def _even_order(count: int) -> NDArray[np.int64]:
+    """(count,) a permutation in which every run of numbers is spread over all of them."""
+    return np.argsort((np.arange(count) * 0.6180339887498949) % 1.0, kind="stable")
+
+
+def _triangle_normals(triangles: Array) -> Array:
+    """(F, 3) unit normals of triangles (F, 3, 3); zero where one has no area."""
     cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    area = np.linalg.norm(cross, axis=1)
-    order = np.argsort((np.arange(count) * 0.6180339887498949) % 1.0, kind="stable")
-    return points[order], (cross[face] / np.maximum(area[face], 1e-300)[:, None])[order]
+    normals: Array = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
+    return normals
 
 
 def spread_over(surface: trimesh.Trimesh, count: int) -> tuple[Array, NDArray[np.int64]]:

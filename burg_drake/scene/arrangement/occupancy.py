@@ -191,6 +191,8 @@ def draw_pose(
     if wanted.pose is not None:
         entry.X_SO(wanted.pose)
         return wanted.pose
+    if how == "as_scanned":
+        return entry.proposed_pose
     share = np.ones(len(entry.stable_poses))
     if how == "probability":
         share = np.array([pose.probability for pose in entry.stable_poses])

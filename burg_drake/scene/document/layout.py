@@ -10,8 +10,9 @@ and `touching`: beside one another, a few millimetres apart or in contact; `pack
 gets; `heap`: in any orientation above a spot, to be dropped."""
 LAYOUTS: tuple[LayoutName, ...] = get_args(LayoutName)
 
-PoseChoice = Literal["probability", "uniform"]
-"""Which of its stable poses an object gets: by their probabilities, or each as often."""
+PoseChoice = Literal["probability", "uniform", "as_scanned"]
+"""Which of its stable poses an object gets: by their probabilities, each as often,
+or as its mesh stands, where that is stable, and else the most probable one."""
 
 TRIES = 100
 """Random places that are tried for an object."""

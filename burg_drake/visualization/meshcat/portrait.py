@@ -10,10 +10,7 @@ import cv2
 import numpy as np
 
 from burg_drake.core import Array, rot_z
-from burg_drake.objects.library import ObjectEntry
-
-UPRIGHT_TOLERANCE = np.deg2rad(10.0)
-"""An object that can stand within this angle of its own frame is shown standing in it [rad]."""
+from burg_drake.objects.library import UPRIGHT_TOLERANCE, ObjectEntry
 
 YAWS = np.deg2rad(np.arange(0.0, 360.0, 15.0))
 """Ways to turn an object about the vertical for its picture [rad]."""
@@ -26,10 +23,8 @@ def upright(entry: ObjectEntry) -> Array:
     """(3, 3) `R_WO` of a standing object: in its own frame if it can, else in its first pose."""
     if not entry.stable_poses:
         return np.eye(3)
-    rotations = [pose.X_SO.matrix()[:3, :3] for pose in entry.stable_poses]
-    if max(R[2, 2] for R in rotations) > np.cos(UPRIGHT_TOLERANCE):
-        return np.eye(3)
-    return rotations[0]
+    R_SO = entry.X_SO(entry.proposed_pose)[:3, :3]
+    return np.eye(3) if R_SO[2, 2] >= np.cos(UPRIGHT_TOLERANCE) else R_SO
 
 
 def best_yaw(points: Array, R_WC: Array) -> float:
