@@ -75,6 +75,8 @@ def add_hand(
     try:
         edit = None if simulated else without_hydroelastic
         (instance,) = add_models(builder.parser(), path, packages, edit=edit)
+    except InvalidInputError:
+        raise
     except (RuntimeError, ValueError) as error:
         raise InvalidInputError(
             f"hand {hand.name!r}: {path} cannot be loaded as one model"
