@@ -31,7 +31,7 @@ def read_depth(path: str | Path, unit: float | None = None) -> NDArray[np.float3
         InvalidInputError: no such file, or not a depth image.
     """
     path = Path(path)
-    if not path.is_file():
+    if not path.exists():
         raise InvalidInputError(f"depth image {path} does not exist")
     depth = _array(path) if path.suffix.lower() == ".npy" else _image(path)
     if depth.ndim != 2 or depth.dtype.kind not in "fui" or depth.dtype == np.uint8:
