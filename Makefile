@@ -28,7 +28,7 @@ help:  ## this list
 setup: $(STAMP)  ## create .venv with everything in it; system libraries too, where allowed
 
 $(STAMP): pyproject.toml tools/setup/set_up.sh
-	@tools/setup/set_up.sh $(VENV)
+	@LOWEST=$(LOWEST) tools/setup/set_up.sh $(VENV)
 	@touch $@
 
 demo: $(STAMP)  ## evaluate grasps on the built-in scene, replay the best one
@@ -48,7 +48,7 @@ test-fast: $(STAMP)  ## test the checkout, without physics, in a minute (ARGS=..
 	$(BIN)/python -m pytest -m "not physics and not thorough" $(ARGS)
 
 test-lowest:  ## a part of the tests with the oldest versions that pyproject.toml allows
-	@LOWEST=1 $(MAKE) setup VENV=$(VENV)-lowest
+	@$(MAKE) --no-print-directory setup VENV=$(VENV)-lowest LOWEST=1
 	@tools/setup/test_wheel.sh $(VENV)-lowest -m "not thorough" $(LOWEST_TESTS)
 
 lint: rules format types  ## ruff and mypy
