@@ -12,7 +12,7 @@ LOWEST_TESTS := tests/core/test_hdf5.py tests/core/test_lazy.py tests/core/test_
 	tests/experiment/test_agreement.py tests/export/test_mjcf.py tests/export/test_usd.py \
 	tests/formats/test_acronym.py tests/fuzzing tests/geometry/test_rays.py tests/objects/test_decompose.py \
 	tests/objects/test_solids.py tests/objects/test_stable_poses.py tests/printout/test_board_printout.py \
-	tests/cameras/test_detection.py tests/simulation/test_drake_quirks.py tests/simulation/test_statics.py \
+	tests/cameras/test_detection.py tests/simulation/test_drake_quirks.py tests/simulation/test_statics.py::test_pads_press_round_objects_with_the_commanded_force \
 	tests/station/test_hand.py tests/test_documents.py tests/test_packaging.py tests/test_typed_use.py \
 	tests/ui/test_incoming.py tests/ui/test_panels.py
 EXAMPLES := $(sort $(wildcard examples/[0-9][0-9]_*.py))
