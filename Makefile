@@ -5,10 +5,20 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.set-up
 N ?= 100
 DEMO := runs/demo$(if $(filter-out 100,$(N)),_$(N))
+# Of all packages that pyproject.toml names, something that they are needed for.
+LOWEST_TESTS := tests/core/test_hdf5.py tests/core/test_lazy.py tests/core/test_progress.py \
+	tests/dataset/test_coco.py tests/dataset/test_shards.py tests/dataset/test_webdataset.py \
+	tests/evaluation/test_cluster.py tests/evaluation/test_jobs.py tests/evaluation/test_table.py \
+	tests/experiment/test_agreement.py tests/export/test_mjcf.py tests/export/test_usd.py \
+	tests/formats/test_acronym.py tests/fuzzing tests/geometry/test_rays.py tests/objects/test_decompose.py \
+	tests/objects/test_solids.py tests/objects/test_stable_poses.py tests/printout/test_board_printout.py \
+	tests/cameras/test_detection.py tests/simulation/test_drake_quirks.py tests/simulation/test_statics.py::test_pads_press_round_objects_with_the_commanded_force \
+	tests/station/test_hand.py tests/test_documents.py tests/test_packaging.py tests/test_typed_use.py \
+	tests/ui/test_incoming.py tests/ui/test_panels.py
 EXAMPLES := $(sort $(wildcard examples/[0-9][0-9]_*.py))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all test-fast lint rules format types examples clean distclean
+.PHONY: help setup demo test test-all test-fast test-lowest lint rules format types examples clean distclean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -18,7 +28,7 @@ help:  ## this list
 setup: $(STAMP)  ## create .venv with everything in it; system libraries too, where allowed
 
 $(STAMP): pyproject.toml tools/setup/set_up.sh
-	@tools/setup/set_up.sh $(VENV)
+	@LOWEST=$(LOWEST) tools/setup/set_up.sh $(VENV)
 	@touch $@
 
 demo: $(STAMP)  ## evaluate grasps on the built-in scene, replay the best one
@@ -36,6 +46,10 @@ test-all: $(STAMP)  ## as test, with what shows again what other tests show, for
 
 test-fast: $(STAMP)  ## test the checkout, without physics, in a minute (ARGS=... go to pytest)
 	$(BIN)/python -m pytest -m "not physics and not thorough" $(ARGS)
+
+test-lowest:  ## a part of the tests with the oldest versions that pyproject.toml allows
+	@$(MAKE) --no-print-directory setup VENV=$(VENV)-lowest LOWEST=1
+	@tools/setup/test_wheel.sh $(VENV)-lowest -m "not thorough" $(LOWEST_TESTS)
 
 lint: rules format types  ## ruff and mypy
 

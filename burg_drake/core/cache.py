@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core.content import content_hash
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.files import (
     NUMBERS,
     UNFINISHED,
@@ -37,6 +37,7 @@ from burg_drake.core.files import (
     open_npz,
     reporting_read_errors,
 )
+from burg_drake.core.paths import expanded
 
 VARIABLE = "BURG_DRAKE_CACHE"
 OFF = "off"
@@ -62,10 +63,19 @@ _log = logging.getLogger("burg_drake")
 
 
 def cache_folder() -> Path | None:
-    """Where entries are kept; None if they are not."""
+    """Where entries are kept; None if they are not.
+
+    Raises:
+        InvalidInputError: the variable names a home folder that nobody has.
+    """
     given = os.environ.get(VARIABLE, "").strip()
+    if given.lower() == OFF:
+        return None
     if given:
-        return None if given.lower() == OFF else Path(given).expanduser()
+        try:
+            return expanded(given)
+        except UnknownNameError as error:
+            raise InvalidInputError(f"{VARIABLE}: {error}") from error
     if base := os.environ.get("XDG_CACHE_HOME", ""):
         return Path(base) / "burg_drake"
     try:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from burg_drake.core import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.documents import checked_events, load_json
-from burg_drake.core.files import GRASP_FILE, read_text, reporting_read_errors
+from burg_drake.core.files import GRASP_FILE, open_regular, read_text, reporting_read_errors
 from burg_drake.core.grasps import GraspSet
 from burg_drake.formats.common import PANDA, GraspFormat, Gripper, ImportedGrasps
 
@@ -61,9 +61,10 @@ def read_grasp_file(
         UnknownNameError: there is no such format.
     """
     path = Path(path)
-    if not path.is_file():
+    if path.is_dir() or not path.exists():
         kind = "is a folder" if path.is_dir() else "does not exist"
         raise InvalidInputError(f"cannot read grasps: {path} {kind}; give a file")
+    open_regular(path).close()  # formats are recognised by reading the file again and again
     chosen = FORMATS[format] if format is not None else format_of(path)
     with reporting_read_errors(path, f"a file of {chosen.title} that can be read"):
         return chosen.read(path, gripper)

@@ -31,6 +31,16 @@ PINHOLE = replace(RADIAL, distortion=())
 FISHEYE = replace(RADIAL, model="fisheye", distortion=(0.03, -0.02, 0.006, -0.001))
 EQUIDISTANT = replace(FISHEYE, distortion=(0.0, 0.0, 0.0, 0.0))
 
+OF_OPENCV = """%YAML:1.0
+---
+image_width: 640
+image_height: 480
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ {}, 600., 240., 0., 0., 1. ]
+"""
 OURS = "version: 1\nwidth: 640\nheight: 480\nfocal: [1, 2]\ncenter: [1, 2]\n"
 # As camera_calibration of ROS writes it.
 CAMERA_INFO = """\
@@ -181,6 +191,12 @@ def test_a_camera_of_a_station() -> None:
         (OURS + "model: fisheyes\n", "'fisheyes' is not valid; did you mean 'fisheye'?"),
         ("", "the document is empty"),
         ("- 1\n- 2\n", "K.yaml"),
+        (OF_OPENCV.format("600., 50., 320., 0."), "the camera's axes are skewed (by 50)"),
+        (OF_OPENCV.format("600., nan, 320., 0."), "the camera's axes are skewed (by nan)"),
+        (OF_OPENCV.format("600., 0., 320., 7."), "the camera matrix has 7 below fx"),
+        (OF_OPENCV.format("1e-300, 0., 320., 0."), "focal has 1e-300; it must be 1 to 1e+06"),
+        (OF_OPENCV.format("600., 0., 1e20, 0."), "center has 1e+20; it must be -1e+06 to 1e+06"),
+        (OURS.replace("width: 640", "width: 64000"), "64000 x 480 pixels; a side has at most"),
         ("%YAML:1.0\n---\nimage_width: 640\n", "camera_matrix with 3 x 3 numbers is missing"),
         ("%YAML:1.0\n---\n: : :\n", "K.yaml"),
         ("<?xml version='1.0'?><opencv_storage>", "K.yaml"),

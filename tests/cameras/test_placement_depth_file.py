@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
 from pathlib import Path
 
 import cv2
@@ -9,6 +11,7 @@ import numpy as np
 import pytest
 
 from burg_drake.cameras.sources.depth_file import read_depth
+from burg_drake.cameras.sources.image_file import decode_image, read_image
 from burg_drake.core.errors import InvalidInputError
 
 METRES = np.array([[0.5, 0.75], [0.0, 1.25]])
@@ -35,3 +38,24 @@ def test_what_is_not_depth_is_refused(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "color.png"), np.zeros((4, 4, 3), np.uint8))
     with pytest.raises(InvalidInputError, match=r"color.png is an array \(4, 4, 3\) of uint8"):
         read_depth(tmp_path / "color.png")
+
+
+@pytest.mark.parametrize("side", [17_000, 60_000])
+def test_large_images_of_small_files_are_not_decoded(tmp_path: Path, side: int) -> None:
+    """A PNG whose pixels, all black, would take up to 7 GB."""
+    chunks = [(b"IHDR", struct.pack(">IIBBBBB", side, 4, 16, 0, 0, 0, 0))]
+    if side > 20_000:
+        chunks = [(b"IHDR", struct.pack(">IIBBBBB", side, side, 16, 0, 0, 0, 0))]
+    chunks += [(b"IDAT", zlib.compress(bytes(side))), (b"IEND", b"")]
+    data = b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+        for kind, body in chunks
+    )
+    path = tmp_path / "large.png"
+    path.write_bytes(data)
+    said = "has 17,000 x 4 pixels; a side" if side < 20_000 else "has more than 179 million pixels"
+    for read in (read_depth, read_image):
+        with pytest.raises(InvalidInputError, match=f"image {path} {said}") as error:
+            read(path)
+        assert "16,384" in str(error.value) and "\n" not in str(error.value)
+    assert decode_image(data) is None

@@ -13,6 +13,7 @@ import pytest
 
 from burg_drake.core import cache
 from burg_drake.core.cache import Arrays, cache_folder, cached
+from burg_drake.core.errors import InvalidInputError
 
 KEY = "0123456789abcdef" * 4
 ARRAYS = {"x": np.array([0.1, np.nan, -0.0]), "k": np.arange(6).reshape(2, 3), "b": np.array(True)}
@@ -192,3 +193,11 @@ def test_the_folder_is_the_user_s(
     for name, value in given.items():
         monkeypatch.setenv(name, value)
     assert cache_folder() == (None if expected is None else Path(expected))
+
+
+def test_the_home_of_nobody_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("BURG_DRAKE_CACHE", "~nobody_of_this_name/cache")
+    with pytest.raises(
+        InvalidInputError, match=r"^BURG_DRAKE_CACHE: ~nobody_of.*write the path ou"
+    ):
+        cache_folder()

@@ -90,8 +90,8 @@ def test_only_regular_files_of_some_size_are_read(tmp_path: Path) -> None:
     (tmp_path / "binary").write_bytes(b"\xff\xfe")
     for place, said in {
         tmp_path: "it is a folder",
-        tmp_path / "pipe": "it is a pipe or a device",
-        "/dev/zero": "it is a pipe or a device",
+        tmp_path / "pipe": "it is a pipe; save it to a file first",
+        "/dev/zero": "it is a device; expected a file",
         tmp_path / "large": "it has more than 16 MiB",
         tmp_path / "binary": "it is not a text file",
         tmp_path / "none": "No such file",

@@ -71,7 +71,7 @@ def huge_chunk(file: Any) -> None:
 def inflating_chunk(file: Any) -> None:
     packer = zlib.compressobj(1)
     packed = b"".join(packer.compress(bytes(1 << 24)) for _ in range(12)) + packer.flush()
-    data = file.create_dataset("x", (10,), "f8", chunks=(10,), compression="gzip")
+    data = file.create_dataset("x", (10_000,), "f8", chunks=(10_000,), compression="gzip")
     data.id.write_direct_chunk((0,), packed)
 
 

@@ -93,6 +93,20 @@ def test_settings_that_contradict_themselves_and_data_that_do_not_fit() -> None:
         AppearanceSettings(shadows=2.0)
     with pytest.raises(DocumentError, match="look:1: photometry: unknown key 'blurr'"):
         read_appearance({"version": 1, "photometry": {"blurr": 1.0}}, "look")
+    light = {"direction": [0, 0, -1], "irradiance": 1.0}
+    for wrong, said in (
+        ({"photometry": {"blur": 1e9}}, "photometry: blur is 1e.09; it must be 0 to 100"),
+        ({"photometry": {"exposure": 1e29}}, "exposure is 1e.29; it must be -20 to 20"),
+        ({"photometry": {"gamma": 0.0}}, "gamma is 0; it must be 0.05 to 20"),
+        ({"photometry": {"white_balance": [1, -1, 1]}}, "white_balance .* must be 0 to 10000 each"),
+        ({"room": -1}, "room is -1; a seed is 0 to"),
+        ({"table": {"pattern": "wood", "seed": -1}}, "seed is -1; a seed is 0 to"),
+        ({"lights": [light | {"irradiance": -1}]}, "irradiance is -1; it must be 0 to 10000"),
+        ({"lights": [light | {"color": [1, 1, -1]}]}, "color .* must be 0 to 10000 each"),
+        ({"object_gains": [[1, 1, 1e9]]}, "object_gains .* must be 0 to 10000 each"),
+    ):
+        with pytest.raises(DocumentError, match=f"look:1: .*{said}"):
+            read_appearance({"version": 1, **wrong}, "look")
     with pytest.raises(UnknownNameError, match="houshold"):
         drawn(0, distractors=(1, 1), distractor_library="houshold")
 

@@ -29,6 +29,10 @@ def test_short_forms() -> None:
             "'head:8786' is not a cluster; give local:N, tls://HOST:PORT or a cluster.yaml",
         ),
         ("http://head", "'http://head' is not an address of a scheduler; write tls://HOST:PORT"),
+        (
+            "tls://head:99999",
+            "tls://head:99999: port 99999 does not exist; they go from 1 to 65535",
+        ),
         ("missing.yaml", "missing.yaml does not exist"),
     ):
         with pytest.raises(BurgError) as refused:

@@ -317,6 +317,15 @@ DAMAGES: list[tuple[Damage, str]] = [
     (lambda d: d["origin"].update(foo=3), "'origin' is not as it was written"),
     (lambda d: d["origin"].update(limits=3), "'origin' is not as it was written"),
     (
+        lambda d: d["origin"]["limits"].update(lower=[float("nan"), -3.0]),
+        "position limits [nan, -3.0] to [3.0, 3.0] of an arm have to be one pair of numbers a"
+        " joint, the lower one first",
+    ),
+    (
+        lambda d: d["origin"]["limits"].update(torque=[-1.0, 1.0]),
+        "torque limits [-1.0, 1.0] of an arm have to be at least 0, or inf",
+    ),
+    (
         lambda d: d["origin"]["limits"].update(torque=[1.0]),
         "the limits in 'origin' are not those of 2 joints",
     ),

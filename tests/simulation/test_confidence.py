@@ -122,6 +122,22 @@ def test_the_load_by_hand() -> None:
     assert math.isfinite(slippery.carried) and slippery.carried > load.carried
 
 
+@pytest.mark.parametrize("share", [0.5, 0.8, 1.25, 2.0])
+def test_the_limit_is_as_far_away_from_both_sides(share: float) -> None:
+    """Half and double of what friction carries are alike, and never below 0; what turns more than
+    it pulls, and what is far, count as far."""
+    carries = 2.0 * GRIP.friction * GRIP.force
+    load = dataclasses.replace(GRIP, mass=share * carries / GRAVITY)
+    expected = abs(math.log10(share))
+    assert grip_signs(Margins(), load)["limit"] == pytest.approx(expected)
+    beside = dataclasses.replace(load, lever=0.75 * RIM)  # 3, 4 and 5 parts of one triangle
+    signs = grip_signs(Margins(), beside)
+    assert signs["turned"] == pytest.approx(signs["carried"] + math.log10(0.75))
+    assert signs["limit"] == pytest.approx(min(0.4, abs(math.log10(1.25 * share))))
+    for far in (dataclasses.replace(load, lever=1.5 * RIM), dataclasses.replace(load, mass=1e-3)):
+        assert grip_signs(Margins(), far)["limit"] == 0.4
+
+
 def test_what_was_not_measured_counts_as_nothing() -> None:
     signs = grip_signs(Margins(end_time=0.4), GRIP)
     assert all(map(math.isfinite, signs.values()))

@@ -16,7 +16,7 @@ from burg_drake.scene.document.scene import Instance
 from burg_drake.simulation.trials.execution import Execution
 from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.simulation.trials.result import TrialResult
-from burg_drake.simulation.trials.trial_settings import NO_LIMITS
+from burg_drake.simulation.trials.trial_settings import DEFAULT_TRIAL, NO_LIMITS
 from burg_drake.station.document.station_document import Obstacle
 
 
@@ -253,6 +253,11 @@ def test_neighbours_in_the_way_of_a_finger_are_pushed_as_if_never_locked(make_sc
     assert lazy.outcome is full.outcome is Outcome.LIFTED
     assert lazy.margins.others_moved > 0.002
     np.testing.assert_allclose(margins(lazy)[:6], margins(full)[:6], rtol=0.05, atol=1e-3)
+    # What moves just as far as it may is not disturbed; what moves a little further is.
+    for allowed, outcome in ((1.0, Outcome.LIFTED), (0.99, Outcome.LIFTED_DISTURBED)):
+        settings = replace(DEFAULT_TRIAL, disturbance=allowed * lazy.margins.others_moved)
+        trial = HandTrial(scene, make_station(), engine=QUICK, settings=settings)
+        assert trial.run("box", X_OG).outcome is outcome
 
 
 def test_clear_errors(box_trial: HandTrial) -> None:

@@ -22,6 +22,7 @@ from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.simulation.trials.trial_settings import TrialSettings
 from burg_drake.station.document.gripper_document import load_hand
 from burg_drake.station.document.station_document import Station, StationDocument, Table
+from tests.pages import ROOT, blocks
 
 NORMAL = TrialSettings()
 
@@ -86,11 +87,16 @@ fingers:
 than they stand in the model, their joints do not start at 0, and nothing couples them there."""
 
 
-@pytest.fixture(scope="module", params=[*HANDS, "own", "uncoupled"])
+@pytest.fixture(scope="module", params=[*HANDS, "own", "uncoupled", "linkage"])
 def case(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Case:
     if request.param in HANDS:
         return HANDS[request.param]
     folder = tmp_path_factory.mktemp("own")
+    if request.param == "linkage":  # fingers that turn, as the page has them: two that slide
+        for block in blocks(ROOT / "docs/hands.md"):
+            if block.remark.startswith("file "):
+                (folder / block.remark.removeprefix("file ")).write_text(block.code, "utf-8")
+        return Case(str(folder / "robotiq_2f85.yaml"), 60.0, (0.022, 0.0375), 0.085)
     fingers = OWN_FINGER.format(name="a", offset=0.003)
     fingers += OWN_FINGER.format(name="b", offset=0.052)
     (folder / "pincer.sdf").write_text(OWN_SDF.format(fingers=fingers), encoding="utf-8")

@@ -7,6 +7,7 @@ p h / E. A finger presses with N, and both pads together hold 2 mu N.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ from trial_world import (
     make_station,
 )
 
+from burg_drake.core.frames import grasp_from_axes
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.scene.document.scene import Scene
 from burg_drake.simulation.mujoco.trial_of_engine import hand_trial_of
@@ -67,6 +69,25 @@ def test_pads_press_round_objects_with_the_commanded_force(make_scene, name, hei
     result = trial.run(name, from_above(height))
     assert result.outcome is Outcome.LIFTED
     assert result.margins.pad_force == pytest.approx(FORCE, rel=0.01)
+
+
+@pytest.mark.parametrize("tilt", [np.deg2rad(15.0), np.deg2rad(-15.0)])
+def test_the_weaker_pad_presses_less_by_half_of_the_weight_along_the_closing_axis(
+    make_scene: Callable[..., Scene], tilt: float
+) -> None:
+    """Along the axis the pads press with 2 N together, as one drive moves both fingers, and with
+    m g sin(tilt) against each other. A ball is pressed in by the root of the force, and so is the
+    area of its patch."""
+    settings = replace(SLOW, hold_time=0.1)
+    trial = HandTrial(make_scene(("ball", 0.3, 0.2, 0.0)), make_station(), settings=settings)
+    c, s = np.cos(tilt), np.sin(tilt)
+    tilted = grasp_from_axes((c, 0.0, -s), (-s, 0.0, -c), (0.0, 0.0, 0.03))
+    light = trial.run("ball", tilted, friction=1.0, mass=0.01).margins
+    heavy = trial.run("ball", tilted, friction=1.0, mass=1.5).margins
+    weaker = FORCE - 1.5 * GRAVITY * abs(s) / 2.0
+    assert light.pad_force == pytest.approx(FORCE, rel=0.01)
+    assert heavy.pad_force == pytest.approx(weaker, rel=0.01)
+    assert heavy.patch_area / light.patch_area == pytest.approx((weaker / FORCE) ** 0.5, rel=0.01)
 
 
 def test_pads_carry_the_weight_and_press_against_each_other(slow_trials) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from burg_drake.station.document.station_document import load_station
 from burg_drake.station.world.hand_check import check_hand
 from burg_drake.station.world.hand_model import add_hand
 from burg_drake.station.world.robot import add_robot
+from tests.pages import ROOT
 
 STUCK = Finger(body="a", joint="j", pad="pad", closed=0.02, open=0.02)
 MOVING = replace(STUCK, open=0.03)
@@ -246,6 +248,12 @@ def changed_model(folder: Path, old: str, new: str) -> Path:
             "joint 'tilt' connects 'camera' to the world; remove it",
         ),
         ("<sdf ", "<sfd ", "cannot be loaded as one model"),
+        (
+            'name="panda_finger_joint2" type="prismatic"',
+            'name="panda_finger_joint2" type="revolute"',
+            r"fingers\[1\].joint 'panda_finger_joint2' is revolute in its model package://.*;"
+            " fingers have to be on prismatic joints: model a hand whose fingers turn by two",
+        ),
     ],
 )
 def test_model_that_does_not_fit(
@@ -284,3 +292,17 @@ def test_the_document_couples_what_the_model_leaves_free(
     simulator.AdvanceTo(0.1)
     moved = [joint.get_translation(context) - 0.01 for joint in found.joints]
     assert moved == pytest.approx([0.001, 0.001] if coupled else [0.002, 0.0], abs=5e-5)
+
+
+def test_depth_of_pads_on_cranks() -> None:
+    """The page's table of a Robotiq 2F-85, by the cranks of MuJoCo Menagerie's: 37 mm to the side
+    and 44 mm forward with the hand open, the middle of the pads 141.5 mm before the flange."""
+    rows = [
+        [float(cell) for cell in re.findall(r"\| ([\d.]+)", line)]
+        for line in (ROOT / "docs/hands.md").read_text("utf-8").splitlines()
+        if line.startswith(("| opening [mm]", "| middle of the pads"))
+    ]
+    opening, depth = np.array(rows)
+    side = 37.0 - (85.0 - opening) / 2.0
+    forward = np.sqrt(37.0**2 + 44.0**2 - side**2)
+    np.testing.assert_allclose(depth, 141.5 + forward - 44.0, atol=0.1)

@@ -1,6 +1,8 @@
 #!/usr/bin/env bash
 # Creates the virtual environment VENV (first argument) and installs burg_drake in it, editable,
 # with the development tools. Uses apt for what the system lacks if that needs no password.
+# With LOWEST=1 it takes the oldest versions that pyproject.toml allows of all that it names, except
+# Blender, which is large.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 venv=${1:?usage: set_up.sh VENV}
@@ -83,7 +85,16 @@ fi
 say "installing burg_drake and what it needs into $venv (Drake is large: this takes a minute or more)"
 quiet=(-qq)
 [ -t 1 ] && quiet=()
-"$venv/bin/python" -m pip install ${quiet[@]+"${quiet[@]}"} --disable-pip-version-check -e '.[dev,ui]'
+pip_install() {
+  "$venv/bin/python" -m pip install ${quiet[@]+"${quiet[@]}"} --disable-pip-version-check "$@"
+}
+if [ -n "${LOWEST:-}" ]; then  # pip takes the newest versions alone
+  pip_install uv
+  "$venv/bin/python" -m uv pip install -q --python "$venv/bin/python" --resolution lowest-direct \
+    -e '.[dask,dev,frame,jobqueue,mujoco,parquet,ui,usd]'
+else
+  pip_install -e '.[dev,ui]'
+fi
 
 install_system_libraries
 say "done: $("$venv/bin/python" -c 'import importlib.metadata as m; print("drake", m.version("drake"))') in $venv"

@@ -11,7 +11,7 @@ from typing import Any
 
 from burg_drake.apps.camera import calibrate, locate, placement, target
 from burg_drake.apps.camera.intrinsics_text import print_intrinsics
-from burg_drake.apps.options import add_group, add_verb
+from burg_drake.apps.options import add_group, add_verb, input_file
 
 
 def add_to(verbs: Any) -> None:
@@ -68,6 +68,7 @@ def _add_intrinsics(parser: Any) -> None:
     parser.add_argument(
         "intrinsics",
         metavar="INTRINSICS",
+        type=input_file,
         help="intrinsics: ours, camera_info of ROS, OpenCV's; or sim:STATION/CAMERA",
     )
 

@@ -18,6 +18,7 @@ from burg_drake.apps.options import (
     add_renaming,
     add_verb,
     gripper_for,
+    input_file,
     named,
     number,
     output_of,
@@ -42,7 +43,9 @@ def add_to(group: Any) -> None:
         "burg-drake grasps convert runs/first out/ --to acronym",
         "burg-drake grasps convert scene.npy grasps.h5 --scene tabletop_six --camera-pose cam.npy",
     )
-    parser.add_argument("input", metavar="IN", help="file of grasps, or folder of a run")
+    parser.add_argument(
+        "input", metavar="IN", type=input_file, help="file of grasps, or folder of a run"
+    )
     parser.add_argument("output", metavar="OUT", help="file, or folder for one file an object")
     parser.add_argument("--formats", action=_ListFormats, nargs=0, help="list the formats and end")
     add_file_options(parser)

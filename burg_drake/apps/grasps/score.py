@@ -12,6 +12,7 @@ from burg_drake.apps.options import (
     add_renaming,
     add_verb,
     friction,
+    input_file,
     output_of,
 )
 from burg_drake.core import InvalidInputError
@@ -50,7 +51,9 @@ def _add_options(parser: Parser) -> None:
     from burg_drake.apps.options import add_file_options, add_file_station
     from burg_drake.grasping.quality import DEFAULT_METRIC
 
-    parser.add_argument("file", metavar="FILE", help="grasp file of any format, or folder of a run")
+    parser.add_argument(
+        "file", metavar="FILE", type=input_file, help="grasp file of any format, or folder of a run"
+    )
     add_file_options(parser)
     parser.add_argument(
         "-o",

@@ -17,6 +17,7 @@ from burg_drake.apps.options import (
     add_verb,
     add_view,
     gripper_for,
+    input_file,
     number,
     station_for,
 )
@@ -49,7 +50,9 @@ def add_to(group: Any) -> None:
         "view the slider `grasp` of Meshcat's controls does, in the order of the list: the highest",
         "value of the coloured column first, or the best.",
     )
-    show.add_argument("file", metavar="RUN|FILE", help="folder of a run, or any grasp file")
+    show.add_argument(
+        "file", metavar="RUN|FILE", type=input_file, help="folder of a run, or any grasp file"
+    )
     add_file_options(show)
     add_source(show)
     add_file_station(show)

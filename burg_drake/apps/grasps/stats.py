@@ -16,6 +16,7 @@ from burg_drake.apps.options import (
     add_renaming,
     add_verb,
     gripper_for,
+    input_file,
     settings_from,
 )
 from burg_drake.core import InvalidInputError
@@ -46,8 +47,12 @@ def add_to(group: Any) -> None:
 def _add_options(parser: Parser) -> None:
     from burg_drake.grasping.similarity import Tolerance
 
-    parser.add_argument("a", metavar="A", help="grasp file of any format, or folder of a run")
-    parser.add_argument("b", metavar="B", nargs="?", help="another one, to compare with A")
+    parser.add_argument(
+        "a", metavar="A", type=input_file, help="grasp file of any format, or folder of a run"
+    )
+    parser.add_argument(
+        "b", metavar="B", type=input_file, nargs="?", help="another one, to compare with A"
+    )
     add_file_options(parser)
     add_hand(parser, default=None)
     add_renaming(parser)

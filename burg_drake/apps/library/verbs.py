@@ -15,6 +15,7 @@ from burg_drake.apps.options import (
     add_workers,
     coefficient,
     friction,
+    input_file,
     named_positive,
     positive,
     unit,
@@ -210,7 +211,10 @@ def _add_named_values(parser: Parser) -> None:
         help="mass of an object; may be given several times",
     )
     parser.add_argument(
-        "--masses", metavar="FILE", help="YAML file of 'NAME: KG' lines; --mass goes first"
+        "--masses",
+        metavar="FILE",
+        type=input_file,
+        help="YAML file of 'NAME: KG' lines, - for the standard input; --mass goes first",
     )
     parser.add_argument(
         "--friction",

@@ -74,6 +74,7 @@ from .sampling import (
 from .values import (
     coefficient as coefficient,
     friction as friction,
+    input_file as input_file,
     named_positive as named_positive,
     not_negative as not_negative,
     number as number,

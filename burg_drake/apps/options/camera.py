@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.options.values import positive
+from burg_drake.apps.options.values import input_file, positive
 from burg_drake.core import InvalidInputError
 
 if TYPE_CHECKING:
@@ -22,7 +22,9 @@ def add_intrinsics(
         help: what it means to the verb.
         required: the verb can do nothing without.
     """
-    parser.add_argument("--intrinsics", metavar="FILE", required=required, help=help)
+    parser.add_argument(
+        "--intrinsics", metavar="FILE", type=input_file, required=required, help=help
+    )
 
 
 def add_live_camera(parser: Any) -> None:

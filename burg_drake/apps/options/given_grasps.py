@@ -12,7 +12,7 @@ from burg_drake.apps.options.grasp_file import (
     add_gripper_link,
     gripper_for,
 )
-from burg_drake.apps.options.values import renaming
+from burg_drake.apps.options.values import input_file, renaming
 from burg_drake.core import InvalidInputError
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ def add_given(parser: Parser, which: Any) -> None:
     which.add_argument(
         "--grasps",
         metavar="FILE|RUN",
+        type=input_file,
         help="judge the grasps of this file, in any known format, or those of a run's folder,"
         " instead of sampling",
     )

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options.arguments import DEFAULT_STATION, Parser, add_station
+from burg_drake.apps.options.values import input_file
 
 if TYPE_CHECKING:
     from burg_drake.formats.common import Gripper
@@ -51,6 +52,7 @@ def add_camera_options(group: Any) -> None:
     group.add_argument(
         "--camera-pose",
         metavar="FILE",
+        type=input_file,
         nargs="+",
         default=[],
         help="pose of the file's camera (or world) in the scene frame: 4x4 .npy, FILE:INDEX for"

@@ -8,12 +8,41 @@ from __future__ import annotations
 import argparse
 import math
 import re
+import stat
+import tempfile
+from functools import cache
+from pathlib import Path
 
-from burg_drake.core import LARGEST_SEED, quoted, shown
+from burg_drake.core import LARGEST_SEED, InvalidInputError, quoted, shown
+from burg_drake.core.files import read_pipe
 
 MOST = 10_000_000
 """What is counted: grasps, trials, rows."""
 MOST_WORKERS = 1024
+STANDARD_INPUT = ("-", "/dev/stdin")
+
+
+def input_file(text: str) -> str:
+    """A file to read, `-` for the standard input. Files are read more than once, to recognise their
+    format: what comes through a pipe, as with `<(...)`, is copied to a file first."""
+    try:
+        if text not in STANDARD_INPUT and not stat.S_ISFIFO(Path(text).stat().st_mode):
+            return text
+    except (OSError, ValueError):  # whoever opens it says what is wrong
+        return text
+    name = "stdin" if text in STANDARD_INPUT else Path(text).name
+    copy = Path(tempfile.mkdtemp(dir=_copies().name)) / name
+    try:
+        copy.write_bytes(read_pipe(0 if text in STANDARD_INPUT else text))
+    except InvalidInputError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+    return str(copy)
+
+
+@cache
+def _copies() -> tempfile.TemporaryDirectory[str]:
+    """The folder of what came through pipes; it goes when the process ends."""
+    return tempfile.TemporaryDirectory(prefix="burg-drake-pipe-")
 
 
 def positive_int(text: str) -> int:

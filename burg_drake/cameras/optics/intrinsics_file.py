@@ -117,10 +117,6 @@ def _matrix(rows: int, columns: int, data: list[float]) -> dict[str, Any]:
 def _of_ros(data: Tree, name: str) -> Intrinsics:
     model = _text(data, "distortion_model", name)
     K = _camera_matrix(data, name)
-    if K[0] == 0.0:
-        raise DocumentError(f"{name}: the camera is not calibrated (its fx is 0)")
-    if abs(K[1]) > 1e-6 * K[0]:
-        raise InvalidInputError(f"{name}: the camera's axes are skewed; that is not supported")
     _refuse_part_of_image(data, name)
     coefficients = _numbers(data, ROS_DISTORTION, name)
     if model not in ROS_MODELS:
@@ -194,6 +190,18 @@ def _camera_matrix(data: Tree, name: str) -> list[float]:
     K = _numbers(data, ROS_MATRIX, name)
     if len(K) != 9:
         raise DocumentError(f"{name}: the camera matrix has {len(K)} numbers; 9 are needed")
+    if K[0] == 0.0:
+        raise DocumentError(f"{name}: the camera is not calibrated (its fx is 0)")
+    if not abs(K[1]) <= 1e-6 * abs(K[0]):
+        raise InvalidInputError(
+            f"{name}: the camera's axes are skewed (by {K[1]:g}); that is not supported, calibrate"
+            " without skew"
+        )
+    if [K[3], *K[6:]] != [0.0, 0.0, 0.0, 1.0]:
+        raise DocumentError(
+            f"{name}: the camera matrix has {K[3]:g} below fx, and {K[6]:g}, {K[7]:g}, {K[8]:g} in"
+            " its last row; it has to have 0, and 0, 0, 1"
+        )
     return K
 
 

@@ -3,6 +3,7 @@ them, or a numpy array."""
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from burg_drake.cameras.sources.image_file import require_image_size
 from burg_drake.cameras.sources.opencv_log import quiet
 from burg_drake.core import InvalidInputError
 from burg_drake.core.files import IMAGE_SIZE, open_npy, read_bytes
@@ -31,7 +33,7 @@ def read_depth(path: str | Path, unit: float | None = None) -> NDArray[np.float3
         InvalidInputError: no such file, or not a depth image.
     """
     path = Path(path)
-    if not path.is_file():
+    if not path.exists():
         raise InvalidInputError(f"depth image {path} does not exist")
     depth = _array(path) if path.suffix.lower() == ".npy" else _image(path)
     if depth.ndim != 2 or depth.dtype.kind not in "fui" or depth.dtype == np.uint8:
@@ -53,9 +55,12 @@ def _array(path: Path) -> NDArray[Any]:
 
 
 def _image(path: Path) -> NDArray[Any]:
-    with quiet():
-        data = np.frombuffer(read_bytes(path, IMAGE_SIZE), np.uint8)
-        depth = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+    data = read_bytes(path, IMAGE_SIZE)
+    require_image_size(data, f"depth image {path}")
+    depth = None
+    with quiet(), contextlib.suppress(cv2.error):
+        if data:
+            depth = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if depth is None:
         raise InvalidInputError(f"{path} is not an image that can be read; give .png or .npy")
     return np.asarray(depth)

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import contextlib
+import io
+import warnings
 from pathlib import Path
 
 import cv2
 import numpy as np
+import PIL.Image
 
 from burg_drake.cameras.sources.frame import Image
 from burg_drake.cameras.sources.opencv_log import quiet
 from burg_drake.core import InvalidInputError
-from burg_drake.core.files import IMAGE_SIZE, atomic_write, read_bytes
+from burg_drake.core.files import IMAGE_SIZE, READ_ERRORS, atomic_write, read_bytes
+from burg_drake.station.document import MAX_SIDE
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 """Of image files; what else there is in a folder is not looked at."""
@@ -40,6 +44,7 @@ def read_image(path: str | Path) -> Image:
         raise InvalidInputError(str(error).replace("read", "read image", 1)) from error
     if not data:
         raise InvalidInputError(f"image {path} is empty (0 bytes)")
+    require_image_size(data, f"image {path}")
     image = decode_image(data)
     if image is None:
         raise InvalidInputError(
@@ -49,7 +54,12 @@ def read_image(path: str | Path) -> Image:
 
 
 def decode_image(data: bytes) -> Image | None:
-    """(H, W, 3) RGB of the contents of an image file; None if they are not an image."""
+    """(H, W, 3) RGB of the contents of an image file; None if they are not an image, or one that is
+    too large."""
+    try:
+        require_image_size(data, "")
+    except InvalidInputError:
+        return None
     if _is_cut_off(data):
         return None
     flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
@@ -57,6 +67,35 @@ def decode_image(data: bytes) -> Image | None:
         bgr = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
         return None if bgr is None or bgr.size == 0 else np.ascontiguousarray(bgr[..., ::-1])
     return None
+
+
+def require_image_size(data: bytes, name: str) -> None:
+    """Refuses the contents of an image file that would take too much memory, before it is decoded;
+    a small file may hold a large image of one colour.
+
+    Args:
+        data: of the file; what is no image passes.
+        name: stands for the file in messages.
+
+    Raises:
+        InvalidInputError: the image has too many pixels.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            with PIL.Image.open(io.BytesIO(data)) as image:  # reads the header alone
+                width, height = image.size
+    except PIL.Image.DecompressionBombError as error:
+        raise InvalidInputError(
+            f"{name} has more than {2e-6 * (PIL.Image.MAX_IMAGE_PIXELS or 0):.0f} million pixels;"
+            f" it may have {MAX_SIDE:,} a side at most"
+        ) from error
+    except (OSError, *READ_ERRORS):
+        return
+    if max(width, height) > MAX_SIDE:
+        raise InvalidInputError(
+            f"{name} has {width:,} x {height:,} pixels; a side has at most {MAX_SIDE:,}"
+        )
 
 
 def _is_cut_off(data: bytes) -> bool:

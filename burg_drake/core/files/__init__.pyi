@@ -15,6 +15,7 @@ from .bounded_text import (
     TABLE as TABLE,
     Limits as Limits,
     read_bytes as read_bytes,
+    read_pipe as read_pipe,
     read_rows as read_rows,
     read_text as read_text,
 )

@@ -32,7 +32,9 @@ def open_regular(path: str | Path) -> BinaryIO:
     except (OSError, ValueError) as error:
         why = error.strerror if isinstance(error, OSError) else "it is not a path"  # with NUL
         raise InvalidInputError(f"cannot read {shown(str(path), 500)}: {why}") from error
-    kind = "a folder" if stat.S_ISDIR(mode) else "a pipe or a device"
+    if stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode):
+        raise InvalidInputError(f"cannot read {path}: it is a pipe; save it to a file first")
+    kind = "a folder" if stat.S_ISDIR(mode) else "a device"
     raise InvalidInputError(f"cannot read {path}: it is {kind}; expected a file")
 
 

@@ -1,7 +1,8 @@
 """The text of documents, and how much of it is read: the one place of all bounds.
 
 Whatever a file holds, reading it ends, takes memory in proportion to these bounds at most, and
-neither waits for another process nor drains a device.
+neither waits for another process nor drains a device. Only `read_pipe` waits for what another
+process writes.
 """
 
 from __future__ import annotations
@@ -77,6 +78,29 @@ def read_bytes(path: str | Path, size: int) -> bytes:
     if len(data) > size:
         raise InvalidInputError(
             f"cannot read {path}: it has more than {size // MIB} MiB, too much for such a file"
+        )
+    return data
+
+
+def read_pipe(pipe: int | str, size: int = GRASP_FILE.size) -> bytes:
+    """All that comes through a pipe, until whoever writes to it ends.
+
+    Args:
+        pipe: its path, or the number of a file descriptor, which stays open.
+        size: bytes that it may have.
+
+    Raises:
+        InvalidInputError: it cannot be read, or more comes.
+    """
+    name = "the standard input" if pipe == 0 else str(pipe)
+    try:
+        with open(pipe, "rb", closefd=isinstance(pipe, str)) as stream:
+            data = stream.read(size + 1)
+    except OSError as error:
+        raise InvalidInputError(f"cannot read {name}: {error.strerror or error}") from error
+    if len(data) > size:
+        raise InvalidInputError(
+            f"cannot read {name}: more than {size // MIB} MiB came; save it to a file first"
         )
     return data
 

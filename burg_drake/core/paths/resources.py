@@ -60,6 +60,7 @@ def resolve(
     Raises:
         UnknownNameError: nothing is there; the message lists the built-in names of this kind, or
             where the package was looked for.
+        InvalidInputError: it is a pipe.
     """
     text = str(reference)
     if text.startswith(PACKAGE_URI):
@@ -76,6 +77,8 @@ def resolve(
             return builtin
     located = path if base is None else base / path
     if os.path.exists(located):  # also tells of names that are too long, and of links in a circle
+        if located.is_fifo():  # what is named so is read more than once, and in its folder
+            raise InvalidInputError(f"cannot read {text}: it is a pipe; save it to a file first")
         return located.resolve()
     where = f" (relative to {base})" if base is not None and not path.is_absolute() else ""
     known = f"; {nearest(path.stem, builtin_names(kind))}" if kind else ""

@@ -77,7 +77,7 @@ def worker_preload(environment: Mapping[str, str] = os.environ) -> dict[str, str
     if sys.platform != "linux" or given.lower() == OFF or _address_space_is_limited():
         return {}
     before = environment.get(PRELOAD, "")
-    for path in [Path(given).expanduser().absolute()] if given else installed_allocators():
+    for path in [Path(os.path.expanduser(given)).absolute()] if given else installed_allocators():
         preload = f"{before}:{path}" if before else str(path)
         tried = tuple(sorted({**environment, PRELOAD: preload}.items()))
         if _can_be_preloaded(path) and _replaces_malloc(path, _changed(path), tried):

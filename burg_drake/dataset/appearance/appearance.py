@@ -7,11 +7,30 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from burg_drake.core import FieldError, InvalidInputError
-from burg_drake.core.documents import Pose, Vector3, parse_document, plain_data
+from burg_drake.core import LARGEST_SEED, FieldError, InvalidInputError
+from burg_drake.core.documents import Pose, Vector3, parse_document, plain_data, require_ranges
 from burg_drake.dataset.appearance.settings import Pattern
 
 WHITE: Vector3 = (1.0, 1.0, 1.0)
+BRIGHTEST = 1e4
+"""Irradiance, gain or part of a colour, of which 1 makes a white surface white."""
+RANGES = {
+    "exposure": (-20.0, 20.0),
+    "gamma": (0.05, 20.0),
+    "blur": (0.0, 100.0),
+    "electrons": (1.0, 1e12),
+}
+"""Of a camera, far beyond those that looks are drawn from."""
+
+
+def _require_gains(values: Vector3, name: str) -> None:
+    if not 0.0 <= min(values) <= max(values) <= BRIGHTEST:
+        raise FieldError(f"{name} {list(values)} must be 0 to {BRIGHTEST:g} each", name)
+
+
+def _require_seed(seed: int | None, name: str) -> None:
+    if seed is not None and not 0 <= seed <= LARGEST_SEED:
+        raise FieldError(f"{name} is {seed}; a seed is 0 to {LARGEST_SEED}", name)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,13 +52,13 @@ class DirectedLight:
     shadows: bool = False
 
     def __post_init__(self) -> None:
-        if not any(self.direction) or min(self.color) < 0.0 or not any(self.color):
+        _require_gains(self.color, "color")
+        if not any(self.direction) or not any(self.color):
             raise InvalidInputError(
-                "a light needs a direction and a color, and no part of the color may be below 0;"
-                f" given: {list(self.direction)}, {list(self.color)}"
+                "a light needs a direction and a color; given:"
+                f" {list(self.direction)}, {list(self.color)}"
             )
-        if self.irradiance < 0.0:
-            raise FieldError(f"irradiance is {self.irradiance:g}; it is at least 0", "irradiance")
+        require_ranges(self, {"irradiance": (0.0, BRIGHTEST)})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +72,9 @@ class TableSurface:
 
     pattern: Pattern
     seed: int
+
+    def __post_init__(self) -> None:
+        _require_seed(self.seed, "seed")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,8 +96,9 @@ class Photometry:
     electrons: float | None = None
 
     def __post_init__(self) -> None:
-        if self.gamma <= 0.0 or self.blur < 0.0 or (self.electrons or 1.0) <= 0.0:
-            raise InvalidInputError("gamma and electrons must be above 0, blur at least 0")
+        known = {name: bounds for name, bounds in RANGES.items() if getattr(self, name) is not None}
+        require_ranges(self, known)
+        _require_gains(self.white_balance, "white_balance")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,11 +143,14 @@ class Appearance:
     distractors: tuple[Distractor, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.room_light < 0.0 or (self.room_light and self.room is None):
+        _require_seed(self.room, "room")
+        require_ranges(self, {"room_light": (0.0, BRIGHTEST)})
+        if self.room_light and self.room is None:
             raise FieldError(
-                f"room_light is {self.room_light:g}; it is at least 0, and 0 without a room",
-                "room_light",
+                f"room_light is {self.room_light:g}; it is 0 without a room", "room_light"
             )
+        for gains in self.object_gains:
+            _require_gains(gains, "object_gains")
 
     def plain(self) -> dict[str, Any]:
         """As dicts, lists, numbers and texts, for JSON and YAML; `read_appearance` reads it."""

@@ -14,6 +14,7 @@ from burg_drake.core.paths import resolve
 
 LOCAL = re.compile(r"local:(\d{1,4})")
 ADDRESS = re.compile(r"(tls|tcp)://(\[[^\]]+\]|[^:/\s]+):(\d{1,5})")
+MAX_PORT = 65_535
 HOW_TLS = (
     "start scheduler and workers with --protocol tls --tls-ca-file CA --tls-cert CERT --tls-key"
     " KEY, and give a cluster.yaml with address: tls://HOST:PORT and tls: {ca, cert, key}"
@@ -194,6 +195,10 @@ def require_safe(address: str, prefix: str = "") -> None:
         what = "worker" if "worker" in prefix else "scheduler"
         raise InvalidInputError(
             f"{prefix}{quoted(address)} is not an address of a {what}; write tls://HOST:PORT"
+        )
+    if not 1 <= int(found[3]) <= MAX_PORT:
+        raise InvalidInputError(
+            f"{prefix}{address}: port {found[3]} does not exist; they go from 1 to {MAX_PORT}"
         )
     if found[1] == "tcp" and not _is_loopback(found[2].strip("[]")):
         raise ClusterError(

@@ -45,6 +45,15 @@ class ArmLimits:
     torque: Array
 
     def __post_init__(self) -> None:
+        if not (self.lower <= self.upper).all():
+            raise InvalidInputError(
+                f"position limits {self.lower.tolist()} to {self.upper.tolist()} of an arm have to"
+                " be one pair of numbers a joint, the lower one first"
+            )
+        if not (self.torque >= 0.0).all():
+            raise InvalidInputError(
+                f"torque limits {self.torque.tolist()} of an arm have to be at least 0, or inf"
+            )
         for name in ("velocity", "acceleration", "jerk"):
             value = getattr(self, name)
             if value.shape != self.lower.shape or not (np.isfinite(value) & (value > 0.0)).all():

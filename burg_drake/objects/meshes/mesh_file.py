@@ -212,6 +212,8 @@ def _check_file(path: Path) -> None:
         raise MeshError(f"{shown}: the name is not UTF-8; rename the file, or the folder it is in")
     if path.is_symlink() and not path.exists():
         raise MeshError(f"{path}: a link to a file that does not exist, or to itself")
+    if path.is_fifo():
+        raise MeshError(f"{path}: it is a pipe; save it to a file first")
     if not path.is_file():
         raise MeshError(f"{path}: the mesh file does not exist")
     if path.suffix.lower() not in FORMATS:

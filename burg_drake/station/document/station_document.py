@@ -33,6 +33,8 @@ SLOWEST = 1e-3
 """Least limit of a joint [rad/s, rad/s^2, rad/s^3]; a motion with slower ones takes hours."""
 MAX_SIDE = 16_384
 """Of a camera's image [pixels]."""
+FOCAL_RANGE = (1.0, 1e6)
+"""Of a camera [pixels]: a pixel sees less than half a turn, and more than nothing."""
 MAX_SAMPLES = 8
 """Of a camera; 64 rays a pixel bring nothing more, and take seconds an image."""
 
@@ -116,6 +118,11 @@ class Camera:
     def __post_init__(self) -> None:
         if min(self.width, self.height, *self.focal) <= 0:
             raise InvalidInputError("camera width, height and focal must be positive")
+        low, high = FOCAL_RANGE
+        if not low <= min(self.focal) <= max(self.focal) <= high:
+            raise FieldError(
+                f"focal {list(self.focal)} of a camera must be {low:g} to {high:g} pixels", "focal"
+            )
         if max(self.width, self.height) > MAX_SIDE:
             raise FieldError(
                 f"image of {self.width} x {self.height} pixels; a side has at most {MAX_SIDE:,}",

@@ -75,6 +75,8 @@ def add_hand(
     try:
         edit = None if simulated else without_hydroelastic
         (instance,) = add_models(builder.parser(), path, packages, edit=edit)
+    except InvalidInputError:
+        raise
     except (RuntimeError, ValueError) as error:
         raise InvalidInputError(
             f"hand {hand.name!r}: {path} cannot be loaded as one model"
@@ -124,7 +126,14 @@ def find_hand(
     _check_name(hand, "body", hand.body, bodies)
     for i, finger in enumerate(hand.fingers):
         _check_name(hand, f"fingers[{i}].body", finger.body, bodies)
-        _check_name(hand, f"fingers[{i}].joint", finger.joint, sliding, "prismatic ")
+        if finger.joint in joints and finger.joint not in sliding:
+            kind = joints[finger.joint].type_name()
+            raise InvalidInputError(
+                f"hand {hand.name!r}: fingers[{i}].joint {finger.joint!r} is {kind} in its model"
+                f" {hand.model}; fingers have to be on prismatic joints: model a hand whose fingers"
+                " turn by two that slide, with the pads of the real one (docs/hands.md)"
+            )
+        _check_name(hand, f"fingers[{i}].joint", finger.joint, sliding)
     one, other = hand.fingers
     return HandModel(
         instance=instance,
@@ -135,7 +144,7 @@ def find_hand(
     )
 
 
-def _check_name(hand: Hand, key: str, name: str, known: Iterable[str], kind: str = "") -> None:
+def _check_name(hand: Hand, key: str, name: str, known: Iterable[str]) -> None:
     if name not in known:
         raise InvalidInputError(
             f"hand {hand.name!r}: {key} {name!r} is not in its model {hand.model};"

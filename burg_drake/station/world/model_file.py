@@ -25,8 +25,10 @@ from burg_drake.core.paths import (
     NO_PACKAGES,
     Packages,
     data_root,
+    named_files,
     named_packages,
 )
+from burg_drake.station.world.model_numbers import require_sound_numbers
 
 PATH = re.compile(r"<uri>\s*((?![A-Za-z]+:)[^<]*?)\s*</uri>")
 """A file that is named by its path, from the folder of the model on if it is not absolute."""
@@ -51,7 +53,8 @@ def add_models(
         edit: of an SDF's text, such as `without_hydroelastic`.
 
     Raises:
-        InvalidInputError: it cannot be read, or is too large.
+        InvalidInputError: it cannot be read, is too large, or has a mass, an inertia or another
+            number that no body has.
         UnknownNameError: it names a package that is nowhere.
         RuntimeError, ValueError: those of `AddModels`.
     """
@@ -60,6 +63,11 @@ def add_models(
         text = read_bytes(path, DOCUMENT.size).decode()
     except UnicodeDecodeError:
         text = ""
+    require_sound_numbers(path)
+    if "<include" in text:
+        for file in named_files(path, packages):
+            if file.suffix in (".sdf", ".urdf"):
+                require_sound_numbers(file)
     if path.suffix != ".sdf" or not text or "<include" in text:
         return list(parser.AddModels(path))
     if edit is not None:

@@ -120,6 +120,8 @@ def _add_arm(
         path, packages = station.arm_model, station.packages
         edit = None if simulated else without_hydroelastic
         (model,) = add_models(builder.parser(), path, packages, edit=edit)
+    except InvalidInputError:
+        raise
     except (RuntimeError, ValueError) as error:
         raise InvalidInputError(
             f"{station.path}: arm.model: {station.arm_model} cannot be loaded as one robot"

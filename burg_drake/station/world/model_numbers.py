@@ -1,0 +1,203 @@
+"""Refuses numbers of a model's SDF or URDF with which no simulation makes sense.
+
+Drake takes many of them on trust: with a mass of NaN every trial ends with NaN, for a negative one
+it warns and takes a mass of its own, and others end the process. So the text is checked before
+Drake reads it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from xml.parsers import expat
+
+from pydrake.multibody.tree import RotationalInertia
+
+from burg_drake.core import InvalidInputError, quoted
+from burg_drake.core.files import DOCUMENT, read_bytes
+
+FINITE = "finite"
+NOT_ZERO = "finite and not 0"
+NOT_NEGATIVE = "finite and at least 0"
+POSITIVE = "finite and above 0"
+LIMIT = "a number, or inf where there is no limit"
+MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+RULES = {
+    **dict.fromkeys(("pose", "xyz", "rpy", "multiplier"), FINITE),
+    **dict.fromkeys(MOMENTS, FINITE),
+    **dict.fromkeys(("scale", "gear_ratio"), NOT_ZERO),
+    **dict.fromkeys(("mass", "damping", "stiffness", "friction", "mu", "mu2"), NOT_NEGATIVE),
+    **dict.fromkeys(("mu_static", "mu_dynamic", "hunt_crossley_dissipation"), NOT_NEGATIVE),
+    **dict.fromkeys(("relaxation_time", "hydroelastic_margin", "rotor_inertia"), NOT_NEGATIVE),
+    "acceleration": NOT_NEGATIVE,
+    **dict.fromkeys(("hydroelastic_modulus", "mesh_resolution_hint", "density"), POSITIVE),
+    **dict.fromkeys(("point_contact_stiffness", "size", "radius", "length", "radii"), POSITIVE),
+    **dict.fromkeys(("lower", "upper", "effort", "velocity"), LIMIT),
+}
+"""What numbers have to be, by the name of their element (SDF) or attribute (URDF) without the
+prefix `drake:`."""
+URDF_RULES = RULES | dict.fromkeys(("effort", "velocity"), NOT_NEGATIVE)
+"""In SDF negative ones stand for no limit."""
+UNREAD = ("gazebo", "light", "plugin", "ros2_control", "sensor")
+"""Elements that are for other programs."""
+PLACES = ("link", "joint", "frame", "collision", "visual", "transmission")
+"""Elements that a message names."""
+
+
+@dataclass
+class _Element:
+    name: str
+    attributes: dict[str, str]
+    line: int
+    children: list[_Element] = field(default_factory=list)
+    text: str = ""
+
+    def values(self) -> Iterator[tuple[str, str]]:
+        """Names and texts; the attribute `value` goes by the name of the element."""
+        if self.text.strip() and not self.children:
+            yield self.name, self.text.strip()
+        for key, text in self.attributes.items():
+            yield self.name if key == "value" else key.removeprefix("drake:"), text
+
+    def figures(self) -> dict[str, str]:
+        """The values of the element and of those in it, by name."""
+        return dict(value for element in (self, *self.children) for value in element.values())
+
+    def walk(self, *outer: _Element) -> Iterator[tuple[_Element, tuple[_Element, ...]]]:
+        """What is in the element, then the element, each with what it is in, outermost first."""
+        for child in self.children:
+            if child.name not in UNREAD:
+                yield from child.walk(*outer, self)
+        yield self, outer
+
+
+def require_sound_numbers(path: Path) -> None:
+    """Refuses a model with a mass, inertia, limit, contact parameter, size or pose that is not a
+    number, or that no body has. What is not valid XML is left to Drake's own message.
+
+    Args:
+        path: SDF or URDF file.
+
+    Raises:
+        InvalidInputError: it cannot be read, or has such a number; the message names file, line,
+            link or joint, and the value.
+    """
+    _check(read_bytes(path, DOCUMENT.size), path)
+
+
+@lru_cache(maxsize=32)
+def _check(text: bytes, path: Path) -> None:
+    root = _parsed(text)
+    if root is None:
+        return
+    rules = URDF_RULES if root.name == "robot" else RULES
+    welded = set(_welded_links(root))
+    for element, outer in root.walk():
+        named = [e for e in (*outer, element) if e.name in PLACES]
+        try:
+            for key, value in element.values():
+                if key in rules:
+                    _require(key, value, rules[key])
+            if element.name == "axis":
+                _require_direction(element.figures())
+            if element.name == "limit":
+                _require_order(element.figures())
+            if element.name == "inertial":
+                _require_inertia(element, massless=named[-1].attributes.get("name") in welded)
+        except ValueError as error:
+            where = ", ".join(f"{e.name} {quoted(e.attributes.get('name', ''))}" for e in named)
+            raise InvalidInputError(
+                f"{path}:{element.line}: {where}{': ' if where else ''}{error}"
+            ) from error
+
+
+def _parsed(text: bytes) -> _Element | None:
+    """The root of a model; None if it is not XML, or nested deeper than any model."""
+    parser = expat.ParserCreate()
+    parser.buffer_text = True
+    opened = [_Element("", {}, 0)]
+
+    def start(name: str, attributes: dict[str, str]) -> None:
+        element = _Element(name.removeprefix("drake:"), attributes, parser.CurrentLineNumber)
+        opened[-1].children.append(element)
+        opened.append(element)
+
+    def characters(text: str) -> None:
+        opened[-1].text += text
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = lambda _: opened.pop()
+    parser.CharacterDataHandler = characters
+    try:
+        parser.Parse(text, True)
+    except expat.ExpatError:
+        return None
+    return opened[0].children[0]
+
+
+def _welded_links(root: _Element) -> Iterator[str]:
+    """Names of links at fixed joints, which may be mere frames without mass."""
+    for joint, _ in root.walk():
+        if joint.name == "joint" and joint.attributes.get("type") == "fixed":
+            for end in joint.children:
+                if end.name in ("parent", "child"):
+                    yield end.attributes.get("link", end.text.strip())
+
+
+def _require(key: str, text: str, rule: str) -> None:
+    for word in text.split():
+        try:
+            value = float(word)
+        except ValueError:
+            raise ValueError(f"{key} is {quoted(text)}; it has to be {rule}") from None
+        finite = math.isfinite(value)
+        sound = {
+            FINITE: finite,
+            NOT_ZERO: finite and value != 0.0,
+            NOT_NEGATIVE: finite and value >= 0.0,
+            POSITIVE: finite and value > 0.0,
+            LIMIT: not math.isnan(value),
+        }
+        if not sound[rule]:
+            raise ValueError(f"{key} is {text}; it has to be {rule}")
+
+
+def _require_direction(axis: dict[str, str]) -> None:
+    direction = axis.get("xyz", "1 0 0")
+    if not any(map(float, direction.split())):
+        raise ValueError(f"axis is {direction}; it has to be a direction")
+
+
+def _require_order(limit: dict[str, str]) -> None:
+    lower, upper = float(limit.get("lower", "-inf")), float(limit.get("upper", "inf"))
+    if "upper" in limit and lower > upper:
+        raise ValueError(f"lower is {lower:g}, above upper, which is {upper:g}; exchange them")
+
+
+def _require_inertia(inertial: _Element, massless: bool) -> None:
+    """Checks that a link has a mass, and moments of inertia that some distribution of it has.
+
+    Args:
+        inertial: of the link.
+        massless: whether mass and moments may be 0.
+    """
+    if inertial.attributes.get("auto") == "true":  # of SDF: by density
+        return
+    figures = {k: v for e in inertial.children for k, v in e.figures().items()}
+    mass = float(figures.get("mass", "1"))
+    unstated = dict(zip(MOMENTS, (1.0, 1.0, 1.0, 0.0, 0.0, 0.0), strict=True))
+    inertia = RotationalInertia(*(float(figures.get(k, moment)) for k, moment in unstated.items()))
+    principal = inertia.CalcPrincipalMomentsOfInertia()
+    if massless and mass == principal.max() == 0.0:
+        return
+    if mass == 0.0:
+        raise ValueError("mass is 0; it has to be above 0, unless a fixed joint holds the link")
+    if not inertia.CouldBePhysicallyValid() or principal.max() == 0.0:
+        moments = ", ".join(f"{moment:g}" for moment in principal)
+        raise ValueError(
+            f"inertia has the principal moments {moments} kg m^2; they have to be above 0, and none"
+            " above the sum of the other two"
+        )
