@@ -255,7 +255,7 @@ def with_copy(sheet: Sheet, pages: tuple[Page, ...], turn: float) -> Sheet:
     middle = np.array([width, height]) / 2
     beside = np.eye(3)
     beside[:2, :2] = [[cos, -sin], [sin, cos]]
-    beside[:2, 2] = middle + [(1.0 + COPY_GAP) * width, 0.0] - beside[:2, :2] @ middle
+    beside[:2, 2] = middle + np.r_[(1.0 + COPY_GAP) * width, 0.0] - beside[:2, :2] @ middle
     places = [_place(page, (1.0, 1.0), 0.0, np.zeros(2)) for page in pages]
     laid = [*(beside @ place for place in places), *places]
     texture = assembled(((1.0 + COPY_SHARE) * width, height), (*pages, *pages), laid)

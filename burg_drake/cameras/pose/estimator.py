@@ -163,7 +163,7 @@ class BoardPose:
                 None,
                 "the edges of the markers are too unclear (blur, contrast); see to the light",
             )
-        best = self._refinement.with_disturbance(rounds[0])
+        best = self._refinement.with_disturbance(light, rounds[0])
         turn = _turn(rounds[0], rounds[1]) if len(rounds) > 1 else 0.0
         if turn > DIFFERENT and not self._decided(rounds[0], rounds[1], found):
             if turn > NEARBY:

@@ -28,7 +28,7 @@ BLOOM = 0.5
 0.2 in pictures that are overexposed twice."""
 ROWS = 0.5
 """What the camera does between the first and the last row that is worth telling [pixels]."""
-MOST_ROWS, MOST_BESIDE, MOST_HEIGHT = 6.0, 3e-3, 8e-3
+MOST_ROWS, MOST_BESIDE, MOST_HEIGHT = 15.0, 5e-3, 8e-3
 """What is no motion [pixels], page or bulge [m] that a pose can be taken from any more: five
 standard deviations of what is expected where there is any."""
 BESIDE, HEIGHT = 2e-4, 5e-4

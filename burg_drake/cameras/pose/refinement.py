@@ -18,6 +18,7 @@ from burg_drake.cameras.optics import Intrinsics
 from burg_drake.cameras.pose.disturbance import Disturbance, DisturbanceFit, SheetModes
 from burg_drake.cameras.pose.edge_fit import EdgeFits, fit_edges
 from burg_drake.cameras.pose.edge_projection import (
+    MARGIN,
     NEAREST,
     EdgeViews,
     motion_of_points,
@@ -85,6 +86,9 @@ UNUSED = 0.05
 beside its place."""
 ROUNDS_BY_MARKER = 2
 """Of that."""
+MAX_SHIFT = MARGIN / 2.0
+"""Of a marker beside its place, up to which its edges are looked for there: seven pixels across
+an edge stay within the image [pixels]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,6 +213,7 @@ class EdgeRefinement:
         last: EdgeRound,
         which: NDArray[np.intp],
         shift: Array,
+        step: bool = True,
     ) -> tuple[EdgeRound, Array]:
         """A round that looks for the edges of each marker beside its place, and weighs them by how
         they fit to each other in the marker, not to the pose: pages that are glued beside their
@@ -219,6 +224,7 @@ class EdgeRefinement:
             last: round.
             which: edges, as indices.
             shift: (M, 2) of each marker from where the pose puts it [pixels].
+            step: the pose moves to where it fits all markers best.
 
         Returns:
             The round, or the last one if too few edges are left, and the shifts from its pose.
@@ -226,6 +232,7 @@ class EdgeRefinement:
         views = view_edges(self._edges, which, self._intrinsics, last.X_SC, last.spread.bloom)
         marker = self._edges.marker[views.which]
         normal = views.across / np.sqrt((views.across**2).sum(axis=1, keepdims=True))
+        shift = np.clip(shift, -MAX_SHIFT, MAX_SHIFT)
         looked_at = replace(views, at=views.at + shift[marker])
         fits = fit_edges(light, self._edges, looked_at, last.spread.blur)
         good = _has_expected_profile(fits)
@@ -239,29 +246,38 @@ class EdgeRefinement:
             weight = good * _tukey_weight(rest, good)
         offset = fits.offset + (normal * shift[marker]).sum(axis=1)
         J = np.column_stack([views.motion, views.bloom])
-        step = _weighted_step(J / sd[:, None], offset / sd, weight)
-        residual = offset - J @ step
+        motion = np.zeros(7)
+        if step:
+            motion = _weighted_step(J / sd[:, None], offset / sd, weight)
+        middle = self._edges.p_SE[views.which].mean(axis=0)
         changed = {
-            "X_SC": perturbed_pose(last.X_SC, step[:6], self._edges.p_SE[views.which].mean(axis=0)),
+            "X_SC": perturbed_pose(last.X_SC, motion[:6], middle),
             "views": views,
             "fits": fits,
             "weight": weight,
-            "residual": residual,
+            "residual": offset - J @ motion,
             "sd": sd,
         }
-        shift = _marker_shifts(normal, residual, weight / sd**2, marker, len(shift))
-        return replace(last, **changed), shift
+        found = replace(last, **changed)
+        return found, self._shifts_by_marker(found, found.residual)
 
-    def with_disturbance(self, last: EdgeRound) -> RefinedPose:
+    def _shifts_by_marker(self, found: EdgeRound, offset: Array) -> Array:
+        """(M, 2) shifts of markers by the offsets (N,) of their edges [pixels]."""
+        views = found.views
+        normal = views.across / np.sqrt((views.across**2).sum(axis=1, keepdims=True))
+        marker = self._edges.marker[views.which]
+        information = found.weight / found.sd**2
+        return _marker_shifts(normal, offset, information, marker, len(self._corners))
+
+    def with_disturbance(self, light: NDArray[np.float32], last: EdgeRound) -> RefinedPose:
         """The pose of the last round if markers may be shifted."""
-        found = DisturbanceFit(
-            last.views,
-            last.residual,
-            last.weight / last.sd**2,
-            self._edges.marker[last.views.which],
-            self._modes,
-            self._intrinsics.height,
-        ).fit(_bloom_prior(), self._intrinsics.known_to or 0.0)
+        found = self._disturbance(last)
+        moved = last.views.motion @ found.step
+        if np.sqrt(np.average(moved**2, weights=last.weight)) > LONG:
+            shift = self._shifts_by_marker(last, last.residual - moved)
+            there = replace(last, X_SC=perturbed_pose(last.X_SC, found.step))
+            last, _ = self._iterate_by_marker(light, there, last.views.which, shift, step=False)
+            found = self._disturbance(last)
         X_SC = perturbed_pose(last.X_SC, found.step)
         covariance = found.covariance.copy()
         covariance[:3, :3] += self._shift_by_blur(last)
@@ -272,6 +288,16 @@ class EdgeRefinement:
             "residual": last.residual - last.views.motion @ found.step,
         }
         return RefinedPose(**(vars(last) | changed), disturbance=found)
+
+    def _disturbance(self, last: EdgeRound) -> Disturbance:
+        return DisturbanceFit(
+            last.views,
+            last.residual,
+            last.weight / last.sd**2,
+            self._edges.marker[last.views.which],
+            self._modes,
+            self._intrinsics.height,
+        ).fit(_bloom_prior(), self._intrinsics.known_to or 0.0)
 
     def _unknown_size(self, p_SC: Array) -> Array:
         """(3, 3) covariance of the camera's position over a print that is longer along one axis by
@@ -472,7 +498,7 @@ def _marker_shifts(
     G, g = np.zeros((count, 2, 2)), np.zeros((count, 2))
     np.add.at(G, marker, information[:, None, None] * normal[:, :, None] * normal[:, None])
     np.add.at(g, marker, (information * offset)[:, None] * normal)
-    G += (1e-6 * np.trace(G, axis1=1, axis2=2) + 1e-12)[:, None, None] * np.eye(2)
+    G += np.eye(2) / FARTHEST**2
     return np.asarray(np.linalg.solve(G, g[..., None])[..., 0])
 
 
