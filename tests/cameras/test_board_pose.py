@@ -366,13 +366,17 @@ def test_half_of_a_sheet_that_is_glued_two_millimetres_aside_still_counts() -> N
     halves = []
     for aside in (-1e-3, 1e-3):
         moved = X_SC.copy()
-        moved[1, 3] -= aside  # the sheet moves the other way than the camera
+        moved[0, 3] -= aside  # the sheet moves the other way than the camera
         halves.append(board_image(Board(), CAMERA, moved))
     cut = round(float(CAMERA.center[0]))
     side_by_side = np.hstack([halves[0][:, :cut], halves[1][:, cut:]])
     estimate = BoardPose(Board(), CAMERA).estimate(side_by_side)
     assert estimate.valid and "beside their places" in estimate.reason
     whole = BoardPose(Board(), CAMERA).estimate(board_image(Board(), CAMERA, X_SC))
-    assert set(estimate.ids) == set(whole.ids)
-    off = error(estimate.X_SC, X_SC)
-    assert np.sqrt(off @ np.linalg.solve(estimate.covariance, off) / 6.0) < 3.0
+    assert len(set(whole.ids) - set(estimate.ids)) < 3  # at the rim
+    truth = X_SC.copy()
+    truth[0, 3] += (
+        1e-3 / 9.0
+    )  # S fits all of the sheet: five columns left and four right of the gap
+    off = error(estimate.X_SC, truth)
+    assert np.sqrt(off @ np.linalg.solve(estimate.covariance, off) / 6.0) < 1.5
