@@ -359,12 +359,12 @@ def test_what_intrinsics_are_known_to_is_in_the_covariance() -> None:
     assert sigmas[0] > 5.0 and sigmas[1] < 1.5
 
 
-def test_half_of_a_sheet_that_is_glued_two_millimetres_aside_still_counts() -> None:
+def test_half_of_a_sheet_that_is_glued_four_millimetres_aside_still_counts() -> None:
     # A gap between markers is at the image's middle, where the pages meet.
     gap = float(Board().layout.p_SQ[4, 1, 0]) + 0.0075
     X_SC = view((gap, 0.21), 0.55, 0.0, 0.0, 0.0)
     halves = []
-    for aside in (-1e-3, 1e-3):
+    for aside in (-2e-3, 2e-3):
         moved = X_SC.copy()
         moved[0, 3] -= aside  # the sheet moves the other way than the camera
         halves.append(board_image(Board(), CAMERA, moved))
@@ -379,4 +379,4 @@ def test_half_of_a_sheet_that_is_glued_two_millimetres_aside_still_counts() -> N
         1e-3 / 9.0
     )  # S fits all of the sheet: five columns left and four right of the gap
     off = error(estimate.X_SC, truth)
-    assert np.sqrt(off @ np.linalg.solve(estimate.covariance, off) / 6.0) < 1.5
+    assert np.sqrt(off @ np.linalg.solve(estimate.covariance, off) / 6.0) < 3.0
