@@ -32,7 +32,7 @@ SIZE = 0.01
 from that within [-]."""
 ASPECT = 0.01
 """Of a print's length along y for that along x [-]."""
-PAGE, HILL = 0.15, 0.12
+PAGE, HILL = 0.15, 0.16
 """Distances within which shifts along the sheet, and heights, are alike [m]: half a page of A4, and
 a hill of paper is wide."""
 MODES = 40
