@@ -347,7 +347,7 @@ def test_a_print_longer_along_one_axis_leaves_its_size_open(scale: tuple[float, 
 def test_what_intrinsics_are_known_to_is_in_the_covariance() -> None:
     X_SC = view((0.29, 0.2), 0.7, 20.0, 40.0, 10.0)
     image = board_image(Board(), CAMERA, X_SC)
-    shifted = tuple((np.array(CAMERA.center) + [0.3, -0.4]).tolist())
+    shifted = (CAMERA.center[0] + 0.3, CAMERA.center[1] - 0.4)
     known = replace(CAMERA, center=shifted, known_to=0.5)
     plain = BoardPose(Board(), replace(known, known_to=None)).estimate(image)
     estimate = BoardPose(Board(), known).estimate(image)
