@@ -85,21 +85,22 @@ class Answer:
 
 
 @lru_cache(maxsize=4)
-def ours_for(camera: Camera) -> burg.cameras.BoardPose:
-    """Our estimator of the default board."""
+def ours_for(camera: Camera, center_off: float = 0.0) -> burg.cameras.BoardPose:
+    """Our estimator of the default board, with intrinsics that are known to that many pixels."""
     intrinsics = burg.cameras.Intrinsics(
         width=camera.size[0],
         height=camera.size[1],
         focal=camera.focal,
         center=camera.center,
         distortion=camera.coefficients,
+        known_to=center_off or None,
     )
     return burg.cameras.BoardPose(burg.load_scene("tabletop_six").board, intrinsics)
 
 
-def ours(image: NDArray[np.uint8], camera: Camera, truth: Array) -> Answer:
+def ours(image: NDArray[np.uint8], camera: Camera, truth: Array, center_off: float = 0.0) -> Answer:
     """Ours, with its own word about validity."""
-    estimator = ours_for(camera)
+    estimator = ours_for(camera, center_off)
     start = time.process_time()
     estimate = estimator.estimate(image)
     spent = 1e3 * (time.process_time() - start)
@@ -181,8 +182,11 @@ def view(name: str, size: str, seed: int, k: int) -> tuple[Answer, Answer]:
     """What both say of a view of a row."""
     cv2.setNumThreads(1)
     camera = CAMERAS[size]
-    taken = picture(ROWS[name], camera, (seed, k))
-    return ours(taken.image, camera, taken.X_SC), opencv(taken.image, camera, taken.X_SC)
+    row = ROWS[name]
+    taken = picture(row, camera, (seed, k))
+    return ours(taken.image, camera, taken.X_SC, row.center_off), opencv(
+        taken.image, camera, taken.X_SC
+    )
 
 
 def negative(name: str, size: str, seed: int, k: int) -> Answer:

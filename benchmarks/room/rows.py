@@ -14,7 +14,7 @@ from .lens import Camera
 from .light import Light, Shadow, irradiance, map_of
 from .paper import Array, Board, Image, printed
 from .sensor import Sensor, image_of
-from .sheet import AS_MEANT, Faults, Sheet, glue
+from .sheet import AS_MEANT, COPY_SHARE, Faults, Sheet, glue, with_copy
 from .views import moved, random_view, seen_at, shaken
 
 WEBCAM = Sensor(blur=0.6, vignetting=0.25, electrons=3000.0, quality=90)
@@ -42,7 +42,13 @@ class Row:
         hand: one is over the board.
         covered: share of the area of the markers in sight.
         few: one or two markers are in sight as a whole.
+        whole: all of the board is in sight. S fits all of the sheet: of what an edge does that is
+            out of sight, an image tells nothing.
         gloss: radiance of the lamp's spot over that of white paper.
+        copy: a second print of the board lies beside the first one.
+        mirrored: the image is, left for right.
+        center_off: distance of the camera's principal point from where its intrinsics have it, to
+            a random side [pixels].
     """
 
     sensor: Sensor = WEBCAM
@@ -54,7 +60,11 @@ class Row:
     hand: bool = False
     covered: float = 0.0
     few: bool = False
+    whole: bool = False
     gloss: float = 0.0
+    copy: bool = False
+    mirrored: bool = False
+    center_off: float = 0.0
 
 
 ROWS = {
@@ -78,6 +88,14 @@ ROWS = {
     "glued": Row(page="A4", faults=Faults(offset=0.5e-3, turn=0.2)),
     "bulge 2 mm": Row(faults=Faults(bulge=2e-3)),
     "glare": Row(gloss=1.5),
+    "rolling 6 px": Row(rolling=6.0),
+    "glued 2 mm": Row(page="A4", faults=Faults(offset=2e-3, turn=0.2)),
+    "curled edge": Row(faults=Faults(curl=6e-3), whole=True),
+    "99 % along x": Row(faults=Faults(scale=(0.99, 1.0))),
+    "99.5 % along x": Row(faults=Faults(scale=(0.995, 1.0))),
+    "principal point": Row(center_off=0.5),
+    "two copies": Row(copy=True),
+    "mirrored": Row(mirrored=True),
 }
 """By name; `room` is shadow, motion, a hand and twice the noise together."""
 
@@ -111,6 +129,15 @@ def picture(row: Row, camera: Camera, seed: tuple[int, ...], board: Board = BOAR
     rng = np.random.default_rng([*seed, *camera.size])
     lying = sheet(board, row.page, row.faults, seed[-1] % SHEETS)
     X_SC = random_view(rng, board.size)
+    while row.whole and not seen_at(camera, X_SC, lying.p_SQ)[1].all():
+        X_SC = random_view(rng, board.size)
+    if row.copy:
+        lying = with_copy(lying, printed(board, row.page), np.pi * (seed[-1] % 2))
+        X_SC[0, 3] += rng.uniform(0.0, COPY_SHARE) * board.size[0]
+    if row.center_off:
+        heading = rng.uniform(-np.pi, np.pi)
+        shift = row.center_off * np.array([np.cos(heading), np.sin(heading)])
+        camera = replace(camera, center=tuple((np.array(camera.center) + shift).tolist()))
     if row.few:
         X_SC = _few_in_sight(camera, X_SC, lying, rng)
     _, inside = seen_at(camera, X_SC, lying.p_SQ)
@@ -120,6 +147,8 @@ def picture(row: Row, camera: Camera, seed: tuple[int, ...], board: Board = BOAR
     side = 2 if row.motion else 4
     seen = radiance(camera, poses, surface, side)
     image = image_of(seen, PAPER, row.sensor, rng)
+    if row.mirrored:
+        image = np.ascontiguousarray(image[:, ::-1])
     return Picture(image, X_SC, lying.p_SQ, inside.all(axis=1))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import cv2
@@ -19,6 +19,10 @@ RIM = 6e-3
 """What of the pages stays around the board [m]; they are trimmed there."""
 RELIEF = 0.01
 """Distance of the points that a sheet's heights are given at [m]."""
+CURLED = 0.15
+"""Width of the strip along an edge that curls [m]."""
+COPY_GAP, COPY_SHARE = 0.03, 0.6
+"""Between a sheet and its copy, and how much of the copy is there [widths of the sheet]."""
 
 
 class Texture(NamedTuple):
@@ -75,12 +79,14 @@ class Faults:
         offset: of a page, the most along x and y [m].
         turn: of a page, the most [deg].
         bulge: the most that the sheet is above the table [m].
+        curl: height of an edge of the sheet [m].
         scale: of the print along x and y of the page.
     """
 
     offset: float = 0.0
     turn: float = 0.0
     bulge: float = 0.0
+    curl: float = 0.0
     scale: tuple[float, float] = (1.0, 1.0)
 
 
@@ -123,7 +129,7 @@ def glue(board: Board, pages: tuple[Page, ...], faults: Faults, rng: np.random.G
     best = _rigid_fit(printed.reshape(-1, 2), corners.reshape(-1, 2))
     printed = _moved(best, printed)
     texture = assembled(board.size, pages, [best @ place for place in places])
-    relief = _bulging(board.size, faults.bulge, rng, printed)
+    relief = _relief(board.size, faults, rng, printed)
     return Sheet(board, texture, relief, np.dstack([printed, relief.at(printed)]))
 
 
@@ -159,7 +165,7 @@ def assembled(size: tuple[float, float], pages: tuple[Page, ...], places: list[A
 
 def flat(size: tuple[float, float]) -> Relief:
     """That of a sheet without bulges."""
-    return _bulging(size, 0.0, np.random.default_rng(0), None)
+    return _relief(size, AS_MEANT, np.random.default_rng(0), None)
 
 
 def texture_of(canvas: Image, left: float, top: float, per_metre: float) -> Texture:
@@ -210,23 +216,47 @@ def _rigid_fit(p: Array, to: Array) -> Array:
     return fit
 
 
-def _bulging(
-    size: tuple[float, float], most: float, rng: np.random.Generator, fit: Array | None
+def _relief(
+    size: tuple[float, float], faults: Faults, rng: np.random.Generator, fit: Array | None
 ) -> Relief:
-    """Two to four round hills, the highest of `most`, less the plane that fits corners best."""
+    """Two to four round hills and an edge that curls up, less the plane that fits corners best."""
     x, y = (np.arange(-5, int(s / RELIEF) + 7) * RELIEF for s in size)
     p = np.stack(np.meshgrid(x, y), axis=-1)
     z = np.zeros(p.shape[:2])
-    if most > 0.0:
+    if faults.bulge > 0.0:
         for _ in range(rng.integers(2, 5)):
             middle, width = rng.uniform(0, 1, 2) * size, rng.uniform(0.06, 0.15)
             z += rng.uniform(0.4, 1) * np.exp(-((p - middle) ** 2).sum(axis=-1) / 2 / width**2)
-        z *= most / z.max()
+        z *= faults.bulge / z.max()
+    if faults.curl > 0.0:
+        axis, far = rng.integers(0, 2, 2)
+        inward = np.clip(size[axis] - p[..., axis] if far else p[..., axis], 0.0, CURLED)
+        z += faults.curl * (1.0 - inward / CURLED) ** 2
     relief = Relief(z.astype(np.float32), float(x[0]), float(y[0]), RELIEF)
-    if most > 0.0 and fit is not None:
+    if z.any() and fit is not None:
         points = fit.reshape(-1, 2)
         terms = np.c_[np.ones(len(points)), points]
         plane = np.linalg.lstsq(terms, relief.at(points), rcond=None)[0]
         z -= plane[0] + p @ plane[1:]
         relief = relief._replace(z=z.astype(np.float32))
     return relief
+
+
+def with_copy(sheet: Sheet, pages: tuple[Page, ...], turn: float) -> Sheet:
+    """The sheet with another print of the same board to its right, of which a part is there.
+
+    Args:
+        sheet: as it lies on the table.
+        pages: of the board.
+        turn: of the copy about its middle [rad].
+    """
+    width, height = sheet.board.size
+    cos, sin = np.cos(turn), np.sin(turn)
+    middle = np.array([width, height]) / 2
+    beside = np.eye(3)
+    beside[:2, :2] = [[cos, -sin], [sin, cos]]
+    beside[:2, 2] = middle + np.r_[(1.0 + COPY_GAP) * width, 0.0] - beside[:2, :2] @ middle
+    places = [_place(page, (1.0, 1.0), 0.0, np.zeros(2)) for page in pages]
+    laid = [*(beside @ place for place in places), *places]
+    texture = assembled(((1.0 + COPY_SHARE) * width, height), (*pages, *pages), laid)
+    return replace(sheet, texture=texture)

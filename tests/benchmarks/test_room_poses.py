@@ -16,6 +16,9 @@ from tests.thorough import thorough
         thorough("motion 4 px", 1.0),
         thorough("bulge 2 mm", 1.0),
         thorough("55 % covered", 1.0),
+        thorough("glued 2 mm", 12.0),
+        thorough("99 % along x", 8.0),
+        thorough("principal point", 1.0),
     ],
 )
 def test_poses_are_found_and_errors_are_what_the_covariance_says(row: str, mm: float) -> None:

@@ -330,3 +330,53 @@ def test_intrinsics_of_another_camera_are_doubtful(clean: np.ndarray) -> None:
     wrong = Intrinsics(width=640, height=480, focal=(600.0, 660.0), center=(360.0, 200.0))
     estimate = estimate_board(clean, wrong, BOARD)
     assert not estimate.valid or "intrinsics" in estimate.reason
+
+
+@pytest.mark.parametrize("scale", [(0.99, 1.0), (1.0, 0.995)])
+def test_a_print_longer_along_one_axis_leaves_its_size_open(scale: tuple[float, float]) -> None:
+    X_SC = view((0.29, 0.2), 0.7, 30.0, 40.0, 10.0)
+    estimate = BoardPose(Board(), CAMERA).estimate(board_image(Board(), CAMERA, X_SC, scale=scale))
+    assert estimate.valid
+    assert "times as long along y as along x" in estimate.reason
+    # The camera's height over the sheet is off by what one axis is, and S by what its middle is.
+    off = error(estimate.X_SC, X_SC)[3:]
+    assert np.sqrt(off @ np.linalg.solve(estimate.covariance[3:, 3:], off) / 3.0) < 1.5
+    assert np.linalg.norm(off) > 1e-3
+
+
+def test_what_intrinsics_are_known_to_is_in_the_covariance() -> None:
+    X_SC = view((0.29, 0.2), 0.7, 20.0, 40.0, 10.0)
+    image = board_image(Board(), CAMERA, X_SC)
+    shifted = (CAMERA.center[0] + 0.3, CAMERA.center[1] - 0.4)
+    known = replace(CAMERA, center=shifted, known_to=0.5)
+    plain = BoardPose(Board(), replace(known, known_to=None)).estimate(image)
+    estimate = BoardPose(Board(), known).estimate(image)
+    assert np.array_equal(estimate.X_SC, plain.X_SC)
+    sigmas = []
+    for found in (plain, estimate):
+        off = error(found.X_SC, X_SC)
+        sigmas.append(np.sqrt(off @ np.linalg.solve(found.covariance, off) / 6.0))
+    assert sigmas[0] > 5.0 and sigmas[1] < 1.5
+
+
+def test_half_of_a_sheet_that_is_glued_four_millimetres_aside_still_counts() -> None:
+    # A gap between markers is at the image's middle, where the pages meet.
+    gap = float(Board().layout.p_SQ[4, 1, 0]) + 0.0075
+    X_SC = view((gap, 0.21), 0.55, 0.0, 0.0, 0.0)
+    halves = []
+    for aside in (-2e-3, 2e-3):
+        moved = X_SC.copy()
+        moved[0, 3] -= aside  # the sheet moves the other way than the camera
+        halves.append(board_image(Board(), CAMERA, moved))
+    cut = round(float(CAMERA.center[0]))
+    side_by_side = np.hstack([halves[0][:, :cut], halves[1][:, cut:]])
+    estimate = BoardPose(Board(), CAMERA).estimate(side_by_side)
+    assert estimate.valid and "beside their places" in estimate.reason
+    whole = BoardPose(Board(), CAMERA).estimate(board_image(Board(), CAMERA, X_SC))
+    assert len(set(whole.ids) - set(estimate.ids)) < 3  # at the rim
+    truth = X_SC.copy()
+    truth[0, 3] += (
+        1e-3 / 9.0
+    )  # S fits all of the sheet: five columns left and four right of the gap
+    off = error(estimate.X_SC, truth)
+    assert np.sqrt(off @ np.linalg.solve(estimate.covariance, off) / 6.0) < 3.0

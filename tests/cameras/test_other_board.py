@@ -13,7 +13,7 @@ from burg_drake.cameras.pose.wrong_board import WrongBoardCheck
 from burg_drake.core import photo_light
 from burg_drake.scene.document.markers import Markers
 from burg_drake.scene.document.scene import Board
-from tests.cameras.board_views import SMALL, error, view
+from tests.cameras.board_views import CAMERA, SMALL, error, view
 from tests.cameras.synthetic import ImageDegradation, board_image, covers_of
 
 BOARD = Board(size=(0.3, 0.24))  # 4 x 3 markers
@@ -113,3 +113,32 @@ def test_frames_are_looked_at_where_the_ring_is() -> None:
     said = WrongBoardCheck(one, SMALL, (1.0, 1.0)).beyond(grey, light, X_SC)
     assert "ids 0, 1, 2 ..." in said
     assert not WrongBoardCheck(BOARD, SMALL, (1.0, 1.0)).beyond(grey, light, VIEW)
+
+
+@pytest.mark.parametrize("covered", [False, True], ids=["whole", "each marker once"])
+def test_two_copies_of_the_board(covered: bool) -> None:
+    left, right = (
+        np.array([[0.075, 0.12, 0.075, 0.12, 0.0]]),
+        np.array([[0.22, 0.12, 0.07, 0.12, 0.0]]),
+    )
+    images = [
+        board_image(BOARD, CAMERA, view((x, 0.12), 0.65, 0.0, 0.0, 0.0), covers=hidden)
+        for x, hidden in ((0.3, right if covered else None), (0.0, left if covered else None))
+    ]
+    side_by_side = np.hstack([images[0][:, :320], images[1][:, 320:]])
+    estimate = BoardPose(BOARD, CAMERA).estimate(side_by_side)
+    assert not estimate.valid
+    assert estimate.reason.startswith("two copies of this board in sight: ")
+    assert estimate.reason.endswith("; remove or cover one of them")
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_mirrored_image(poses: BoardPose, axis: int) -> None:
+    estimate = poses.estimate(np.flip(board_image(BOARD, SMALL, VIEW), axis))
+    assert not estimate.valid
+    assert estimate.reason.startswith("the image is mirrored: 12 markers of the board can be read")
+
+
+def test_a_picture_of_something_else_is_not_mirrored(poses: BoardPose) -> None:
+    other = replace(BOARD, markers=Markers(first_id=100))
+    assert "mirrored" not in poses.estimate(board_image(other, SMALL, VIEW)).reason

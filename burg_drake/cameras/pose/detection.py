@@ -65,11 +65,18 @@ class Detection:
         index: (N,) which of the layout's markers each is.
         corners: (N, 4, 2) their corners, in the order of the layout's [pixels].
         candidates: number of other squares that may be markers, but not of this board.
+        twice: (M,) markers of the layout that are seen at two places or more; not in `index`.
     """
 
     index: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     corners: Array = field(default_factory=lambda: np.empty((0, 4, 2)))
     candidates: int = 0
+    twice: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+
+    @property
+    def count(self) -> int:
+        """Markers of the board that were read."""
+        return len(self.index) + len(self.twice)
 
 
 class MarkerDetector:
@@ -91,9 +98,9 @@ class MarkerDetector:
         for encoded, (windows, constant) in SEARCHES:
             image = grey if encoded else even_levels(photo_light(grey))
             again = self._search(image, windows, constant)
-            if len(again.index) >= len(found.index):
+            if again.count >= found.count:
                 found = again
-            if len(found.index) >= (self._enough if encoded else 1):
+            if found.count >= (self._enough if encoded else 1):
                 break
         return found
 
@@ -118,8 +125,8 @@ class MarkerDetector:
         turns, index = np.divmod(best[fits], len(self._patterns) // 4)
         first = (np.arange(4) + turns[:, None]) % 4
         corners = np.take_along_axis(squares[fits], first[..., None], axis=1)
-        index, corners = _without_duplicates(index, corners)
-        return Detection(index, self._refined_corners(grey, corners), int((~fits).sum()))
+        index, corners, twice = _without_duplicates(index, corners)
+        return Detection(index, self._refined_corners(grey, corners), int((~fits).sum()), twice)
 
     def _refined_corners(self, grey: NDArray[np.uint8], corners: Array) -> Array:
         """Corners where the lines of both of their sides meet."""
@@ -152,8 +159,11 @@ def side_lengths(corners: Array) -> Array:
     return np.asarray(np.sqrt((side**2).sum(axis=2)).mean(axis=1))
 
 
-def _without_duplicates(index: NDArray[np.intp], corners: Array) -> tuple[NDArray[np.intp], Array]:
-    """Markers that are seen at one place, by the largest quadrilateral there."""
+def _without_duplicates(
+    index: NDArray[np.intp], corners: Array
+) -> tuple[NDArray[np.intp], Array, NDArray[np.intp]]:
+    """Markers that are seen at one place, by the largest quadrilateral there, and those that are
+    seen at several."""
     side, middle = side_lengths(corners), corners.mean(axis=1)
     order = np.lexsort((-side, index))
     index, corners, side, middle = index[order], corners[order], side[order], middle[order]
@@ -161,7 +171,7 @@ def _without_duplicates(index: NDArray[np.intp], corners: Array) -> tuple[NDArra
     largest = first[which]
     elsewhere = np.abs(middle - middle[largest]).max(axis=1) > SAME_PLACE * side[largest]
     once = ~np.isin(values, index[elsewhere])
-    return values[once], corners[first[once]]
+    return values[once], corners[first[once]], values[~once]
 
 
 @dataclass(frozen=True)

@@ -21,11 +21,11 @@ from burg_drake.core import Array
 ALONE = 0.006, 0.02, 0.06, 0.2
 """Shifts of single markers, for whatever else is not as assumed; standard deviations that are tried
 [pixels]. In images without noise the first one is right."""
-IN_PLANE = 1.5e-4, 6e-4
+IN_PLANE = 1.5e-4, 6e-4, 2e-3
 """Of pages along the sheet [m]."""
-OUT_OF_PLANE = 4e-4, 1.5e-3
+OUT_OF_PLANE = 4e-4, 1.5e-3, 4e-3
 """Of the height of a sheet that does not lie flat [m]."""
-ROWS = 0.8
+ROWS = 0.8, 4.0
 """By what the camera does from the first row of an image to the last one [pixels]."""
 SIZE = 0.01
 """Of the markers for their distances: light spreads further from the white around a marker than
@@ -40,7 +40,7 @@ MODES = 40
 FAINT = 1e-3
 """Patterns of less than this share of the strongest one's variance are left out."""
 KINDS: dict[str, tuple[float, ...]] = {
-    "rows": (ROWS,),
+    "rows": ROWS,
     "aspect": (ASPECT,),
     "size": (SIZE,),
     "in_plane": IN_PLANE,
@@ -51,10 +51,12 @@ FEWEST = 5
 LEAST_SPREAD = 1e-3
 """Of that over what noise makes; keeps probabilities finite."""
 RARE = 6.0
-"""By how much each kind of shift lowers the logarithm of the probability before it is seen."""
+"""By how much each kind of shift lowers the logarithm of the probability before it is seen; the
+largest of its sizes lowers it twice as much."""
 TOLD = 8.0
 """By how much the logarithm of the probability must exceed that without a kind of shift for it to
-be told; less may be chance, and only widens the covariance."""
+be told; less may be chance, and only widens the covariance. Another kind that explains the same
+does not keep the better one from being told."""
 TEMPER = 4.0
 """Logarithms of probabilities count by this part of them: patterns are not quite those of a real
 sheet."""
@@ -116,6 +118,7 @@ class SheetModes:
     neither shifts nor turns the sheet as a whole.
 
     Attributes:
+        middle: (2,) of the markers [m].
         in_plane: (N, 2, K) of shifts along x and y, of unit variance.
         out_of_plane: (N, L) of heights, of unit variance.
     """
@@ -123,7 +126,8 @@ class SheetModes:
     def __init__(self, center: Array, p_SE: Array) -> None:
         """Takes the markers' middles (M, 3) and the edges' (N, 3) [m]."""
         n = len(center)
-        x, y = (center[:, :2] - center[:, :2].mean(axis=0)).T
+        self.middle = center[:, :2].mean(axis=0)
+        x, y = (center[:, :2] - self.middle).T
         one, zero = np.ones(n), np.zeros(n)
         moved = np.stack([[one, zero], [zero, one], [-y, x]], axis=-1)  # (2, n, 3)
         alike, between = _alike(center, p_SE, PAGE)
@@ -207,16 +211,18 @@ class DisturbanceFit:
         self._modes = modes.in_plane[which], modes.out_of_plane[which]
         J = views.motion[kept]
         row = views.at[kept, 1:] / height - 0.5
+        x, y = modes.middle  # about which the sheet is longer: S is the frame that fits best
         strength = np.sqrt((J**2).mean(axis=0)) + 1e-9
         # What the camera does from the first row to the last one moves each edge by [pixels].
         self._turning = J / strength / np.sqrt(6.0)
         parts = {
             "pose": np.column_stack([J, views.bloom[kept]]),
             "rows": row * self._turning,
-            "aspect": 0.5 * views.print[kept, :1],
+            "aspect": 0.5 * (views.print[kept, :1] + (J[:, 3:5] * [-x, y]).sum(axis=1)[:, None]),
             "size": views.print[kept, 1:],
             "in_plane": (J[:, None, 3:5] @ self._modes[0])[:, 0],
             "out_of_plane": J[:, 5:] * self._modes[1],
+            "center": self._normal,
         }
         ends = np.cumsum([0, *(part.shape[1] for part in parts.values())])
         self._columns = {kind: np.arange(*ends[k : k + 2]) for k, kind in enumerate(parts)}
@@ -224,11 +230,12 @@ class DisturbanceFit:
         self._add_up()
         self._equations = {alone: self._normal_equations(alone) for alone in ALONE}
 
-    def fit(self, prior: Array) -> Disturbance:
+    def fit(self, prior: Array, center: float = 0.0) -> Disturbance:
         """The most probable shifts, and the step of the pose with them.
 
         Args:
             prior: (7, 7) information about the step of pose and bloom that is known before.
+            center: standard deviation of the camera's principal point along u and v [pixels].
         """
         solved = {s: self._solve(s, prior) for s in map(MarkerShifts, ALONE)}
         best = max(solved.values(), key=_logarithm)
@@ -239,7 +246,7 @@ class DisturbanceFit:
             if better is best:
                 break
             best = better
-        return self._disturbance(best, list(solved.values()))
+        return self._disturbance(best, list(solved.values()), center)
 
     def _by_marker(self) -> tuple[Array, Array]:
         """(n, 2, 2) information about the shift of each marker, and (n, 2) times what is seen."""
@@ -291,16 +298,19 @@ class DisturbanceFit:
         covariance = np.linalg.inv(A)
         x = covariance @ b
         logarithm += 0.5 * float(b @ x) - 0.5 * float(np.linalg.slogdet(A)[1])
-        logarithm -= float(np.log(known).sum()) + RARE * len(sds)
+        rare = sum(1 + (sds[k] == KINDS[k][-1] and len(KINDS[k]) > 1) for k in _kinds(shifts))
+        logarithm -= float(np.log(known).sum()) + RARE * rare
         return _Solution(logarithm, shifts, x, covariance, columns)
 
-    def _disturbance(self, best: _Solution, solved: list[_Solution]) -> Disturbance:
-        """What the best solution says, its step and covariance those of all, by probability."""
+    def _disturbance(self, best: _Solution, solved: list[_Solution], center: float) -> Disturbance:
+        """What the best solution says, its step and covariance those of all, by probability. The
+        step takes the principal point as it is known, so that the pose fits the image with it."""
         x = np.zeros(self._J.shape[1])
         x[best.columns] = best.x
+        chosen = _kinds(best.shifts)
         for kind in KINDS:
-            without = max(s.logarithm for s in solved if not getattr(s.shifts, kind))
-            if best.logarithm - without < TOLD:
+            without = (s for s in solved if not _kinds(s.shifts) - (chosen - {kind}))
+            if best.logarithm - max(map(_logarithm, without)) < TOLD:
                 x[self._columns[kind]] = 0.0
         rows, aspect, size, in_plane, out_of_plane = (x[self._columns[kind]] for kind in KINDS)
         weight = np.exp((np.array([s.logarithm for s in solved]) - best.logarithm) / TEMPER)
@@ -309,9 +319,13 @@ class DisturbanceFit:
         step = weight @ steps
         apart = steps - step
         covariance = np.einsum("s,sij->ij", weight, [s.covariance[:6, :6] for s in solved])
+        covariance += (apart * weight[:, None]).T @ apart
+        A, _, _ = self._equations[best.shifts.alone]
+        by_center = (best.covariance @ A[np.ix_(best.columns, self._columns["center"])])[:6]
+        covariance += center**2 * by_center @ by_center.T
         return Disturbance(
             step,
-            covariance + (apart * weight[:, None]).T @ apart,
+            covariance,
             best.shifts,
             float(np.linalg.norm(self._modes[0] @ in_plane, axis=1).max()),
             float(np.abs(self._modes[1] @ out_of_plane).max()),
@@ -323,6 +337,10 @@ class DisturbanceFit:
 
 def _logarithm(solution: _Solution) -> float:
     return solution.logarithm
+
+
+def _kinds(shifts: MarkerShifts) -> set[str]:
+    return {kind for kind in KINDS if getattr(shifts, kind)}
 
 
 def _with_another(shifts: MarkerShifts) -> Iterator[MarkerShifts]:

@@ -16,7 +16,12 @@ from scipy.spatial.transform import Rotation
 
 from burg_drake.cameras.optics import Intrinsics
 from burg_drake.cameras.pose.coarse import CoarsePose, coarse_pose
-from burg_drake.cameras.pose.detection import Detection, MarkerDetector, other_markers
+from burg_drake.cameras.pose.detection import (
+    FEWEST_OTHER,
+    Detection,
+    MarkerDetector,
+    other_markers,
+)
 from burg_drake.cameras.pose.edges import marker_edges
 from burg_drake.cameras.pose.estimate import BoardEstimate
 from burg_drake.cameras.pose.print_quality import (
@@ -55,6 +60,9 @@ USED_EDGES = 6
 DOUBTFUL_RESIDUAL = 0.3
 """From this distance of markers from their places on, the camera's intrinsics are doubtful, or the
 board is not flat [pixels]."""
+
+MIN_COPY_MARKERS = 3
+"""Markers beside the board that stand to each other as on another print of it."""
 
 
 class BoardPose:
@@ -122,33 +130,40 @@ class BoardPose:
     ) -> BoardEstimate:
         """Finds markers, and from them the pose."""
         seen = self._detector.detect(grey)
+        if len(seen.twice) >= FEWEST_OTHER:
+            return BoardEstimate(reason=_two_copies(f"{len(seen.twice)} markers are at two places"))
         if not len(seen.index):
-            return BoardEstimate(reason=self._no_markers_reason(grey, seen))
+            reason = self._mirrored_reason(grey, seen) or self._no_markers_reason(grey, seen)
+            return BoardEstimate(reason=reason)
         coarse = coarse_pose(self._p_SQ[seen.index], seen.corners, self.intrinsics)
-        wrong = self._other_board_reason(seen, coarse)
+        wrong = self._copy_reason(seen, coarse) or self._other_board_reason(seen, coarse)
         if wrong:
-            return BoardEstimate(reason=wrong)
+            return BoardEstimate(reason=self._mirrored_reason(grey, seen) or wrong)
         found = seen.index[coarse.inliers]
-        refined, wrong = self._refine(light, coarse.X_SC, found)
+        refined, wrong = self._refine(light, coarse.X_SC, found, seen.corners[coarse.inliers])
         if refined is None:
-            return BoardEstimate(reason=wrong)
+            return BoardEstimate(reason=self._mirrored_reason(grey, seen) or wrong)
         wrong = self._wrong_print_reason(refined)
         if wrong:
             return BoardEstimate(reason=wrong)
         return self._estimate(grey, light, refined, depth, X_SC_known)
 
     def _refine(
-        self, light: NDArray[np.float32], poses: list[Array], found: NDArray[np.intp]
+        self,
+        light: NDArray[np.float32],
+        poses: list[Array],
+        found: NDArray[np.intp],
+        corners: Array,
     ) -> tuple[RefinedPose | None, str]:
         """The pose that fits the edges best, or why there is none."""
-        attempts = [self._refinement.refine(light, X_SC, found) for X_SC in poses]
+        attempts = [self._refinement.refine(light, X_SC, found, corners) for X_SC in poses]
         rounds = sorted((r for r in attempts if r is not None), key=lambda r: self._off(r, found))
         if not rounds:
             return (
                 None,
                 "the edges of the markers are too unclear (blur, contrast); see to the light",
             )
-        best = self._refinement.with_disturbance(rounds[0])
+        best = self._refinement.with_disturbance(light, rounds[0])
         turn = _turn(rounds[0], rounds[1]) if len(rounds) > 1 else 0.0
         if turn > DIFFERENT and not self._decided(rounds[0], rounds[1], found):
             if turn > NEARBY:
@@ -245,6 +260,35 @@ class BoardPose:
                 f" {layout.ids[-1]}; is first_id right?"
             )
         return f"{start} in sight, this one has {layout.dictionary}"
+
+    def _mirrored_reason(self, grey: NDArray[np.uint8], seen: Detection) -> str:
+        """That more markers can be read in the mirrored image, if so."""
+        if seen.candidates < FEWEST_OTHER:
+            return ""
+        mirrored = self._detector.detect(np.ascontiguousarray(grey[:, ::-1]))
+        if mirrored.count < max(FEWEST_OTHER, len(seen.index) + 1):
+            return ""
+        return (
+            f"the image is mirrored: {mirrored.count} markers of the board can be read the other"
+            " way round; turn off mirroring in the camera's settings or driver"
+        )
+
+    def _copy_reason(self, seen: Detection, coarse: CoarsePose) -> str:
+        """That markers beside the board stand as on another print of it; empty if none do."""
+        rest = ~coarse.inliers
+        if not coarse.X_SC or rest.sum() < MIN_COPY_MARKERS:
+            return ""
+        places, corners = self._p_SQ[seen.index[rest]], seen.corners[rest]
+        copy = coarse_pose(places, corners, self.intrinsics)
+        if not copy.X_SC or copy.inliers.sum() < MIN_COPY_MARKERS:
+            return ""
+        # Another board's markers would be within this one's grid: two sheets lie side by side.
+        rays = self.intrinsics.rays(corners[copy.inliers].mean(axis=1)) @ coarse.X_SC[0][:3, :3].T
+        at = coarse.X_SC[0][:2, 3] - coarse.X_SC[0][2, 3] * rays[:, :2] / rays[:, 2:]
+        low, high = self._p_SQ.min(axis=(0, 1))[:2], self._p_SQ.max(axis=(0, 1))[:2]
+        if ((at > low) & (at < high)).all(axis=1).any():
+            return ""
+        return _two_copies(f"{_markers(len(at))} stand as on another print beside it")
 
     def _other_board_reason(self, seen: Detection, coarse: CoarsePose) -> str:
         """Why the markers that were found are not this board; empty if they are."""
@@ -352,6 +396,11 @@ def _residual_doubt(error: float) -> str:
             " board is flat"
         )
     return ""
+
+
+def _two_copies(seen: str) -> str:
+    """Why no pose is given: nothing tells on which of the sheets the objects belong."""
+    return f"two copies of this board in sight: {seen}; remove or cover one of them"
 
 
 def _markers(count: int) -> str:

@@ -8,7 +8,7 @@ part of them, take part as soon as the pose tells well enough where their edges 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from burg_drake.cameras.optics import Intrinsics
 from burg_drake.cameras.pose.disturbance import Disturbance, DisturbanceFit, SheetModes
 from burg_drake.cameras.pose.edge_fit import EdgeFits, fit_edges
 from burg_drake.cameras.pose.edge_projection import (
+    MARGIN,
     NEAREST,
     EdgeViews,
     motion_of_points,
@@ -80,6 +81,14 @@ REWEIGHTED = 3
 """Rounds of robust weights in a step."""
 LEAST_EDGES = 24
 """With fewer a pose does not count as refined."""
+UNUSED = 0.05
+"""Share of the read markers that fit no pose with the others, from which on each is looked for
+beside its place."""
+ROUNDS_BY_MARKER = 2
+"""Of that."""
+MAX_SHIFT = MARGIN / 2.0
+"""Of a marker beside its place, up to which its edges are looked for there: seven pixels across
+an edge stay within the image [pixels]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +159,11 @@ class EdgeRefinement:
         self._modes = SheetModes(p_SQ.mean(axis=1), edges.p_SE)
 
     def refine(
-        self, light: NDArray[np.float32], X_SC: Array, markers: NDArray[np.intp]
+        self,
+        light: NDArray[np.float32],
+        X_SC: Array,
+        markers: NDArray[np.intp],
+        corners: Array,
     ) -> EdgeRound | None:
         """Refines a pose.
 
@@ -158,6 +171,7 @@ class EdgeRefinement:
             light: (H, W) image in linear light.
             X_SC: (4, 4) pose that puts the edges of `markers` within about a pixel.
             markers: those that were found, as indices of the layout's.
+            corners: (N, 4, 2) of them in the image [pixels].
 
         Returns:
             The last round; None if too few edges look as they should.
@@ -179,26 +193,119 @@ class EdgeRefinement:
             result = result and self._iterate(light, result.X_SC, found[:LAST], result.spread)
             if result is None or result.moved < STILL:
                 break
+        if result and self._unused(result, markers) > max(2.0, UNUSED * len(markers)):
+            shift = np.zeros((len(self._corners), 2))
+            p_C = (self._corners[markers] - result.X_SC[:3, 3]) @ result.X_SC[:3, :3]
+            shift[markers] = (corners - self._intrinsics.project(p_C)).mean(axis=1)
+            for _ in range(ROUNDS_BY_MARKER):
+                result, shift = self._iterate_by_marker(light, result, found[:LAST], shift)
         return result
 
-    def with_disturbance(self, last: EdgeRound) -> RefinedPose:
+    def _unused(self, result: EdgeRound, markers: NDArray[np.intp]) -> int:
+        """Markers that were read, but of which most edges are not where the pose puts them."""
+        marker, n = self._edges.marker[result.views.which], len(self._corners)
+        used = np.bincount(marker, weights=result.weight > 0.0, minlength=n)
+        return int((used < 0.5 * np.bincount(marker, minlength=n))[markers].sum())
+
+    def _iterate_by_marker(
+        self,
+        light: NDArray[np.float32],
+        last: EdgeRound,
+        which: NDArray[np.intp],
+        shift: Array,
+        step: bool = True,
+    ) -> tuple[EdgeRound, Array]:
+        """A round that looks for the edges of each marker beside its place, and weighs them by how
+        they fit to each other in the marker, not to the pose: pages that are glued beside their
+        places would drop out otherwise.
+
+        Args:
+            light: (H, W) image in linear light.
+            last: round.
+            which: edges, as indices.
+            shift: (M, 2) of each marker from where the pose puts it [pixels].
+            step: the pose moves to where it fits all markers best.
+
+        Returns:
+            The round, or the last one if too few edges are left, and the shifts from its pose.
+        """
+        views = view_edges(self._edges, which, self._intrinsics, last.X_SC, last.spread.bloom)
+        marker = self._edges.marker[views.which]
+        normal = views.across / np.sqrt((views.across**2).sum(axis=1, keepdims=True))
+        shift = np.clip(shift, -MAX_SHIFT, MAX_SHIFT)
+        looked_at = replace(views, at=views.at + shift[marker])
+        fits = fit_edges(light, self._edges, looked_at, last.spread.blur)
+        good = _has_expected_profile(fits)
+        if good.sum() < LEAST_EDGES:
+            return last, shift
+        sd = np.sqrt(_offset_variance(fits, good) + MODEL_SD**2)
+        weight = good.astype(float)
+        for _ in range(REWEIGHTED):
+            apart = _marker_shifts(normal, fits.offset, weight / sd**2, marker, len(shift))
+            rest = (fits.offset - (normal * apart[marker]).sum(axis=1)) / sd
+            weight = good * _tukey_weight(rest, good)
+        offset = fits.offset + (normal * shift[marker]).sum(axis=1)
+        J = np.column_stack([views.motion, views.bloom])
+        motion = np.zeros(7)
+        if step:
+            motion = _weighted_step(J / sd[:, None], offset / sd, weight)
+        middle = self._edges.p_SE[views.which].mean(axis=0)
+        changed = {
+            "X_SC": perturbed_pose(last.X_SC, motion[:6], middle),
+            "views": views,
+            "fits": fits,
+            "weight": weight,
+            "residual": offset - J @ motion,
+            "sd": sd,
+        }
+        found = replace(last, **changed)
+        return found, self._shifts_by_marker(found, found.residual)
+
+    def _shifts_by_marker(self, found: EdgeRound, offset: Array) -> Array:
+        """(M, 2) shifts of markers by the offsets (N,) of their edges [pixels]."""
+        views = found.views
+        normal = views.across / np.sqrt((views.across**2).sum(axis=1, keepdims=True))
+        marker = self._edges.marker[views.which]
+        information = found.weight / found.sd**2
+        return _marker_shifts(normal, offset, information, marker, len(self._corners))
+
+    def with_disturbance(self, light: NDArray[np.float32], last: EdgeRound) -> RefinedPose:
         """The pose of the last round if markers may be shifted."""
-        found = DisturbanceFit(
+        found = self._disturbance(last)
+        moved = last.views.motion @ found.step
+        if np.sqrt(np.average(moved**2, weights=last.weight)) > LONG:
+            shift = self._shifts_by_marker(last, last.residual - moved)
+            there = replace(last, X_SC=perturbed_pose(last.X_SC, found.step))
+            last, _ = self._iterate_by_marker(light, there, last.views.which, shift, step=False)
+            found = self._disturbance(last)
+        X_SC = perturbed_pose(last.X_SC, found.step)
+        covariance = found.covariance.copy()
+        covariance[:3, :3] += self._shift_by_blur(last)
+        covariance[3:, 3:] += found.aspect**2 * self._unknown_size(X_SC[:3, 3])
+        changed = {
+            "X_SC": X_SC,
+            "covariance": covariance,
+            "residual": last.residual - last.views.motion @ found.step,
+        }
+        return RefinedPose(**(vars(last) | changed), disturbance=found)
+
+    def _disturbance(self, last: EdgeRound) -> Disturbance:
+        return DisturbanceFit(
             last.views,
             last.residual,
             last.weight / last.sd**2,
             self._edges.marker[last.views.which],
             self._modes,
             self._intrinsics.height,
-        ).fit(_bloom_prior())
-        covariance = found.covariance.copy()
-        covariance[:3, :3] += self._shift_by_blur(last)
-        changed = {
-            "X_SC": perturbed_pose(last.X_SC, found.step),
-            "covariance": covariance,
-            "residual": last.residual - last.views.motion @ found.step,
-        }
-        return RefinedPose(**(vars(last) | changed), disturbance=found)
+        ).fit(_bloom_prior(), self._intrinsics.known_to or 0.0)
+
+    def _unknown_size(self, p_SC: Array) -> Array:
+        """(3, 3) covariance of the camera's position over a print that is longer along one axis by
+        as much as its length: which of both axes is right, the image does not say, nor to which
+        part of the sheet S belongs."""
+        middle = np.r_[self._modes.middle, 0.0]
+        arm = p_SC - middle
+        return np.asarray(0.25 * (np.outer(arm, arm) + np.diag(middle**2)))
 
     def _shift_by_blur(self, last: EdgeRound) -> Array:
         """(3, 3) covariance of the rotation that a blur makes which is not alike on both sides."""
@@ -372,10 +479,27 @@ def _robust_step(
     step = _weighted_step(J, e, weight)
     for _ in range(REWEIGHTED):
         rest = e - J @ step
-        scale = 1.4826 * np.median(np.abs(rest[good]))  # of normal residuals
-        weight = good * np.maximum(1.0 - (rest / (TUKEY * scale)) ** 2, 0.0) ** 2
+        weight = good * _tukey_weight(rest, good)
         step = _weighted_step(J, e, weight)
     return step, weight
+
+
+def _tukey_weight(rest: Array, good: NDArray[np.bool_]) -> Array:
+    """(N,) weights of residuals (N,) by the spread of the good ones."""
+    scale = 1.4826 * np.median(np.abs(rest[good]))  # of normal residuals
+    return np.asarray(np.maximum(1.0 - (rest / (TUKEY * scale)) ** 2, 0.0) ** 2)
+
+
+def _marker_shifts(
+    normal: Array, offset: Array, information: Array, marker: NDArray[np.intp], count: int
+) -> Array:
+    """(M, 2) shifts of markers by the offsets (N,) of their edges along normals (N, 2); 0 for
+    markers without edges."""
+    G, g = np.zeros((count, 2, 2)), np.zeros((count, 2))
+    np.add.at(G, marker, information[:, None, None] * normal[:, :, None] * normal[:, None])
+    np.add.at(g, marker, (information * offset)[:, None] * normal)
+    G += np.eye(2) / FARTHEST**2
+    return np.asarray(np.linalg.solve(G, g[..., None])[..., 0])
 
 
 def _weighted_step(J: Array, e: Array, weight: Array) -> Array:
