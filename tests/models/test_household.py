@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import trimesh
 from scipy import ndimage
+from scipy.spatial import ConvexHull
 
 from burg_drake.objects.library.document import load_library
 from tests.thorough import thorough
@@ -243,3 +244,16 @@ def test_shipped_library_shows_the_colours():
         if len(wanted) == 1:
             wanted = {shape.rgba[:3]}
         assert shown == wanted, name
+
+
+def test_the_lying_bottle_rests_on_a_face() -> None:
+    """Its centre of mass is 5 mm or more within the corners that touch, and not above a ridge."""
+    library = load_library("household")
+    entry = library.entry("bottle")
+    X_SO = entry.X_SO(0)
+    assert abs(X_SO[2, 2]) < 0.1  # it lies
+    pieces = [trimesh.load_mesh(library.root / piece, process=False) for piece in entry.pieces]
+    p_S = np.vstack([piece.vertices for piece in pieces]) @ X_SO[:3, :3].T + X_SO[:3, 3]
+    corners = p_S[p_S[:, 2] < p_S[:, 2].min() + 1e-4, :2]
+    center = (X_SO[:3, :3] @ entry.mass_properties.center_of_mass + X_SO[:3, 3])[:2]
+    assert -(ConvexHull(corners).equations @ [*center, 1.0]).max() > 5e-3
