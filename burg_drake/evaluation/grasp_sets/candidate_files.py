@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -59,6 +59,7 @@ def read_grasps(
     X_SF: Array | None = None,
     object_ids: Mapping[int, str] | None = None,
     scene_id: str | None = None,
+    correction: Iterable[str] = (),
 ) -> GivenGrasps:
     """Reads a grasp file and gives each grasp to an instance of the scene.
 
@@ -79,13 +80,15 @@ def read_grasps(
             scene frame if None.
         object_ids: names of instances by the file's object ids.
         scene_id: the one to take of a file of several scenes.
+        correction: mistakes of the file that are made up for, such as `["turn:z90"]`; see
+            `pose_mistakes.CORRECTIONS`.
 
     Raises:
         InvalidInputError: the file cannot be read, or it is not told what its grasps belong to.
-        UnknownNameError: an object, instance or scene that is not there.
+        UnknownNameError: an object, instance, scene or correction that is not there.
     """
     scene = as_scene(scene)
-    imported = read_input(path, format, gripper)
+    imported = read_input(path, format, gripper, correction)
     names = InstanceNames(scene, str(path), dict(objects or {}))
     grasps = _of_one_scene(imported.grasps, scene_id, names.path)
     frame = frame or imported.frame
@@ -101,7 +104,10 @@ def read_grasps(
         raise InvalidInputError(
             f"{path} has grasps in the frame of a camera; give the camera's pose in the scene"
         ).about("X_SF")
-    X_SG = grasps.X_OG if X_SF is None else X_SF @ grasps.X_OG
+    X_SF = np.eye(4) if X_SF is None else X_SF
+    X_SG = X_SF @ grasps.X_OG
+    measured = {**grasps.provenance, "X_SM": X_SF.tolist()}
+    grasps = dataclasses.replace(grasps, provenance=measured)
     owner, notes = _owners(grasps, X_SG, names, object_ids or {}, gripper)
     placed = by_instance(scene, _without_instance(grasps), X_SG, owner)
     return GivenGrasps(placed, (*imported.notes, *notes, *_repeated(placed, names.path)))
