@@ -156,7 +156,7 @@ def _content(arguments: argparse.Namespace) -> Content:
     station = station_for(arguments, arguments.file)
     gripper, format = gripper_for(arguments, station), arguments.source
     objects = dict(arguments.rename)
-    imported = read_input(path, format, gripper)
+    imported = read_input(path, format, gripper, arguments.correction)
     grasps = imported.grasps
     if len(grasps) == 0:
         raise InvalidInputError(f"{path} has no grasps")
@@ -172,7 +172,15 @@ def _content(arguments: argparse.Namespace) -> Content:
             " with `burg-drake grasps convert --scene` first"
         )
     if source.scene is not None:
-        given = read_grasps(source.scene, path, gripper, format=format, objects=objects)
+        given = read_grasps(
+            source.scene,
+            path,
+            gripper,
+            format=format,
+            objects=objects,
+            correction=arguments.correction,
+            station=station,
+        )
         provenance = imported.grasps.provenance
         grasps = dataclasses.replace(_on_instances(given.by_instance), provenance=provenance)
     return Content(grasps, source, station, ranked_set(grasps), title=path.name)

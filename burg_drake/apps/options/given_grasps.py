@@ -9,7 +9,7 @@ from burg_drake.apps.options.arguments import Parser
 from burg_drake.apps.options.grasp_file import (
     FRAMES,
     add_camera_options,
-    add_gripper_link,
+    add_reading,
     gripper_for,
 )
 from burg_drake.apps.options.values import renaming
@@ -41,7 +41,7 @@ def add_given(parser: Parser, which: Any) -> None:
     group.add_argument(
         "--grasps-format", metavar="NAME", help="format of the file (default: by its content)"
     )
-    add_gripper_link(group)
+    add_reading(group)
     group.add_argument(
         "--grasps-object",
         metavar="[THEIRS=]OURS",
@@ -65,7 +65,7 @@ def require_file(arguments: argparse.Namespace) -> None:
         InvalidInputError: names the option.
     """
     names = ("grasps_format", "grasps_object", "grasps_frame", "camera_pose", "object_ids")
-    for name in (*names, "scene_id", "gripper_link"):
+    for name in (*names, "scene_id", "gripper_link", "correction"):
         if getattr(arguments, name) and arguments.grasps is None:
             raise InvalidInputError(
                 f"--{name.replace('_', '-')} is for grasp files; add --grasps FILE"
@@ -88,4 +88,6 @@ def read_given(arguments: argparse.Namespace, scene: Scene, station: Station) ->
         X_SF=read_poses(poses) if poses else None,
         object_ids=arguments.object_ids,
         scene_id=arguments.scene_id,
+        correction=arguments.correction,
+        station=station,
     )

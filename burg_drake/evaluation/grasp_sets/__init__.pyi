@@ -15,7 +15,20 @@ from .input import (
     read_input as read_input,
     station_reference as station_reference,
 )
+from .mistake_search import (
+    find_mistake as find_mistake,
+    given_hints as given_hints,
+    half_width_notes as half_width_notes,
+    mistake_notes as mistake_notes,
+)
 from .near_objects import require_near as require_near
+from .pose_mistakes import (
+    CORRECTIONS as CORRECTIONS,
+    Mistake as Mistake,
+    MistakeFound as MistakeFound,
+    corrected_poses as corrected_poses,
+    usual_mistakes as usual_mistakes,
+)
 from .provenance import set_documents as set_documents
 from .run_set import (
     column_called as column_called,

@@ -3,15 +3,16 @@ open hand and where its pads meet the object."""
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array, inverse, make_pose, rot_z
-from burg_drake.core.grasps import GraspSet
+from burg_drake.core import Array, BurgError, inverse, make_pose, rot_z
+from burg_drake.core.grasps import GraspSet, Outcome
 from burg_drake.evaluation.candidates import held_instances
 from burg_drake.evaluation.grasp_sets.pose_mistakes import (
     Mistake,
@@ -21,6 +22,8 @@ from burg_drake.evaluation.grasp_sets.pose_mistakes import (
     frames_of,
     usual_mistakes,
 )
+from burg_drake.evaluation.grasp_sets.run_set import of_instances
+from burg_drake.evaluation.store import Run
 from burg_drake.formats import FORMATS
 from burg_drake.formats.common import GraspFormat, Gripper
 from burg_drake.objects.library import ObjectLibrary
@@ -30,6 +33,7 @@ from burg_drake.station.document import Station
 if TYPE_CHECKING:
     from burg_drake.geometry import Surface
     from burg_drake.grasping.clearance import HandClearance
+    from burg_drake.station.diagram import StationDiagram
 
 MAX_GRASPS = 24
 """So many grasps of a set are looked at."""
@@ -45,14 +49,25 @@ MIN_SHARE_ABOUT = 0.9
 MIN_GAIN = 2.5
 """So many times as many have to fit as before."""
 MAX_CLOSING = 0.4
-"""Where the pads close on the object at more of the grasps, whatever the hand hits, only turns about
-the closing direction can be wrong: they do at 0.67 and more of the grasps of right sets, other than
-of scissors, and at 0.38 and less if the grasps of objects without symmetry are meant otherwise."""
+"""Where the pads close on the object at a larger share of the grasps, whatever the rest of the hand
+hits, closing direction and origin are right, and only the approach can be wrong. On the built-in
+objects the share is 0.67 to 1 for right sets (0.17 for scissors), and at most 0.38 for grasps that
+are turned or moved, unless turned grasps of thin objects hold as well."""
 TIE = 0.9
 """Mistakes whose counts differ by less than this factor are held to be equally good."""
 FRICTION = 0.5
 """Least coefficient of friction that the pads are taken to have: sets from elsewhere were made with
 others than ours."""
+HALF = (0.45, 0.55)
+"""Shares of the distance between the contacts that are taken for half of it."""
+FAR = 1.0
+"""Lengths are tried as millimetres where half of the grasps are farther from the origin [m]."""
+TOUCHED = [
+    outcome.value
+    for outcome in Outcome
+    if outcome.held or outcome in (Outcome.SLIPPED, Outcome.DROPPED, Outcome.BLOCKED)
+]
+"""Outcomes of grasps that both fingers have touched their object at."""
 SAME_READER = ("isaac_grasp", "graspgen_yaml")
 """Formats of which either can be read as the other."""
 R_BODY_OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
@@ -65,7 +80,7 @@ Fits = NDArray[np.bool_]
 def find_mistake(
     grasps: Mapping[str, GraspSet], station: Station, source: Scene | ObjectLibrary
 ) -> MistakeFound | None:
-    """The usual mistake that a set of grasps shows, if it shows one.
+    """Finds the usual mistake that a set of grasps shows, if it shows one.
 
     Args:
         grasps: in the frames of their objects, by instance of the scene, or else by object of the
@@ -91,6 +106,63 @@ def find_mistake(
         alone, in_scene = alone[rows], None if in_scene is None else in_scene[rows]
     found = _decide(search, mistakes, alone)
     return found if found is not None or in_scene is None else _decide(search, mistakes, in_scene)
+
+
+def mistake_notes(
+    grasps: Mapping[str, GraspSet],
+    station: Station,
+    source: Scene | ObjectLibrary,
+    *,
+    format_option: str = "--grasps-format",
+) -> tuple[str, ...]:
+    """A sentence about the usual mistake that a set of grasps shows, with what corrects it, and one
+    about widths that are half as large as they should be.
+
+    Args:
+        grasps, station, source: see `find_mistake`.
+        format_option: what the caller's option about the format of a file is called.
+    """
+    found = find_mistake(grasps, station, source)
+    mistaken = () if found is None else (found.text(format_option),)
+    return (*mistaken, *half_width_notes(grasps, station, source))
+
+
+def given_hints(run: Run) -> tuple[str, ...]:
+    """The notes of `mistake_notes` on a run whose grasps were given; none on sampled ones.
+
+    Mistakes about poses are looked for where most grasps did not get so far that both fingers
+    touched the object.
+    """
+    if run.document.grasps.origin != "given":
+        return ()
+    touched = np.isin(run.results["outcome"], TOUCHED)
+    with contextlib.suppress(BurgError):
+        scene, station = run.scene(), run.station()
+        grasps = of_instances(run.candidates.grasps.with_columns(instance=run.candidates.instance))
+        search = half_width_notes if 2 * touched.sum() > len(touched) else mistake_notes
+        return search(grasps, station, scene)
+    return ()
+
+
+def half_width_notes(
+    grasps: Mapping[str, GraspSet], station: Station, source: Scene | ObjectLibrary
+) -> tuple[str, ...]:
+    """A note if most widths are half of the distance of the contacts."""
+    from burg_drake.grasping.quality import grasp_contacts
+
+    test, ratios = _FitTest(station, source), []
+    for name, part in grasps.items():
+        known = np.flatnonzero(part.width > 0.0)[:MAX_GRASPS]
+        contacts = grasp_contacts(test.surface(name), part.X_OG[known], test.jaws)
+        apart = np.linalg.norm(contacts.p_OC[:, 1] - contacts.p_OC[:, 0], axis=-1)
+        ratios += (part.width[known] / apart)[contacts.touching].tolist()
+    half = sum(HALF[0] < ratio < HALF[1] for ratio in ratios)
+    if half < max(MIN_FITTING, MIN_SHARE_COMBINED * len(ratios)):
+        return ()
+    return (
+        f"widths of {half} of {len(ratios)} grasps that were looked at are half of the distance"
+        " between the contacts; if they are those of one finger, give --correction half_widths",
+    )
 
 
 class _Search:
@@ -133,6 +205,8 @@ class _Search:
     def mistakes(self) -> list[Mistake]:
         """Those that can have been made."""
         found = usual_mistakes(self.format, self._gripper)
+        if np.median(np.linalg.norm(self._X_MG[:, :3, 3], axis=-1)) < FAR:
+            found = [mistake for mistake in found if mistake.correction != ("millimetres",)]
         if self._scene is None:
             return found
         if self._X_SM is None:
@@ -232,16 +306,9 @@ class _FitTest:
         from burg_drake.grasping.quality import jaws_of
 
         self._station, self._source = station, source
-        self._jaws = jaws_of(station.hand, station.hand_model, station.packages)
+        self.jaws = jaws_of(station.hand, station.hand_model, station.packages)
         self._screens: dict[str, HandClearance] = {}
         self._surfaces: dict[str, Surface] = {}
-        self._everything: HandClearance | None = None
-        if isinstance(source, Scene):
-            from burg_drake.grasping.clearance import HandClearance
-            from burg_drake.station.diagram import build_station_diagram
-
-            self._diagram = build_station_diagram(source, station, robot="hand")
-            self._everything = HandClearance(self._diagram)
 
     def __call__(self, names: Names, X_OG: Array) -> tuple[Fits, Fits | None]:
         """(N,) which grasps fit their object, and which the rest of the scene does not hinder."""
@@ -264,10 +331,25 @@ class _FitTest:
         closing = np.zeros(len(names), dtype=bool)
         for name in dict.fromkeys(names.tolist()):
             mine = names == name
-            contacts = grasp_contacts(self._surface(name), X_OG[mine], self._jaws)
+            contacts = grasp_contacts(self.surface(name), X_OG[mine], self.jaws)
             friction = max(FRICTION, self._library.entry(self._object(name)).friction)
             closing[mine] = are_antipodal(contacts, X_OG[mine], friction)
         return closing
+
+    @cached_property
+    def _diagram(self) -> StationDiagram | None:
+        """Of the scene, if there is one."""
+        from burg_drake.station.diagram import build_station_diagram
+
+        if not isinstance(self._source, Scene):
+            return None
+        return build_station_diagram(self._source, self._station, robot="hand")
+
+    @cached_property
+    def _everything(self) -> HandClearance | None:
+        from burg_drake.grasping.clearance import HandClearance
+
+        return None if self._diagram is None else HandClearance(self._diagram)
 
     @property
     def _library(self) -> ObjectLibrary:
@@ -277,7 +359,7 @@ class _FitTest:
         return self._source.instance(name).object if isinstance(self._source, Scene) else name
 
     def _X_WO(self, name: str) -> Array:
-        return np.eye(4) if self._everything is None else self._diagram.X_WO(name)
+        return np.eye(4) if self._diagram is None else self._diagram.X_WO(name)
 
     def _screen(self, name: str) -> HandClearance:
         from burg_drake.grasping.clearance import HandClearance, hand_clearance_alone
@@ -285,12 +367,12 @@ class _FitTest:
         if name not in self._screens:
             self._screens[name] = (
                 hand_clearance_alone(self._library, name, self._station)
-                if self._everything is None
+                if self._diagram is None
                 else HandClearance(self._diagram, bodies=[name])
             )
         return self._screens[name]
 
-    def _surface(self, name: str) -> Surface:
+    def surface(self, name: str) -> Surface:
         from burg_drake.geometry import Surface
 
         object = self._object(name)
@@ -299,9 +381,7 @@ class _FitTest:
         return self._surfaces[object]
 
 
-def _decide(
-    search: _Search, mistakes: Sequence[Mistake], fits: Fits
-) -> MistakeFound | None:
+def _decide(search: _Search, mistakes: Sequence[Mistake], fits: Fits) -> MistakeFound | None:
     """The mistake that makes most grasps fit; None if it does not make enough of them fit.
 
     Args:
@@ -339,7 +419,9 @@ def _decide(
         likeness=tuple(format.title for format in likeness),
         format=_other_reader(search.format.name, [format.name for format in likeness]),
         alternatives=tuple(
-            m.words for m in good if not (m.moves_frame and m.turn == chosen.turn)
+            m.words
+            for m in good
+            if m != chosen and not (reach is not None and m.turn == chosen.turn)
         )[:2],
         reach_mm=reach,
     )
@@ -380,6 +462,6 @@ def _promising(grasps: GraspSet) -> list[int]:
     scores, where there are so many; data sets have failures, and networks poor grasps."""
     score = np.where(np.isfinite(grasps.score), grasps.score, -np.inf)
     if set(score.tolist()) == {0.0, 1.0} and (score == 1.0).sum() >= MIN_FITTING:
-        return np.flatnonzero(score == 1.0).tolist()
+        return [int(k) for k in np.flatnonzero(score == 1.0)]
     best = np.argsort(-score, kind="stable")[: max(MAX_GRASPS, len(grasps) // 2)]
-    return np.sort(best).tolist()
+    return sorted(int(k) for k in best)

@@ -131,9 +131,9 @@ def corrected_poses(X_MG: Array, X_GF: Array, correction: Sequence[str]) -> Arra
     return X
 
 
-def corrected(imported: ImportedGrasps, gripper: Gripper, correction: Iterable[str]) -> (
-    ImportedGrasps
-):
+def corrected(
+    imported: ImportedGrasps, gripper: Gripper, correction: Iterable[str]
+) -> ImportedGrasps:
     """What was read of a file, once mistakes are corrected; see `corrected_poses`.
 
     Args:
@@ -168,7 +168,10 @@ def frames_of(grasps: GraspSet, gripper: Gripper) -> Array:
 
 def format_of_set(grasps: GraspSet) -> GraspFormat:
     """The format that a set was read from, as its provenance says; else ours."""
-    names = [grasps.provenance.get("format"), *(p.get("format") for p in parts_of(grasps.provenance))]
+    names = [
+        grasps.provenance.get("format"),
+        *(p.get("format") for p in parts_of(grasps.provenance)),
+    ]
     return FORMATS[next((n for n in names if isinstance(n, str) and n in FORMATS), "burg_drake")]
 
 
@@ -219,9 +222,10 @@ def usual_mistakes(format: GraspFormat, gripper: Gripper) -> list[Mistake]:
         gripper: the hand.
     """
     origin = _origin(format, gripper)
-    known = {round(o - origin, 2) for o in _origins(gripper)} - {0.0}
-    base = round(1e3 * gripper.X_HG[2, 3] - origin, 2)
-    distances = [base, *sorted(known - {base}, key=abs)] if base else sorted(known, key=abs)
+    base = round(1e3 * gripper.X_HG[2, 3], 2)
+    known = {round(o - origin, 2) for o in _origins(gripper)} | {base, -base}
+    first = sorted((base, -base), key=lambda d: (abs(d + origin - base), -d))
+    distances = [d for d in dict.fromkeys([*first, *sorted(known, key=abs)]) if d]
     quarter, flange = ("turn:z90",), (("turn:z45",), ("turn:z-45",))
     others = [
         (*first, *then)
@@ -231,13 +235,13 @@ def usual_mistakes(format: GraspFormat, gripper: Gripper) -> list[Mistake]:
     found = [_frame_mistake(quarter, 0.0)]
     found += [_frame_mistake((), d) for d in distances]
     found += [_frame_mistake(turn, 0.0) for turn in others]
-    found += [Mistake(words, (name,)) for name, (_, words) in FILE_POSES.items() if name != "millimetres"]
+    found += [Mistake(words, (name,)) for name, (_, words) in FILE_POSES.items()]
     found += [_frame_mistake(turn, d) for turn, d in product((quarter, *others), distances)]
     found += [_frame_mistake(turn, d) for turn, d in product(flange, (0.0, base)) if turn or d]
     found += [
         replace(_frame_mistake(turn, d), step=True)
         for turn, d in product(((), quarter), OFFSETS_MM.tolist())
-        if d and d not in known
+        if d and d not in distances
     ]
     return list(dict.fromkeys(found))
 
@@ -248,7 +252,7 @@ def _origin(format: GraspFormat, gripper: Gripper) -> float:
 
 
 def _origins(gripper: Gripper) -> list[float]:
-    """How far the origins of known frames are behind G [mm]: of all formats, and the finger tips."""
+    """How far origins of known frames are behind G [mm]: of all formats, and the finger tips."""
     return [*(_origin(format, gripper) for format in FORMATS.values()), -1e3 * gripper.tip]
 
 
@@ -293,13 +297,16 @@ class MistakeFound:
 
     def text(self, format_option: str = "--grasps-format") -> str:
         """What was found and what corrects it, in a sentence."""
-        of = f"of {self.count} grasps" + (f" looked at, of {self.total}," if self.total > self.count else "")
+        of = f"of {self.count} grasps" + (
+            f" looked at, of {self.total}," if self.total > self.count else ""
+        )
         fits = "clear and held by the pads"
         words = self.mistake.words
         if self.reach_mm is not None and self.reach_mm[0] < self.reach_mm[1]:
             low, high = sorted(map(abs, self.reach_mm))
             words += f" (anything from {low:g} to {high:g} mm does)"
-        text = f"{self.before} {of} are {fits} as they were read; {words} {self.after} of {self.count} are"
+        text = f"{self.before} {of} are {fits} as they were read;"
+        text += f" {words} {self.after} of {self.count} are"
         if self.likeness:
             text += f", as files of {listing(self.likeness)} have them"
         text += f"; {self.remedy(format_option)}"
@@ -311,9 +318,10 @@ class MistakeFound:
         """What corrects it."""
         mistake = self.mistake
         if mistake.camera is not None:
-            return "if so, give that pose of the camera"
+            return "if that is the camera's pose, give it (--camera-pose)"
         if mistake.frame is not None:
-            return f"if so, give --grasps-frame {'scene' if mistake.frame == 'world' else mistake.frame}"
+            frame = "scene" if mistake.frame == "world" else mistake.frame
+            return f"if they are, give --grasps-frame {frame}"
         if self.format:
-            return f"if so, give {format_option} {self.format}"
-        return f"if so, give --correction {','.join(mistake.correction)}"
+            return f"if they are meant so, give {format_option} {self.format}"
+        return f"if they are meant so, give --correction {','.join(mistake.correction)}"
