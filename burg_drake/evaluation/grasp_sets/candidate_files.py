@@ -282,7 +282,7 @@ def _explained(
     mistake = find_mistake(grasps, as_station(station), names.scene)
     if mistake is None:
         return error
-    return InvalidInputError(f"{error} {mistake.text()}")
+    return InvalidInputError(f"{error}; {mistake.text()}")
 
 
 def _named_owners(

@@ -25,7 +25,7 @@ from burg_drake.evaluation.grasp_sets.pose_mistakes import (
 from burg_drake.evaluation.grasp_sets.run_set import of_instances
 from burg_drake.evaluation.store import Run
 from burg_drake.formats import FORMATS
-from burg_drake.formats.common import GraspFormat, Gripper
+from burg_drake.formats.common import GraspFormat, Gripper, PoseFrame
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.document import Scene
 from burg_drake.station.document import Station
@@ -225,7 +225,11 @@ class _Search:
     def fits(self, mistakes: Sequence[Mistake]) -> tuple[Fits, Fits | None]:
         """(K + 1, N) which grasps fit their object as they were read and once each mistake is
         corrected, and which of those are clear of all else in the scene."""
-        placed = [self._placed(self._X_MG), *(self._as_meant(mistake) for mistake in mistakes)]
+        meant = [self._X_MG, *(self._as_meant(mistake) for mistake in mistakes)]
+        placed = self._placed(np.stack(meant))
+        for k, mistake in enumerate(mistakes, 1):
+            if mistake.frame is not None:
+                placed[k] = self._in_frame(mistake.frame)
         names = np.concatenate([name for name, _ in placed])
         X_OG = np.concatenate([X for _, X in placed])
         alone, clear = self._test(names, X_OG)
@@ -236,7 +240,7 @@ class _Search:
     def closing_share(self) -> float:
         """Share of the grasps, as they were read, at which the pads close on the object, whatever
         else the hand hits."""
-        return float(self._test.closes(*self._placed(self._X_MG)).mean())
+        return float(self._test.closes(*self._placed(self._X_MG[None])[0]).mean())
 
     def keeps_closing_line(self, mistake: Mistake) -> bool:
         """Whether the fingers close along the same line once a mistake is corrected."""
@@ -245,23 +249,26 @@ class _Search:
         X_GN = corrected_poses(np.eye(4), self.format.X_GF(self._gripper), mistake.correction)
         return bool(np.abs([X_GN[1:3, 0], X_GN[1:3, 3]]).max() < 1e-3)
 
-    def _as_meant(self, mistake: Mistake) -> tuple[Names, Array]:
-        if mistake.camera is not None:
-            return self._held(mistake.camera @ self._X_MG)
-        if mistake.frame == "world":
-            return self._name, inverse(self._X_SO(self._name)) @ self._X_MG
-        if mistake.frame == "object":
+    def _as_meant(self, mistake: Mistake) -> Array:
+        """(N, 4, 4) the grasps in M once a mistake about grasps or the camera is corrected."""
+        if mistake.camera is not None and self._X_SM is not None:
+            return np.asarray(inverse(self._X_SM) @ mistake.camera @ self._X_MG)
+        return corrected_poses(self._X_MG, self._X_GF, mistake.correction)
+
+    def _placed(self, X_MG: Array) -> list[tuple[Names, Array]]:
+        """Instances, or objects, and grasps in their frames, of K times N grasps (K, N, 4, 4)."""
+        if self._X_SM is None or self._scene is None:
+            return [(self._name, X) for X in X_MG]
+        X_SG = (self._X_SM @ X_MG).reshape(-1, 4, 4)
+        names, _ = held_instances(self._scene, X_SG, self._gripper)  # at once: it reads meshes
+        X_OG = inverse(self._X_SO(names)) @ X_SG
+        return list(zip(names.reshape(len(X_MG), -1), X_OG.reshape(X_MG.shape), strict=True))
+
+    def _in_frame(self, frame: PoseFrame) -> tuple[Names, Array]:
+        """Instances, and grasps whose poses are measured in another frame than M."""
+        if frame == "object":
             return self._held_as_objects()
-        return self._placed(corrected_poses(self._X_MG, self._X_GF, mistake.correction))
-
-    def _placed(self, X_MG: Array) -> tuple[Names, Array]:
-        """Instances, or objects, and grasps in their frames."""
-        return (self._name, X_MG) if self._X_SM is None else self._held(self._X_SM @ X_MG)
-
-    def _held(self, X_SG: Array) -> tuple[Names, Array]:
-        assert self._scene is not None
-        names, _ = held_instances(self._scene, X_SG, self._gripper)
-        return names, inverse(self._X_SO(names)) @ X_SG
+        return self._name, inverse(self._X_SO(self._name)) @ self._X_MG
 
     def _held_as_objects(self) -> tuple[Names, Array]:
         """The poses taken as those in the frame of one object: of the one that most grasps fit."""
@@ -421,7 +428,7 @@ def _decide(search: _Search, mistakes: Sequence[Mistake], fits: Fits) -> Mistake
         alternatives=tuple(
             m.words
             for m in good
-            if m != chosen and not (reach is not None and m.turn == chosen.turn)
+            if m != chosen and not (m.moves_frame and chosen.moves_frame and m.turn == chosen.turn)
         )[:2],
         reach_mm=reach,
     )
