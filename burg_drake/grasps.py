@@ -2,6 +2,9 @@
 
 from burg_drake.evaluation.grasp_sets import (
     GivenGrasps as GivenGrasps,
+    Mistake as Mistake,
+    MistakeFound as MistakeFound,
+    find_mistake as find_mistake,
     read_grasps as read_grasps,
     scored_set as scored_set,
 )

@@ -183,7 +183,20 @@ def _content(arguments: argparse.Namespace) -> Content:
         )
         provenance = imported.grasps.provenance
         grasps = dataclasses.replace(_on_instances(given.by_instance), provenance=provenance)
+    _print_mistakes(grasps, source, station)
     return Content(grasps, source, station, ranked_set(grasps), title=path.name)
+
+
+def _print_mistakes(grasps: GraspSet, source: GraspSource, station: Station) -> None:
+    """Says which usual mistake grasps from elsewhere show."""
+    from burg_drake.evaluation.grasp_sets import mistake_notes
+
+    named = grasps.object if source.scene is None else grasps.column("instance")
+    by_name = {name: grasps.select(named == name) for name in dict.fromkeys(named.tolist())}
+    for note in mistake_notes(
+        by_name, station, source.scene or source.library, format_option="--from"
+    ):
+        print(f"note: {note}")
 
 
 def _content_of_run(arguments: argparse.Namespace) -> Content:
