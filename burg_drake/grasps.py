@@ -1,6 +1,7 @@
 """Grasps: files of many formats, sampling on a mesh, clearance, quality and comparison of sets."""
 
 from burg_drake.evaluation.grasp_sets import (
+    FileReading as FileReading,
     GivenGrasps as GivenGrasps,
     Mistake as Mistake,
     MistakeFound as MistakeFound,

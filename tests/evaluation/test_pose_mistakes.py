@@ -10,13 +10,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
+from burg_drake.core.errors import UnknownNameError
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
-from burg_drake.evaluation.grasp_sets.candidate_files import by_names, read_grasps
+from burg_drake.evaluation.grasp_sets.candidate_files import (
+    MisplacedGraspsError,
+    by_names,
+    read_grasps,
+)
 from burg_drake.evaluation.grasp_sets.input import read_input
 from burg_drake.evaluation.grasp_sets.mistake_search import find_mistake, mistake_notes
-from burg_drake.evaluation.grasp_sets.pose_mistakes import corrected_poses
+from burg_drake.evaluation.grasp_sets.pose_mistakes import FileReading, corrected_poses
 from burg_drake.evaluation.grasp_sets.sampled import sample_grasps
 from burg_drake.formats.common.grasp_format import PANDA
 from burg_drake.formats.grasp_files import FORMATS, write_grasp_file
@@ -136,7 +140,7 @@ def test_files_of_every_format(
     X_SF = pose((175, 5, 30), (0.3, 0.25, 0.7)) if FORMATS[name].frame == "camera" else None
     X_FO = {"object": np.eye(4), "world": six.X_SO("mug")}.get(FORMATS[name].frame)
     X_FO = np.linalg.inv(X_SF) @ six.X_SO("mug") if X_FO is None else X_FO
-    options = {"station": panda, "X_SF": X_SF}
+    options = {"X_SF": X_SF}
     if FORMATS[name].frame == "object":
         options["objects"] = {"": "mug"}
     for turn in (np.eye(4), pose((0, 0, 90))):
@@ -144,16 +148,17 @@ def test_files_of_every_format(
         write_grasp_file(GraspSet.create(X_FO @ right.X_OG @ turn, object="mug"), path, name)
         try:
             given = read_grasps(six, path, PANDA, **options)
-            text = " ".join(mistake_notes(given.by_instance, panda, six))
-        except InvalidInputError as error:
-            text = str(error)
+            found = given.by_instance
+        except MisplacedGraspsError as error:
+            found = error.grasps
+        text = " ".join(mistake_notes(found, panda, six))
         if turn[0, 0] == 1.0:
             assert text == ""
             continue
         other = {"isaac_grasp": "graspgen_yaml", "graspgen_yaml": "isaac_grasp"}.get(name)
         remedy = f"--grasps-format {other}" if other else "--correction turn:z90"
         assert remedy in text and "12 of 12 are" in text
-        more = {"format": other} if other else {"correction": ["turn:z90"]}
+        more = {"format": other or FileReading(correction=("turn:z90",))}
         corrected = read_grasps(six, path, PANDA, **options, **more)
         assert find_mistake(corrected.by_instance, panda, six) is None
 
@@ -166,13 +171,17 @@ def test_frames_that_are_measured_in_and_poses_of_cameras(
     assert found is not None and "give --grasps-frame scene" in found.text()
     in_object = tmp_path / "object.npy"
     write_grasp_file(right, in_object, "burg")
-    with pytest.raises(InvalidInputError, match=r"12 of 12 are.*--grasps-frame object"):
-        read_grasps(six, in_object, PANDA, station=panda)
+    with pytest.raises(MisplacedGraspsError) as error:
+        read_grasps(six, in_object, PANDA)
+    found = find_mistake(error.value.grasps, panda, six)
+    assert found is not None and "give --grasps-frame object" in found.text()
     seen = tmp_path / "seen.npy"
     in_camera = GraspSet.create(np.linalg.inv(X_SC) @ X_SO @ right.X_OG, object="")
     write_grasp_file(in_camera, seen, "graspnet")
-    with pytest.raises(InvalidInputError, match="pose of the camera inverted 12 of 12 are"):
-        read_grasps(six, seen, PANDA, station=panda, X_SF=np.linalg.inv(X_SC))
+    with pytest.raises(MisplacedGraspsError) as error:
+        read_grasps(six, seen, PANDA, X_SF=np.linalg.inv(X_SC))
+    found = find_mistake(error.value.grasps, panda, six)
+    assert found is not None and "pose of the camera inverted 12 of 12 are" in found.text()
 
 
 def test_millimetres_in_a_file(right: GraspSet, six: Scene, panda: Station, tmp_path: Path) -> None:
@@ -180,9 +189,11 @@ def test_millimetres_in_a_file(right: GraspSet, six: Scene, panda: Station, tmp_
     X[:, :3, 3] *= 1000.0
     path = tmp_path / "mm.npz"
     GraspSet.create(X, object="mug").save(path)
-    with pytest.raises(InvalidInputError, match=r"metres.*12 of 12 are.*--correction millimetres"):
-        read_grasps(six, path, PANDA, station=panda)
-    corrected = read_grasps(six, path, PANDA, correction=["millimetres"])
+    with pytest.raises(MisplacedGraspsError, match="metres") as error:
+        read_grasps(six, path, PANDA)
+    found = find_mistake(error.value.grasps, panda, six)
+    assert found is not None and "give --correction millimetres" in found.text()
+    corrected = read_grasps(six, path, PANDA, format=FileReading(correction=("millimetres",)))
     np.testing.assert_allclose(corrected.by_instance["mug"].X_OG, right.X_OG, atol=1e-12)
 
 

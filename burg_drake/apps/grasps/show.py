@@ -145,7 +145,7 @@ def _widths(grasps: GraspSet, widest: float) -> Array:
 
 
 def _content(arguments: argparse.Namespace) -> Content:
-    from burg_drake.evaluation.grasp_sets import read_grasps, read_input
+    from burg_drake.evaluation.grasp_sets import FileReading, read_grasps, read_input
     from burg_drake.evaluation.results import ranked_set
     from burg_drake.formats.common import with_objects_renamed
     from burg_drake.scene.document import load_scene
@@ -176,10 +176,8 @@ def _content(arguments: argparse.Namespace) -> Content:
             source.scene,
             path,
             gripper,
-            format=format,
+            format=FileReading(format, arguments.correction),
             objects=objects,
-            correction=arguments.correction,
-            station=station,
         )
         provenance = imported.grasps.provenance
         grasps = dataclasses.replace(_on_instances(given.by_instance), provenance=provenance)

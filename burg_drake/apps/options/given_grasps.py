@@ -74,20 +74,29 @@ def require_file(arguments: argparse.Namespace) -> None:
 
 def read_given(arguments: argparse.Namespace, scene: Scene, station: Station) -> GivenGrasps:
     """The grasps of the file that --grasps names, on the instances of a scene."""
-    from burg_drake.evaluation.grasp_sets import read_grasps
+    from burg_drake.evaluation.grasp_sets import (
+        FileReading,
+        MisplacedGraspsError,
+        find_mistake,
+        read_grasps,
+    )
     from burg_drake.formats.common import read_poses
 
     poses = arguments.camera_pose
-    return read_grasps(
-        scene,
-        arguments.grasps,
-        gripper_for(arguments, station),
-        format=arguments.grasps_format,
-        objects=dict(arguments.grasps_object),
-        frame=FRAMES.get(arguments.grasps_frame),  # type: ignore[arg-type]
-        X_SF=read_poses(poses) if poses else None,
-        object_ids=arguments.object_ids,
-        scene_id=arguments.scene_id,
-        correction=arguments.correction,
-        station=station,
-    )
+    try:
+        return read_grasps(
+            scene,
+            arguments.grasps,
+            gripper_for(arguments, station),
+            format=FileReading(arguments.grasps_format, arguments.correction),
+            objects=dict(arguments.grasps_object),
+            frame=FRAMES.get(arguments.grasps_frame),  # type: ignore[arg-type]
+            X_SF=read_poses(poses) if poses else None,
+            object_ids=arguments.object_ids,
+            scene_id=arguments.scene_id,
+        )
+    except MisplacedGraspsError as error:
+        mistake = find_mistake(error.grasps, station, scene)
+        if mistake is None:
+            raise
+        raise InvalidInputError(f"{error}; {mistake.text()}") from error

@@ -1,5 +1,6 @@
 from .candidate_files import (
     GivenGrasps as GivenGrasps,
+    MisplacedGraspsError as MisplacedGraspsError,
     NoSceneIdsError as NoSceneIdsError,
     by_names as by_names,
     read_grasps as read_grasps,
@@ -18,16 +19,13 @@ from .input import (
 from .mistake_search import (
     find_mistake as find_mistake,
     given_hints as given_hints,
-    half_width_notes as half_width_notes,
     mistake_notes as mistake_notes,
 )
 from .near_objects import require_near as require_near
 from .pose_mistakes import (
-    CORRECTIONS as CORRECTIONS,
+    FileReading as FileReading,
     Mistake as Mistake,
     MistakeFound as MistakeFound,
-    corrected_poses as corrected_poses,
-    usual_mistakes as usual_mistakes,
 )
 from .provenance import set_documents as set_documents
 from .run_set import (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,8 +21,8 @@ from burg_drake.evaluation.candidates import (
     require_instances,
 )
 from burg_drake.evaluation.grasp_sets.input import read_input
-from burg_drake.evaluation.grasp_sets.mistake_search import find_mistake
 from burg_drake.evaluation.grasp_sets.near_objects import require_near
+from burg_drake.evaluation.grasp_sets.pose_mistakes import FileReading
 from burg_drake.evaluation.grasp_sets.run_set import of_instances, without_instance
 from burg_drake.formats.common import (
     PANDA,
@@ -32,7 +32,6 @@ from burg_drake.formats.common import (
     with_objects_renamed,
 )
 from burg_drake.scene.document import Scene, SceneLike, as_scene
-from burg_drake.station.document import StationLike, as_station
 
 OBJECT_ID, SCENE_ID = "object_id", "scene_id"
 """Columns by which files of several objects, or of several scenes, tell theirs apart."""
@@ -40,6 +39,18 @@ ROUNDING = 1e-6
 """By which a width may be beyond the hand's opening and still be its end [m]: single precision."""
 NO_OBJECT = -1
 """Object id of grasps of which it is not known."""
+
+
+class MisplacedGraspsError(InvalidInputError):
+    """Grasps of a file are nowhere near their objects.
+
+    Attributes:
+        grasps: by instance, in which `find_mistake` may find why.
+    """
+
+    def __init__(self, message: str, grasps: Mapping[str, GraspSet] | None = None) -> None:
+        super().__init__(message)
+        self.grasps = dict(grasps or {})
 
 
 class NoSceneIdsError(InvalidInputError):
@@ -64,14 +75,12 @@ def read_grasps(
     path: str | Path,
     gripper: Gripper = PANDA,
     *,
-    format: str | None = None,
+    format: str | FileReading | None = None,
     objects: Mapping[str, str] | None = None,
     frame: PoseFrame | None = None,
     X_SF: Array | None = None,
     object_ids: Mapping[int, str] | None = None,
     scene_id: str | None = None,
-    correction: Iterable[str] = (),
-    station: StationLike | None = None,
 ) -> GivenGrasps:
     """Reads a grasp file and gives each grasp to an instance of the scene.
 
@@ -84,7 +93,7 @@ def read_grasps(
         scene: the scene.
         path: a file of any format in `formats.grasp_files`, or the folder of a run.
         gripper: the hand that the grasps are for.
-        format: of the file; None to tell by the content.
+        format: of the file; None to tell by the content. A `FileReading` corrects mistakes, too.
         objects: names of the scene's objects, or of its instances, by the names that the file has;
             a name by the empty text is for all grasps.
         frame: what the poses are measured in, in place of what the format says.
@@ -92,17 +101,14 @@ def read_grasps(
             scene frame if None.
         object_ids: names of instances by the file's object ids.
         scene_id: the one to take of a file of several scenes.
-        correction: mistakes of the file that are made up for, such as `["turn:z90"]`; see
-            `pose_mistakes.CORRECTIONS`.
-        station: with the hand. If it is given, errors about grasps that are nowhere near an object
-            say which usual mistake that comes from, where one is found.
 
     Raises:
         InvalidInputError: the file cannot be read, or it is not told what its grasps belong to.
         UnknownNameError: an object, instance, scene or correction that is not there.
     """
     scene = as_scene(scene)
-    imported = read_input(path, format, gripper, correction)
+    reading = format if isinstance(format, FileReading) else FileReading(format)
+    imported = read_input(path, reading.format, gripper, reading.correction)
     names = InstanceNames(scene, str(path), dict(objects or {}))
     grasps = _of_one_scene(imported.grasps, scene_id, names.path)
     frame = frame or imported.frame
@@ -112,7 +118,7 @@ def read_grasps(
                 f"{path} has grasps in the frames of their objects, to which neither a pose nor"
                 " object ids apply"
             )
-        found = _of_names(grasps, names, station)
+        found = _of_names(grasps, names)
         return GivenGrasps(
             found, (*imported.notes, *_repeated(found, path), *_wide(grasps, path, gripper))
         )
@@ -127,7 +133,7 @@ def read_grasps(
     grasps = dataclasses.replace(grasps, provenance=measured)
     owner, held = _owners(grasps, X_SG, names, object_ids or {}, gripper)
     placed = by_instance(scene, without_instance(grasps), X_SG, owner)
-    notes = _missed(placed, held, names, station)
+    notes = _missed(placed, held, names)
     return GivenGrasps(
         placed,
         (*imported.notes, *notes, *_repeated(placed, path), *_wide(grasps, path, gripper)),
@@ -174,9 +180,7 @@ def by_names(scene: Scene, grasps: GraspSet) -> dict[str, GraspSet]:
     return _of_names(grasps, InstanceNames(scene, "the set", {}, is_file=False))
 
 
-def _of_names(
-    grasps: GraspSet, names: InstanceNames, station: StationLike | None = None
-) -> dict[str, GraspSet]:
+def _of_names(grasps: GraspSet, names: InstanceNames) -> dict[str, GraspSet]:
     """The same, with the names of a file."""
     on_instances = INSTANCE in grasps.columns and not names.given
     found = of_instances(grasps) if on_instances else _of_objects(grasps, names)
@@ -185,7 +189,7 @@ def _of_names(
         for part in found.values():
             require_near(part, names.scene.library, names.path, is_file=names.is_file)
     except InvalidInputError as error:
-        raise _explained(error, found, names, station) from error
+        raise MisplacedGraspsError(str(error), found).about(*error.arguments) from error
     return found
 
 
@@ -247,42 +251,26 @@ def _missed(
     placed: Mapping[str, GraspSet],
     held: NDArray[np.bool_],
     names: InstanceNames,
-    station: StationLike | None,
 ) -> tuple[str, ...]:
     """A note about grasps that hold nothing.
 
     Raises:
-        InvalidInputError: none holds anything.
+        MisplacedGraspsError: none holds anything.
     """
     missed = int((~held).sum())
     if not missed:
         return ()
     if missed == len(held):
-        error = InvalidInputError(
+        raise MisplacedGraspsError(
             f"none of the {missed} grasps of {names.path} has an object of scene"
             f" {names.scene.name!r} between its fingers; is the scene the right one, and the pose"
-            " of the camera or workspace?"
+            " of the camera or workspace?",
+            placed,
         ).about("X_SF", "frame")
-        raise _explained(error, placed, names, station)
     return (
         f"{missed} of {len(held)} grasps have no object between their fingers; they are given to"
         " the one with the nearest surface.",
     )
-
-
-def _explained(
-    error: InvalidInputError,
-    grasps: Mapping[str, GraspSet],
-    names: InstanceNames,
-    station: StationLike | None,
-) -> InvalidInputError:
-    """The same error, with the usual mistake that the grasps show, if they show one."""
-    if station is None:
-        return error
-    mistake = find_mistake(grasps, as_station(station), names.scene)
-    if mistake is None:
-        return error
-    return InvalidInputError(f"{error}; {mistake.text()}")
 
 
 def _named_owners(

@@ -13,6 +13,7 @@ from burg_drake.core.grasps import GraspSet
 from burg_drake.evaluation.candidates import in_frame
 from burg_drake.evaluation.grasp_sets.candidate_files import read_grasps
 from burg_drake.evaluation.grasp_sets.input import read_input
+from burg_drake.evaluation.grasp_sets.pose_mistakes import FileReading
 from burg_drake.formats.common import (
     PANDA,
     Gripper,
@@ -94,13 +95,12 @@ def read_in_frame(
         seen.scene,
         path,
         gripper,
-        format=format,
+        format=FileReading(format, tuple(seen.correction)),
         objects=objects,
         frame=given,
         X_SF=None if given == "object" else seen.X_SF,
         object_ids=seen.object_ids if wanted == "object" else None,
         scene_id=seen.scene_id,
-        correction=seen.correction,
     )
     if wanted == "object":
         named = [

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from burg_drake.core import Array, BurgError, inverse, make_pose, rot_z
 from burg_drake.core.grasps import GraspSet, Outcome
-from burg_drake.evaluation.candidates import held_instances
+from burg_drake.evaluation.candidates import Owners, held_instances
 from burg_drake.evaluation.grasp_sets.pose_mistakes import (
     Mistake,
     MistakeFound,
@@ -74,7 +74,6 @@ SAME_READER = ("isaac_grasp", "graspgen_yaml")
 R_BODY_OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 """A camera as OpenCV has it in a body whose x points forward, as ROS has it."""
 
-Names = NDArray[np.str_]
 Fits = NDArray[np.bool_]
 
 
@@ -256,7 +255,7 @@ class _Search:
             return np.asarray(inverse(self._X_SM) @ mistake.camera @ self._X_MG)
         return corrected_poses(self._X_MG, self._X_GF, mistake.correction)
 
-    def _placed(self, X_MG: Array) -> list[tuple[Names, Array]]:
+    def _placed(self, X_MG: Array) -> list[tuple[Owners, Array]]:
         """Instances, or objects, and grasps in their frames, of K times N grasps (K, N, 4, 4)."""
         if self._X_SM is None or self._scene is None:
             return [(self._name, X) for X in X_MG]
@@ -265,13 +264,13 @@ class _Search:
         X_OG = inverse(self._X_SO(names)) @ X_SG
         return list(zip(names.reshape(len(X_MG), -1), X_OG.reshape(X_MG.shape), strict=True))
 
-    def _in_frame(self, frame: PoseFrame) -> tuple[Names, Array]:
+    def _in_frame(self, frame: PoseFrame) -> tuple[Owners, Array]:
         """Instances, and grasps whose poses are measured in another frame than M."""
         if frame == "object":
             return self._held_as_objects()
         return self._name, inverse(self._X_SO(self._name)) @ self._X_MG
 
-    def _held_as_objects(self) -> tuple[Names, Array]:
+    def _held_as_objects(self) -> tuple[Owners, Array]:
         """The poses taken as those in the frame of one object: of the one that most grasps fit."""
         assert self._scene is not None
         among = list(self._scene.instances)
@@ -280,7 +279,7 @@ class _Search:
         best = among[int(fits.reshape(len(among), -1).sum(axis=1).argmax())]
         return np.full(self.count, best), self._X_MG
 
-    def _X_SO(self, names: Names) -> Array:
+    def _X_SO(self, names: Owners) -> Array:
         assert self._scene is not None
         poses = {name: self._scene.X_SO(name) for name in set(names.tolist())}
         return np.stack([poses[name] for name in names.tolist()])
@@ -318,7 +317,7 @@ class _FitTest:
         self._screens: dict[str, HandClearance] = {}
         self._surfaces: dict[str, Surface] = {}
 
-    def __call__(self, names: Names, X_OG: Array) -> tuple[Fits, Fits | None]:
+    def __call__(self, names: Owners, X_OG: Array) -> tuple[Fits, Fits | None]:
         """(N,) which grasps fit their object, and which the rest of the scene does not hinder."""
         fits = np.zeros(len(names), dtype=bool)
         clear = np.zeros(len(names), dtype=bool)
@@ -332,7 +331,7 @@ class _FitTest:
                 clear[held] = self._everything.is_clear(X_WO @ X_OG[held])
         return fits, None if self._everything is None else clear
 
-    def closes(self, names: Names, X_OG: Array) -> Fits:
+    def closes(self, names: Owners, X_OG: Array) -> Fits:
         """(N,) at which grasps the pads close on their object, whatever else the hand hits."""
         from burg_drake.grasping.quality import are_antipodal, grasp_contacts
 

@@ -90,6 +90,20 @@ def _quarter_turn(degrees: float) -> Array:
     return make_pose(rotation_from_rpy(np.deg2rad([degrees, 0.0, 0.0])))
 
 
+@dataclass(frozen=True)
+class FileReading:
+    """How a file is read.
+
+    Attributes:
+        format: of the file; None to tell by the content.
+        correction: mistakes of the file that are made up for, such as `("turn:z90",)`; see
+            `corrected_poses`.
+    """
+
+    format: str | None = None
+    correction: tuple[str, ...] = ()
+
+
 def check_corrections(correction: Iterable[str]) -> tuple[str, ...]:
     """The corrections, if all of them are known.
 
