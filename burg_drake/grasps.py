@@ -1,7 +1,11 @@
 """Grasps: files of many formats, sampling on a mesh, clearance, quality and comparison of sets."""
 
 from burg_drake.evaluation.grasp_sets import (
+    FileReading as FileReading,
     GivenGrasps as GivenGrasps,
+    Mistake as Mistake,
+    MistakeFound as MistakeFound,
+    find_mistake as find_mistake,
     read_grasps as read_grasps,
     scored_set as scored_set,
 )

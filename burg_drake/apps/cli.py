@@ -34,6 +34,9 @@ DEBUG_VARIABLE = "BURG_DEBUG"
 OPTIONS_OF = {
     "X_SF": ("camera_pose",),
     "objects": ("grasps_object", "rename"),
+    "format": ("grasps_format", "source"),
+    "frame": ("grasps_frame", "frame"),
+    "hand": ("hand", "station"),
     "moved": ("run",),
     "out": ("output",),
     "folder": ("output",),

@@ -19,6 +19,7 @@ from burg_drake.core import InvalidInputError
 from burg_drake.core.files import remove_unfinished, writable_folder
 from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.evaluation.candidates import given_candidates
+from burg_drake.evaluation.grasp_sets import given_hints
 from burg_drake.evaluation.records import (
     EvaluationSettings,
     Journal,
@@ -182,6 +183,8 @@ def _evaluate_one(
             if left:
                 run = _judge(run, Job(scene.name, make_judge, left), journal, executor, reporter)
                 require_judged(run)
+                hints = given_hints(run)
+                run = save_run(replace(run, document=replace(run.document, hints=hints)))
             more = grow(run)
             if more is None:
                 break

@@ -88,7 +88,7 @@ def format_of(path: str | Path) -> GraspFormat:
     raise InvalidInputError(
         f"{path} is not a file of grasps in a known format ({', '.join(FORMATS)}); if it is, name"
         " the format to see what is wrong"
-    )
+    ).about("format")
 
 
 def write_grasp_file(

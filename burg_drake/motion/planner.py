@@ -101,7 +101,7 @@ class Planner:
             limit_margin=self.reach.settings.limit_margin,
         )
         low, high = hand.opening
-        finger_travel = high - (low if np.isnan(width) else width)
+        finger_travel = high - (low if np.isnan(width) else min(width, high))
         return replace(
             plan,
             close_time=finger_travel / 2.0 / hand.closing_speed + GRIP_TIME,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import h5py
@@ -15,6 +16,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import grasp_from_axes, make_pose, rotation_from_rpy
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.records.table_file import read_table
+from burg_drake.formats.grasp_files import write_grasp_file
 from burg_drake.scene.document.scene import load_scene
 from burg_drake.station.document.station_document import load_station
 from tests.apps.conftest import TWO
@@ -95,6 +97,37 @@ def test_a_data_set_s_grasps_of_an_object(tmp_path: Path, capsys: Capture) -> No
     )
 
 
+def test_turned_grasps_are_told_and_corrected(tmp_path: Path, capsys: Capture) -> None:
+    """Grasps that lift a box, turned by a quarter about the approach: the note counts them, names
+    the option, which leads to the lifts, and speaks of no sampling."""
+    heights = [ABOVE @ make_pose(p_AB=(0.0, y, 0.0)) for y in (-0.004, 0.0, 0.004)]
+    turned = np.stack(heights) @ make_pose(rotation_from_rpy(np.deg2rad([0.0, 0.0, 90.0])))
+    path = tmp_path / "turned.npz"
+    GraspSet.create(turned, object="box").save(path)
+    results = judged(tmp_path, "--grasps", str(path), "--mode", "hand")
+    assert "lifted" not in results["outcome"].tolist()
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "note: 0 of 3 grasps are clear and held by the pads as they were read; turned by 90" in (
+        printed
+    )
+    assert "3 of 3 are; if they are meant so, give --correction turn:z90" in printed
+    assert "sample grasps" not in printed
+    report = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+    assert "--correction turn:z90" in report
+    shutil.rmtree(tmp_path / "run")
+    options = ["--grasps", str(path), "--mode", "hand", "--correction", "turn:z90"]
+    assert judged(tmp_path, *options)["outcome"].tolist() == ["lifted"] * 3
+    assert "clear and held by the pads" not in capsys.readouterr().out
+
+
+def test_the_link_of_another_gripper_names_its_option(tmp_path: Path, capsys: Capture) -> None:
+    path = tmp_path / "box.yaml"
+    write_grasp_file(GraspSet.create(X_OG, object="box"), path, "isaac_grasp")
+    path.write_text(path.read_text().replace("/World/panda_hand", "/World/tool"))
+    assert main(["evaluate", "tabletop_six", "--grasps", str(path)]) == 2
+    assert "'tool' as the gripper's link (--gripper-link" in capsys.readouterr().err
+
+
 def test_grasps_for_another_hand_are_judged_with_a_note(tmp_path: Path, capsys: Capture) -> None:
     path = tmp_path / "grasps.h5"
     hand = {"hand": {"name": "wsg_50"}}
@@ -133,6 +166,9 @@ def test_a_file_that_does_not_say_which_scene_it_is_of(tmp_path: Path) -> None:
         (["--grasps", "a.npy", "--camera-pose", "missing.npy"], "cannot read missing.npy"),
         (["--grasps", "a.npy", "--grasps-format", "vgm"], "no grasp format 'vgm'; did you mean"),
         (["--grasps", "a.npy"], "is not a file of grasps in a known format"),
+        (["--grasps", "a.npy"], "name the format to see what is wrong (--grasps-format)"),
+        (["--grasps", "a.npy", "--correction", "yup"], "no correction 'yup'; did you mean 'y_up'"),
+        (["--correction", "inverse"], "--correction is for grasp files; add --grasps FILE"),
         (
             ["--grasps", "a.npy", "--grasps-format", "graspnet"],
             "has shape (2, 3); expected (N, 17)",

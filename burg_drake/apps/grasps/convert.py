@@ -118,6 +118,7 @@ def _read(arguments: argparse.Namespace, target: GraspFormat, gripper: Gripper) 
             X_SF=read_poses(arguments.camera_pose) if arguments.camera_pose else None,
             object_ids=arguments.object_ids,
             scene_id=arguments.scene_id,
+            correction=arguments.correction,
         ),
     )
 

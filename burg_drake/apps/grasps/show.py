@@ -148,7 +148,7 @@ def _widths(grasps: GraspSet, widest: float) -> Array:
 
 
 def _content(arguments: argparse.Namespace) -> Content:
-    from burg_drake.evaluation.grasp_sets import read_grasps, read_input
+    from burg_drake.evaluation.grasp_sets import FileReading, read_grasps, read_input
     from burg_drake.evaluation.results import ranked_set
     from burg_drake.formats.common import with_objects_renamed
     from burg_drake.scene.document import load_scene
@@ -159,7 +159,7 @@ def _content(arguments: argparse.Namespace) -> Content:
     station = station_for(arguments, arguments.file)
     gripper, format = gripper_for(arguments, station), arguments.source
     objects = dict(arguments.rename)
-    imported = read_input(path, format, gripper)
+    imported = read_input(path, format, gripper, arguments.correction)
     grasps = imported.grasps
     if len(grasps) == 0:
         raise InvalidInputError(f"{path} has no grasps")
@@ -175,10 +175,29 @@ def _content(arguments: argparse.Namespace) -> Content:
             " with `burg-drake grasps convert --scene` first"
         )
     if source.scene is not None:
-        given = read_grasps(source.scene, path, gripper, format=format, objects=objects)
+        given = read_grasps(
+            source.scene,
+            path,
+            gripper,
+            format=FileReading(format, arguments.correction),
+            objects=objects,
+        )
         provenance = imported.grasps.provenance
         grasps = dataclasses.replace(_on_instances(given.by_instance), provenance=provenance)
+    _print_mistakes(grasps, source, station)
     return Content(grasps, source, station, ranked_set(grasps), title=path.name)
+
+
+def _print_mistakes(grasps: GraspSet, source: GraspSource, station: Station) -> None:
+    """Says which usual mistake grasps from elsewhere show."""
+    from burg_drake.evaluation.grasp_sets import mistake_notes
+
+    named = grasps.object if source.scene is None else grasps.column("instance")
+    by_name = {name: grasps.select(named == name) for name in dict.fromkeys(named.tolist())}
+    for note in mistake_notes(
+        by_name, station, source.scene or source.library, format_option="--from"
+    ):
+        print(f"note: {note}")
 
 
 def _content_of_run(arguments: argparse.Namespace) -> Content:

@@ -81,7 +81,7 @@ def run_stats(arguments: argparse.Namespace) -> int:
     paths = [arguments.a] if arguments.b is None else [arguments.a, arguments.b]
     given = arguments.hand or arguments.gripper_link
     gripper = gripper_for(arguments) if given else None
-    sets = [read_input(path, arguments.source, gripper) for path in paths]
+    sets = [read_input(path, arguments.source, gripper, arguments.correction) for path in paths]
     sets = _renamed(sets, dict(arguments.rename))
     _check_frames(paths, sets)
     summaries = [summarize(s.grasps, lever=tolerance.lever) for s in sets]

@@ -9,7 +9,7 @@ from burg_drake.apps.options.arguments import Parser
 from burg_drake.apps.options.grasp_file import (
     FRAMES,
     add_camera_options,
-    add_gripper_link,
+    add_reading,
     gripper_for,
 )
 from burg_drake.apps.options.values import input_file, renaming
@@ -42,7 +42,7 @@ def add_given(parser: Parser, which: Any) -> None:
     group.add_argument(
         "--grasps-format", metavar="NAME", help="format of the file (default: by its content)"
     )
-    add_gripper_link(group)
+    add_reading(group)
     group.add_argument(
         "--grasps-object",
         metavar="[THEIRS=]OURS",
@@ -66,7 +66,7 @@ def require_file(arguments: argparse.Namespace) -> None:
         InvalidInputError: names the option.
     """
     names = ("grasps_format", "grasps_object", "grasps_frame", "camera_pose", "object_ids")
-    for name in (*names, "scene_id", "gripper_link"):
+    for name in (*names, "scene_id", "gripper_link", "correction"):
         if getattr(arguments, name) and arguments.grasps is None:
             raise InvalidInputError(
                 f"--{name.replace('_', '-')} is for grasp files; add --grasps FILE"
@@ -75,18 +75,29 @@ def require_file(arguments: argparse.Namespace) -> None:
 
 def read_given(arguments: argparse.Namespace, scene: Scene, station: Station) -> GivenGrasps:
     """The grasps of the file that --grasps names, on the instances of a scene."""
-    from burg_drake.evaluation.grasp_sets import read_grasps
+    from burg_drake.evaluation.grasp_sets import (
+        FileReading,
+        MisplacedGraspsError,
+        find_mistake,
+        read_grasps,
+    )
     from burg_drake.formats.common import read_poses
 
     poses = arguments.camera_pose
-    return read_grasps(
-        scene,
-        arguments.grasps,
-        gripper_for(arguments, station),
-        format=arguments.grasps_format,
-        objects=dict(arguments.grasps_object),
-        frame=FRAMES.get(arguments.grasps_frame),  # type: ignore[arg-type]
-        X_SF=read_poses(poses) if poses else None,
-        object_ids=arguments.object_ids,
-        scene_id=arguments.scene_id,
-    )
+    try:
+        return read_grasps(
+            scene,
+            arguments.grasps,
+            gripper_for(arguments, station),
+            format=FileReading(arguments.grasps_format, arguments.correction),
+            objects=dict(arguments.grasps_object),
+            frame=FRAMES.get(arguments.grasps_frame),  # type: ignore[arg-type]
+            X_SF=read_poses(poses) if poses else None,
+            object_ids=arguments.object_ids,
+            scene_id=arguments.scene_id,
+        )
+    except MisplacedGraspsError as error:
+        mistake = find_mistake(error.grasps, station, scene)
+        if mistake is None:
+            raise
+        raise InvalidInputError(f"{error}; {mistake.text()}") from error

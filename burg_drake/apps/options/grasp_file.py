@@ -20,19 +20,28 @@ FRAMES = {"object": "object", "scene": "world", "camera": "camera"}
 
 
 def add_file_options(parser: Parser) -> None:
-    """The options --from and --gripper-link, by which a file is read."""
+    """The options --from, --gripper-link and --correction, by which a file is read."""
     parser.add_argument(
         "--from", dest="source", metavar="FORMAT", help="format to read (default: by the content)"
     )
-    add_gripper_link(parser)
+    add_reading(parser)
 
 
-def add_gripper_link(parser: Any) -> None:
-    """The option --gripper-link."""
+def add_reading(parser: Any) -> None:
+    """The options --gripper-link and --correction."""
     parser.add_argument(
         "--gripper-link",
         metavar="NAME",
         help="name of the hand's body in isaac_grasp files (default: that in its model)",
+    )
+    parser.add_argument(
+        "--correction",
+        metavar="NAME,...",
+        type=lambda text: tuple(text.split(",")),
+        default=(),
+        help="read poses that are meant otherwise: turn:z90 (degrees about z, the approach, x, the"
+        " closing direction, or y), forward:103.4 (mm along the approach), inverse, transposed,"
+        " wxyz, xyzw, y_up, z_up, millimetres, half_widths",
     )
 
 

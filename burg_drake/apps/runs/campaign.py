@@ -145,7 +145,10 @@ def _given(arguments: argparse.Namespace, station: Station) -> GraspsLike | None
     if arguments.grasps is None:
         return None
     imported = read_input(
-        arguments.grasps, arguments.grasps_format, gripper_for(arguments, station)
+        arguments.grasps,
+        arguments.grasps_format,
+        gripper_for(arguments, station),
+        arguments.correction,
     )
     for note in imported.notes:
         print(f"note: {note}")

@@ -115,6 +115,7 @@ def _add_options(parser: Parser) -> None:
 def run_reach(arguments: argparse.Namespace) -> int:
     """Asks, prints tables and writes what is wanted; 1 if that failed for some grasps."""
     from burg_drake.evaluation import reach
+    from burg_drake.evaluation.grasp_sets import mistake_notes
     from burg_drake.motion.workspace import require_usable_arm
     from burg_drake.scene.document import load_scene
     from burg_drake.station.checks import require_valid_scene
@@ -126,6 +127,7 @@ def run_reach(arguments: argparse.Namespace) -> int:
     require_valid_scene(scene, station)
     motion = chosen_motion(arguments, station)
     grasps = _grasps(arguments, scene, station)
+    hints = mistake_notes(grasps, station, scene) if arguments.grasps is not None else ()
     if isinstance(output, Output):
         output.require_fits([name for part in grasps.values() for name in part.object.tolist()])
     for warning in require_usable_arm(scene, station):
@@ -141,6 +143,8 @@ def run_reach(arguments: argparse.Namespace) -> int:
         progress=not arguments.quiet,
     )
     _print_answers(judged, scene, motion, arguments)
+    for hint in hints:
+        print(f"note: {hint}")
     reachable = _reachable(judged)
     if arguments.plans is not None:
         print(f"{(reachable & ~_unplanned(judged)).sum()} plans are in {arguments.plans}")
@@ -178,10 +182,9 @@ def _print_answers(
     from burg_drake.station.document import GraspMotion
 
     names = [scene.instance(n).object for n in chosen_instances(scene, arguments.only)]
-    print_tables(judged.select(_answered(judged)), names, motion)
-    if arguments.grasps is not None and (
-        note := missing_grasps_note(names, judged.object.tolist())
-    ):
+    given = arguments.grasps is not None
+    print_tables(judged.select(_answered(judged)), names, motion, given=given)
+    if given and (note := missing_grasps_note(names, judged.object.tolist())):
         print(f"note: {note}")
     if motion != GraspMotion():
         print(f"motion: {motion_text(motion)}")

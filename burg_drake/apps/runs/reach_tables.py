@@ -16,7 +16,9 @@ BLOCKERS = 3
 """Most frequent bodies that are listed for each outcome."""
 
 
-def print_tables(grasps: GraspSet, asked: Iterable[str], motion: GraspMotion) -> None:
+def print_tables(
+    grasps: GraspSet, asked: Iterable[str], motion: GraspMotion, *, given: bool = False
+) -> None:
     """Counts by object and by outcome, what was in the way, objects without a clear or reachable
     grasp, and how fast that was found out.
 
@@ -24,6 +26,7 @@ def print_tables(grasps: GraspSet, asked: Iterable[str], motion: GraspMotion) ->
         grasps: as `reach` has judged them.
         asked: objects that it was asked about, of which some may have no grasp.
         motion: of the hand.
+        given: whether the grasps are the user's own.
     """
     from burg_drake.core.grasps import Outcome, Stage
     from burg_drake.core.terminal import format_number
@@ -37,7 +40,7 @@ def print_tables(grasps: GraspSet, asked: Iterable[str], motion: GraspMotion) ->
     reach_table(by_object, total).show()
     outcome_table(grasps, by_object, total).show()
     ended, blocker = grasps.column("outcome"), grasps.column("blocker")
-    notes = unclear_notes(grasps.object, ended, blocker)
+    notes = unclear_notes(grasps.object, ended, blocker, given=given)
     for note in (*notes, *unmoved_notes(grasps.object, ended, blocker, motion)):
         print(f"note: {note}")
     clear = sum(n for o, n in total.items() if o.stage is not Stage.CLEAR)

@@ -1,5 +1,6 @@
 from .candidate_files import (
     GivenGrasps as GivenGrasps,
+    MisplacedGraspsError as MisplacedGraspsError,
     NoSceneIdsError as NoSceneIdsError,
     by_names as by_names,
     read_grasps as read_grasps,
@@ -15,7 +16,17 @@ from .input import (
     read_input as read_input,
     station_reference as station_reference,
 )
+from .mistake_search import (
+    find_mistake as find_mistake,
+    given_hints as given_hints,
+    mistake_notes as mistake_notes,
+)
 from .near_objects import require_near as require_near
+from .pose_mistakes import (
+    FileReading as FileReading,
+    Mistake as Mistake,
+    MistakeFound as MistakeFound,
+)
 from .provenance import set_documents as set_documents
 from .run_set import (
     column_called as column_called,

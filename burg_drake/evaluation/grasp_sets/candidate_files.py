@@ -22,13 +22,35 @@ from burg_drake.evaluation.candidates import (
 )
 from burg_drake.evaluation.grasp_sets.input import read_input
 from burg_drake.evaluation.grasp_sets.near_objects import require_near
-from burg_drake.formats.common import PANDA, Gripper, PoseFrame, with_objects_renamed
+from burg_drake.evaluation.grasp_sets.pose_mistakes import FileReading
+from burg_drake.evaluation.grasp_sets.run_set import of_instances, without_instance
+from burg_drake.formats.common import (
+    PANDA,
+    PREGRASP_WIDTH,
+    Gripper,
+    PoseFrame,
+    with_objects_renamed,
+)
 from burg_drake.scene.document import Scene, SceneLike, as_scene
 
 OBJECT_ID, SCENE_ID = "object_id", "scene_id"
 """Columns by which files of several objects, or of several scenes, tell theirs apart."""
+ROUNDING = 1e-6
+"""By which a width may be beyond the hand's opening and still be its end [m]: single precision."""
 NO_OBJECT = -1
 """Object id of grasps of which it is not known."""
+
+
+class MisplacedGraspsError(InvalidInputError):
+    """Grasps of a file are nowhere near their objects.
+
+    Attributes:
+        grasps: by instance, in which `find_mistake` may find why.
+    """
+
+    def __init__(self, message: str, grasps: Mapping[str, GraspSet] | None = None) -> None:
+        super().__init__(message)
+        self.grasps = dict(grasps or {})
 
 
 class NoSceneIdsError(InvalidInputError):
@@ -53,7 +75,7 @@ def read_grasps(
     path: str | Path,
     gripper: Gripper = PANDA,
     *,
-    format: str | None = None,
+    format: str | FileReading | None = None,
     objects: Mapping[str, str] | None = None,
     frame: PoseFrame | None = None,
     X_SF: Array | None = None,
@@ -71,7 +93,7 @@ def read_grasps(
         scene: the scene.
         path: a file of any format in `formats.grasp_files`, or the folder of a run.
         gripper: the hand that the grasps are for.
-        format: of the file; None to tell by the content.
+        format: of the file; None to tell by the content. A `FileReading` corrects mistakes, too.
         objects: names of the scene's objects, or of its instances, by the names that the file has;
             a name by the empty text is for all grasps.
         frame: what the poses are measured in, in place of what the format says.
@@ -82,10 +104,11 @@ def read_grasps(
 
     Raises:
         InvalidInputError: the file cannot be read, or it is not told what its grasps belong to.
-        UnknownNameError: an object, instance or scene that is not there.
+        UnknownNameError: an object, instance, scene or correction that is not there.
     """
     scene = as_scene(scene)
-    imported = read_input(path, format, gripper)
+    reading = format if isinstance(format, FileReading) else FileReading(format)
+    imported = read_input(path, reading.format, gripper, reading.correction)
     names = InstanceNames(scene, str(path), dict(objects or {}))
     grasps = _of_one_scene(imported.grasps, scene_id, names.path)
     frame = frame or imported.frame
@@ -96,18 +119,44 @@ def read_grasps(
                 " object ids apply"
             )
         found = _of_names(grasps, names)
-        return GivenGrasps(found, (*imported.notes, *_repeated(found, names.path)))
+        return GivenGrasps(
+            found, (*imported.notes, *_repeated(found, path), *_wide(grasps, path, gripper))
+        )
     if frame == "camera" and X_SF is None:
         raise InvalidInputError(
-            f"{path} has grasps in the frame of a camera; give the camera's pose in the scene"
-        ).about("X_SF")
-    X_SG = grasps.X_OG if X_SF is None else X_SF @ grasps.X_OG
-    owner, notes = _owners(grasps, X_SG, names, object_ids or {}, gripper)
-    placed = by_instance(scene, _without_instance(grasps), X_SG, owner)
-    return GivenGrasps(placed, (*imported.notes, *notes, *_repeated(placed, names.path)))
+            f"{path} has grasps in the frame of a camera; give the camera's pose in the scene, or"
+            " say in which other frame they are"
+        ).about("X_SF", "frame")
+    X_SF = np.eye(4) if X_SF is None else X_SF
+    X_SG = X_SF @ grasps.X_OG
+    measured = {**grasps.provenance, "X_SM": X_SF.tolist()}
+    grasps = dataclasses.replace(grasps, provenance=measured)
+    owner, held = _owners(grasps, X_SG, names, object_ids or {}, gripper)
+    placed = by_instance(scene, without_instance(grasps), X_SG, owner)
+    notes = _missed(placed, held, names)
+    return GivenGrasps(
+        placed,
+        (*imported.notes, *notes, *_repeated(placed, path), *_wide(grasps, path, gripper)),
+    )
 
 
-def _repeated(by_instance: Mapping[str, GraspSet], path: str) -> tuple[str, ...]:
+def _wide(grasps: GraspSet, path: str | Path, gripper: Gripper) -> tuple[str, ...]:
+    """A note about widths to which the hand does not open."""
+    widest, notes = gripper.opening[1], []
+    arriving = grasps.columns.get(PREGRASP_WIDTH)
+    for name, values in (("width", grasps.width), (PREGRASP_WIDTH, arriving)):
+        beyond = None if values is None else values[values > widest + ROUNDING]
+        if beyond is not None and len(beyond):
+            notes.append(
+                f"{name} of {len(beyond)} of {len(grasps)} grasps of {path} is beyond the"
+                f" {1e3 * widest:g} mm to which hand {gripper.name!r} opens (largest"
+                f" {1e3 * beyond.max():.4g} mm); they are judged all the same, with the hand open"
+                f" at {1e3 * widest:g} mm."
+            )
+    return tuple(notes)
+
+
+def _repeated(by_instance: Mapping[str, GraspSet], path: str | Path) -> tuple[str, ...]:
     """A note about grasps that are there several times, which `given_candidates` leaves out."""
     count = sum(len(part) - len(np.unique(part.id)) for part in by_instance.values())
     return (f"{count} grasps of {path} repeat others; each is judged once.",) if count else ()
@@ -134,10 +183,13 @@ def by_names(scene: Scene, grasps: GraspSet) -> dict[str, GraspSet]:
 def _of_names(grasps: GraspSet, names: InstanceNames) -> dict[str, GraspSet]:
     """The same, with the names of a file."""
     on_instances = INSTANCE in grasps.columns and not names.given
-    found = _of_instances(grasps) if on_instances else _of_objects(grasps, names)
+    found = of_instances(grasps) if on_instances else _of_objects(grasps, names)
     require_instances(names.scene, found, names.path)
-    for part in found.values():
-        require_near(part, names.scene.library, names.path, is_file=names.is_file)
+    try:
+        for part in found.values():
+            require_near(part, names.scene.library, names.path, is_file=names.is_file)
+    except InvalidInputError as error:
+        raise MisplacedGraspsError(str(error), found).about(*error.arguments) from error
     return found
 
 
@@ -160,27 +212,13 @@ def _of_one_scene(grasps: GraspSet, scene_id: str | None, path: str) -> GraspSet
     return grasps.select(ids == scene_id)
 
 
-def _of_instances(grasps: GraspSet) -> dict[str, GraspSet]:
-    """Grasps of a file that names instances, each set with its own provenance."""
-    owner = grasps.columns[INSTANCE]
-    given = grasps.provenance.get("parts")
-    parts = given if isinstance(given, Mapping) else {}
-    rest = _without_instance(grasps)
-    found = {}
-    for name in dict.fromkeys(owner.tolist()):
-        part = parts.get(name)
-        provenance = part if isinstance(part, Mapping) else {}
-        found[name] = dataclasses.replace(rest.select(owner == name), provenance=provenance)
-    return found
-
-
 def _of_objects(grasps: GraspSet, names: InstanceNames) -> dict[str, GraspSet]:
     """Grasps in object frames by instance, in the scene's order."""
     foreign = sorted(set(grasps.object.tolist()))
     names.require_used(foreign)
     sets: dict[str, list[GraspSet]] = {name: [] for name in names.scene.instances}
     for name in foreign:
-        chosen = _without_instance(grasps.select(grasps.object == name))
+        chosen = without_instance(grasps.select(grasps.object == name))
         for instance in names.of_object(name):
             object = names.scene.instance(instance).object
             sets[instance].append(with_objects_renamed(chosen, {name: object}))
@@ -197,24 +235,40 @@ def _owners(
     names: InstanceNames,
     object_ids: Mapping[int, str],
     gripper: Gripper,
-) -> tuple[Owners, tuple[str, ...]]:
-    """(N,) instances that grasps (N, 4, 4) in the scene frame belong to, and notes about it."""
+) -> tuple[Owners, NDArray[np.bool_]]:
+    """(N,) instances that grasps (N, 4, 4) in the scene frame belong to, and which of them are told
+    by the file, or have something of it between their fingers."""
     names.require_used([""])
     among = names.of_object("") if names.given else None
     owner = _named_owners(grasps, names, object_ids)
     open_ = owner == ""
-    owner[open_], held = held_instances(names.scene, X_SG[open_], gripper, among)
+    held = np.ones(len(owner), dtype=bool)
+    owner[open_], held[open_] = held_instances(names.scene, X_SG[open_], gripper, among)
+    return owner.astype(str), held
+
+
+def _missed(
+    placed: Mapping[str, GraspSet],
+    held: NDArray[np.bool_],
+    names: InstanceNames,
+) -> tuple[str, ...]:
+    """A note about grasps that hold nothing.
+
+    Raises:
+        MisplacedGraspsError: none holds anything.
+    """
     missed = int((~held).sum())
     if not missed:
-        return owner.astype(str), ()
-    if missed == len(X_SG):
-        raise InvalidInputError(
+        return ()
+    if missed == len(held):
+        raise MisplacedGraspsError(
             f"none of the {missed} grasps of {names.path} has an object of scene"
             f" {names.scene.name!r} between its fingers; is the scene the right one, and the pose"
-            " of the camera or workspace?"
-        ).about("X_SF")
-    return owner.astype(str), (
-        f"{missed} of {len(X_SG)} grasps have no object between their fingers; they are given to"
+            " of the camera or workspace?",
+            placed,
+        ).about("X_SF", "frame")
+    return (
+        f"{missed} of {len(held)} grasps have no object between their fingers; they are given to"
         " the one with the nearest surface.",
     )
 
@@ -244,9 +298,3 @@ def _named_owners(
             )
         named[ids == number] = instance
     return named
-
-
-def _without_instance(grasps: GraspSet) -> GraspSet:
-    """The same grasps without the column that candidates have in their own way."""
-    columns = {name: values for name, values in grasps.columns.items() if name != INSTANCE}
-    return dataclasses.replace(grasps, columns=columns)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from burg_drake.core.grasps import GraspSet
 from burg_drake.evaluation.candidates import in_frame
 from burg_drake.evaluation.grasp_sets.candidate_files import read_grasps
 from burg_drake.evaluation.grasp_sets.input import read_input
+from burg_drake.evaluation.grasp_sets.pose_mistakes import FileReading
 from burg_drake.formats.common import (
     PANDA,
     Gripper,
@@ -34,12 +35,14 @@ class SeenScene:
         X_SF: (4, 4) the camera in the scene frame; where a world is not the scene frame, that.
         object_ids: names of instances by the file's object ids.
         scene_id: the one to take of a file of several scenes.
+        correction: mistakes of the file that are made up for, see `pose_mistakes`.
     """
 
     scene: Scene | None = None
     X_SF: Array | None = None
     object_ids: Mapping[int, str] = field(default_factory=dict)
     scene_id: str | None = None
+    correction: Sequence[str] = ()
 
 
 def read_in_frame(
@@ -67,12 +70,12 @@ def read_in_frame(
         InvalidInputError: the file cannot be read, or a scene or the camera's pose is missing.
         UnknownNameError: an object, instance or scene that is not there.
     """
-    imported = read_input(path, format, gripper)
+    seen = seen or SeenScene()
+    imported = read_input(path, format, gripper, seen.correction)
     given = frame or imported.frame
     if given == wanted:
         grasps = with_objects_renamed(imported.grasps, objects or {})
         return ImportedGrasps(grasps, wanted, imported.notes)
-    seen = seen or SeenScene()
     if "object" not in (given, wanted):
         if seen.X_SF is None:
             raise InvalidInputError(
@@ -92,7 +95,7 @@ def read_in_frame(
         seen.scene,
         path,
         gripper,
-        format=format,
+        format=FileReading(format, tuple(seen.correction)),
         objects=objects,
         frame=given,
         X_SF=None if given == "object" else seen.X_SF,

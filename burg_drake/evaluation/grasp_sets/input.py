@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from burg_drake.core import InvalidInputError
 from burg_drake.core.grasps import GraspSet, parts_of
 from burg_drake.core.paths import is_resolved
+from burg_drake.evaluation.grasp_sets.pose_mistakes import check_corrections, corrected
 from burg_drake.evaluation.grasp_sets.run_set import run_documents, run_grasps
 from burg_drake.evaluation.records import is_table
 from burg_drake.evaluation.store import load_run
@@ -21,7 +22,10 @@ OURS = "burg_drake"
 
 
 def read_input(
-    path: str | Path, format: str | None = None, gripper: Gripper | None = None
+    path: str | Path,
+    format: str | None = None,
+    gripper: Gripper | None = None,
+    correction: Iterable[str] = (),
 ) -> ImportedGrasps:
     """Reads grasps.
 
@@ -31,15 +35,17 @@ def read_input(
         format: of the file; None to tell by the content.
         gripper: the hand that grasps are taken for; the Panda's if None, without a note where
             they name another one.
+        correction: mistakes of the file that are made up for, see `pose_mistakes`.
 
     Returns:
         The grasps; their provenance names the hand.
 
     Raises:
         InvalidInputError: the file cannot be read, or is the table of a run.
-        UnknownNameError: there is no such format.
+        UnknownNameError: there is no such format or correction.
     """
     path = Path(path)
+    correction = check_corrections(correction)
     if path.is_dir():
         imported = ImportedGrasps(run_grasps(load_run(path)), "object")
     elif is_table(path):
@@ -49,6 +55,7 @@ def read_input(
         )
     else:
         imported = read_grasp_file(path, format, gripper or PANDA)
+    imported = corrected(imported, gripper or PANDA, correction)
     hand = hand_of(imported.grasps)
     if hand is None:
         if path.is_dir() or (format or format_name(path)) == OURS:

@@ -35,5 +35,6 @@ def require_near(
         if nearest > FARTHEST:
             raise InvalidInputError(
                 f"{source}: the nearest grasp of object {name!r} is {nearest:.3g} m away from it;"
-                " lengths have to be metres, and if the grasps are of another object, say which"
-            ).about("objects")
+                " lengths have to be metres, and if the grasps are of another object, or in another"
+                " frame, say which"
+            ).about("objects", "frame")

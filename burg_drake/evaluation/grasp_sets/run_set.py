@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from burg_drake.core import BurgError
 from burg_drake.core.documents import load_document
 from burg_drake.core.grasps import INPUT_PREFIX, GraspSet
+from burg_drake.evaluation.candidates import INSTANCE
 from burg_drake.evaluation.grasp_sets.provenance import hand_entry, object_files
 from burg_drake.evaluation.records import TEXT
 from burg_drake.evaluation.store import SCENE_FILE, STATION_FILE, Run
@@ -78,3 +80,23 @@ def run_documents(run: Run) -> dict[str, Any]:
         objects = sorted({instance.object for instance in scene.instances.values()})
         named["object_files"] = object_files(scene.library, objects)
     return named
+
+
+def of_instances(grasps: GraspSet) -> dict[str, GraspSet]:
+    """Grasps of a file that names instances, each set with its own provenance."""
+    owner = grasps.columns[INSTANCE]
+    given = grasps.provenance.get("parts")
+    parts = given if isinstance(given, Mapping) else {}
+    rest = without_instance(grasps)
+    found = {}
+    for name in dict.fromkeys(owner.tolist()):
+        part = parts.get(name)
+        provenance = part if isinstance(part, Mapping) else {}
+        found[name] = dataclasses.replace(rest.select(owner == name), provenance=provenance)
+    return found
+
+
+def without_instance(grasps: GraspSet) -> GraspSet:
+    """The same grasps without the column that candidates have in their own way."""
+    columns = {name: values for name, values in grasps.columns.items() if name != INSTANCE}
+    return dataclasses.replace(grasps, columns=columns)

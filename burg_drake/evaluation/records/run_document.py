@@ -132,6 +132,7 @@ class RunDocument:
         table: format of the results file.
         versions: of the software and the machine.
         stretches: sessions in which it was worked on.
+        hints: usual mistakes that given grasps show, one sentence each.
     """
 
     version: int = 1
@@ -150,6 +151,7 @@ class RunDocument:
     table: TableFormat = "csv"
     versions: dict[str, str] = field(default_factory=dict)
     stretches: tuple[WorkSession, ...] = ()
+    hints: tuple[str, ...] = ()
 
 
 def begun_now(workers: int, before: int) -> WorkSession:

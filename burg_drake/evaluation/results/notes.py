@@ -22,6 +22,8 @@ HIT = {Outcome.COLLISION_TARGET: SELF, Outcome.COLLISION_TABLE: TABLE}
 REMEDY_OF_ARM = (
     "another station, or another place on the board, may help; mode `hand` leaves the arm out"
 )
+REMEDY_OF_GIVEN = "burg-drake grasps show draws them at their object"
+"""What would help where grasps were given and the open hand is not clear."""
 REMEDIES = {
     Stage.CLEAR: "sample grasps at which the hand is clear, which is the default",
     Stage.REACHABLE: REMEDY_OF_ARM,
@@ -34,10 +36,12 @@ NO_RETREAT = (Outcome.HAND_COLLISION_RETREAT, Outcome.RETREAT_LINE)
 
 
 def run_notes(run: Run) -> tuple[str, ...]:
-    """A sentence for each instance with fewer grasps than asked, or for those that no grasps were
-    given for, and, once all of its grasps are judged, for each object of which nothing could be
-    executed, or that has too few lifted or failing ones for a run that is to be balanced."""
+    """A sentence for each usual mistake that given grasps show, for each instance with fewer grasps
+    than asked, or for those that no grasps were given for, and, once all of its grasps are judged,
+    for each object of which nothing could be executed, or that has too few lifted or failing ones
+    for a run that is to be balanced."""
     return (
+        *run.document.hints,
         *_without_grasps(run),
         *shortfalls(run),
         *_unexecuted(run),
@@ -73,24 +77,31 @@ def _without_grasps(run: Run) -> list[str]:
 def _unexecuted(run: Run) -> list[str]:
     columns, notes = run.results, []
     motion = motion_in(run.document.trial)
+    given = run.document.grasps.origin == "given"
     for name, count in run.document.grasps.objects.items():
         mine = columns["object"] == name
         outcomes = columns["outcome"][mine]
         tried = np.isin(outcomes, [o.value for o in Outcome if o.stage is Stage.EXECUTED])
         executed = tried & (outcomes != Outcome.SIMULATION_FAILED)
         if count and len(outcomes) == count and not executed.any():
-            notes.append(_unexecuted_note(name, columns, mine, motion))
+            notes.append(_unexecuted_note(name, columns, mine, motion, given=given))
     return notes
 
 
-def _unexecuted_note(name: str, columns: Columns, mine: np.ndarray, motion: GraspMotion) -> str:
+def _unexecuted_note(
+    name: str, columns: Columns, mine: np.ndarray, motion: GraspMotion, *, given: bool
+) -> str:
     stages = Counter(columns["stage"][mine].tolist())
-    remedy = REMEDIES[Stage(stages.most_common(1)[0][0])]
+    remedy = _remedy(Stage(stages.most_common(1)[0][0]), given=given)
     outcomes, blockers = columns["outcome"][mine], columns["blocker"][mine]
     if other := _other_motion(Outcome(_counted(outcomes, blockers)[0][0][0]), motion):
         remedy = f"{other} may help; {remedy}"
     causes = _causes(outcomes, blockers)
     return f"{name}: nothing executed of {_grasps(mine)}: {causes}; {remedy}"
+
+
+def _remedy(stage: Stage, *, given: bool) -> str:
+    return REMEDY_OF_GIVEN if given and stage is Stage.CLEAR else REMEDIES[stage]
 
 
 def _other_motion(outcome: Outcome, motion: GraspMotion) -> str:
@@ -108,12 +119,17 @@ def _other_motion(outcome: Outcome, motion: GraspMotion) -> str:
 
 
 def unclear_notes(
-    objects: NDArray[np.str_], outcomes: NDArray[np.str_], blockers: NDArray[np.str_]
+    objects: NDArray[np.str_],
+    outcomes: NDArray[np.str_],
+    blockers: NDArray[np.str_],
+    *,
+    given: bool = False,
 ) -> tuple[str, ...]:
     """A sentence for each object whose grasps all end because the open hand collides.
 
     Args:
         objects, outcomes, blockers: (N,) of each grasp.
+        given: whether the grasps are the user's own.
     """
     clear = ~np.isin(outcomes, [o.value for o in Outcome if o.stage is Stage.CLEAR])
     notes = []
@@ -121,7 +137,7 @@ def unclear_notes(
         mine = objects == name
         if not clear[mine].any():
             causes = _causes(outcomes[mine], blockers[mine])
-            remedy = REMEDIES[Stage.CLEAR]
+            remedy = _remedy(Stage.CLEAR, given=given)
             notes.append(f"{name}: none of {_grasps(mine)} is clear: {causes}; {remedy}")
     return tuple(notes)
 

@@ -138,6 +138,7 @@ class GraspFormat:
         read: the grasps of a file made for a gripper.
         write: writes grasps of a gripper and returns what the file cannot carry, one sentence each.
         one_object: a file holds the grasps of one object.
+        X_GF_each: (N, 4, 4) the same for each grasp of a set that was read, where they differ.
     """
 
     name: str
@@ -152,3 +153,10 @@ class GraspFormat:
     read: Callable[[Path, Gripper], ImportedGrasps]
     write: Callable[[GraspSet, Path, Gripper], tuple[str, ...]]
     one_object: bool = False
+    X_GF_each: Callable[[GraspSet, Gripper], Array] | None = None
+
+    def frames(self, grasps: GraspSet, gripper: Gripper) -> Array:
+        """(N, 4, 4) the format's grasp frame in ours, for each grasp that was read of a file."""
+        if self.X_GF_each is not None:
+            return self.X_GF_each(grasps, gripper)
+        return np.broadcast_to(self.X_GF(gripper), (len(grasps), 4, 4))

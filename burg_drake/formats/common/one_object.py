@@ -116,7 +116,7 @@ def check_hand(given: str, gripper: Gripper, where: str) -> tuple[str, ...]:
         raise InvalidInputError(
             f"{where}: the grasps are of hand {known!r} and were to be read as those of"
             f" {gripper.name!r}; read them with the hand that they were made for"
-        )
+        ).about("hand")
     return (f"{where}: {given!r} was taken for hand {gripper.name!r}.",)
 
 

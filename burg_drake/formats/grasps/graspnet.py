@@ -65,6 +65,10 @@ def _X_GF(gripper: Gripper) -> Array:
     return inverse(X_FG(DEFAULT_DEPTH, gripper))
 
 
+def _X_GF_each(grasps: GraspSet, gripper: Gripper) -> Array:
+    return inverse(X_FG(_numbers(grasps, "depth", DEFAULT_DEPTH), gripper))
+
+
 def _recognises(path: Path) -> bool:
     shape = npy_shape(path)
     return shape is not None and len(shape) == 2 and shape[1] == NUMBERS
@@ -170,6 +174,7 @@ FORMAT = GraspFormat(
         "double precision",
     ),
     X_GF=_X_GF,
+    X_GF_each=_X_GF_each,
     recognises=_recognises,
     read=_read,
     write=_write,

@@ -111,7 +111,7 @@ def _check_gripper(path: Path, document: Mapping[str, Any], gripper: Gripper) ->
             f"{path}: {key}: {link!r} is not {gripper.body!r}, the frame of hand {gripper.name!r};"
             " read it with the hand that the grasps were made for, or, if the two frames are the"
             f" same, name {object_name(link)!r} as the gripper's link"
-        )
+        ).about("gripper_link", "hand")
 
 
 def _object(path: Path, document: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:

@@ -1,0 +1,474 @@
+"""Finds which of the usual mistakes of `pose_mistakes` a set of grasps shows, by the screen of the
+open hand and where its pads meet the object."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import Array, BurgError, inverse, make_pose, rot_z
+from burg_drake.core.grasps import GraspSet, Outcome
+from burg_drake.evaluation.candidates import Owners, held_instances
+from burg_drake.evaluation.grasp_sets.pose_mistakes import (
+    Mistake,
+    MistakeFound,
+    corrected_poses,
+    format_of_set,
+    frames_of,
+    usual_mistakes,
+)
+from burg_drake.evaluation.grasp_sets.run_set import of_instances
+from burg_drake.evaluation.store import Run
+from burg_drake.formats import FORMATS
+from burg_drake.formats.common import GraspFormat, Gripper, PoseFrame
+from burg_drake.objects.library import ObjectLibrary
+from burg_drake.scene.document import Scene
+from burg_drake.station.document import Station
+
+if TYPE_CHECKING:
+    from burg_drake.geometry import Surface
+    from burg_drake.grasping.clearance import HandClearance
+    from burg_drake.station.diagram import StationDiagram
+
+MAX_GRASPS = 24
+"""So many grasps of a set are looked at."""
+MIN_FITTING = 3
+"""Where fewer fit once a mistake is corrected, it is not named."""
+MIN_SHARE, MIN_SHARE_COMBINED = 0.6, 0.8
+"""A mistake is named where at least this share of the grasps fits once it is corrected; more where
+two are to be corrected together, or the distance is not that of a known frame. Of grasps sampled by
+points alone, which are often in a collision, up to 0.67 fit if a quarter turn and a distance are
+combined."""
+MIN_SHARE_ABOUT = 0.9
+"""The same of turns about the closing direction, which the pads do not notice."""
+MIN_GAIN = 2.5
+"""So many times as many have to fit as before."""
+MAX_CLOSING = 0.4
+"""Where the pads close on the object at a larger share of the grasps, whatever the rest of the hand
+hits, closing direction and origin are right, and only the approach can be wrong. On the built-in
+objects the share is 0.67 to 1 for right sets (0.17 for scissors), and at most 0.38 for grasps that
+are turned or moved, unless turned grasps of thin objects hold as well."""
+TIE = 0.9
+"""Mistakes whose counts differ by less than this factor are held to be equally good."""
+FRICTION = 0.5
+"""Least coefficient of friction that the pads are taken to have: sets from elsewhere were made with
+others than ours."""
+HALF = (0.35, 0.6)
+"""Ratios of width to distance between the patches of contact that are taken for a half. Of right
+widths the ratio is 0.75 to 1.07 at nearly all grasps: it is least at the curved wall of a mug."""
+FAR = 1.0
+"""Lengths are tried as millimetres where half of the grasps are farther from the origin [m]."""
+TOUCHED = [
+    outcome.value
+    for outcome in Outcome
+    if outcome.held or outcome in (Outcome.SLIPPED, Outcome.DROPPED, Outcome.BLOCKED)
+]
+"""Outcomes of grasps that both fingers have touched their object at."""
+SAME_READER = ("isaac_grasp", "graspgen_yaml")
+"""Formats of which either can be read as the other."""
+R_BODY_OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+"""A camera as OpenCV has it in a body whose x points forward, as ROS has it."""
+
+Fits = NDArray[np.bool_]
+
+
+def find_mistake(
+    grasps: Mapping[str, GraspSet], station: Station, source: Scene | ObjectLibrary
+) -> MistakeFound | None:
+    """Finds the usual mistake that a set of grasps shows, if it shows one.
+
+    Args:
+        grasps: in the frames of their objects, by instance of the scene, or else by object of the
+            library. Their provenance says how a file was read.
+        station: whose hand it is.
+        source: where the objects stand, or else where they are.
+
+    Returns:
+        The mistake that makes most grasps fit, where few fit as they are; None if that is none.
+    """
+    held = {name: part for name, part in grasps.items() if len(part)}
+    if not held:
+        return None
+    from burg_drake.station.world import station_gripper
+
+    search = _Search(held, station, source, station_gripper(station))
+    mistakes = search.mistakes()
+    alone, in_scene = search.fits(mistakes)
+    if search.closing_share() > MAX_CLOSING:
+        about = [k for k, mistake in enumerate(mistakes) if search.keeps_closing_line(mistake)]
+        mistakes = [mistakes[k] for k in about]
+        rows = [0, *(k + 1 for k in about)]
+        alone, in_scene = alone[rows], None if in_scene is None else in_scene[rows]
+    found = _decide(search, mistakes, alone)
+    return found if found is not None or in_scene is None else _decide(search, mistakes, in_scene)
+
+
+def mistake_notes(
+    grasps: Mapping[str, GraspSet],
+    station: Station,
+    source: Scene | ObjectLibrary,
+    *,
+    format_option: str = "--grasps-format",
+) -> tuple[str, ...]:
+    """A sentence about the usual mistake that a set of grasps shows, with what corrects it, and one
+    about widths that are half as large as they should be.
+
+    Args:
+        grasps, station, source: see `find_mistake`.
+        format_option: what the caller's option about the format of a file is called.
+    """
+    found = find_mistake(grasps, station, source)
+    mistaken = () if found is None else (found.text(format_option),)
+    return (*mistaken, *half_width_notes(grasps, station, source))
+
+
+def given_hints(run: Run) -> tuple[str, ...]:
+    """The notes of `mistake_notes` on a run whose grasps were given; none on sampled ones.
+
+    Mistakes about poses are looked for where most grasps did not get so far that both fingers
+    touched the object.
+    """
+    if run.document.grasps.origin != "given":
+        return ()
+    touched = np.isin(run.results["outcome"], TOUCHED)
+    with contextlib.suppress(BurgError):
+        scene, station = run.scene(), run.station()
+        grasps = of_instances(run.candidates.grasps.with_columns(instance=run.candidates.instance))
+        search = half_width_notes if 2 * touched.sum() > len(touched) else mistake_notes
+        return search(grasps, station, scene)
+    return ()
+
+
+def half_width_notes(
+    grasps: Mapping[str, GraspSet], station: Station, source: Scene | ObjectLibrary
+) -> tuple[str, ...]:
+    """A note if most widths are half of the distance of the contacts."""
+    from burg_drake.grasping.quality import grasp_contacts
+
+    test, ratios = _FitTest(station, source), []
+    for name, part in grasps.items():
+        known = np.flatnonzero(part.width > 0.0)[:MAX_GRASPS]
+        contacts = grasp_contacts(test.surface(name), part.X_OG[known], test.jaws)
+        apart = np.linalg.norm(contacts.p_OC[:, 1] - contacts.p_OC[:, 0], axis=-1)
+        ratios += (part.width[known] / apart)[contacts.touching].tolist()
+    half = sum(HALF[0] < ratio < HALF[1] for ratio in ratios)
+    if half < max(MIN_FITTING, MIN_SHARE_COMBINED * len(ratios)):
+        return ()
+    return (
+        f"widths of {half} of {len(ratios)} grasps that were looked at are half of the distance"
+        " between the contacts; if they are those of one finger, give --correction half_widths",
+    )
+
+
+class _Search:
+    """Grasps of a set, as they were read and as each mistake would have them."""
+
+    def __init__(
+        self,
+        grasps: Mapping[str, GraspSet],
+        station: Station,
+        source: Scene | ObjectLibrary,
+        gripper: Gripper,
+    ) -> None:
+        self._scene = source if isinstance(source, Scene) else None
+        self._gripper = gripper
+        self._test = _FitTest(station, source)
+        first = next(iter(grasps.values()))
+        how = first.provenance
+        X_SM = how.get("X_SM")
+        self._X_SM = None if X_SM is None or self._scene is None else np.array(X_SM, dtype=float)
+        if self._X_SM is None and self._scene is not None:
+            grasps = _one_instance_each(grasps, self._scene)
+        self.format = format_of_set(first)
+        self.total = sum(len(part) for part in grasps.values())
+        rows = [(name, part, k) for name, part in grasps.items() for k in _promising(part)]
+        chosen = np.unique(np.linspace(0, len(rows) - 1, min(MAX_GRASPS, len(rows))).astype(int))
+        frames = {name: frames_of(part, gripper) for name, part in grasps.items()}
+        picked = [rows[i] for i in chosen]
+        self._name = np.array([name for name, _, _ in picked])
+        X_OG = np.stack([part.X_OG[k] for _, part, k in picked])
+        self._X_GF = np.stack([frames[name][k] for name, _, k in picked])
+        self._X_MG = X_OG
+        if self._X_SM is not None:
+            self._X_MG = inverse(self._X_SM) @ self._X_SO(self._name) @ X_OG
+
+    @property
+    def count(self) -> int:
+        """How many grasps are looked at."""
+        return len(self._name)
+
+    def mistakes(self) -> list[Mistake]:
+        """Those that can have been made."""
+        found = usual_mistakes(self.format, self._gripper)
+        if np.median(np.linalg.norm(self._X_MG[:, :3, 3], axis=-1)) < FAR:
+            found = [mistake for mistake in found if mistake.correction != ("millimetres",)]
+        if self._scene is None:
+            return found
+        if self._X_SM is None:
+            return [*found, Mistake("measured in the frame of the scene", frame="world")]
+        found.append(Mistake("measured in the frame of their object", frame="object"))
+        if not np.allclose(self._X_SM, np.eye(4)):
+            found += [
+                Mistake("with the pose of the camera inverted", camera=inverse(self._X_SM)),
+                Mistake(
+                    "with a camera whose pose is that of a body whose x points forward",
+                    camera=self._X_SM @ make_pose(R_BODY_OPTICAL),
+                ),
+            ]
+        return found
+
+    def fits(self, mistakes: Sequence[Mistake]) -> tuple[Fits, Fits | None]:
+        """(K + 1, N) which grasps fit their object as they were read and once each mistake is
+        corrected, and which of those are clear of all else in the scene."""
+        meant = [self._X_MG, *(self._as_meant(mistake) for mistake in mistakes)]
+        placed = self._placed(np.stack(meant))
+        for k, mistake in enumerate(mistakes, 1):
+            if mistake.frame is not None:
+                placed[k] = self._in_frame(mistake.frame)
+        names = np.concatenate([name for name, _ in placed])
+        X_OG = np.concatenate([X for _, X in placed])
+        alone, clear = self._test(names, X_OG)
+        shape = (len(placed), self.count)
+        alone = alone.reshape(shape)
+        return alone, None if clear is None else alone & clear.reshape(shape)
+
+    def closing_share(self) -> float:
+        """Share of the grasps, as they were read, at which the pads close on the object, whatever
+        else the hand hits."""
+        return float(self._test.closes(*self._placed(self._X_MG[None])[0]).mean())
+
+    def keeps_closing_line(self, mistake: Mistake) -> bool:
+        """Whether the fingers close along the same line once a mistake is corrected."""
+        if not mistake.moves_frame:
+            return False
+        X_GN = corrected_poses(np.eye(4), self.format.X_GF(self._gripper), mistake.correction)
+        return bool(np.abs([X_GN[1:3, 0], X_GN[1:3, 3]]).max() < 1e-3)
+
+    def _as_meant(self, mistake: Mistake) -> Array:
+        """(N, 4, 4) the grasps in M once a mistake about grasps or the camera is corrected."""
+        if mistake.camera is not None and self._X_SM is not None:
+            return np.asarray(inverse(self._X_SM) @ mistake.camera @ self._X_MG)
+        return corrected_poses(self._X_MG, self._X_GF, mistake.correction)
+
+    def _placed(self, X_MG: Array) -> list[tuple[Owners, Array]]:
+        """Instances, or objects, and grasps in their frames, of K times N grasps (K, N, 4, 4)."""
+        if self._X_SM is None or self._scene is None:
+            return [(self._name, X) for X in X_MG]
+        X_SG = (self._X_SM @ X_MG).reshape(-1, 4, 4)
+        names, _ = held_instances(self._scene, X_SG, self._gripper)  # at once: it reads meshes
+        X_OG = inverse(self._X_SO(names)) @ X_SG
+        return list(zip(names.reshape(len(X_MG), -1), X_OG.reshape(X_MG.shape), strict=True))
+
+    def _in_frame(self, frame: PoseFrame) -> tuple[Owners, Array]:
+        """Instances, and grasps whose poses are measured in another frame than M."""
+        if frame == "object":
+            return self._held_as_objects()
+        return self._name, inverse(self._X_SO(self._name)) @ self._X_MG
+
+    def _held_as_objects(self) -> tuple[Owners, Array]:
+        """The poses taken as those in the frame of one object: of the one that most grasps fit."""
+        assert self._scene is not None
+        among = list(self._scene.instances)
+        names = np.repeat(among, self.count)
+        fits, _ = self._test(names, np.tile(self._X_MG, (len(among), 1, 1)))
+        best = among[int(fits.reshape(len(among), -1).sum(axis=1).argmax())]
+        return np.full(self.count, best), self._X_MG
+
+    def _X_SO(self, names: Owners) -> Array:
+        assert self._scene is not None
+        poses = {name: self._scene.X_SO(name) for name in set(names.tolist())}
+        return np.stack([poses[name] for name in names.tolist()])
+
+    def least_share(self, mistake: Mistake) -> float:
+        """Share of the grasps that has to fit once a mistake is corrected for it to be named."""
+        if self.keeps_closing_line(mistake):
+            return MIN_SHARE_ABOUT
+        combined = mistake.step or bool(mistake.turn and mistake.forward)
+        return MIN_SHARE_COMBINED if combined else MIN_SHARE
+
+    def likeness(self, mistake: Mistake) -> tuple[GraspFormat, ...]:
+        """Other formats that measure grasps as those are once a mistake is corrected."""
+        if not mistake.moves_frame:
+            return ()
+        X_GF = self.format.X_GF(self._gripper)
+        X_GF = inverse(corrected_poses(np.eye(4), X_GF, mistake.correction)) @ X_GF
+        same = (X_GF, make_pose(rot_z(np.pi)) @ X_GF)  # fingers are exchangeable
+        return tuple(
+            format
+            for format in FORMATS.values()
+            if format.name != self.format.name
+            and any(np.allclose(X, format.X_GF(self._gripper), atol=1e-4) for X in same)
+        )
+
+
+class _FitTest:
+    """Tells which grasps fit: the open hand is clear of the object, and its pads close on it."""
+
+    def __init__(self, station: Station, source: Scene | ObjectLibrary) -> None:
+        from burg_drake.grasping.quality import jaws_of
+
+        self._station, self._source = station, source
+        self.jaws = jaws_of(station.hand, station.hand_model, station.packages)
+        self._screens: dict[str, HandClearance] = {}
+        self._surfaces: dict[str, Surface] = {}
+
+    def __call__(self, names: Owners, X_OG: Array) -> tuple[Fits, Fits | None]:
+        """(N,) which grasps fit their object, and which the rest of the scene does not hinder."""
+        fits = np.zeros(len(names), dtype=bool)
+        clear = np.zeros(len(names), dtype=bool)
+        for name in dict.fromkeys(names.tolist()):
+            mine = np.flatnonzero(names == name)
+            X_WO = self._X_WO(name)
+            free = mine[self._screen(name).is_clear(X_WO @ X_OG[mine])]
+            held = free[self.closes(names[free], X_OG[free])]
+            fits[held] = True
+            if self._everything is not None:
+                clear[held] = self._everything.is_clear(X_WO @ X_OG[held])
+        return fits, None if self._everything is None else clear
+
+    def closes(self, names: Owners, X_OG: Array) -> Fits:
+        """(N,) at which grasps the pads close on their object, whatever else the hand hits."""
+        from burg_drake.grasping.quality import are_antipodal, grasp_contacts
+
+        closing = np.zeros(len(names), dtype=bool)
+        for name in dict.fromkeys(names.tolist()):
+            mine = names == name
+            contacts = grasp_contacts(self.surface(name), X_OG[mine], self.jaws)
+            friction = max(FRICTION, self._library.entry(self._object(name)).friction)
+            closing[mine] = are_antipodal(contacts, X_OG[mine], friction)
+        return closing
+
+    @cached_property
+    def _diagram(self) -> StationDiagram | None:
+        """Of the scene, if there is one."""
+        from burg_drake.station.diagram import build_station_diagram
+
+        if not isinstance(self._source, Scene):
+            return None
+        return build_station_diagram(self._source, self._station, robot="hand")
+
+    @cached_property
+    def _everything(self) -> HandClearance | None:
+        from burg_drake.grasping.clearance import HandClearance
+
+        return None if self._diagram is None else HandClearance(self._diagram)
+
+    @property
+    def _library(self) -> ObjectLibrary:
+        return self._source.library if isinstance(self._source, Scene) else self._source
+
+    def _object(self, name: str) -> str:
+        return self._source.instance(name).object if isinstance(self._source, Scene) else name
+
+    def _X_WO(self, name: str) -> Array:
+        return np.eye(4) if self._diagram is None else self._diagram.X_WO(name)
+
+    def _screen(self, name: str) -> HandClearance:
+        from burg_drake.grasping.clearance import HandClearance, hand_clearance_alone
+
+        if name not in self._screens:
+            self._screens[name] = (
+                hand_clearance_alone(self._library, name, self._station)
+                if self._diagram is None
+                else HandClearance(self._diagram, bodies=[name])
+            )
+        return self._screens[name]
+
+    def surface(self, name: str) -> Surface:
+        from burg_drake.geometry import Surface
+
+        object = self._object(name)
+        if object not in self._surfaces:
+            self._surfaces[object] = Surface.of(self._library.surface(object))
+        return self._surfaces[object]
+
+
+def _decide(search: _Search, mistakes: Sequence[Mistake], fits: Fits) -> MistakeFound | None:
+    """The mistake that makes most grasps fit; None if it does not make enough of them fit.
+
+    Args:
+        search: has the grasps.
+        mistakes: K of them.
+        fits: (K + 1, N) which grasps fit, as they were read and once each is corrected.
+    """
+    before, *after = fits.sum(axis=1).tolist()
+    count = {
+        mistake: n
+        for mistake, n in zip(mistakes, after, strict=True)
+        if n >= max(MIN_FITTING, MIN_GAIN * before, search.least_share(mistake) * search.count)
+    }
+    if not count:
+        return None
+    best = max(count.values())
+    named = [m for m in count if not m.step]
+    top = max((count[m] for m in named), default=0)
+    good = [m for m in named if count[m] == top] if top >= TIE * best else []
+    chosen = good[0] if good else next(m for m in count if count[m] == best)
+    reach = None
+    if chosen.forward and chosen.moves_frame:
+        run = _run_of(chosen, count, TIE * best)
+        known = [m for m in count if m in run and not m.step and m.forward]
+        middle = 0.5 * (run[0].forward + run[-1].forward)
+        chosen = known[0] if known else min(run, key=lambda m: abs(m.forward - middle))
+        reach = (run[0].forward, run[-1].forward)
+    likeness = search.likeness(chosen)
+    return MistakeFound(
+        chosen,
+        before,
+        count[chosen],
+        search.count,
+        search.total,
+        likeness=tuple(format.title for format in likeness),
+        format=_other_reader(search.format.name, [format.name for format in likeness]),
+        alternatives=tuple(
+            m.words
+            for m in good
+            if m != chosen and not (m.moves_frame and chosen.moves_frame and m.turn == chosen.turn)
+        )[:2],
+        reach_mm=reach,
+    )
+
+
+def _run_of(chosen: Mistake, count: Mapping[Mistake, int], least: float) -> list[Mistake]:
+    """Mistakes with the same turn and neighbouring distances that do about as well."""
+    line = sorted((m for m in count if m.moves_frame and m.turn == chosen.turn), key=_forward)
+    low = high = line.index(chosen)
+    while low > 0 and count[line[low - 1]] >= least:
+        low -= 1
+    while high + 1 < len(line) and count[line[high + 1]] >= least:
+        high += 1
+    return line[low : high + 1]
+
+
+def _forward(mistake: Mistake) -> float:
+    return mistake.forward
+
+
+def _other_reader(name: str, others: Sequence[str]) -> str:
+    """A format by which a file of the one called `name` can be read, too; "" if there is none."""
+    if name not in SAME_READER:
+        return ""
+    return next((other for other in others if other in SAME_READER), "")
+
+
+def _one_instance_each(grasps: Mapping[str, GraspSet], scene: Scene) -> dict[str, GraspSet]:
+    """The grasps on one instance of each object: those of an object go to all of its instances."""
+    chosen: dict[str, str] = {}
+    for name in grasps:
+        chosen.setdefault(scene.instance(name).object, name)
+    return {name: grasps[name] for name in chosen.values()}
+
+
+def _promising(grasps: GraspSet) -> list[int]:
+    """Grasps to look at: the successes, where scores are 0 and 1, or else the half with the highest
+    scores, where there are so many; data sets have failures, and networks poor grasps."""
+    score = np.where(np.isfinite(grasps.score), grasps.score, -np.inf)
+    if set(score.tolist()) == {0.0, 1.0} and (score == 1.0).sum() >= MIN_FITTING:
+        return [int(k) for k in np.flatnonzero(score == 1.0)]
+    best = np.argsort(-score, kind="stable")[: max(MAX_GRASPS, len(grasps) // 2)]
+    return sorted(int(k) for k in best)

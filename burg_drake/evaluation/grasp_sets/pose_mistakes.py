@@ -1,0 +1,341 @@
+"""The usual mistakes in grasps from elsewhere: which there are, how each is corrected, and which of
+them a set of grasps shows.
+
+A set shows a mistake if its grasps do not fit their objects as they are, but do once the mistake is
+corrected. A grasp fits if the open hand is clear of the object and its pads close on it; nothing is
+simulated.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product
+
+import numpy as np
+
+from burg_drake.core import (
+    Array,
+    UnknownNameError,
+    inverse,
+    listing,
+    make_pose,
+    nearest,
+    quaternion_from_rotation,
+    rotation_from_quaternion,
+    rotation_from_rpy,
+)
+from burg_drake.core.grasps import GraspSet, parts_of
+from burg_drake.formats import FORMATS
+from burg_drake.formats.common import GraspFormat, Gripper, ImportedGrasps, PoseFrame
+
+OFFSETS_MM = np.arange(-120.0, 121.0, 5.0)
+"""Distances along the approach that are tried besides those of known frames [mm]."""
+NAMES = {
+    "z": "the approach",
+    "x": "the closing direction",
+    "y": "the axis across approach and closing direction",
+}
+"""Axes of G in words."""
+
+
+def _turned(X_MG: Array, X_GF: Array, axis: str, degrees: float) -> Array:
+    """Grasps (..., 4, 4) turned about the origin of the file's frame F."""
+    rpy = np.deg2rad(degrees) * np.array([axis == name for name in "xyz"])
+    X_GO = make_pose(p_AB=X_GF[..., :3, 3])
+    turned: Array = X_MG @ X_GO @ make_pose(rotation_from_rpy(rpy)) @ inverse(X_GO)
+    return turned
+
+
+def _with_rotations(X: Array, R: Array) -> Array:
+    return make_pose(R, X[..., :3, 3])
+
+
+def _reordered(X: Array, shift: int) -> Array:
+    """The poses with the four numbers wxyz of their quaternions shifted."""
+    flat = quaternion_from_rotation(X[..., :3, :3].reshape(-1, 3, 3))
+    R = rotation_from_quaternion(np.roll(flat, shift, axis=-1))
+    return _with_rotations(X, R.reshape(*X.shape[:-2], 3, 3))
+
+
+FILE_POSES: Mapping[str, tuple[Callable[[Array], Array], str]] = {
+    "inverse": (inverse, "with each pose inverted"),
+    "transposed": (
+        lambda X: _with_rotations(X, np.swapaxes(X[..., :3, :3], -1, -2)),
+        "with each rotation transposed",
+    ),
+    "wxyz": (lambda X: _reordered(X, -1), "with quaternions that are in the order w, x, y, z"),
+    "xyzw": (lambda X: _reordered(X, 1), "with quaternions that are in the order x, y, z, w"),
+    "y_up": (lambda X: _quarter_turn(90.0) @ X, "with y up in the frame that they are measured in"),
+    "z_up": (
+        lambda X: _quarter_turn(-90.0) @ X,
+        "with z up in the frame that they are measured in, where the object has y",
+    ),
+    "millimetres": (
+        lambda X: make_pose(X[..., :3, :3], X[..., :3, 3] / 1000.0),
+        "with lengths in millimetres",
+    ),
+}
+"""Corrections of the poses that a file has, by name: of poses (..., 4, 4) in the file's convention,
+and in words."""
+HALF_WIDTHS = "half_widths"
+CORRECTIONS = (*FILE_POSES, HALF_WIDTHS, "turn:AXISDEGREES", "forward:MM")
+"""What `correction` may have."""
+_TURN = re.compile(r"turn:([xyz])([+-]?\d+(?:\.\d+)?)")
+_FORWARD = re.compile(r"forward:([+-]?\d+(?:\.\d+)?)")
+
+
+def _quarter_turn(degrees: float) -> Array:
+    return make_pose(rotation_from_rpy(np.deg2rad([degrees, 0.0, 0.0])))
+
+
+@dataclass(frozen=True)
+class FileReading:
+    """How a file is read.
+
+    Attributes:
+        format: of the file; None to tell by the content.
+        correction: mistakes of the file that are made up for, such as `("turn:z90",)`; see
+            `corrected_poses`.
+    """
+
+    format: str | None = None
+    correction: tuple[str, ...] = ()
+
+
+def check_corrections(correction: Iterable[str]) -> tuple[str, ...]:
+    """The corrections, if all of them are known.
+
+    Raises:
+        UnknownNameError: one is not.
+    """
+    names = tuple(correction)
+    for name in names:
+        plain = name in FILE_POSES or name == HALF_WIDTHS
+        if not (plain or _TURN.fullmatch(name) or _FORWARD.fullmatch(name)):
+            known = [*FILE_POSES, HALF_WIDTHS]
+            raise UnknownNameError(
+                f"there is no correction {name!r}; {nearest(name, known)}, a turn such as"
+                " turn:z90, or a distance along the approach in millimetres such as forward:103.4"
+            ).about("correction")
+    return names
+
+
+def corrected_poses(X_MG: Array, X_GF: Array, correction: Sequence[str]) -> Array:
+    """Grasps as they are once mistakes are corrected, one after the other.
+
+    Args:
+        X_MG: (..., 4, 4) grasps as read, in the frame M that they are measured in.
+        X_GF: (..., 4, 4) the grasp frame F of the file in ours, as it was taken to be.
+        correction: such as `("turn:z90", "forward:103.4")`. A turn is about an axis of G, through
+            the origin of F; `forward` is along the approach as it is then.
+
+    Returns:
+        (..., 4, 4) grasps.
+    """
+    X = X_MG
+    for name in correction:
+        if turn := _TURN.fullmatch(name):
+            X = _turned(X, X_GF, turn[1], float(turn[2]))
+        elif forward := _FORWARD.fullmatch(name):
+            X = X @ make_pose(p_AB=(0.0, 0.0, float(forward[1]) / 1000.0))
+        elif name in FILE_POSES:
+            X = FILE_POSES[name][0](X @ X_GF) @ inverse(X_GF)
+    return X
+
+
+def corrected(
+    imported: ImportedGrasps, gripper: Gripper, correction: Iterable[str]
+) -> ImportedGrasps:
+    """What was read of a file, once mistakes are corrected; see `corrected_poses`.
+
+    Args:
+        imported: what was read.
+        gripper: the hand that it was read for.
+        correction: names of `CORRECTIONS`; `half_widths` doubles widths.
+
+    Raises:
+        UnknownNameError: there is no such correction.
+    """
+    names = check_corrections(correction)
+    if not names:
+        return imported
+    grasps = imported.grasps
+    X_MG = corrected_poses(grasps.X_OG, frames_of(grasps, gripper), names)
+    factor = 2.0 if HALF_WIDTHS in names else 1.0
+    found = GraspSet.create(
+        X_MG,
+        object=grasps.object,
+        width=grasps.width * factor,
+        score=grasps.score,
+        provenance={**grasps.provenance, "correction": list(names)},
+        columns=grasps.columns,
+    )
+    return replace(imported, grasps=found)
+
+
+def frames_of(grasps: GraspSet, gripper: Gripper) -> Array:
+    """(N, 4, 4) poses in G of the grasp frame that the file of a set has."""
+    return format_of_set(grasps).frames(grasps, gripper)
+
+
+def format_of_set(grasps: GraspSet) -> GraspFormat:
+    """The format that a set was read from, as its provenance says; else ours."""
+    names = [
+        grasps.provenance.get("format"),
+        *(p.get("format") for p in parts_of(grasps.provenance)),
+    ]
+    return FORMATS[next((n for n in names if isinstance(n, str) and n in FORMATS), "burg_drake")]
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """A way in which grasps may be meant otherwise than they were read.
+
+    Attributes:
+        words: what makes up for it, as in "turned by 90 degrees about the approach".
+        correction: the same as `corrected_poses` takes it.
+        frame: what poses are measured in, if that is the mistake; then nothing else is.
+        camera: whether the camera's pose is the mistake.
+        step: whether it is one of many distances, none of which is that of a known frame.
+    """
+
+    words: str
+    correction: tuple[str, ...] = ()
+    frame: PoseFrame | None = None
+    camera: Array | None = field(default=None, compare=False)
+    step: bool = False
+
+    @property
+    def turn(self) -> tuple[str, ...]:
+        """Its turns."""
+        return tuple(name for name in self.correction if name.startswith("turn:"))
+
+    @property
+    def forward(self) -> float:
+        """Distance along the approach [mm]."""
+        return sum(float(m[1]) for name in self.correction if (m := _FORWARD.fullmatch(name)))
+
+    @property
+    def moves_frame(self) -> bool:
+        """Whether it is about the grasp frame of a file: turns, and a distance."""
+        kinds = ("turn:", "forward:")
+        return bool(self.correction) and all(name.startswith(kinds) for name in self.correction)
+
+
+def usual_mistakes(format: GraspFormat, gripper: Gripper) -> list[Mistake]:
+    """The table of mistakes, those first that are made most.
+
+    Turns are all by right angles, but one by 180 degrees about the approach, which exchanges the
+    fingers, and those by which the Panda's flange differs from its hand. Distances are those
+    between the origins of known frames, and steps.
+
+    Args:
+        format: that the grasps were read as.
+        gripper: the hand.
+    """
+    origin = _origin(format, gripper)
+    base = round(1e3 * gripper.X_HG[2, 3], 2)
+    known = {round(o - origin, 2) for o in _origins(gripper)} | {base, -base}
+    first = sorted((base, -base), key=lambda d: (abs(d + origin - base), -d))
+    distances = [d for d in dict.fromkeys([*first, *sorted(known, key=abs)]) if d]
+    quarter, flange = ("turn:z90",), (("turn:z45",), ("turn:z-45",))
+    others = [
+        (*first, *then)
+        for first in (("turn:x180",), ("turn:x90",), ("turn:x-90",), ("turn:y90",), ("turn:y-90",))
+        for then in ((), quarter)
+    ]
+    found = [_frame_mistake(quarter, 0.0)]
+    found += [_frame_mistake((), d) for d in distances]
+    found += [_frame_mistake(turn, 0.0) for turn in others]
+    found += [Mistake(words, (name,)) for name, (_, words) in FILE_POSES.items()]
+    found += [_frame_mistake(turn, d) for turn, d in product((quarter, *others), distances)]
+    found += [_frame_mistake(turn, d) for turn, d in product(flange, (0.0, base)) if turn or d]
+    found += [
+        replace(_frame_mistake(turn, d), step=True)
+        for turn, d in product(((), quarter), OFFSETS_MM.tolist())
+        if d and d not in distances
+    ]
+    return list(dict.fromkeys(found))
+
+
+def _origin(format: GraspFormat, gripper: Gripper) -> float:
+    """How far the origin of a format's frame is behind G [mm]."""
+    return -1e3 * float(format.X_GF(gripper)[2, 3])
+
+
+def _origins(gripper: Gripper) -> list[float]:
+    """How far origins of known frames are behind G [mm]: of all formats, and the finger tips."""
+    return [*(_origin(format, gripper) for format in FORMATS.values()), -1e3 * gripper.tip]
+
+
+def _frame_mistake(turn: tuple[str, ...], forward: float) -> Mistake:
+    """A mistake about the grasp frame of a file."""
+    words = [
+        f"turned by {float(m[2]):g} degrees about {NAMES[m[1]]}"
+        for name in turn
+        if (m := _TURN.fullmatch(name))
+    ]
+    if forward:
+        way = "forward" if forward > 0.0 else "back"
+        words.append(f"moved {way} by {abs(forward):g} mm along the approach")
+    moved = (f"forward:{forward:g}",) if forward else ()
+    return Mistake(" and ".join(words), (*turn, *moved))
+
+
+@dataclass(frozen=True)
+class MistakeFound:
+    """A mistake that a set of grasps shows.
+
+    Attributes:
+        mistake: it.
+        before, after: number of grasps that fit as they are, and once it is corrected.
+        count: number of grasps that were looked at.
+        total: number of grasps in the set.
+        likeness: titles of formats that measure grasps as the corrected ones are.
+        format: another format by which the same file can be read, which corrects it.
+        alternatives: what else does as well, in words.
+        reach_mm: least and largest distance along the approach that does as well [mm].
+    """
+
+    mistake: Mistake
+    before: int
+    after: int
+    count: int
+    total: int
+    likeness: tuple[str, ...] = ()
+    format: str = ""
+    alternatives: tuple[str, ...] = ()
+    reach_mm: tuple[float, float] | None = None
+
+    def text(self, format_option: str = "--grasps-format") -> str:
+        """What was found and what corrects it, in a sentence."""
+        of = f"of {self.count} grasps" + (
+            f" looked at, of {self.total}," if self.total > self.count else ""
+        )
+        fits = "clear and held by the pads"
+        words = self.mistake.words
+        if self.reach_mm is not None and self.reach_mm[0] < self.reach_mm[1]:
+            low, high = sorted(map(abs, self.reach_mm))
+            words += f" (anything from {low:g} to {high:g} mm does)"
+        text = f"{self.before} {of} are {fits} as they were read;"
+        text += f" {words} {self.after} of {self.count} are"
+        if self.likeness:
+            text += f", as files of {listing(self.likeness)} have them"
+        text += f"; {self.remedy(format_option)}"
+        if self.alternatives:
+            text += f" (as many are {' or '.join(self.alternatives)})"
+        return text
+
+    def remedy(self, format_option: str = "--grasps-format") -> str:
+        """What corrects it."""
+        mistake = self.mistake
+        if mistake.camera is not None:
+            return "if that is the camera's pose, give it (--camera-pose)"
+        if mistake.frame is not None:
+            frame = "scene" if mistake.frame == "world" else mistake.frame
+            return f"if they are, give --grasps-frame {frame}"
+        if self.format:
+            return f"if they are meant so, give {format_option} {self.format}"
+        return f"if they are meant so, give --correction {','.join(mistake.correction)}"
