@@ -122,6 +122,8 @@ COMMANDS = {
     "cameras/calibration/target_sheet.py",
     "evaluation/cluster/document.py",
     "evaluation/report/sections/reproduction.py",
+    "evaluation/grasp_sets/mistake_search.py",
+    "evaluation/grasp_sets/pose_mistakes.py",
     "experiment/pages/protocol.py",
 }
 """Files with commands to type, of our program and of Dask's, or texts beside such a command."""
@@ -159,4 +161,4 @@ def test_the_command_line_adds_the_option_of_an_argument(
     np.save(poses, np.eye(4)[None])
     words = ["reach", "tabletop_six", "--grasps", str(poses), "--grasps-frame", "camera"]
     assert main(words) == 2
-    assert capsys.readouterr().err.endswith("give the camera's pose in the scene (--camera-pose)\n")
+    assert capsys.readouterr().err.endswith("frame they are (--camera-pose, --grasps-frame)\n")

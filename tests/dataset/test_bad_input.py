@@ -235,7 +235,7 @@ def test_sizes_that_a_sensor_does_not_have(tmp_path: Path) -> None:
     for size, said in (
         ("[640, 100]", "d435 has no depth images of 640 x 100 pixels; they have the aspect of 640"),
         ("[640, 0]", "d435 has no depth images of 640 x 0 pixels"),
-        ("[32000, 24000]", "images of 32000 x 24000 pixels; a side has at most 16,384"),
+        ("[32000, 24000]", "image of 32000 x 24000 pixels; a side has at most 16,384"),
     ):
         path.write_text(f"version: 1\nsensor: d435\nsize: {size}\n")
         with pytest.raises(InvalidInputError) as refused:

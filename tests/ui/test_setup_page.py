@@ -223,7 +223,7 @@ def test_two_pages_show_the_same_and_come_back_after_a_kill(setup: Setup, tmp_pa
 
 
 def test_the_mouse_selects_and_keys_change_what_is_selected(setup: Setup) -> None:
-    setup.session.do(AddObject("box", position=(0.1, 0.1)))
+    setup.session.do(AddObject("box", stable_pose=0, position=(0.1, 0.1)))
     setup.session.do(AddObject("can", position=(0.3, 0.2)))
     setup.session.select(())
     setup.open()
@@ -299,7 +299,7 @@ def test_an_arrow_over_another_object_moves_what_is_selected(setup: Setup) -> No
     counts is who moves and along which axis, whatever the browser takes hold of."""
     setup.session.do(SetBoard(Board(size=(0.594, 0.42))))
     setup.session.do(AddObject("can", position=(0.25, 0.3)))
-    setup.session.do(AddObject("box", position=(0.3, 0.22)))
+    setup.session.do(AddObject("box", stable_pose=0, position=(0.3, 0.22)))
     setup.session.select(("can",))
     setup.session.restrict_movement(False)
     setup.open()
@@ -335,7 +335,7 @@ def nearest_object(setup: Setup, p_SQ: Any) -> str:
 
 
 def test_turning_with_shift_keeps_the_selection(setup: Setup) -> None:
-    setup.session.do(AddObject("box", position=(0.1, 0.15)))
+    setup.session.do(AddObject("box", stable_pose=0, position=(0.1, 0.15)))
     setup.session.do(AddObject("can", position=(0.3, 0.15)))
     setup.session.select(("box", "can"))
     setup.open()

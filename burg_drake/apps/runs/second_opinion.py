@@ -7,8 +7,6 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-import numpy as np
-
 from burg_drake.apps.options import Parser
 from burg_drake.core import InvalidInputError
 from burg_drake.core.grasps import CONTESTED
@@ -86,6 +84,8 @@ def settled_line(columns: Columns) -> str:
     Args:
         columns: `SETTLED` of a run.
     """
+    import numpy as np
+
     engine, before, outcome, confidence = (columns[name] for name in SETTLED)
     again = np.flatnonzero(engine != "")
     if not len(again):

@@ -19,7 +19,7 @@ from burg_drake.station.document import HALF_PIXEL as HALF_PIXEL, MAX_SIDE, Came
 
 DISTORTION_SIZES = (0, 4, 5, 8, 12, 14)
 """Numbers of coefficients that OpenCV's model of a lens may have."""
-RANGES = {"focal": (1.0, 1e6), "center": (-1e6, 1e6), "distortion": (-1e6, 1e6)}
+RANGES = {"focal": (1.0, 1e6), "center": (-1e6, 1e6), "distortion": (-1e12, 1e12)}
 """Of each number, far beyond those of any camera: with others projections overflow."""
 LensModel = Literal["perspective", "fisheye"]
 

@@ -50,6 +50,8 @@ NEARBY = 0.03
 """Two poses that fit alike and differ by less are one, which is known less well [rad]."""
 PLAUSIBLE = 0.3
 """Share of the edges of markers that were read which must be seen for a pose to be right."""
+MIN_MIRRORED = 4
+"""Markers that have to be read in the mirrored image: of another board, two may be by chance."""
 DIFFERENT = 0.01
 """Angle between poses that are not the same [rad]."""
 KNOWN_SHARE = 0.05
@@ -266,7 +268,7 @@ class BoardPose:
         if seen.candidates < FEWEST_OTHER:
             return ""
         mirrored = self._detector.detect(np.ascontiguousarray(grey[:, ::-1]))
-        if mirrored.count < max(FEWEST_OTHER, len(seen.index) + 1):
+        if mirrored.count < max(MIN_MIRRORED, len(seen.index) + 1):
             return ""
         return (
             f"the image is mirrored: {mirrored.count} markers of the board can be read the other"

@@ -32,7 +32,7 @@ tip sinks in deeper, which a station's table can bear."""
 SINK_TOLERANCE = 2.5e-3
 """How deep an object may be in a box of the station [m]: they yield as the table does, and what
 leans on them with an edge or a tip sinks in by up to 2 mm."""
-SUNKEN_TOLERANCE = 5e-4
+SUNKEN_TOLERANCE = 1e-3
 """How deep an object may stand in the table [m] before that is worth a word: in other simulators,
 and in the world, tables yield by less."""
 STANDING_TOLERANCE = 1e-4
