@@ -115,8 +115,8 @@ class Publications:
             if classes.TFMessage is None:
                 raise MissingDependencyError(
                     "tf2_msgs is not installed, which the board's frame on tf needs; install it, or"
-                    " give --tf-parent none"
-                )
+                    " let the node leave tf alone: none"
+                ).about("tf_parent")
             self._frames = advertise("/tf", classes.TFMessage, TF_QUEUE)
 
     def publish(self, sighting: Sighting, draw: Callable[[Sighting], Any]) -> None:

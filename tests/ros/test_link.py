@@ -119,6 +119,6 @@ def test_images_without_a_frame_stay_off_tf(
 
 def test_tf_needs_its_messages(ros2_classes: MessageClasses) -> None:
     classes = replace(ros2_classes, TFMessage=None)
-    with pytest.raises(MissingDependencyError, match=r"tf2_msgs .* give --tf-parent none"):
+    with pytest.raises(MissingDependencyError, match=r"tf2_msgs .* leave tf alone"):
         Graph().publications(Names(image="/image"), classes)
     Graph().publications(Names(image="/image", parent=Parent.NONE), classes)
