@@ -19,7 +19,7 @@ from burg_drake.objects.collision import (
 )
 from burg_drake.objects.library import Decomposition, Fit
 from burg_drake.objects.meshes import SurfaceMesh
-from burg_drake.pipeline.source import ObjectSource
+from burg_drake.pipeline.source import ObjectSource, piece_meshes
 
 PIECE_DECIMALS = 7
 """Vertices of pieces are rounded to 0.1 um, so that files hold exactly what was computed with."""
@@ -59,8 +59,9 @@ def cut(source: ObjectSource, mesh: SurfaceMesh) -> Cut:
     Raises:
         MeshError: it cannot be cut, or given pieces are not convex.
     """
-    if source.pieces is not None:
-        return _measured(given_pieces(source.pieces), mesh, None)
+    given = piece_meshes(source)
+    if given is not None:
+        return _measured(given_pieces(given), mesh, None)
     parameters = source.decomposition
     first = best = _at(mesh, parameters)
     if parameters.threshold != Decomposition().threshold:

@@ -15,7 +15,7 @@ from burg_drake.objects.library import DEFAULT_CONTACT
 from burg_drake.objects.meshes import mesh_hash
 from burg_drake.objects.physics import DEFAULT_DENSITY
 from burg_drake.pipeline.cutting import FINER, MOST_PIECES
-from burg_drake.pipeline.source import ObjectSource, check_source
+from burg_drake.pipeline.source import ObjectSource, check_source, piece_meshes
 
 VERSION = 3
 """Raise it when a stage gives other results for the same input; everything is then built anew."""
@@ -60,8 +60,9 @@ def stage_keys(source: ObjectSource, confirm: bool) -> StageKeys:
     check_source(source)
     mesh = mesh_hash(source.mesh)
     given = None
-    if source.pieces is not None:
-        given = [(np.asarray(p.vertices), np.asarray(p.faces)) for p in source.pieces]
+    pieces_given = piece_meshes(source)
+    if pieces_given is not None:
+        given = [(np.asarray(p.vertices), np.asarray(p.faces)) for p in pieces_given]
     thickness = None if source.wall_thickness is None else float(source.wall_thickness)
     makers = (_release("trimesh"), _release("manifold3d"))
     surface = (mesh, float(source.scale), thickness, source.openings, *makers)

@@ -25,7 +25,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, cast
 
-import trimesh
 import yaml
 
 from burg_drake.core import InvalidInputError
@@ -33,7 +32,7 @@ from burg_drake.core.documents import Reader, Vector3, load_nodes
 from burg_drake.core.paths import require_name
 from burg_drake.core.terminal import Rgba
 from burg_drake.objects.library import ContactKind, Decomposition, Inertia
-from burg_drake.objects.meshes import UNITS, Openings, read_mesh
+from burg_drake.objects.meshes import UNITS, Openings
 from burg_drake.pipeline.source import NAME_PATTERN, ObjectSource, object_name
 
 Unit = Literal["mm", "cm", "m", "in"]
@@ -241,12 +240,6 @@ def _completed(item: RecipeObject, defaults: Defaults) -> RecipeObject:
     return dataclasses.replace(item, **missing)
 
 
-def _piece(file: Path, scale: float) -> trimesh.Trimesh:
-    piece = read_mesh(file)
-    piece.merge_vertices(merge_tex=True, merge_norm=True)
-    return piece.apply_scale(scale)
-
-
 def _source(name: str, item: RecipeObject, root: Path) -> ObjectSource:
     scale = item.scale if item.scale is not None else UNITS[item.unit or "m"]
     return ObjectSource(
@@ -260,7 +253,7 @@ def _source(name: str, item: RecipeObject, root: Path) -> ObjectSource:
         openings=item.openings or "wall",
         friction=item.friction,
         scale=scale,
-        pieces=tuple(_piece(root / file, scale) for file in item.pieces) or None,
+        pieces=tuple(root / file for file in item.pieces) or None,
         contact=item.contact,
         rgba=item.rgba,
         description=item.description,

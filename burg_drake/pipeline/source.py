@@ -13,7 +13,7 @@ from burg_drake.core import InvalidInputError, content_hash, quoted
 from burg_drake.core.documents import Vector3
 from burg_drake.core.terminal import Rgba
 from burg_drake.objects.library import DEFAULT_FRICTION, ContactKind, Decomposition, Inertia
-from burg_drake.objects.meshes import Openings
+from burg_drake.objects.meshes import Openings, read_piece
 
 NAME_PATTERN = re.compile(r"[a-z0-9][a-z0-9_]*")
 
@@ -36,7 +36,8 @@ class ObjectSource:
         openings: what becomes of an open surface: a `wall`, or a solid with flat caps (`close`).
         friction: coefficient; `entry.DEFAULT_FRICTION` if None.
         scale: factor from the mesh's unit to metres.
-        pieces: convex pieces in O [m]; made by decomposition if None.
+        pieces: convex pieces, meshes in O [m] or mesh files in the mesh's own frame and unit; made
+            by decomposition if None.
         contact: what touches others in simulation; chosen by the object's shape if None.
         rgba: colour, 0 to 1 each; by default what the mesh file says.
         description: for people.
@@ -54,7 +55,7 @@ class ObjectSource:
     openings: Openings = "wall"
     friction: float | None = None
     scale: float = 1.0
-    pieces: tuple[trimesh.Trimesh, ...] | None = None
+    pieces: tuple[trimesh.Trimesh | Path, ...] | None = None
     contact: ContactKind | None = None
     rgba: Rgba | None = None
     description: str = ""
@@ -94,6 +95,20 @@ def object_name(text: str) -> str:
             f"{quoted(text)} makes no object name; use letters or digits a-z, 0-9"
         )
     return name
+
+
+def piece_meshes(source: ObjectSource) -> tuple[trimesh.Trimesh, ...] | None:
+    """The convex pieces that come with an object, in O [m]; None if there are none.
+
+    Raises:
+        MeshError: a file cannot be read.
+    """
+    if source.pieces is None:
+        return None
+    return tuple(
+        piece if isinstance(piece, trimesh.Trimesh) else read_piece(piece, source.scale)
+        for piece in source.pieces
+    )
 
 
 def check_source(source: ObjectSource) -> None:

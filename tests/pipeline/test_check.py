@@ -197,14 +197,20 @@ def test_missing_textures_are_told(tmp_path: Path) -> None:
     ("name", "text"),
     [
         ("a.obj", "mtllib gone.mtl\nv 0 0 0\n"),
+        ("a.obj", "mtllib there.mtl gone.mtl # by hand\n"),
+        ("a.gltf", '{"images": [{"uri": "gone.png"}, {"uri": 5}, {}]}'),
+        ("there.obj", "mtllib\tthere.mtl\n"),
         ("a.ply", "ply\nformat ascii 1.0\ncomment TextureFile gone.png\nend_header\n"),
         ("a.gltf", '{"images": [{"uri": "gone%2Epng"}, {"uri": "data:image/png;base64,"}]}'),
     ],
 )
 def test_what_names_a_texture(name: str, text: str, tmp_path: Path) -> None:
+    (tmp_path / "there.mtl").write_text("map_Kd\tgone.png\n" if name == "there.obj" else "")
     (tmp_path / name).write_text(text)
-    (sentence,) = missing_textures(tmp_path / name)
-    assert sentence.startswith(f"{name} names gone.")
+    found = [s for s in missing_textures(tmp_path / name) if " names 5," not in s]
+    named = "there.mtl" if name == "there.obj" else name
+    (sentence,) = found
+    assert sentence.startswith(f"{named} names gone.")
 
 
 def test_advice_on_coarse_pieces_is_what_was_not_tried() -> None:

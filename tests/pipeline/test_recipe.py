@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -227,12 +228,13 @@ def test_pieces_of_ones_own(tmp_path: Path) -> None:
     trimesh.util.concatenate(bars).export(tmp_path / "l.stl")
     (tmp_path / "objects.yaml").write_text(
         "version: 1\nobjects:\n"
-        "  l: {mesh: l.stl, unit: mm, mass: 0.1, pieces: [bar0.stl, bar1.stl]}\n"
+        "  l: {mesh: l.stl, mass: 0.1, pieces: [bar0.stl, bar1.stl]}\n"
+        "  gone: {mesh: l.stl, unit: mm, mass: 0.1, pieces: [bar0.stl, gone.stl]}\n"
     )
-    report = build_library(
-        load_recipe(tmp_path / "objects.yaml").sources(), tmp_path / "library", confirm=False
-    )
-    assert not report.failed
+    sources = load_recipe(tmp_path / "objects.yaml").sources()
+    sources[0] = replace(sources[0], scale=0.001)  # as --unit l=mm does
+    report = build_library(sources, tmp_path / "library", confirm=False)
+    assert list(report.failed) == ["gone"] and "gone.stl" in report.failed["gone"]
     entry = report.library.entry("l")
     assert entry.decomposition is None and len(entry.pieces) == 2
     pieces = [trimesh.load_mesh(report.library.root / piece) for piece in entry.pieces]

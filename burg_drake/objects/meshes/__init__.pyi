@@ -2,7 +2,6 @@ from .cleaning import signed_volume as signed_volume
 from .mesh_file import (
     companions as companions,
     missing_textures as missing_textures,
-    read_mesh as read_mesh,
 )
 from .offset import (
     folded as folded,
@@ -21,6 +20,7 @@ from .surface import (
     check_size as check_size,
     load_mesh as load_mesh,
     mesh_hash as mesh_hash,
+    read_piece as read_piece,
     texture_image as texture_image,
     unit_scale as unit_scale,
 )

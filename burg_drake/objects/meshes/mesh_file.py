@@ -33,6 +33,9 @@ NO_COLOUR = (204, 204, 204, 255)
 REFERRING = (".obj", ".gltf", ".ply")
 """Mesh formats that refer to other files, such as materials and textures."""
 
+LONGEST_LINE = 65536
+"""Bytes of a line that are looked at for the name of a file."""
+
 TEXT_ONLY = (".obj", ".off")
 """Mesh formats that have no binary form here."""
 
@@ -160,7 +163,7 @@ def missing_textures(path: Path) -> list[str]:
     suffix = path.suffix.lower()
     found: list[tuple[Path, str]] = []
     if suffix == ".obj":
-        for library in _named(path, "mtllib"):
+        for library in _material_files(path):
             file = path.parent / library
             found.append((path, library))
             if file.is_file():
@@ -177,6 +180,14 @@ def missing_textures(path: Path) -> list[str]:
     ]
 
 
+def _material_files(path: Path) -> list[str]:
+    """Files of materials that an OBJ file names; a line may name several."""
+    names: list[str] = []
+    for text in _named(path, "mtllib"):
+        names += [text] if (path.parent / text).is_file() else text.split()
+    return names
+
+
 def _picture(materials: Path, text: str) -> str:
     """The file that `map_Kd` names; options such as `-s 1 1 1` may stand before it."""
     return text if (materials.parent / text).is_file() else text.split()[-1]
@@ -186,7 +197,7 @@ def _image_uris(path: Path) -> list[str]:
     """Pictures beside a glTF file; none of one that is damaged."""
     try:
         images = json.loads(path.read_bytes()).get("images", ())
-        uris = [image.get("uri", "data:") for image in images]
+        uris = [str(image.get("uri", "data:")) for image in images]
     except (AttributeError, RecursionError, TypeError, ValueError):
         return []
     return [unquote(uri) for uri in uris if not uri.startswith("data:")]
@@ -195,13 +206,14 @@ def _image_uris(path: Path) -> list[str]:
 def _named(path: Path, keyword: str, until: str = "") -> list[str]:
     """What follows a keyword at the start of a line of a text."""
     names = []
-    with path.open("rb") as lines:
-        for raw in lines:
-            line = raw.decode("utf-8", errors="replace").strip()
-            if until and line == until:
+    words = keyword.lower().split()
+    with path.open("rb") as file:
+        while raw := file.readline(LONGEST_LINE):
+            line = raw.decode("utf-8", errors="replace").partition(" #")[0].split(None, len(words))
+            if until and line == [until]:
                 break
-            if line.lower().startswith(f"{keyword.lower()} "):
-                names.append(line[len(keyword) :].strip())
+            if len(line) > len(words) and [w.lower() for w in line[: len(words)]] == words:
+                names.append(line[-1].strip())
     return names
 
 

@@ -104,6 +104,9 @@ class SurfaceMesh:
     wall: float | None = None
 
 
+GLTF = (".glb", ".gltf")
+
+
 def load_mesh(
     mesh: str | Path | trimesh.Trimesh,
     scale: float = 1.0,
@@ -128,9 +131,8 @@ def load_mesh(
     if isinstance(mesh, trimesh.Trimesh):
         raw = mesh.copy()
     else:
-        raw = read_mesh(Path(mesh))
-        if Path(mesh).suffix.lower() in (".glb", ".gltf"):
-            raw.apply_transform(make_pose(R_ZUP_YUP))
+        raw = _read_zup(Path(mesh))
+        if Path(mesh).suffix.lower() in GLTF:
             sentences.append("turned from glTF's y-up to z-up")
     _check_numbers(raw, name)
     if (alpha := make_opaque(raw)) is not None:
@@ -170,6 +172,25 @@ def check_size(mesh: str | Path | trimesh.Trimesh, scale: float) -> None:
     raw = mesh if isinstance(mesh, trimesh.Trimesh) else read_mesh(Path(mesh))
     _check_numbers(raw, mesh_name(mesh))
     check_extent(scale * _extent(raw), mesh_name(mesh), scale)
+
+
+def read_piece(file: Path, scale: float) -> trimesh.Trimesh:
+    """A convex piece of an object [m] from a mesh file in the object's own frame and unit.
+
+    Raises:
+        MeshError: the file cannot be read.
+    """
+    piece = _read_zup(file)
+    piece.merge_vertices(merge_tex=True, merge_norm=True)
+    return piece.apply_scale(scale)
+
+
+def _read_zup(file: Path) -> trimesh.Trimesh:
+    """A mesh file with z up, as which glTF is read turned."""
+    mesh = read_mesh(file)
+    if file.suffix.lower() in GLTF:
+        mesh.apply_transform(make_pose(R_ZUP_YUP))
+    return mesh
 
 
 def _extent(mesh: trimesh.Trimesh) -> float:
