@@ -60,7 +60,7 @@ def test_objects_on_each_others_places_are_told() -> None:
     there = aligner(drawing([cover(SHORT, HERE, ON_PLACE), cover(LONG, THERE, ON_PLACE)], LOOK))
     shapes = {"long": plate(LONG, HERE), "short": plate(SHORT, THERE)}
     located = locate_objects(there, shapes)
-    stands = exchanged_objects(there, shapes, located, ["long", "short"])
+    stands, _ = exchanged_objects(there, shapes, located, ["long", "short"])
     assert {place: name for place, (name, _) in stands.items()} == {
         "long": "short",
         "short": "long",
@@ -73,7 +73,7 @@ def test_objects_on_their_own_places_are_not() -> None:
     there = aligner(drawing([cover(LONG, HERE, ON_PLACE), cover(SHORT, THERE, ON_PLACE)], LOOK))
     shapes = {"long": plate(LONG, HERE), "short": plate(SHORT, THERE)}
     located = locate_objects(there, shapes)
-    assert exchanged_objects(there, shapes, located, ["long", "short"]) == {}
+    assert exchanged_objects(there, shapes, located, ["long", "short"]) == ({}, set())
 
 
 def mug(x: float, sd: float, angle: float = 0.1, **changes: object) -> Placement:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import cv2
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from burg_drake.cameras.placement.alignment import Aligner, PinholeView, window_slices
 from burg_drake.cameras.placement.candidates import Placed
 from burg_drake.cameras.placement.document import ExtraObject
+from burg_drake.cameras.placement.search import RANGE
 from burg_drake.core import Array
 
 CERTAIN = 0.5
@@ -25,12 +26,16 @@ LEAST_AREA = 5e-4
 """Area that it covers at least, as if it were flat on the board [m²]."""
 
 
-def extra_objects(aligner: Aligner, placed: Iterable[Placed]) -> tuple[ExtraObject, ...]:
+def extra_objects(
+    aligner: Aligner, placed: Iterable[Placed], p_SR: Sequence[Array] = ()
+) -> tuple[ExtraObject, ...]:
     """What none of the objects explains, the largest first.
 
     Args:
         aligner: of the image.
         placed: all objects that were found, where they are.
+        p_SR: (3,) places where another object of the scene may stand that was not found anywhere.
+            Nothing there counts, as it may be that one.
     """
     view = aligner.view
     pitch = _pixels_per_metre(view)
@@ -46,8 +51,18 @@ def extra_objects(aligner: Aligner, placed: Iterable[Placed]) -> tuple[ExtraObje
     size = 2 * round(TOGETHER * pitch / 2) + 1
     count, labels = cv2.connectedComponents(cv2.dilate(stands, np.ones((size, size), np.uint8)))
     found = [_described(view, (labels == k) & (stands > 0)) for k in range(1, count)]
-    large = [(area, extra) for area, extra in found if area > LEAST_AREA]
+    large = [
+        (area, extra)
+        for area, extra in found
+        if area > LEAST_AREA and not any(_reaches(extra, p) for p in p_SR)
+    ]
     return tuple(extra for _, extra in sorted(large, key=lambda f: -f[0]))
+
+
+def _reaches(extra: ExtraObject, p_SR: Array) -> bool:
+    """Whether a thing is where an object is looked for whose place this is."""
+    off = float(np.hypot(*(np.array(extra.position) - p_SR[:2])))
+    return off < RANGE + extra.width / 2.0
 
 
 def _described(view: PinholeView, mask: NDArray[np.bool_]) -> tuple[float, ExtraObject]:
