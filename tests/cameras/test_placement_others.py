@@ -76,6 +76,34 @@ def test_objects_on_their_own_places_are_not() -> None:
     assert exchanged_objects(there, shapes, located, ["long", "short"]) == ({}, set())
 
 
+@pytest.mark.parametrize(("place", "told"), [((0.48, 0.33, 0.3), True), ((0.51, 0.34, 0.3), False)])
+def test_an_object_stands_on_anothers_place_only_if_enough_of_it_is_seen(
+    place: tuple[float, float, float], told: bool
+) -> None:
+    """66 and 30 % of it are in the image, and nothing else stands anywhere."""
+    there = aligner(drawing([cover(LONG, place, ON_PLACE)], LOOK))
+    shapes = {"long": plate(LONG, HERE), "short": plate(SHORT, place)}
+    located = locate_objects(there, shapes)
+    stands, _ = exchanged_objects(there, shapes, located, ["long", "short"])
+    assert {place: name for place, (name, _) in stands.items()} == ({"short": "long"} if told else {})
+
+
+def test_what_an_object_left_its_place_to_may_be_the_one_that_is_missing() -> None:
+    """A strip is all that is seen of the short plate, where the long one belongs."""
+    strip = cover((0.05, 0.02), HERE, ON_PLACE)
+    there = aligner(drawing([strip, cover(LONG, THERE, ON_PLACE)], LOOK))
+    shapes = {"long": plate(LONG, HERE), "short": plate(SHORT, THERE)}
+    located = locate_objects(there, shapes)
+    stands, empty = exchanged_objects(there, shapes, located, ["long", "short"])
+    assert {place: name for place, (name, _) in stands.items()} == {"short": "long"}
+    assert empty == {"long"}
+    placed = [where for _, where in stands.values()]
+    (strip_seen,) = extra_objects(there, placed)
+    assert np.hypot(*np.subtract(strip_seen.position, HERE[:2])) < 0.02
+    assert extra_objects(there, placed, [shapes["long"].p_SR]) == ()
+    assert extra_objects(there, placed, [shapes["short"].p_SR]) == (strip_seen,)
+
+
 def mug(x: float, sd: float, angle: float = 0.1, **changes: object) -> Placement:
     """A placement of a mug that is off along x."""
     placed = Placement(
