@@ -87,10 +87,9 @@ class _HiddenBoard:
         object stand there, in a direction (2,) [m]."""
         p_S = start + np.arange(MARGIN, MAX_HIDDEN_EXTENT, MARGIN / 2)[:, None] * toward
         _, pixels = self._view.project(np.column_stack([p_S, np.zeros(len(p_S))]))
-        free = sample_nearest(self._covered, pixels, False)
-        for foot in self._feet:
-            free &= [cv2.pointPolygonTest(foot, p, False) < 0 for p in p_S.tolist()]
-        return MARGIN / 2 * int(np.argmin(np.append(free, False)))
+        hidden = sample_nearest(self._covered, pixels, False).astype(bool)
+        on_foot = [any(cv2.pointPolygonTest(f, p, False) >= 0 for f in self._feet) for p in p_S]
+        return MARGIN / 2 * int(np.argmin(np.append(hidden & ~np.array(on_foot), False)))
 
 
 def _described(

@@ -205,11 +205,12 @@ class EdgeRefinement:
 
     def _beside(self, result: EdgeRound, shift: Array) -> int:
         """Markers of which most edges are not where the pose puts them, and the corners that were
-        read neither: edges of small or half hidden markers are unclear without being elsewhere."""
+        read farther from there than edges are looked for: edges of small or half hidden markers are
+        unclear without being elsewhere."""
         marker, n = self._edges.marker[result.views.which], len(self._corners)
         used = np.bincount(marker, weights=result.weight > 0.0, minlength=n)
         unused = used < 0.5 * np.bincount(marker, minlength=n)
-        return int((unused & (np.linalg.norm(shift, axis=1) > LONG)).sum())
+        return int((unused & (np.linalg.norm(shift, axis=1) > FARTHEST)).sum())
 
     def _iterate_by_marker(
         self,
