@@ -5,12 +5,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
+import trimesh
 
 from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.cameras.placement.alignment.background import empty_board
 from burg_drake.cameras.placement.alignment.pinhole import PinholeView
+from burg_drake.cameras.placement.alignment.shape import target_shape
 from burg_drake.cameras.placement.alignment.silhouette_aligner import SilhouetteAligner
 from burg_drake.cameras.placement.combination import combine_checks
 from burg_drake.cameras.placement.document import (
@@ -25,8 +28,8 @@ from burg_drake.cameras.placement.extras import extra_objects
 from burg_drake.cameras.placement.localization import locate_objects
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import make_pose
-from tests.cameras.plates import BOARD, INTRINSICS, aligner, cover, drawing, plate
+from burg_drake.core.frames import make_pose, rot_z
+from tests.cameras.plates import BOARD, INTRINSICS, VIEW, X_SC, aligner, cover, drawing, plate
 from tests.cameras.synthetic import ImageDegradation, board_image
 
 LOOK = ImageDegradation(blur=0.7, noise=2.0)
@@ -60,7 +63,7 @@ def test_objects_on_each_others_places_are_told() -> None:
     there = aligner(drawing([cover(SHORT, HERE, ON_PLACE), cover(LONG, THERE, ON_PLACE)], LOOK))
     shapes = {"long": plate(LONG, HERE), "short": plate(SHORT, THERE)}
     located = locate_objects(there, shapes)
-    stands = exchanged_objects(there, shapes, located, ["long", "short"])
+    stands, _ = exchanged_objects(there, shapes, located, ["long", "short"])
     assert {place: name for place, (name, _) in stands.items()} == {
         "long": "short",
         "short": "long",
@@ -73,7 +76,52 @@ def test_objects_on_their_own_places_are_not() -> None:
     there = aligner(drawing([cover(LONG, HERE, ON_PLACE), cover(SHORT, THERE, ON_PLACE)], LOOK))
     shapes = {"long": plate(LONG, HERE), "short": plate(SHORT, THERE)}
     located = locate_objects(there, shapes)
-    assert exchanged_objects(there, shapes, located, ["long", "short"]) == {}
+    assert exchanged_objects(there, shapes, located, ["long", "short"]) == ({}, set())
+
+
+def test_what_stands_behind_an_object_is_named_where_its_hidden_foot_may_be() -> None:
+    """A box, drawn by its corners, hides the near part of a plate."""
+    square, middle = (0.08, 0.08), np.array([0.28, 0.17])
+    away = (middle - X_SC[:2, 3]) / np.linalg.norm(middle - X_SC[:2, 3])
+    place = (*middle, np.arctan2(away[1], away[0]))
+    size, X_SB = (0.04, 0.12, 0.05), make_pose(rot_z(place[2]), (*(middle - 0.08 * away), 0.025))
+    mesh = trimesh.creation.box(size)
+    box = target_shape(mesh.vertices, mesh.faces, X_SB)
+    image = drawing([cover(square, place, ON_PLACE)], LOOK)
+    corners = cv2.convexHull(VIEW.project(box.p_SV)[1].astype(np.float32))
+    cv2.fillConvexPoly(image, np.rint(corners).astype(np.int32), (200, 60, 40))
+    (extra,) = extra_objects(aligner(image), [(box, ON_PLACE)])
+    assert np.hypot(*np.subtract(extra.position, middle)) < 0.02
+
+
+@pytest.mark.parametrize(("place", "told"), [((0.48, 0.33, 0.3), True), ((0.51, 0.34, 0.3), False)])
+def test_an_object_stands_on_anothers_place_only_if_enough_of_it_is_seen(
+    place: tuple[float, float, float], told: bool
+) -> None:
+    """66 and 30 % of it are in the image, and nothing else stands anywhere."""
+    there = aligner(drawing([cover(LONG, place, ON_PLACE)], LOOK))
+    shapes = {"long": plate(LONG, HERE), "short": plate(SHORT, place)}
+    located = locate_objects(there, shapes)
+    stands, _ = exchanged_objects(there, shapes, located, ["long", "short"])
+    assert {place: name for place, (name, _) in stands.items()} == (
+        {"short": "long"} if told else {}
+    )
+
+
+def test_what_an_object_left_its_place_to_may_be_the_one_that_is_missing() -> None:
+    """A strip is all that is seen of the short plate, where the long one belongs."""
+    strip = cover((0.05, 0.02), HERE, ON_PLACE)
+    there = aligner(drawing([strip, cover(LONG, THERE, ON_PLACE)], LOOK))
+    shapes = {"long": plate(LONG, HERE), "short": plate(SHORT, THERE)}
+    located = locate_objects(there, shapes)
+    stands, empty = exchanged_objects(there, shapes, located, ["long", "short"])
+    assert {place: name for place, (name, _) in stands.items()} == {"short": "long"}
+    assert empty == {"long"}
+    placed = [where for _, where in stands.values()]
+    (strip_seen,) = extra_objects(there, placed)
+    assert np.hypot(*np.subtract(strip_seen.position, HERE[:2])) < 0.02
+    assert extra_objects(there, placed, [shapes["long"].p_SR]) == ()
+    assert extra_objects(there, placed, [shapes["short"].p_SR]) == (strip_seen,)
 
 
 def mug(x: float, sd: float, angle: float = 0.1, **changes: object) -> Placement:

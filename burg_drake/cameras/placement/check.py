@@ -127,14 +127,15 @@ def _measured(
         for name, found in located.items()
     }
     doubtful = [name for name, placed in placements.items() if placed.status != "measured"]
-    stands = exchanged_objects(aligner, shapes, located, doubtful)
+    stands, empty = exchanged_objects(aligner, shapes, located, doubtful)
     elsewhere = {name: place for place, (name, _) in stands.items()}
     placed = [
         (shapes[name], found.alignment.q)
         for name, found in located.items()
         if found.alignment is not None and name not in stands and name not in elsewhere
     ]
-    extra = extra_objects(aligner, [*placed, *(where for _, where in stands.values())])
+    placed += [where for _, where in stands.values()]
+    extra = extra_objects(aligner, placed, [shapes[name].p_SR for name in empty])
     for name in {*stands, *elsewhere}:
         reason = _exchange(name, stands[name][0] if name in stands else "", elsewhere.get(name, ""))
         placements[name] = unseen(scene, name, reason, located[name].seen)

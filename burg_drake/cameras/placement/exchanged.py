@@ -7,7 +7,7 @@ other.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,13 +23,17 @@ from burg_drake.cameras.placement.localization import Located, best_alignment
 from burg_drake.core import Array
 
 FITS = 0.7
-"""Agreement of an object's outline from which on it may stand in another's place."""
+"""Agreement of what is seen of an object's outline from which on it may stand in a place."""
+SHOWN = 0.4
+"""Share of its outline that is seen and agrees from which on it is said to stand in another's
+place: with less, an object behind another one fits many things."""
 FILLED = 0.6
 """Mean evidence in its silhouette for that."""
 COLORED = 0.4
 """Likeness of its colors for that, where they are known."""
-CLEARER = 0.25
-"""By how much better than the object that belongs there it has to fit, in all of these together."""
+CLEARER = 0.5
+"""By how much better than the object that belongs there, and than in its own place, it has to fit:
+in the sum of agreement, evidence and likeness, which is 3 at most."""
 
 
 def exchanged_objects(
@@ -37,7 +41,7 @@ def exchanged_objects(
     shapes: dict[str, TargetShape],
     located: dict[str, Located],
     doubtful: list[str],
-) -> dict[str, tuple[str, Placed]]:
+) -> tuple[dict[str, tuple[str, Placed]], set[str]]:
     """Which object stands in the place of which, and where exactly.
 
     Args:
@@ -48,7 +52,8 @@ def exchanged_objects(
 
     Returns:
         By the name of the place: the name of what stands there, its shape as if that were its
-        target, and its displacement from there.
+        target, and its displacement from there. And the names of places in which their own objects
+        do not stand, but others of the scene may that were not found anywhere.
     """
     sure = {
         name: (shapes[name], found.alignment.q)
@@ -65,13 +70,17 @@ def exchanged_objects(
             shape = at_place_of(shapes[name], shapes[place])
             found = _found(aligner, shape, sure, others)
             fit = _fit(aligner, shape, found, others)
-            if found is not None and fit > max(own[place], own[name]) + CLEARER:
-                rated.append((fit, place, name, (shape, found.q)))
+            clear = fit.total > max(own[place].total, own[name].total) + CLEARER
+            if found is not None and fit.good and fit.shown > SHOWN and clear:
+                rated.append((fit.total, place, name, (shape, found.q)))
     stands: dict[str, tuple[str, Placed]] = {}
     for _, place, name, placed in sorted(rated, key=lambda r: -r[0]):
         if place not in stands and name not in {other for other, _ in stands.values()}:
             stands[place] = name, placed
-    return stands
+    elsewhere = {name for name, _ in stands.values()}
+    lost = {name for name in doubtful if not own[name].good} - elsewhere
+    empty = {place for place in lost | elsewhere if place not in stands and lost - {place}}
+    return stands, empty
 
 
 def at_place_of(shape: TargetShape, place: TargetShape) -> TargetShape:
@@ -89,13 +98,30 @@ def _found(
     return best_alignment(aligner, shape, starts, others, far=True)
 
 
-def _fit(aligner: Aligner, shape: TargetShape, found: Alignment | None, others: Array) -> float:
-    """How well an object fits: agreement, evidence and likeness together; 0 if one is too low."""
+@dataclass(frozen=True)
+class _Fit:
+    """How well an object fits where it was aligned.
+
+    Attributes:
+        total: agreement, evidence and likeness together.
+        good: none of them is too low.
+        shown: share of its outline that is seen and agrees.
+    """
+
+    total: float = 0.0
+    good: bool = False
+    shown: float = 0.0
+
+
+def _fit(aligner: Aligner, shape: TargetShape, found: Alignment | None, others: Array) -> _Fit:
     if found is None:
-        return 0.0
+        return _Fit()
     filled, _ = support_of(aligner.view, shape, found.q, aligner.evidence, others)
     alike = aligner.likeness(shape, found.q, others)
     colored = alike > COLORED or not aligner.sees_colors or shape.colors is None
-    if found.agreement < FITS or filled < FILLED or not colored:
-        return 0.0
-    return float(np.clip(found.agreement, 0.0, 1.0)) + filled + alike
+    _, seen = aligner.view.seen(shape, found.q, others)
+    return _Fit(
+        float(np.clip(found.agreement, 0.0, 1.0)) + filled + alike,
+        found.agreement >= FITS and filled >= FILLED and colored,
+        found.coverage * seen,
+    )

@@ -193,19 +193,24 @@ class EdgeRefinement:
             result = result and self._iterate(light, result.X_SC, found[:LAST], result.spread)
             if result is None or result.moved < STILL:
                 break
-        if result and self._unused(result, markers) > max(2.0, UNUSED * len(markers)):
-            shift = np.zeros((len(self._corners), 2))
-            p_C = (self._corners[markers] - result.X_SC[:3, 3]) @ result.X_SC[:3, :3]
-            shift[markers] = (corners - self._intrinsics.project(p_C)).mean(axis=1)
+        if result is None:
+            return None
+        shift = np.zeros((len(self._corners), 2))
+        p_C = (self._corners[markers] - result.X_SC[:3, 3]) @ result.X_SC[:3, :3]
+        shift[markers] = (corners - self._intrinsics.project(p_C)).mean(axis=1)
+        if self._beside(result, shift) > max(2.0, UNUSED * len(markers)):
             for _ in range(ROUNDS_BY_MARKER):
                 result, shift = self._iterate_by_marker(light, result, found[:LAST], shift)
         return result
 
-    def _unused(self, result: EdgeRound, markers: NDArray[np.intp]) -> int:
-        """Markers that were read, but of which most edges are not where the pose puts them."""
+    def _beside(self, result: EdgeRound, shift: Array) -> int:
+        """Markers of which most edges are not where the pose puts them, and the corners that were
+        read farther from there than edges are looked for: edges of small or half hidden markers are
+        unclear without being elsewhere."""
         marker, n = self._edges.marker[result.views.which], len(self._corners)
         used = np.bincount(marker, weights=result.weight > 0.0, minlength=n)
-        return int((used < 0.5 * np.bincount(marker, minlength=n))[markers].sum())
+        unused = used < 0.5 * np.bincount(marker, minlength=n)
+        return int((unused & (np.linalg.norm(shift, axis=1) > FARTHEST)).sum())
 
     def _iterate_by_marker(
         self,

@@ -10,6 +10,7 @@ from .depth_aligner import (
 )
 from .pinhole import (
     PinholeView as PinholeView,
+    sample_nearest as sample_nearest,
     window_slices as window_slices,
 )
 from .shape import (
