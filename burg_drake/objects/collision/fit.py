@@ -162,7 +162,8 @@ def _depth_inside(surface: trimesh.Trimesh, solid: trimesh.Trimesh, floor: float
     """Depth of the deepest point of a surface inside a closed one [m], 0 if not above the floor."""
     if not solid.is_watertight:
         return 0.0
-    points = _points_in_box(surface, solid.bounds + [[floor], [-floor]])
+    low, high = solid.bounds
+    points = _points_in_box(surface, np.array([low + floor, high - floor]))
     if not len(points):
         return 0.0
     rays, normals = RayCaster(np.asarray(solid.vertices), solid.faces), solid.face_normals
