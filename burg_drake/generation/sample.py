@@ -33,7 +33,7 @@ from burg_drake.scene.document import (
     SceneRecipe,
 )
 from burg_drake.simulation.settling import settle_scene
-from burg_drake.station.checks import SceneCheck
+from burg_drake.station.checks import SceneCheck, surface_issues
 from burg_drake.station.document import (
     MODEL_NAMES,
     Station,
@@ -189,8 +189,13 @@ class SceneSampler:
         return broken_rule(scene, self.station, self.recipe), scene
 
     def _faults(self, scene: Scene) -> str:
-        """What keeps a scene from being built as its document says; "" if nothing does."""
+        """What keeps a scene from being built as its document says; "" if nothing does.
+
+        A heap is too dear to be dropped again for surfaces that overlap.
+        """
         kinds = {issue.kind for issue in self._check.issues(scene) if issue.is_error}
+        if not kinds and self.recipe.layout != "heap" and surface_issues(scene):
+            kinds.add("overlap")
         return next((reason for kind, reason in REASONS.items() if kind in kinds), "")
 
     def _with_origin(self, scene: Scene, number: int, attempt: int) -> Scene:

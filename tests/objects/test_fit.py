@@ -8,7 +8,12 @@ import trimesh
 
 from burg_drake.core.errors import MeshError
 from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.objects.collision.fit import measure_fit, surface_distance, union_mesh
+from burg_drake.objects.collision.fit import (
+    measure_fit,
+    surface_distance,
+    surface_overlap,
+    union_mesh,
+)
 
 RADIUS = 0.03
 
@@ -110,3 +115,36 @@ def test_no_or_open_parts_are_refused() -> None:
     holey = trimesh.Trimesh(ball().vertices, ball().faces[1:], process=False)
     with pytest.raises(MeshError, match=r"part 1 is not a closed surface"):
         measure_fit(ball(), [ball(), holey], 1.0)
+
+
+@pytest.mark.parametrize("depth", [0.0012, 0.004])
+def test_balls_overlap_by_what_they_are_short_of_two_radii(depth: float) -> None:
+    direction = np.array([2.0, -3.0, 6.0]) / 7.0
+    other = ball().apply_translation((2 * RADIUS - depth) * direction)
+    assert surface_overlap(ball(), other, 1e-3) == pytest.approx(depth, abs=1e-4)
+    assert surface_overlap(ball(), other, 0.005) == 0.0
+
+
+def test_bars_that_cross_without_a_corner_in_each_other() -> None:
+    one = box((0.2, 0.02, 0.02))
+    other = box((0.02, 0.2, 0.02), at=(0.01, 0.0, 0.02 - 0.0015))
+    X = make_pose(rotation_from_rpy((0.3, -0.2, 1.0)), (0.1, 0.2, 0.3))
+    for bars in (
+        (one, other),
+        (other, one),
+        [bar.copy().apply_transform(X) for bar in (one, other)],
+    ):
+        assert surface_overlap(*bars, 1e-3) == pytest.approx(0.0015, abs=1e-6)
+
+
+def test_nothing_is_inside_a_hollow_or_an_open_surface() -> None:
+    marble, hole = ball(), box((0.08,) * 3)
+    hole.invert()
+    shell = trimesh.util.concatenate([box((0.1,) * 3), hole])
+    assert surface_overlap(marble, shell, 1e-3) == 0.0
+    assert surface_overlap(marble, box((0.1,) * 3), 1e-3) > 0.019
+    sunk = marble.copy().apply_translation((0.04 - RADIUS + 0.002, 0.0, 0.0))
+    assert surface_overlap(sunk, shell, 1e-3) == pytest.approx(0.002, abs=1e-4)
+    lid_off = box((0.1,) * 3)
+    lid_off.update_faces(np.arange(len(lid_off.faces)) > 0)
+    assert surface_overlap(marble, lid_off, 1e-3) == 0.0

@@ -45,14 +45,25 @@ def laid_out(
 
 
 def placed_pieces(library: ObjectLibrary, arrangement: Arrangement) -> dict[str, list[Array]]:
-    """Corners (N, 3) of the pieces of each instance in S."""
-    return {
-        one.name or one.object: [
-            transform_points(one.X_SO.matrix(), np.asarray(library.mesh(piece).vertices))
-            for piece in library.entry(one.object).pieces
+    """Corners (N, 3) in S of what each instance touches others with: of its pieces, or of a prism
+    within its cylinder."""
+    placed = {}
+    for one in arrangement.instances:
+        entry = library.entry(one.object)
+        primitive = entry.contact.primitive
+        corners = [np.asarray(library.mesh(piece).vertices) for piece in entry.pieces]
+        if primitive is not None and primitive.shape == "cylinder":
+            angle = np.linspace(0.0, 2.0 * np.pi, 256, endpoint=False)
+            radius, length = primitive.size
+            x, y = radius * np.cos(angle), radius * np.sin(angle)
+            ends = np.concatenate(
+                [np.column_stack([x, y, np.full(256, z)]) for z in (-length / 2, length / 2)]
+            )
+            corners = [transform_points(primitive.X_OP.matrix(), ends)]
+        placed[one.name or one.object] = [
+            transform_points(one.X_SO.matrix(), points) for points in corners
         ]
-        for one in arrangement.instances
-    }
+    return placed
 
 
 def overlap(one: Array, other: Array) -> bool:
@@ -77,8 +88,7 @@ def test_nothing_overlaps_or_is_beyond_the_edge(shapes: ObjectShapes, layout: La
         assert points[:, :2].min() > -1e-4
         assert (points[:, :2].max(axis=0) < np.array(BOARD.size) + 1e-4).all()
         assert points[:, 2].min() > -1e-3
-    touching = [corners for name, corners in pieces.items() if name != "can"]  # a cylinder
-    for one, other in itertools.combinations(touching, 2):
+    for one, other in itertools.combinations(pieces.values(), 2):
         # a hundredth of a millimetre smaller, as what touches overlaps by rounding
         assert not any(
             overlap(p.mean(axis=0) + (p - p.mean(axis=0)) * 0.999, q) for p in one for q in other

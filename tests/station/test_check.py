@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,10 +12,12 @@ import trimesh
 from burg_drake.core.documents.schema import Pose
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import inverse
+from burg_drake.objects.library.document import load_library
 from burg_drake.pipeline.build import build_library
 from burg_drake.pipeline.source import ObjectSource
 from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene, save_scene
 from burg_drake.scene.document.validation import SceneIssue
+from burg_drake.station.checks.scene_check import SceneCheck
 from burg_drake.station.checks.scene_issues import check_scene
 from burg_drake.station.checks.valid_scene import require_valid_scene
 from burg_drake.station.diagram.builder import build_station_diagram
@@ -35,7 +38,9 @@ HEIGHT = EDGE / 2
 def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("cubes")
     cube = ObjectSource(name="cube", mesh=trimesh.creation.box((EDGE, EDGE, EDGE)), mass=0.2)
-    assert not build_library([cube], out).failed
+    core = trimesh.creation.box((EDGE - 0.002, EDGE - 0.002, EDGE))
+    padded = replace(cube, name="padded", pieces=(core,), contact="pieces")
+    assert not build_library([cube, padded], out).failed
     return out
 
 
@@ -72,6 +77,26 @@ def test_two_boxes_that_overlap_by_3_mm(library: Path, panda: Station, tmp_path:
     assert (issue.instance, issue.kind) == ("cube_0", "overlap")
     assert issue.amount == pytest.approx(0.003, abs=1e-6)
     assert issue.message == "'cube_0' and 'cube_1' overlap by 3.0 mm; move them apart"
+
+
+@pytest.mark.parametrize(("depth", "kind"), [(0.0009, ""), (0.0015, "surface_overlap")])
+def test_surfaces_overlap_where_pieces_do_not(
+    library: Path, panda: Station, depth: float, kind: str
+) -> None:
+    """The pieces stay 1 mm inside the cubes' sides, so that they are apart by 2 mm less `depth`."""
+    instances = tuple(
+        Instance(name=f"cube_{i}", object="padded", X_SO=Pose((x, 0.2, HEIGHT)))
+        for i, x in enumerate((0.2, 0.2 + EDGE - depth))
+    )
+    document = SceneDocument(name="cubes", library=str(library), instances=instances)
+    scene = Scene(document, load_library(library), library / "scene.yaml")
+    assert SceneCheck(panda, scene.library).issues(scene) == ()
+    issues = check_scene(scene, panda)
+    assert [issue.kind for issue in issues] == [kind] * bool(kind)
+    for issue in issues:
+        assert (issue.instance, issue.other, issue.is_error) == ("cube_0", "cube_1", False)
+        assert issue.amount == pytest.approx(depth, abs=1e-6)
+        assert "surfaces of 'cube_0' and 'cube_1' overlap by 1.5 mm" in issue.message
 
 
 def test_touching_by_less_than_a_millimetre_is_fine(
@@ -159,7 +184,7 @@ def test_what_was_sound_is_looked_at_again_once_a_model_was_edited(
     shutil.copytree(library, edited)
     places = (0.2, 0.2, HEIGHT), (0.2 + EDGE + 1e-4, 0.2, HEIGHT)
     require_valid_scene(scene_of(edited, tmp_path, *places), panda)
-    (model,) = edited.rglob("*.sdf")
+    (model,) = edited.rglob("cube.sdf")
     text = model.read_text()
     before, wider = (
         f"<size>{EDGE} {EDGE} {EDGE}</size>",

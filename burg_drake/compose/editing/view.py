@@ -22,6 +22,7 @@ InstanceStatus = Literal["ok", "collision", "in_ground", "out_of_bounds", "hover
 WORST_FIRST: tuple[InstanceStatus, ...] = ("collision", "in_ground", "out_of_bounds", "hovering")
 STATUS: Mapping[str, InstanceStatus] = {
     "overlap": "collision",
+    "surface_overlap": "collision",
     "in_ground": "in_ground",
     "sunken": "in_ground",
     "out_of_bounds": "out_of_bounds",

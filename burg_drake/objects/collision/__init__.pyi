@@ -18,6 +18,7 @@ from .fit import (
     deviation as deviation,
     deviation_warning as deviation_warning,
     measure_fit as measure_fit,
+    surface_overlap as surface_overlap,
 )
 from .object_hull import (
     hull_corners as hull_corners,

@@ -1,4 +1,5 @@
-"""How well convex parts, a primitive or another mesh stand for an object's surface."""
+"""How well convex parts, a primitive or another mesh stand for an object's surface, and how deep
+the surfaces of two objects are in each other."""
 
 from __future__ import annotations
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from burg_drake.core import Array, MeshError
-from burg_drake.geometry import triangle_distances
+from burg_drake.geometry import RayCaster, triangle_distances
 from burg_drake.objects.library import Decomposition, Fit
 from burg_drake.objects.physics import sample_surface, spread_over
 
@@ -42,6 +43,15 @@ ROUND = 256
 GROWTH = 1e-6
 """Parts are grown by this before their union is taken [m]: parts that share a face have vertices
 rounded to 1e-7 m, and without it slits between them would count as surface."""
+
+OVERLAP_SPACING = 2e-3
+"""Largest distance of neighbouring points of a surface that are looked for in another one [m]."""
+
+RAY_DIRECTIONS = np.array(
+    [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1), (0.6, 0.64, 0.48)]
+)
+"""(7, 3) unit vectors along which rays look for the way out of a surface; the last one passes
+beside the edges of what is aligned with the axes."""
 
 
 def measure_fit(surface: trimesh.Trimesh, parts: Sequence[trimesh.Trimesh], volume: float) -> Fit:
@@ -129,6 +139,61 @@ def surface_distance(one: trimesh.Trimesh, other: trimesh.Trimesh, enough: float
         if largest <= enough:
             largest = max(largest, _farthest(some, surface, enough))
     return largest
+
+
+def surface_overlap(one: trimesh.Trimesh, other: trimesh.Trimesh, floor: float) -> float:
+    """How deep the deepest point of one surface is inside the other one, either way [m].
+
+    That is at most the way by which they would have to be moved apart. Points are taken on the
+    faces and edges of both, `OVERLAP_SPACING` apart at most.
+
+    Args:
+        one, other: surfaces in one frame, wound outward. Nothing is inside a surface that is not
+            closed.
+        floor: lower depths need not be known [m].
+
+    Returns:
+        The depth; 0 where it is not above the floor.
+    """
+    return max(_depth_inside(one, other, floor), _depth_inside(other, one, floor))
+
+
+def _depth_inside(surface: trimesh.Trimesh, solid: trimesh.Trimesh, floor: float) -> float:
+    """Depth of the deepest point of a surface inside a closed one [m], 0 if not above the floor."""
+    if not solid.is_watertight:
+        return 0.0
+    low, high = solid.bounds
+    points = _points_in_box(surface, np.array([low + floor, high - floor]))
+    if not len(points):
+        return 0.0
+    rays, normals = RayCaster(np.asarray(solid.vertices), solid.faces), solid.face_normals
+    for direction in RAY_DIRECTIONS:
+        face, distance = rays.first_hits(points, np.broadcast_to(direction, points.shape))
+        leaves = (face >= 0) & (normals[face] @ direction > 0.0)
+        points = points[leaves & (distance > floor)]
+    depth = _farthest(points, solid) if len(points) else 0.0
+    return depth if depth > floor else 0.0
+
+
+def _points_in_box(surface: trimesh.Trimesh, box: Array) -> Array:
+    """Points (N, 3) of a surface within a box (2, 3): vertices, and middles of edges, of triangles
+    that are halved until no edge is longer than `OVERLAP_SPACING`."""
+    found = [np.asarray(surface.vertices)]
+    triangles = np.asarray(surface.triangles)
+    while len(triangles):
+        meets = (triangles.max(axis=1) > box[0]) & (triangles.min(axis=1) < box[1])
+        triangles = triangles[meets.all(axis=1)]
+        edges = np.roll(triangles, -1, axis=1) - triangles
+        squared = np.einsum("fij,fij->fi", edges, edges)
+        large = squared.max(axis=1) > OVERLAP_SPACING**2
+        triangles, longest = triangles[large], squared[large].argmax(axis=1)
+        rows = np.arange(len(triangles))
+        a, b, c = (triangles[rows, (longest + i) % 3] for i in range(3))
+        middle = (a + b) / 2.0
+        found.append(middle)
+        triangles = np.concatenate([np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)])
+    points = np.concatenate(found)
+    return points[((points > box[0]) & (points < box[1])).all(axis=1)]
 
 
 def _points(surface: trimesh.Trimesh) -> tuple[Array, Array]:

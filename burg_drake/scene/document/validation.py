@@ -25,7 +25,8 @@ from burg_drake.scene.document.scene import Scene, SceneLike, as_scene
 IN_BOUNDS_TOLERANCE = 1e-4
 """How far an object may stick out over the board's edge [m]: rounding of documents."""
 TOUCH_TOLERANCE = 1e-3
-"""How deep an object may start in another one [m]: it settles within a step."""
+"""How deep an object may start in another one [m]: it settles within a step. Surfaces of objects
+may be as deep in each other before that is worth a word."""
 GROUND_TOLERANCE = 1.5e-3
 """How deep an object may be in the ground [m]: the table yields in simulation. What stands on a
 tip sinks in deeper, which a station's table can bear."""
@@ -46,7 +47,9 @@ at."""
 MILLIMETRES_SUSPECTED = 5.0
 """A coordinate on a table of this size [m] or more was probably meant in millimetres."""
 
-IssueKind = Literal["out_of_bounds", "in_ground", "sunken", "hovering", "overlap"]
+IssueKind = Literal[
+    "out_of_bounds", "in_ground", "sunken", "hovering", "overlap", "surface_overlap"
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +58,8 @@ class SceneIssue:
 
     Attributes:
         instance: name of the instance it is about.
-        kind: what is wrong. `hovering` and `sunken` (in the table, which bears it there) are
+        kind: what is wrong. `hovering`, `sunken` (in the table, which bears it there) and
+            `surface_overlap` (only the surfaces overlap, not what objects touch others with) are
             warnings, all else are errors.
         amount: how far beyond, below, above or into something [m].
         message: one clear line.
@@ -71,7 +75,7 @@ class SceneIssue:
     @property
     def is_error(self) -> bool:
         """Grasps of this scene would be judged in a world other than the document's."""
-        return self.kind not in ("hovering", "sunken")
+        return self.kind not in ("hovering", "sunken", "surface_overlap")
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,5 +5,6 @@ from .scene_check import (
 from .scene_issues import (
     check_scene as check_scene,
     overlaps as overlaps,
+    surface_issues as surface_issues,
 )
 from .valid_scene import require_valid_scene as require_valid_scene

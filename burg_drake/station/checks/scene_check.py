@@ -73,9 +73,9 @@ class _PlacedInstance:
 class SceneCheck:
     """Says of scenes of one library what is wrong with them on a station.
 
-    Verdicts are those of `burg_drake.station.checks.scene_issues.check_scene`. Overlaps are those
-    of the convex shapes that objects touch others with; the arm is in its home posture. To be
-    used from one thread at a time.
+    Verdicts are those of `burg_drake.station.checks.scene_issues.check_scene`, which looks at the
+    objects' true surfaces as well. Overlaps are those of the convex shapes that objects touch
+    others with; the arm is in its home posture. To be used from one thread at a time.
 
     Args:
         station: where the scenes stand.

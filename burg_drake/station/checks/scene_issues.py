@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterable
+
 from pydrake.multibody.tree import BodyIndex
 
-from burg_drake.scene.document import SceneIssue, SceneLike, as_scene
+from burg_drake.objects.collision import surface_overlap
+from burg_drake.scene.document import (
+    TOUCH_TOLERANCE,
+    Scene,
+    SceneIssue,
+    SceneLike,
+    as_scene,
+    length_text,
+)
 from burg_drake.station.checks.scene_check import SceneCheck
 from burg_drake.station.diagram import StationDiagram, mesh_by_pieces
 from burg_drake.station.document import StationLike, as_station
 
 
 def check_scene(scene: SceneLike, station: StationLike) -> tuple[SceneIssue, ...]:
-    """All that `validate_scene` checks, and overlaps with other objects and with the station.
+    """All that `validate_scene` checks, overlaps with other objects and with the station, and
+    overlaps of the objects' true surfaces.
 
     Args:
         scene: the scene.
@@ -21,7 +33,51 @@ def check_scene(scene: SceneLike, station: StationLike) -> tuple[SceneIssue, ...
         What was found; nothing if all is well.
     """
     scene, station = as_scene(scene), as_station(station)
-    return SceneCheck(station, scene.library).issues(scene)
+    issues = SceneCheck(station, scene.library).issues(scene)
+    return (*issues, *surface_issues(scene, issues))
+
+
+def surface_issues(scene: Scene, known: Iterable[SceneIssue] = ()) -> tuple[SceneIssue, ...]:
+    """Objects whose true surfaces are more than `TOUCH_TOLERANCE` deep in each other.
+
+    What objects touch others with in simulation can be apart there, as convex pieces and
+    primitives are smaller than the surface in places.
+
+    Args:
+        scene: the scene.
+        known: issues found before; pairs that overlap by these are left out.
+
+    Returns:
+        One warning a pair, in the order of the document.
+
+    Raises:
+        MeshError: the surface of an object is damaged.
+    """
+    found = {(issue.instance, issue.other) for issue in known if issue.kind == "overlap"}
+    free = tuple(scene.instances)
+    pairs = [*itertools.combinations(free, 2), *itertools.product(free, scene.background)]
+    surfaces = {}
+    for name in (*free, *scene.background):
+        surfaces[name] = scene.library.surface(scene.instance(name).object)
+        surfaces[name].apply_transform(scene.X_SO(name))
+    issues = []
+    for a, b in pairs:
+        (low_a, high_a), (low_b, high_b) = surfaces[a].bounds, surfaces[b].bounds
+        apart = (low_a + TOUCH_TOLERANCE > high_b) | (low_b + TOUCH_TOLERANCE > high_a)
+        if (a, b) in found or apart.any():
+            continue
+        depth = surface_overlap(surfaces[a], surfaces[b], TOUCH_TOLERANCE)
+        if depth > 0.0:
+            message = (
+                f"the surfaces of {a!r} and {b!r} overlap by {length_text(depth)}, though what"
+                " they touch others with in simulation does not; move them apart"
+            )
+            issues.append(
+                SceneIssue(
+                    instance=a, kind="surface_overlap", amount=depth, message=message, other=b
+                )
+            )
+    return tuple(issues)
 
 
 def overlaps(station_diagram: StationDiagram) -> dict[tuple[str, str], float]:
