@@ -162,8 +162,6 @@ def test_what_sinks_in_on_tips_is_lifted_out_of_the_table(pose: int, tmp_path) -
     lowest = surface.min() + settled.scene.X_SO("airplane")[2, 3]
     assert lowest == pytest.approx(0.0, abs=6e-4)
     assert check_scene(settled.scene, make_station()) == ()
-    again = settle_scene(settled.scene, make_station())
-    assert again.at_rest and again.displacements["airplane"].distance < 2e-4
     moved = stillness(settled.scene, make_station(), duration=1.0)
     assert is_still(moved), moved
 
