@@ -116,8 +116,8 @@ def settle_scene(
         settled, moving = placed_scene(built, falling.X_WO), falling.moving
         if not moving:
             landed = settled
-            for engine in (RELAXING, RELAXING_ON_TRIANGLES):
-                settled, moving = _at_rest(landed, station, engine, progress)
+            for relaxing in (RELAXING, RELAXING_ON_TRIANGLES):
+                settled, moving = _at_rest(landed, station, relaxing, progress)
                 if not moving:
                     settled = _lifted_out(settled, built)
                     break
