@@ -151,6 +151,9 @@ def test_what_hovers_is_put_on_what_is_below(session: ComposeSession) -> None:
     assert session.do(MoveObjects({"marble": X_SO})).status["marble"] == "in_ground"
     view = session.do(PutDown(("marble",)))
     assert span(view, "marble")[0, 2] == pytest.approx(0.0, abs=ROUNDED)
+    X_SO = view.X_SO("box")
+    X_SO[2, 3] -= 1e-3
+    assert session.do(MoveObjects({"box": X_SO})).status["box"] == "sunken"
 
 
 def test_planar_movement_takes_place_and_yaw_alone(three: ComposeSession) -> None:

@@ -3,7 +3,9 @@ settle without it."""
 
 from __future__ import annotations
 
+import importlib.util
 import math
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +29,14 @@ from tools.household.curves import ellipse
 from tools.household.solids import hulls, rings_along, tube, union
 
 HOUSEHOLD = load_library("household")
+SOURCE = Path(__file__).resolve().parents[2] / "benchmarks" / "settling.py"
+SPEC = importlib.util.spec_from_file_location("settling_benchmark", SOURCE)
+assert SPEC is not None and SPEC.loader is not None
+BENCHMARK = importlib.util.module_from_spec(SPEC)
+sys.modules[SPEC.name] = BENCHMARK
+SPEC.loader.exec_module(BENCHMARK)
+OTHER_PAIRS = [p for p in BENCHMARK.PAIRS if p not in ("marble in a mug", "ring over a peg")]
+"""Of the benchmark; those two have tests of their own."""
 RADIUS = 0.015
 """Of the marble [m]."""
 ROLLING_MASS = 1.4
@@ -123,3 +133,20 @@ def test_a_ring_over_a_peg_comes_to_rest(tmp_path: Path) -> None:
         X_SO = settled.scene.X_SO(name)
         assert X_SO[2, 3] == pytest.approx(height, abs=1e-4)
         assert X_SO[2, 2] > math.cos(math.radians(0.05))
+
+
+@pytest.fixture(scope="module")
+def pairs_library(tmp_path_factory: pytest.TempPathFactory) -> ObjectLibrary:
+    folder = tmp_path_factory.mktemp("pairs")
+    assert not build_library(BENCHMARK.pair_sources(), folder, confirm=False).failed
+    return load_library(folder)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", OTHER_PAIRS)
+def test_the_other_pairs_of_the_benchmark_come_to_rest(
+    name: str, pairs_library: ObjectLibrary
+) -> None:
+    scene = pair(*BENCHMARK.PAIRS[name], library=pairs_library)
+    settled = settle_scene(scene, load_station("panda_tabletop"))
+    assert settled.at_rest, settled.moving

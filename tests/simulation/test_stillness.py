@@ -58,6 +58,8 @@ def test_what_is_in_the_air_falls(make_scene) -> None:
     assert not is_still(moved)
     assert moved["block"].distance == pytest.approx(GRAVITY * 0.1**2 / 2, rel=0.02)
     assert moved["block"].angle == pytest.approx(0.0, abs=1e-6)
+    low = make_scene(placed("block", "block", 0.3, 0.002))
+    assert stillness(low, make_station(), duration=0.5)["block"].distance > 1.9e-3
 
 
 def test_what_will_not_stay_is_foretold(make_scene) -> None:

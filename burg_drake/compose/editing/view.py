@@ -16,15 +16,23 @@ if TYPE_CHECKING:
     from burg_drake.compose.background import SettlingProposal
     from burg_drake.evaluation.stages import GraspCount
 
-InstanceStatus = Literal["ok", "collision", "in_ground", "out_of_bounds", "hovering", "unknown"]
+InstanceStatus = Literal[
+    "ok", "collision", "in_ground", "out_of_bounds", "hovering", "sunken", "unknown"
+]
 """`unknown`: the library has no such object any more, or the scene cannot be checked."""
 
-WORST_FIRST: tuple[InstanceStatus, ...] = ("collision", "in_ground", "out_of_bounds", "hovering")
+WORST_FIRST: tuple[InstanceStatus, ...] = (
+    "collision",
+    "in_ground",
+    "out_of_bounds",
+    "hovering",
+    "sunken",
+)
 STATUS: Mapping[str, InstanceStatus] = {
     "overlap": "collision",
     "surface_overlap": "collision",
     "in_ground": "in_ground",
-    "sunken": "in_ground",
+    "sunken": "sunken",
     "out_of_bounds": "out_of_bounds",
     "hovering": "hovering",
 }

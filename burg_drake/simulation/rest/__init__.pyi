@@ -5,6 +5,7 @@ from .criterion import (
 )
 from .displacement import (
     Displacement as Displacement,
+    depth_in_table as depth_in_table,
     displacement_from_document as displacement_from_document,
 )
 from .drift import predict_drift as predict_drift

@@ -39,7 +39,7 @@ CALM_SPEED = BodySpeed(speed=3e-5, turning=float(np.deg2rad(0.02)))
 GROUP_CALM_SPEED = BodySpeed(speed=1e-4, turning=float(np.deg2rad(0.1)))
 """The same of objects that touch each other, which creep, slower and slower, for long."""
 ROLLING_SHARE = 0.5
-"""Of the rolling resistance: what comes to rest with less of it stays."""
+"""Relaxing uses half of the rolling resistance, so that the other half is a margin."""
 CALM_WINDOWS = 2
 """So many windows in succession."""
 STOPPED = SpatialVelocity(np.zeros(3), np.zeros(3))

@@ -10,9 +10,14 @@ from pydrake.systems.framework import Context
 
 from burg_drake.core import Array, InvalidInputError, SimulationError
 from burg_drake.scene.document import SceneLike, as_scene
-from burg_drake.simulation.rest.displacement import Displacement, displacement_from_document
+from burg_drake.simulation.rest.displacement import (
+    Displacement,
+    depth_in_table,
+    displacement_from_document,
+)
 from burg_drake.simulation.rest.rolling_resistance import resist_rolling
-from burg_drake.station.diagram import StationDiagram, build_station_diagram
+from burg_drake.station.checks import DEEPEST
+from burg_drake.station.diagram import StationDiagram, build_station_diagram, touching
 from burg_drake.station.document import ENGINES, Engine, StationLike, as_station
 
 STILL_DISTANCE = 5e-4
@@ -35,6 +40,10 @@ def stillness(
     The world is that of `build_station_diagram` with this engine, in which trials are executed and
     which users simulate.
 
+    An object that touches nothing but the table may sink straight into it, as far as the table
+    yields to what stands on it: that is no movement. `settle_scene` lifts such objects onto the
+    table, and they sink in again.
+
     Args:
         scene: the scene.
         station: table, pose of the board and obstacles.
@@ -42,7 +51,8 @@ def stillness(
         engine: how time is stepped.
 
     Returns:
-        By free instance: how far it is from where the document places it at the end.
+        By free instance: how far it is at the end from where the document places it, without how
+        far it has sunk into the table if it stands there alone.
 
     Raises:
         InvalidInputError: the duration is not above 0.
@@ -61,10 +71,23 @@ def stillness(
             f"{scene.path}: the scene cannot be simulated: {' '.join(str(error).split())}"
         ) from error
     context = built.plant.GetMyContextFromRoot(simulator.get_context())
+    beside = touching(built, [*built.free.values(), *built.fixed.values()])
     return {
-        name: displacement_from_document(built, name, X_WO)
+        name: displacement_from_document(
+            built, name, X_WO if built.free[name] in beside else _lifted(built, name, X_WO)
+        )
         for name, X_WO in poses(built, context).items()
     }
+
+
+def _lifted(built: StationDiagram, name: str, X_WO: Array) -> Array:
+    """`X_WO` without how far the instance has sunk straight into the table since the start."""
+    center_of_mass = np.array((*built.scene.entry(name).mass_properties.center_of_mass, 1.0))
+    lowered = float(((built.X_WO(name) - X_WO) @ center_of_mass)[2])
+    sunk = min(lowered, depth_in_table(built.scene, X_WO, name), DEEPEST)
+    lifted = X_WO.copy()
+    lifted[2, 3] += max(0.0, sunk)
+    return lifted
 
 
 def poses(built: StationDiagram, context: Context) -> dict[str, Array]:

@@ -9,20 +9,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from burg_drake.core import Array, InvalidInputError, SimulationError
+from burg_drake.core import InvalidInputError, SimulationError
 from burg_drake.scene.document import (
     SUNKEN_TOLERANCE,
     TOUCH_TOLERANCE,
     Scene,
     SceneLike,
     as_scene,
-    support_vertices,
 )
 from burg_drake.simulation.rest import (
     RELAXING,
     RELAXING_ON_TRIANGLES,
     BodySpeed,
     Displacement,
+    depth_in_table,
     displacement_from_document,
     fall,
     predict_drift,
@@ -116,8 +116,8 @@ def settle_scene(
         settled, moving = placed_scene(built, falling.X_WO), falling.moving
         if not moving:
             landed = settled
-            for engine in (RELAXING, RELAXING_ON_TRIANGLES):
-                settled, moving = _at_rest(landed, station, engine, progress)
+            for relaxing in (RELAXING, RELAXING_ON_TRIANGLES):
+                settled, moving = _at_rest(landed, station, relaxing, progress)
                 if not moving:
                     settled = _lifted_out(settled, built)
                     break
@@ -179,7 +179,7 @@ def _lifted_out(settled: Scene, before: StationDiagram) -> Scene:
     beside = touching(built, [*built.free.values(), *built.fixed.values()])
     X_WO = {name: built.X_WO(name) for name in built.free}
     for name, X in X_WO.items():
-        depth = _depth_in_table(settled, X, name)
+        depth = depth_in_table(settled, X, name)
         if depth > SUNKEN_TOLERANCE and built.free[name] not in beside:
             X[2, 3] += depth
     lifted = placed_scene(built, X_WO)
@@ -192,12 +192,6 @@ def _lifted_out(settled: Scene, before: StationDiagram) -> Scene:
     )
     document = dataclasses.replace(lifted.document, instances=instances)
     return Scene(document, settled.library, settled.path)
-
-
-def _depth_in_table(scene: Scene, X_WO: Array, name: str) -> float:
-    """How far what an instance rests with, at `X_WO`, is below the table's top [m]."""
-    p_OC = support_vertices(scene.library, scene.instance(name).object)
-    return -float((p_OC @ X_WO[2, :3]).min() + X_WO[2, 3])
 
 
 def _require_above(built: StationDiagram) -> None:
@@ -215,7 +209,7 @@ def _require_apart(built: StationDiagram) -> None:
     yielding = {"table", *built.station.document.background}
     for (a, b), depth in overlaps(built).items():
         if b == "table":  # as `SceneCheck` has it: Drake's depths are off by up to a millimetre
-            depth = min(depth, _depth_in_table(built.scene, built.X_WO(a), a))
+            depth = min(depth, depth_in_table(built.scene, built.X_WO(a), a))
         if depth > (DEEPEST if b in yielding else TOUCH_TOLERANCE):
             raise InvalidInputError(
                 f"{built.scene.path}: {a!r} and {b!r} overlap by {depth * 1e3:.1f} mm, and would"

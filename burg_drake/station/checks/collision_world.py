@@ -128,6 +128,15 @@ class CollisionWorld:
                 fixed[key] = max(fixed.get(key, 0.0), pair.depth)
         return among, fixed
 
+    def touched(self, name: str, gap: float) -> set[str]:
+        """Bodies, fixed ones among them, that are closer to a movable one than `gap` [m]."""
+        own = set(self.geometries(name))
+        owner = {**self.anchored, **self._owner}
+        pairs = self.query().ComputeSignedDistancePairwiseClosestPoints(gap)
+        ids = ((pair.id_A, pair.id_B) for pair in pairs)
+        others = {b if a in own else a for a, b in ids if (a in own) != (b in own)}
+        return {owner[g] for g in others if g in owner}
+
     def query(self) -> QueryObject:
         """Drake's answers about the bodies as they stand; good until they are moved."""
         return self._graph.get_query_output_port().Eval(self._context)

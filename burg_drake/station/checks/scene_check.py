@@ -39,7 +39,7 @@ from burg_drake.station.checks.body_shapes import object_shapes, surrounding_sha
 from burg_drake.station.checks.collision_world import CollisionWorld
 from burg_drake.station.checks.sinking import push_up
 from burg_drake.station.checks.travel import Travel
-from burg_drake.station.diagram import StationDiagram, build_station_diagram
+from burg_drake.station.diagram import GAP, StationDiagram, build_station_diagram
 from burg_drake.station.document import Station, StationLike, as_station
 from burg_drake.station.world import ROBOT_MODELS, Robot, name_taken_error, obstacle_name_error
 
@@ -257,10 +257,11 @@ class SceneCheck:
                 raise name_taken_error(scene, name)
 
     def _sunken_issue(self, name: str) -> SceneIssue | None:
-        """Whether an object stands in the table, as deep as the table bears it in simulation."""
+        """Whether an object alone stands in the table, as deep as the table bears it in simulation.
+        What touches others cannot be lifted without them."""
         placed = self._placed[name]
         depth = -max(placed.surface, placed.support)
-        if depth <= SUNKEN_TOLERANCE:
+        if depth <= SUNKEN_TOLERANCE or self._world.touched(name, GAP) - {"table"}:
             return None
         return SceneIssue(
             instance=name,

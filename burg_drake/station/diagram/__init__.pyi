@@ -10,6 +10,7 @@ from .hand_description import (
 )
 from .hand_handle import HandHandle as HandHandle
 from .leaning import (
+    GAP as GAP,
     soften as soften,
     touching as touching,
 )

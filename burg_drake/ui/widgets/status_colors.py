@@ -31,8 +31,10 @@ STATUS_STYLES: dict[str, StatusStyle] = {
     "out_of_bounds": StatusStyle((236, 90, 180), "out of bounds"),
     "in_ground": StatusStyle((140, 80, 30), "in the ground"),
     "hovering": StatusStyle((64, 140, 230), "hovering"),
+    "sunken": StatusStyle((64, 140, 230), "sunk into the table"),
 }
-"""By status; green, red and pink as in the tool of the paper (Rudorfer et al., 2022)."""
+"""By status; green, red and pink as in the tool of the paper (Rudorfer et al., 2022);
+blue are warnings."""
 
 OTHER = StatusStyle((120, 120, 120), "not checked")
 FIXED: Rgb8 = (150, 155, 162)
