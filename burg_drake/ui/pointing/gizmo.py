@@ -177,7 +177,7 @@ class Gizmo:
         if who != self._who or self._drag is None or self._drag.is_over:
             return
         X = X_SG @ inverse(self._X_SGi)
-        self._drag.move({name: X @ X_SO for name, X_SO in self._start.items()}, raises=True)
+        self._drag.move({name: X @ X_SO for name, X_SO in self._start.items()}, changes_height=True)
 
     def _end(self, who: int | None) -> None:
         if who != self._who:
