@@ -186,11 +186,11 @@ def test_what_the_hand_alone_cannot_predict_is_shown_apart(
     out = " ".join(capsys.readouterr().out.split())
     told = " ".join(re.sub(r"<[^>]+>", " ", page.read_text()).replace("\u00a0", " ").split())
     for text in (out, told):
-        assert "7 trials ended as no verdict of the hand alone can predict" in text
+        assert "7 trials failed for reasons that a run of the hand alone does not predict" in text
         assert "(6 no path, 1 protective stop), 5 of them after a predicted success" in text
         assert "without them precision is 80 %" in text and "instead of 60 %" in text
     assert "Success predicted, failure seen: 3 " in told
-    assert "Success predicted, ended as the hand alone cannot predict: 5 " in told
+    assert "Success predicted, failed for reasons that the hand alone does not predict: 5 " in told
 
 
 def test_a_run_with_the_arm_has_to_predict_it(tmp_path: Path) -> None:

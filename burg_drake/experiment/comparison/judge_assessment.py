@@ -73,7 +73,7 @@ class Strata:
 
 @dataclass(frozen=True, kw_only=True)
 class Unpredictable:
-    """Trials that ended as no verdict of the hand alone can predict, and the figures without them.
+    """Failures that a run of the hand alone does not predict, and figures without them.
 
     Attributes:
         outcomes: these trials by how they ended, the most frequent first.
@@ -97,8 +97,8 @@ class Judgement:
         all_grasps: figures of all grasps that they were chosen from, each trial standing for so
             many; None if nothing says what they were chosen from.
         not_represented: grasps that could have been chosen and that no trial stands for.
-        unpredictable: trials that ended as no verdict of a run of the hand alone can predict; all
-            other figures count them as failures. None of other modes, and where there are none.
+        unpredictable: failures that a run of the hand alone does not predict; all other figures
+            count them as failures. None if there are none, and in other modes.
         bias: predicted against actual success of the trials themselves; `all_grasps.excess` says
             whether it promises too much or too little where trials stand for others.
         standing_out: objects and causes whose verdicts are wrong more often than those of others,

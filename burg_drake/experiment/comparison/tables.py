@@ -116,7 +116,7 @@ def figure_table(comparison: Comparison, judged: Judgement, name: str = "") -> T
 
 
 def unpredictable_table(judged: Judgement, name: str = "") -> TextTable:
-    """Figures with and without trials that ended as no verdict of the hand alone predicts."""
+    """Figures with and without failures that the hand alone does not predict."""
     table = TextTable(f"With and without outcomes that the hand alone cannot predict{name}")
     table.texts("of")
     for key in ABOUT_UNPREDICTABLE:

@@ -227,17 +227,17 @@ def _more(difference: float, of: str) -> str:
 
 
 def unpredictable_words(judged: Judgement) -> str:
-    """What ended trials that no verdict of the hand alone predicts, and precision without them;
-    empty where nothing did."""
+    """Failures that a run of the hand alone does not predict, and precision without them; empty if
+    there are none."""
     found = judged.unpredictable
     if found is None:
         return ""
     count = sum(found.outcomes.values())
     without = found.selected if weighted(judged) is None else found.all_grasps or found.selected
     return (
-        f"{count:,} trial{'' if count == 1 else 's'} ended as no verdict of the hand alone can"
-        f" predict ({counts_words(found.outcomes)}), {found.promised:,} of them after a predicted"
-        f" success. They count as failures; without them precision is"
+        f"{count:,} trial{'' if count == 1 else 's'} failed for reasons that a run of the hand"
+        f" alone does not predict ({counts_words(found.outcomes)}), {found.promised:,} of them"
+        f" after a predicted success. They count as failures; without them precision is"
         f" {brief(without.precision)} instead of {brief(estimated(judged).precision)}."
     )
 

@@ -50,7 +50,7 @@ def case_section(comparison: Comparison, judged: Judgement, photos: Path | None)
             round(judged.selected.fp) - promised,
         ),
         (
-            "success predicted, ended as the hand alone cannot predict",
+            "success predicted, failed for reasons that the hand alone does not predict",
             [d for d in of if d.ended in beyond],
             promised,
         ),

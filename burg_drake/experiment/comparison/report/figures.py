@@ -121,7 +121,7 @@ def figure_cell(found: Estimate, *, percent: bool) -> Html:
 
 
 def unpredictable_section(judged: Judgement) -> Html | None:
-    """Figures with and without trials that ended as no verdict of the hand alone predicts."""
+    """Figures with and without failures that the hand alone does not predict."""
     if judged.unpredictable is None:
         return None
     rows = [
@@ -161,7 +161,7 @@ def standing_out_section(judged: Judgement) -> Html:
                 *(element("td", c) for c in cells),
             )
         )
-    apart = " Trials that ended as the hand alone cannot predict are left out."
+    apart = " Failures that the hand alone does not predict are left out."
     if judged.unpredictable is None:
         apart = ""
     names = ["", "what", "predicted", "wrong", "others wrong", "how the wrong ones ended", "p"]
