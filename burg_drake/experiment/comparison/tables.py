@@ -161,7 +161,7 @@ def standing_out_table(judged: Judgement, name: str = "") -> TextTable | str:
         )
     table.caption = (
         "wrong more often than others with the same prediction: Fisher's exact test, one-sided"
-        f" mid-p, corrected by Holm's method for {judged.looked_at} groups"
+        f" mid-p, corrected by Holm's method for {judged.tested_groups} groups"
     )
     if judged.unpredictable is not None:
         table.caption += "; without what the hand alone cannot predict"

@@ -169,7 +169,7 @@ def standing_out_section(judged: Judgement) -> Html:
         "What stands out",
         "Objects, verdicts and bodies in the way whose trials ended otherwise than predicted more"
         " often than others with the same prediction. p: one-sided mid-p of Fisher's exact test,"
-        f" corrected by Holm's method for the {judged.looked_at} groups that were tested, so that"
+        f" corrected by Holm's method for the {judged.tested_groups} tested groups, so that"
         f" nothing is named in 19 of 20 experiments in which nothing differs.{apart}",
         table(names, rows),
     )
