@@ -42,7 +42,7 @@ take an answer, too."""
 REQUEST_TIMEOUT = 10.0
 """Time for a whole request, head and body, and for the first one to begin [s]."""
 BROWSER_CONNECTIONS = 6
-"""That a browser opens to one server at most."""
+"""Most connections a browser opens to one server."""
 MOST_REFUSALS = 8
 """Connections beyond those that are told so at a time; more are closed without a word."""
 REFUSED_WITHIN = 2.0
