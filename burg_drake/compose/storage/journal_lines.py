@@ -123,7 +123,7 @@ class JournalReader:
             self._take(parse_json(line, "journal", LINE_LIMITS))
         except DAMAGE_ERRORS:
             self._whole_line = False
-            self._next = None  # how many instances the line had is not known
+            self._next = None  # the number of instances in the line is unknown
         self._damaged |= not self._whole_line
         return self._whole_line
 

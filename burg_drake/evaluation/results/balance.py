@@ -1,4 +1,4 @@
-"""Lifted and failing grasps of each object, for runs that are to have enough of both."""
+"""Counts of lifted and failing grasps of each object, and notes on objects with too few."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from burg_drake.evaluation.store import Run
 
 
 def lifted_and_failed(run: Run) -> dict[str, tuple[int, int]]:
-    """Numbers of judged grasps that are lifted, and that are not, by object; of those that the run
-    counts, see `EvaluationSettings.balanced_among`."""
+    """Numbers of lifted and of failing grasps by object, among the judged grasps that the run
+    counts; see `EvaluationSettings.balanced_among`."""
     columns, grasps = run.results, run.document.grasps
     counted = np.isin(columns["stage"], [s.value for s in STAGES_AMONG[grasps.balanced_among]])
     counted &= columns["outcome"] != Outcome.SIMULATION_FAILED.value

@@ -219,7 +219,7 @@ def bias_words(comparison: Comparison, judged: Judgement | None = None) -> str:
 
 
 def _more(difference: float, of: str) -> str:
-    """By how much something is more, or less, in percentage points."""
+    """A difference in percentage points, as words."""
     if difference == 0:
         return f"just as much {of.replace('than', 'as')}"
     more = "more" if difference > 0 else "less"
@@ -249,12 +249,12 @@ def counts_words(outcomes: Mapping[str, int]) -> str:
 
 
 def standing_out_name(one: OutlierGroup) -> str:
-    """What an object or cause that stands out is called."""
+    """Name of an outlier group for people."""
     return outcome_label(one.name) if one.kind == "verdict" else one.name
 
 
 def standing_out_words(judged: Judgement) -> str:
-    """What stands out, in one sentence; empty if nothing does."""
+    """A sentence on the outlier groups; empty if there are none."""
     parts = [
         f"{standing_out_name(one)} ({one.kind}; {one.wrong} of {one.trials} predicted"
         f" {'successes failed' if one.predicted else 'failures succeeded'}, of all others"
@@ -265,7 +265,7 @@ def standing_out_words(judged: Judgement) -> str:
 
 
 def nothing_stands_out(judged: Judgement) -> str:
-    """What is said where no object or cause stands out."""
+    """A sentence for judgements without outlier groups."""
     if not judged.tested_groups:
         return "Too few trials to tell whether verdicts of an object or a cause stand out."
     groups = f"{judged.tested_groups} groups" if judged.tested_groups > 1 else "group"
