@@ -32,7 +32,7 @@ from burg_drake.evaluation.run import (
     evaluate_scenes,
     extend_run,
     finish_run,
-    grow,
+    next_round,
     open_grasps,
     open_run,
     require_judged,
@@ -185,7 +185,7 @@ def _evaluate_one(
                 require_judged(run)
                 hints = given_hints(run)
                 run = save_run(replace(run, document=replace(run.document, hints=hints)))
-            more = grow(run)
+            more = next_round(run)
             if more is None:
                 break
             reporter.show(Progress("sampling"))

@@ -49,7 +49,7 @@ class Drawing:
         footprint: around where it touches the sheet, in `footprint_color`.
         on_black: colour of both lines on black cells.
         fixed: whether it belongs to the background.
-        dash: length of the dashes of the outline [m]; 0 of one that is drawn through.
+        dash: length of the dashes of the outline [m]; 0 for a solid line.
         raised: around the part that lies above other objects, which covers none of the sheet.
     """
 

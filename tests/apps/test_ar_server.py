@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from burg_drake.apps.ar.server import PAGES, ViewServer
-from burg_drake.apps.web.server import MOST_REFUSALS
+from burg_drake.apps.web.server import MAX_REFUSALS
 from burg_drake.cameras.live.actions import ViewActions
 from burg_drake.cameras.live.event_log import EventLog
 from burg_drake.cameras.live.frame_processing import FrameProcessor
@@ -279,11 +279,11 @@ def test_a_flood_of_connections_takes_no_threads(server: ViewServer) -> None:
     before = threading.active_count()
     flood = [
         socket.create_connection(small.server_address[:2], timeout=HANG_GUARD)
-        for _ in range(MOST_REFUSALS + 4)
+        for _ in range(MAX_REFUSALS + 4)
     ]
     try:
         assert [connection.recv(1) for connection in flood[:-1]] == [b""] * (len(flood) - 1)
-        assert threading.active_count() <= before + 1 + MOST_REFUSALS
+        assert threading.active_count() <= before + 1 + MAX_REFUSALS
         flood[-1].sendall(b"GET /status HTTP/1.1\r\nHost: localhost\r\n\r\n")
         assert flood[-1].recv(100).startswith(b"HTTP/1.1 200")
     finally:

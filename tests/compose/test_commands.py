@@ -163,7 +163,7 @@ def test_planar_movement_takes_place_and_yaw_alone(three: ComposeSession) -> Non
     X_SO = three.do(MoveObjects({"box": tilt @ yaw @ before})).X_SO("box")
     assert X_SO[2, 3] == before[2, 3]
     np.testing.assert_allclose(X_SO[2, :3], before[2, :3], atol=2e-6)  # tilt
-    raised = three.do(MoveObjects({"box": tilt @ yaw @ before}, raises=True)).X_SO("box")
+    raised = three.do(MoveObjects({"box": tilt @ yaw @ before}, changes_height=True)).X_SO("box")
     assert raised[2, 3] == pytest.approx((tilt @ yaw @ before)[2, 3], abs=1e-6)
     np.testing.assert_array_equal(raised[2, :3], X_SO[2, :3])
     turn = X_SO[:3, :3] @ before[:3, :3].T
@@ -204,13 +204,13 @@ def test_how_far_a_selected_object_is_above_what_is_below(three: ComposeSession)
     assert three.select(("box",)).gaps == {}
     box = three.view.X_SO("box")
     box[2, 3] += 0.1
-    assert three.do(MoveObjects({"box": box}, raises=True)).gaps == {
+    assert three.do(MoveObjects({"box": box}, changes_height=True)).gaps == {
         "box": pytest.approx(0.1, abs=2e-4)
     }
     (x, y, _), top = span(three.view, "box").mean(axis=0), span(three.view, "box")[1, 2]
     marble = three.view.X_SO("marble")
     marble[:3, 3] = x, y, top + marble[2, 3] + 0.03
-    view = three.do(MoveObjects({"marble": marble}, raises=True))
+    view = three.do(MoveObjects({"marble": marble}, changes_height=True))
     assert view.gaps == {"marble": pytest.approx(0.03, abs=1e-3)}
     assert three.select(()).gaps == {}
 

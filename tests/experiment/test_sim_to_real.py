@@ -173,7 +173,7 @@ def test_what_the_hand_alone_cannot_predict_is_shown_apart(
     run, sheet = tried(tmp_path, OF_THE_ARM, {"success": 200, "failure": 1000})
     found = compare(run, sheet).judgement
     apart = found.unpredictable
-    assert apart is not None and apart.promised == 5
+    assert apart is not None and apart.predicted_successes == 5
     assert apart.outcomes == {"no_path": 6, "protective_stop": 1}
     assert found.selected.cells == (12, 8, 0, 10) and apart.selected.cells == (12, 3, 0, 8)
     assert found.selected.precision.value == pytest.approx(12 / 20)
@@ -186,11 +186,11 @@ def test_what_the_hand_alone_cannot_predict_is_shown_apart(
     out = " ".join(capsys.readouterr().out.split())
     told = " ".join(re.sub(r"<[^>]+>", " ", page.read_text()).replace("\u00a0", " ").split())
     for text in (out, told):
-        assert "7 trials ended as no verdict of the hand alone can predict" in text
+        assert "7 trials failed for reasons that a run of the hand alone does not predict" in text
         assert "(6 no path, 1 protective stop), 5 of them after a predicted success" in text
         assert "without them precision is 80 %" in text and "instead of 60 %" in text
     assert "Success predicted, failure seen: 3 " in told
-    assert "Success predicted, ended as the hand alone cannot predict: 5 " in told
+    assert "Success predicted, failed for reasons that the hand alone does not predict: 5 " in told
 
 
 def test_a_run_with_the_arm_has_to_predict_it(tmp_path: Path) -> None:
@@ -226,7 +226,7 @@ def test_an_object_that_slips_stands_out(tmp_path: Path) -> None:
         for k in (0, 1)
     )
     assert box.p_value == pytest.approx((at_least + beyond) / 2)
-    assert box.corrected == pytest.approx(box.p_value * found.looked_at)
+    assert box.corrected == pytest.approx(box.p_value * found.tested_groups)
     text = comparison_page(compare(run, sheet))
     assert (
         "What stands out: box (object; 6 of 8 predicted successes failed, of all others 1 of 15)"
@@ -248,7 +248,7 @@ def test_nothing_stands_out_where_all_are_alike(tmp_path: Path) -> None:
     alike = [*some("lifted", "lifted", 6), *some("lifted", "slipped", 4)]
     run, sheet = tried(tmp_path, {"mug": alike, "box": alike})
     found = compare(run, sheet)
-    assert found.judgement.standing_out == () and found.judgement.looked_at == 2
+    assert found.judgement.standing_out == () and found.judgement.tested_groups == 2
     said = " ".join(part for part in comparison_tables(found) if isinstance(part, str))
     assert "No object, verdict or body in the way stands out among the 2 groups" in said
 

@@ -144,10 +144,13 @@ def test_a_torn_line_of_the_journal_is_left_behind(tmp_path: Path) -> None:
         file.write(b'{"number": 2, "gra')
     book.record(3, outcome="lifted")
     assert [entry.number for entry in book.entries()] == [1, 3]
-    assert "trials.entries.jsonl: line 2 cannot be read" in book.damage()
+    assert book.damage().endswith(
+        "trials.entries.jsonl:2: damaged entry, skipped; compare trials.yaml with your notes, then"
+        " delete the line"
+    )
     with (tmp_path / "trials.entries.jsonl").open("r+b") as file:
         file.write(b"\xff")
-    assert "lines 1, 2 cannot be read" in book.damage()
+    assert "trials.entries.jsonl:1, 2: damaged entries, skipped;" in book.damage()
     assert [entry.number for entry in book.entries()] == [3]
 
 

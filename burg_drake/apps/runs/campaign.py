@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import chosen_motion, how_to_retry, read_given, require_standoff_of_arm
 from burg_drake.apps.runs.second_opinion import (
-    SETTLED,
+    SETTLED_COLUMNS,
     first_engine,
     settle,
     settled_line,
@@ -70,7 +70,7 @@ def evaluate_many(
     campaign = settle(campaign, arguments, executor)
     print_campaign(campaign)
     if arguments.rejudge is not None:
-        print(settled_line(campaign.columns(SETTLED)))
+        print(settled_line(campaign.columns(SETTLED_COLUMNS)))
     if motion != GraspMotion():
         print(f"motion  {motion_text(motion)}")
     return campaign_exit_code(campaign)

@@ -31,7 +31,7 @@ from burg_drake.apps.options import (
 )
 from burg_drake.apps.runs.campaign import evaluate_many
 from burg_drake.apps.runs.second_opinion import (
-    SETTLED,
+    SETTLED_COLUMNS,
     add_rejudge_contested,
     first_engine,
     settle,
@@ -185,7 +185,7 @@ def _print_run(run: Run, motion: GraspMotion, *, rejudged: bool) -> None:
     if motion != GraspMotion():
         print(f"motion  {motion_text(motion)}")
     if rejudged or any(verdict.judged_again for verdict in run.verdicts.values()):
-        print(settled_line({name: run.results[name] for name in SETTLED}))
+        print(settled_line({name: run.results[name] for name in SETTLED_COLUMNS}))
     if contested := run.contested:
         print(f"contested: {listing(contested)}; --rejudge contested settles them")
     print(f"table   {run.table_path}")

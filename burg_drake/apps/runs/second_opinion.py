@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from burg_drake.station.document import Engine
 
 REJUDGE = ("contested",)
-SETTLED = ("judged_again", "outcome_before", "outcome", "confidence")
-"""Columns that `settled_line` is told from."""
+SETTLED_COLUMNS = ("judged_again", "outcome_before", "outcome", "confidence")
+"""Columns that `settled_line` reads."""
 
 
 def add_rejudge_contested(parser: Parser) -> None:
@@ -82,11 +82,11 @@ def settled_line(columns: Columns) -> str:
     """How many verdicts another engine has settled, and how many of them changed.
 
     Args:
-        columns: `SETTLED` of a run.
+        columns: `SETTLED_COLUMNS` of a run.
     """
     import numpy as np
 
-    engine, before, outcome, confidence = (columns[name] for name in SETTLED)
+    engine, before, outcome, confidence = (columns[name] for name in SETTLED_COLUMNS)
     again = np.flatnonzero(engine != "")
     if not len(again):
         known = np.isfinite(confidence).any()

@@ -46,7 +46,7 @@ def add_show_simulated(parser: Parser, more: str = "") -> None:
 
 
 def print_damage(book: TrialBook) -> bool:
-    """Says on standard error which lines of the journal cannot be read; whether there are any."""
+    """Prints damaged lines of the journal to standard error. Returns True if there are any."""
     damage = book.damage()
     if damage:
         print(f"burg-drake: {damage}", file=sys.stderr)

@@ -36,17 +36,18 @@ from burg_drake.core import (
 
 PORTS = 50
 """How many ports are tried if none is given."""
-IDLE = 30.0
-"""A connection that was admitted is closed after this without a request [s]; a client that does not
-take an answer, too."""
+IDLE_TIMEOUT = 30.0
+"""Seconds without a request after which an admitted connection is closed; also the time that a
+client has to take an answer."""
 REQUEST_TIMEOUT = 10.0
-"""Time for a whole request, head and body, and for the first one to begin [s]."""
+"""Seconds for a whole request, head and body, and for the first one to begin."""
 BROWSER_CONNECTIONS = 6
-"""That a browser opens to one server at most."""
-MOST_REFUSALS = 8
-"""Connections beyond those that are told so at a time; more are closed without a word."""
-REFUSED_WITHIN = 2.0
-"""How long a connection too many may take to ask for something [s]."""
+"""Most connections a browser opens to one server."""
+MAX_REFUSALS = 8
+"""Maximum number of surplus connections answered with status 503 at a time; further ones are closed
+without an answer."""
+REFUSAL_TIMEOUT = 2.0
+"""Seconds that a surplus connection has for its request."""
 
 Handler = Callable[[Any], None]
 """Answers a request, with the body of a POST, or the query of a GET."""
@@ -69,7 +70,7 @@ class PageServer(ThreadingHTTPServer):
     Attributes:
         first_port: the first port that is tried.
         title: of what is served, for messages.
-        poll: between two looks of whether to stop serving [s].
+        poll: seconds between checks whether to stop serving.
         host: as given.
 
     Raises:
@@ -136,13 +137,13 @@ class PageServer(ThreadingHTTPServer):
         return connection in self._refused
 
     def admit(self, connection: socket.socket) -> None:
-        """Notes that a connection has asked for something that it may have."""
+        """Notes that a connection has made a request that was not refused."""
         with self._lock:
             if connection in self._served:
                 self._admitted.add(connection)
 
     def is_admitted(self, connection: socket.socket) -> bool:
-        """Whether it has."""
+        """Whether a connection was admitted."""
         return connection in self._admitted
 
     def process_request(self, request: Any, client_address: Any) -> None:
@@ -151,7 +152,7 @@ class PageServer(ThreadingHTTPServer):
         with self._lock:
             if self._make_room(address):
                 self._served[request] = address
-            elif len(self._refused) + len(self._ending) < MOST_REFUSALS:
+            elif len(self._refused) + len(self._ending) < MAX_REFUSALS:
                 self._refused.add(request)
             else:
                 super().shutdown_request(request)
@@ -167,8 +168,8 @@ class PageServer(ThreadingHTTPServer):
         super().shutdown_request(request)
 
     def _make_room(self, address: str) -> bool:
-        """Whether one more connection from an address can be served, after another one has been
-        closed that is not admitted, if there are too many."""
+        """Whether one more connection from an address can be served. If there are too many, this
+        closes one that is not admitted."""
         own = [c for c, of in self._served.items() if of == address]
         share = max(BROWSER_CONNECTIONS, self.connections // 2)
         most = self.connections if address == LOOPBACK else share
@@ -176,10 +177,12 @@ class PageServer(ThreadingHTTPServer):
             return True
         among = own if len(own) >= most else list(self._served)
         waiting = [c for c in among if c not in self._admitted]
-        if not waiting or len(self._ending) >= MOST_REFUSALS:
+        if not waiting or len(self._ending) >= MAX_REFUSALS:
             return False
         counts = Counter(self._served[c] for c in waiting)
-        oldest = max(waiting, key=lambda c: counts[self._served[c]])  # of those alike the first
+        oldest = max(
+            waiting, key=lambda c: counts[self._served[c]]
+        )  # the first of those with equal counts
         del self._served[oldest]
         self._ending.add(oldest)
         with contextlib.suppress(OSError):
@@ -196,7 +199,8 @@ LOOPBACK = "this machine"
 
 
 def _address(host: str) -> str:
-    """What connections are counted by: an address, of IPv6 the network that one site has."""
+    """The key by which connections are counted: an IPv4 address, or the /64 network of an IPv6
+    address."""
     ip = ipaddress.ip_address(host.partition("%")[0])
     mapped = getattr(ip, "ipv4_mapped", None) or ip
     if mapped.is_loopback:
@@ -205,22 +209,22 @@ def _address(host: str) -> str:
 
 
 class _TimedStream(io.RawIOBase):
-    """What a connection sends, until a deadline."""
+    """The stream of a connection's data, with a deadline."""
 
     def __init__(self, connection: socket.socket, seconds: float) -> None:
         self._connection = connection
         self.expect_within(seconds)
 
     def expect_within(self, seconds: float) -> None:
-        """Puts the deadline so many seconds from now."""
+        """Sets the deadline to this many seconds from now."""
         self._deadline = time.monotonic() + seconds
 
     def readable(self) -> bool:
-        """Nothing else."""
+        """The stream can be read, and not written."""
         return True
 
     def readinto(self, buffer: Any) -> int:
-        """Reads what there is.
+        """Reads the data that have arrived.
 
         Raises:
             TimeoutError: the deadline has passed.
@@ -249,7 +253,7 @@ class PageHandler(BaseHTTPRequestHandler):
     """
 
     protocol_version = "HTTP/1.1"
-    timeout = IDLE
+    timeout = IDLE_TIMEOUT
     server: PageServer
     package: str
     pages: Mapping[str, tuple[str, str]]
@@ -267,7 +271,7 @@ class PageHandler(BaseHTTPRequestHandler):
     def handle_one_request(self) -> None:
         """Waits for a request, and answers it."""
         if self.server.is_admitted(self.connection):
-            self._stream.expect_within(IDLE)
+            self._stream.expect_within(IDLE_TIMEOUT)
             try:
                 self._received.peek(1)
             except TimeoutError:
@@ -279,7 +283,7 @@ class PageHandler(BaseHTTPRequestHandler):
     @property
     def _request_timeout(self) -> float:
         """Time for a request [s]."""
-        return REFUSED_WITHIN if self.server.refuses(self.connection) else REQUEST_TIMEOUT
+        return REFUSAL_TIMEOUT if self.server.refuses(self.connection) else REQUEST_TIMEOUT
 
     def admitted(self) -> tuple[str, dict[str, str]]:
         """Path and query of a request.

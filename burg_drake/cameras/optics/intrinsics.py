@@ -19,8 +19,8 @@ from burg_drake.station.document import HALF_PIXEL as HALF_PIXEL, MAX_SIDE, Came
 
 DISTORTION_SIZES = (0, 4, 5, 8, 12, 14)
 """Numbers of coefficients that OpenCV's model of a lens may have."""
-RANGES = {"focal": (1.0, 1e6), "center": (-1e6, 1e6), "distortion": (-1e12, 1e12)}
-"""Of each number, far beyond those of any camera: with others projections overflow."""
+INTRINSICS_RANGES = {"focal": (1.0, 1e6), "center": (-1e6, 1e6), "distortion": (-1e12, 1e12)}
+"""Allowed values, far beyond those of any camera; projections overflow with larger ones."""
 LensModel = Literal["perspective", "fisheye"]
 
 
@@ -75,7 +75,7 @@ class Intrinsics:
                 f"image of {self.width} x {self.height} pixels; a side has at most {MAX_SIDE:,}",
                 "width" if self.width > MAX_SIDE else "height",
             )
-        for name, (low, high) in RANGES.items():
+        for name, (low, high) in INTRINSICS_RANGES.items():
             for value in getattr(self, name):
                 if not low <= value <= high:
                     raise FieldError(f"{name} has {value:g}; it must be {low:g} to {high:g}", name)

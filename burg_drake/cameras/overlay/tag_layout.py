@@ -13,12 +13,12 @@ from burg_drake.core import Array, Bytes
 
 GAP = 4
 """Between a tag and what it names, and between tags [pixels]."""
-ROWS = 4
-"""Distances from its body that are tried for a tag, a tag's height apart."""
+TAG_ROWS = 4
+"""Number of distances from the body at which a tag is tried; they are a tag's height apart."""
 ROW_COST = 0.05
-"""Share of a tag that may lie on bodies rather than that the tag moves away by its height."""
+"""Cost of moving a tag away by its height, as the share of the tag that covers bodies."""
 LEADER_DISTANCE = 12.0
-"""A tag farther than this from its box has a line that leads there [pixels]."""
+"""Distance of a tag from its box beyond which a line connects them [pixels]."""
 Corner = tuple[int, int]
 Plate = tuple[Bytes, NDArray[np.uint16]]
 
@@ -82,7 +82,7 @@ def _options(box: Array, width: int, height: int) -> list[tuple[Corner, int]]:
     (left, top), (right, bottom) = np.round(box).astype(int).tolist()
     x, y = (left + right - width) // 2, (top + bottom - height) // 2
     options: list[tuple[Corner, int]] = []
-    for row in range(ROWS):
+    for row in range(TAG_ROWS):
         away = GAP + row * (height + 2)
         for column in (x, left, right - width):
             options += [((column, top - height - away), row), ((column, bottom + away), row)]

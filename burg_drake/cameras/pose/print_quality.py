@@ -28,7 +28,7 @@ BLOOM = 0.5
 0.2 in pictures that are overexposed twice."""
 ROWS = 0.5
 """What the camera does between the first and the last row that is worth telling [pixels]."""
-MOST_ROWS, MOST_BESIDE, MOST_HEIGHT = 10.0, 5e-3, 8e-3
+MAX_ROW_MOTION, MAX_PAGE_SHIFT, MOST_HEIGHT = 10.0, 5e-3, 8e-3
 """Motion while rows are exposed [pixels], shift of a page and height of a bulge [m] beyond which no
 pose is given. In pictures of the room with 6 pixels, pages glued 2 mm aside along both axes and an
 edge that curls up by 6 mm, less is found and the covariance holds."""
@@ -59,7 +59,11 @@ def implausible(found: Disturbance) -> str:
             f"another board: {1.0 + found.aspect:.2f} times as long along y as along x; or check"
             " the intrinsics"
         )
-    if found.rows > MOST_ROWS or found.in_plane > MOST_BESIDE or found.out_of_plane > MOST_HEIGHT:
+    if (
+        found.rows > MAX_ROW_MOTION
+        or found.in_plane > MAX_PAGE_SHIFT
+        or found.out_of_plane > MOST_HEIGHT
+    ):
         return (
             "markers are not where a board that lies still and flat has them: check the intrinsics,"
             " light, and that the board is one sheet"

@@ -28,13 +28,13 @@ class MoveObjects:
     """Brings objects to other poses.
 
     Attributes:
-        X_SO: (4, 4) poses by instance. Where movement is planar, their height and tilt are not
-            taken.
-        raises: their height is taken even then.
+        X_SO: (4, 4) poses by instance. Where movement is planar, objects keep their height and
+            tilt.
+        changes_height: Heights change even while objects are kept upright.
     """
 
     X_SO: Mapping[str, ArrayLike] = field(default_factory=dict)
-    raises: bool = False
+    changes_height: bool = False
 
     @property
     def label(self) -> str:
@@ -45,7 +45,8 @@ class MoveObjects:
         X_SO = {name: _checked(X, name) for name, X in self.X_SO.items()}
         if surroundings.planar:
             X_SO = {
-                name: upright(state.X_SO(name), X, raises=self.raises) for name, X in X_SO.items()
+                name: upright(state.X_SO(name), X, changes_height=self.changes_height)
+                for name, X in X_SO.items()
             }
         return state.moved(X_SO).select(X_SO)
 
@@ -170,11 +171,11 @@ def stable_pose_matrix(state: State, object: str, stable_pose: int) -> Array:
         raise InvalidInputError(f"{object!r}: {error}") from error
 
 
-def upright(X_SO: Array, X_new: Array, *, raises: bool) -> Array:
-    """(4, 4) `X_new` with the tilt of `X_SO`, and with its height unless that is to be taken."""
+def upright(X_SO: Array, X_new: Array, *, changes_height: bool) -> Array:
+    """(4, 4) `X_new` with the tilt of `X_SO`, and with its height unless heights change."""
     R_SO = X_SO[:3, :3]
     yaw = yaw_between(R_SO, X_new[:3, :3])
-    height = (X_new if raises else X_SO)[2, 3]
+    height = (X_new if changes_height else X_SO)[2, 3]
     return make_pose(rot_z(yaw) @ R_SO, (*X_new[:2, 3], height))
 
 

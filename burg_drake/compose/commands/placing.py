@@ -30,7 +30,7 @@ from burg_drake.scene.document import Instance
 from burg_drake.station.document import boxes_in_scene
 
 GAP = 0.01
-"""Between copies that have no place on the board and what is there [m]."""
+"""Gap between the board's objects and copies for which the board has no room [m]."""
 
 
 @dataclass(frozen=True)

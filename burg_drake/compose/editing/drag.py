@@ -51,7 +51,7 @@ class Drag:
         self._session = session
         self._start = {name: start.X_SO(name) for name in names}
         self._X_SO: dict[str, ArrayLike] = dict(self._start)
-        self._raises = False
+        self._changes_height = False
         self._asked = self._checked = 0
         self._newest = threading.Lock()
         self._checking = threading.Lock()
@@ -61,12 +61,12 @@ class Drag:
         """It was ended or cancelled, or something else changed the scene."""
         return not self._session.holds(self)
 
-    def move(self, X_SO: Mapping[str, ArrayLike], *, raises: bool = False) -> SessionView:
+    def move(self, X_SO: Mapping[str, ArrayLike], *, changes_height: bool = False) -> SessionView:
         """Holds instances at poses.
 
         Args:
             X_SO: (4, 4) by name of all instances that are held, or of some.
-            raises: their heights are taken even where movement is planar.
+            changes_height: Heights change even while objects are kept upright.
 
         Returns:
             The scene with them there, and the status of all instances.
@@ -78,14 +78,14 @@ class Drag:
             if name not in self._start:
                 raise InvalidInputError(f"{name!r} is not held; drag it, too")
         with self._newest:
-            self._X_SO, self._raises = {**self._X_SO, **X_SO}, raises
+            self._X_SO, self._changes_height = {**self._X_SO, **X_SO}, changes_height
             self._asked += 1
             number = self._asked
         with self._checking:
             with self._newest:
                 if number <= self._checked:  # newer poses were checked while this call waited
                     return self._session.view
-                self._checked, move = self._asked, MoveObjects(self._X_SO, self._raises)
+                self._checked, move = self._asked, MoveObjects(self._X_SO, self._changes_height)
             return self._session.preview(self, move)
 
     def move_by(self, offset: tuple[float, float, float], yaw: float = 0.0) -> SessionView:

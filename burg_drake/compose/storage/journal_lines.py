@@ -20,10 +20,10 @@ from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.document import Instance, SceneDocument
 
 VERSION = 1
-UNREADABLE = (BurgError, ValueError, KeyError, TypeError, AttributeError, OverflowError)
-"""What reading a damaged line ends in."""
-LINE = Limits(size=1 << 26, values=1_000_000, depth=8)
-"""Of one line; the deepest has a list of instances, each with a list of numbers."""
+DAMAGE_ERRORS = (BurgError, ValueError, KeyError, TypeError, AttributeError, OverflowError)
+"""Exceptions that a damaged line raises."""
+LINE_LIMITS = Limits(size=1 << 26, values=1_000_000, depth=8)
+"""Of one line; the deepest one holds a list of instances, each with a list of numbers."""
 
 
 class JournalWriter:
@@ -120,10 +120,10 @@ class JournalReader:
         """
         self._whole_line = True
         try:
-            self._take(parse_json(line, "journal", LINE))
-        except UNREADABLE:
+            self._take(parse_json(line, "journal", LINE_LIMITS))
+        except DAMAGE_ERRORS:
             self._whole_line = False
-            self._next = None  # how many instances the line had is not known
+            self._next = None  # the number of instances in the line is unknown
         self._damaged |= not self._whole_line
         return self._whole_line
 
@@ -201,7 +201,7 @@ class JournalReader:
         for number, values in enumerate(written, first):
             try:
                 found[number] = _read(values)
-            except UNREADABLE:
+            except DAMAGE_ERRORS:
                 self._whole_line = False
         return found
 
@@ -220,7 +220,7 @@ def library_roots(lines: list[str]) -> list[str]:
         if '"library"' not in line:
             continue
         try:
-            values = parse_json(line, "journal", LINE)
+            values = parse_json(line, "journal", LINE_LIMITS)
         except BurgError:
             continue
         if isinstance(values, dict) and isinstance(values.get("library"), str):

@@ -12,20 +12,20 @@ from burg_drake.core.documents import Pose, Vector3, parse_document, plain_data,
 from burg_drake.dataset.appearance.settings import Pattern
 
 WHITE: Vector3 = (1.0, 1.0, 1.0)
-BRIGHTEST = 1e4
-"""Irradiance, gain or part of a colour, of which 1 makes a white surface white."""
-RANGES = {
+MAX_GAIN = 1e4
+"""Maximum irradiance, gain or component of a colour; with 1 a white surface is white."""
+CAMERA_RANGES = {
     "exposure": (-20.0, 20.0),
     "gamma": (0.05, 20.0),
     "blur": (0.0, 100.0),
     "electrons": (1.0, 1e12),
 }
-"""Of a camera, far beyond those that looks are drawn from."""
+"""Allowed values of a camera, far beyond those that looks are sampled from."""
 
 
 def _require_gains(values: Vector3, name: str) -> None:
-    if not 0.0 <= min(values) <= max(values) <= BRIGHTEST:
-        raise FieldError(f"{name} {list(values)} must be 0 to {BRIGHTEST:g} each", name)
+    if not 0.0 <= min(values) <= max(values) <= MAX_GAIN:
+        raise FieldError(f"{name} {list(values)} must be 0 to {MAX_GAIN:g} each", name)
 
 
 def _require_seed(seed: int | None, name: str) -> None:
@@ -58,7 +58,7 @@ class DirectedLight:
                 "a light needs a direction and a color; given:"
                 f" {list(self.direction)}, {list(self.color)}"
             )
-        require_ranges(self, {"irradiance": (0.0, BRIGHTEST)})
+        require_ranges(self, {"irradiance": (0.0, MAX_GAIN)})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,7 +96,11 @@ class Photometry:
     electrons: float | None = None
 
     def __post_init__(self) -> None:
-        known = {name: bounds for name, bounds in RANGES.items() if getattr(self, name) is not None}
+        known = {
+            name: bounds
+            for name, bounds in CAMERA_RANGES.items()
+            if getattr(self, name) is not None
+        }
         require_ranges(self, known)
         _require_gains(self.white_balance, "white_balance")
 
@@ -144,7 +148,7 @@ class Appearance:
 
     def __post_init__(self) -> None:
         _require_seed(self.room, "room")
-        require_ranges(self, {"room_light": (0.0, BRIGHTEST)})
+        require_ranges(self, {"room_light": (0.0, MAX_GAIN)})
         if self.room_light and self.room is None:
             raise FieldError(
                 f"room_light is {self.room_light:g}; it is 0 without a room", "room_light"

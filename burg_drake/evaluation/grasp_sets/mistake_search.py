@@ -36,43 +36,44 @@ if TYPE_CHECKING:
     from burg_drake.station.diagram import StationDiagram
 
 MAX_GRASPS = 24
-"""So many grasps of a set are looked at."""
+"""Maximum number of grasps of a set that are examined."""
 MIN_FITTING = 3
-"""Where fewer fit once a mistake is corrected, it is not named."""
+"""Minimum number of grasps that have to fit after the correction for a mistake to be reported."""
 MIN_SHARE, MIN_SHARE_COMBINED = 0.6, 0.8
-"""A mistake is named where at least this share of the grasps fits once it is corrected; more where
-two are to be corrected together, or the distance is not that of a known frame. Of grasps sampled by
+"""Minimum share of the grasps that has to fit after the correction; the second one applies to two
+mistakes at once, and to distances that no known frame has. Of grasps sampled by
 points alone, which are often in a collision, up to 0.67 fit if a quarter turn and a distance are
 combined."""
 MIN_SHARE_ABOUT = 0.9
 """The same of turns about the closing direction, which the pads do not notice."""
 MIN_GAIN = 2.5
-"""So many times as many have to fit as before."""
+"""Minimum ratio of the grasps that fit after the correction to those that fit before."""
 MAX_CLOSING = 0.4
 """Where the pads close on the object at a larger share of the grasps, whatever the rest of the hand
 hits, closing direction and origin are right, and only the approach can be wrong. On the built-in
 objects the share is 0.67 to 1 for right sets (0.17 for scissors), and at most 0.38 for grasps that
 are turned or moved, unless turned grasps of thin objects hold as well."""
-TIE = 0.9
-"""Mistakes whose counts differ by less than this factor are held to be equally good."""
-FRICTION = 0.5
-"""Least coefficient of friction that the pads are taken to have: sets from elsewhere were made with
-others than ours."""
-HALF = (0.35, 0.6)
-"""Ratios of width to distance between the patches of contact that are taken for a half. Of right
-widths the ratio is 0.75 to 1.07 at nearly all grasps: it is least at the curved wall of a mug."""
-FAR = 1.0
-"""Lengths are tried as millimetres where half of the grasps are farther from the origin [m]."""
-TOUCHED = [
+TIE_RATIO = 0.9
+"""Mistakes count as equally good if the ratio of their counts is above this."""
+MIN_FRICTION = 0.5
+"""Minimum friction coefficient assumed for the pads, as sets from elsewhere assume other
+coefficients than ours."""
+HALF_WIDTH_RATIOS = (0.35, 0.6)
+"""Range of the ratio of width to distance of the contact patches that is taken for half widths.
+For correct widths nearly all ratios are 0.75 to 1.07, the smallest at the curved wall of a mug."""
+MILLIMETRE_DISTANCE = 1.0
+"""Lengths are also tried as millimetres if the median distance of the grasps from the origin is
+larger [m]."""
+CONTACT_OUTCOMES = [
     outcome.value
     for outcome in Outcome
     if outcome.held or outcome in (Outcome.SLIPPED, Outcome.DROPPED, Outcome.BLOCKED)
 ]
-"""Outcomes of grasps that both fingers have touched their object at."""
+"""Outcomes of grasps at which both fingers have touched the object."""
 SAME_READER = ("isaac_grasp", "graspgen_yaml")
-"""Formats of which either can be read as the other."""
+"""Formats that can be read as one another."""
 R_BODY_OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
-"""A camera as OpenCV has it in a body whose x points forward, as ROS has it."""
+"""Orientation of a camera's optical frame (OpenCV) in its body frame (ROS, x forward)."""
 
 Fits = NDArray[np.bool_]
 
@@ -135,7 +136,7 @@ def given_hints(run: Run) -> tuple[str, ...]:
     """
     if run.document.grasps.origin != "given":
         return ()
-    touched = np.isin(run.results["outcome"], TOUCHED)
+    touched = np.isin(run.results["outcome"], CONTACT_OUTCOMES)
     with contextlib.suppress(BurgError):
         scene, station = run.scene(), run.station()
         grasps = of_instances(run.candidates.grasps.with_columns(instance=run.candidates.instance))
@@ -156,7 +157,7 @@ def half_width_notes(
         contacts = grasp_contacts(test.surface(name), part.X_OG[known], test.jaws)
         apart = np.linalg.norm(contacts.p_OC[:, 1] - contacts.p_OC[:, 0], axis=-1)
         ratios += (part.width[known] / apart)[contacts.touching].tolist()
-    half = sum(HALF[0] < ratio < HALF[1] for ratio in ratios)
+    half = sum(HALF_WIDTH_RATIOS[0] < ratio < HALF_WIDTH_RATIOS[1] for ratio in ratios)
     if half < max(MIN_FITTING, MIN_SHARE_COMBINED * len(ratios)):
         return ()
     return (
@@ -205,7 +206,7 @@ class _Search:
     def mistakes(self) -> list[Mistake]:
         """Those that can have been made."""
         found = usual_mistakes(self.format, self._gripper)
-        if np.median(np.linalg.norm(self._X_MG[:, :3, 3], axis=-1)) < FAR:
+        if np.median(np.linalg.norm(self._X_MG[:, :3, 3], axis=-1)) < MILLIMETRE_DISTANCE:
             found = [mistake for mistake in found if mistake.correction != ("millimetres",)]
         if self._scene is None:
             return found
@@ -339,7 +340,7 @@ class _FitTest:
         for name in dict.fromkeys(names.tolist()):
             mine = names == name
             contacts = grasp_contacts(self.surface(name), X_OG[mine], self.jaws)
-            friction = max(FRICTION, self._library.entry(self._object(name)).friction)
+            friction = max(MIN_FRICTION, self._library.entry(self._object(name)).friction)
             closing[mine] = are_antipodal(contacts, X_OG[mine], friction)
         return closing
 
@@ -407,11 +408,11 @@ def _decide(search: _Search, mistakes: Sequence[Mistake], fits: Fits) -> Mistake
     best = max(count.values())
     named = [m for m in count if not m.step]
     top = max((count[m] for m in named), default=0)
-    good = [m for m in named if count[m] == top] if top >= TIE * best else []
+    good = [m for m in named if count[m] == top] if top >= TIE_RATIO * best else []
     chosen = good[0] if good else next(m for m in count if count[m] == best)
     reach = None
     if chosen.forward and chosen.moves_frame:
-        run = _run_of(chosen, count, TIE * best)
+        run = _run_of(chosen, count, TIE_RATIO * best)
         known = [m for m in count if m in run and not m.step and m.forward]
         middle = 0.5 * (run[0].forward + run[-1].forward)
         chosen = known[0] if known else min(run, key=lambda m: abs(m.forward - middle))

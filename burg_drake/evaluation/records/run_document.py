@@ -221,8 +221,9 @@ def _sampled(grasps: Grasps) -> str:
     how = "sampled blind" if grasps.blind else "clear of the scene"
     where = f", on {', '.join(grasps.only)}" if grasps.only else ""
     balance = (
-        f", more until {grasps.until_balanced} of each object are lifted and as many are not, among"
-        f" {grasps.balanced_among}, {grasps.max_per_object} at most"
+        f", more until each object has {grasps.until_balanced} lifted and"
+        f" {grasps.until_balanced} failing ones (counted: {grasps.balanced_among}; at most"
+        f" {grasps.max_per_object} grasps)"
         if grasps.until_balanced
         else ""
     )

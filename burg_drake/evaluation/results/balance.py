@@ -1,4 +1,4 @@
-"""Lifted and failing grasps of each object, for runs that are to have enough of both."""
+"""Counts of lifted and failing grasps of each object, and notes on objects with too few."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from burg_drake.evaluation.store import Run
 
 
 def lifted_and_failed(run: Run) -> dict[str, tuple[int, int]]:
-    """Numbers of judged grasps that are lifted, and that are not, by object; of those that the run
-    counts, see `EvaluationSettings.balanced_among`."""
+    """Numbers of lifted and of failing grasps by object, among the judged grasps that the run
+    counts; see `EvaluationSettings.balanced_among`."""
     columns, grasps = run.results, run.document.grasps
     counted = np.isin(columns["stage"], [s.value for s in STAGES_AMONG[grasps.balanced_among]])
     counted &= columns["outcome"] != Outcome.SIMULATION_FAILED.value
@@ -20,7 +20,7 @@ def lifted_and_failed(run: Run) -> dict[str, tuple[int, int]]:
 
 
 def unbalanced_notes(run: Run) -> list[str]:
-    """A sentence for each object that has fewer of either than the run was to have, once all of its
+    """A sentence for each object with fewer lifted or failing grasps than asked for, once all
     grasps are judged."""
     grasps = run.document.grasps
     if not grasps.until_balanced or not run.complete:
@@ -28,14 +28,16 @@ def unbalanced_notes(run: Run) -> list[str]:
     notes = []
     for name, counts in lifted_and_failed(run).items():
         parts = [
-            f"{n} of {grasps.until_balanced} grasps that {what}"
-            for n, what in zip(counts, ("are lifted", "fail"), strict=True)
+            f"{n} of the {grasps.until_balanced} {what}"
+            for n, what in zip(counts, ("lifted", "failing"), strict=True)
             if n < grasps.until_balanced
         ]
         if parts:
+            among = grasps.balanced_among
+            counted = "" if among == "all" else f" ({among} ones count)"
             notes.append(
-                f"{name}: {' and '.join(parts)}, among {grasps.balanced_among} ones, after"
-                f" {grasps.objects[name]:,} grasps; no more were to be sampled"
-                f" (max_grasps_per_object {grasps.max_per_object:,})"
+                f"{name}: {' and '.join(parts)} grasps asked for{counted}, after"
+                f" {grasps.objects[name]:,} grasps (max_grasps_per_object is"
+                f" {grasps.max_per_object:,})"
             )
     return notes

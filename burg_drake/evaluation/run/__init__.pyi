@@ -1,4 +1,4 @@
-from .balancing import grow as grow
+from .balancing import next_round as next_round
 from .completeness import require_judged as require_judged
 from .many_scenes import evaluate_scenes as evaluate_scenes
 from .preparation import (

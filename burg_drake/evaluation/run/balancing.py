@@ -1,8 +1,8 @@
-"""Goes on sampling where a run is to have some lifted grasps of each object and some that fail.
+"""Samples further grasps until a run has enough lifted and enough failing ones of each object.
 
-A run grows in rounds, each of which begins when all grasps so far are judged: what is sampled next
-follows from verdicts alone, never from who judged them or in which order. Grasps of a later round
-are those of a longer sampling with the same seed, whose first ones are there already.
+Each round begins when all grasps so far are judged. What it samples follows from the verdicts
+alone, not from who judged them or in which order. A later round repeats the sampling with the same
+seed and a larger number, so that it begins with the grasps that are there already.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from burg_drake.evaluation.store import Run
 from burg_drake.scene.document import Scene
 from burg_drake.station.document import Station
 
-Asked = dict[str, tuple[int, int]]
-"""How many ordinary and how many slippery grasps are sampled, by object."""
+RequestedCounts = dict[str, tuple[int, int]]
+"""Numbers of ordinary and of slippery grasps to sample, by object."""
 
 
-def sample_asked(scene: Scene, station: Station, document: RunDocument) -> Candidates:
+def sample_requested(scene: Scene, station: Station, document: RunDocument) -> Candidates:
     """The grasps that a run's document asks for.
 
     Args:
@@ -44,7 +44,7 @@ def sample_asked(scene: Scene, station: Station, document: RunDocument) -> Candi
     for slippery in (False, True):
         by_count: defaultdict[int, list[str]] = defaultdict(list)
         for name in names:
-            by_count[_asked(grasps, scene.instance(name).object)[slippery]].append(name)
+            by_count[_requested(grasps, scene.instance(name).object)[slippery]].append(name)
         for count, those in sorted(by_count.items()):
             if count:
                 settings = SamplingSettings(
@@ -58,28 +58,29 @@ def sample_asked(scene: Scene, station: Station, document: RunDocument) -> Candi
     return join_candidates({name: _joined(found[name]) for name in names})
 
 
-def grow(run: Run) -> RunDocument | None:
+def next_round(run: Run) -> RunDocument | None:
     """The document of a judged run that asks for more grasps; None if no more are needed.
 
-    None are if each object has as many grasps of both kinds as are wanted, or no more are to be
-    sampled. A run that a second engine has judged again does not grow any more.
+    None are needed if each object has enough lifted and enough failing grasps, or the maximum of
+    grasps. A run that a second engine has judged again gets no further round.
     """
     grasps = run.document.grasps
     if not grasps.until_balanced or any(v.judged_again for v in run.verdicts.values()):
         return None
-    asked = {name: _more(grasps, name, counts) for name, counts in lifted_and_failed(run).items()}
-    if all(asked[name] == _asked(grasps, name) for name in asked):
+    counts = lifted_and_failed(run)
+    requested: RequestedCounts = {name: _more(grasps, name, counts[name]) for name in counts}
+    if all(requested[name] == _requested(grasps, name) for name in requested):
         return None
-    return replace(run.document, grasps=replace(grasps, asked=asked))
+    return replace(run.document, grasps=replace(grasps, asked=requested))
 
 
-def _asked(grasps: Grasps, object: str) -> tuple[int, int]:
+def _requested(grasps: Grasps, object: str) -> tuple[int, int]:
     return grasps.asked.get(object, (grasps.per_object or 0, 0))
 
 
 def _more(grasps: Grasps, object: str, counts: tuple[int, int]) -> tuple[int, int]:
     """How many grasps are sampled in the next round: twice as many of what is missing."""
-    ordinary, slippery = _asked(grasps, object)
+    ordinary, slippery = _requested(grasps, object)
     lifted, failed = (n < grasps.until_balanced for n in counts)
     room = grasps.max_per_object - ordinary - slippery
     more = np.array([ordinary * lifted, (slippery or grasps.per_object or 0) * failed])

@@ -22,7 +22,7 @@ from burg_drake.evaluation.records import (
     write_table,
 )
 from burg_drake.evaluation.report import write_report
-from burg_drake.evaluation.run.balancing import sample_asked
+from burg_drake.evaluation.run.balancing import sample_requested
 from burg_drake.evaluation.run.request import ByInstance, Request
 from burg_drake.evaluation.stages import require_scene_for
 from burg_drake.evaluation.store import (
@@ -88,7 +88,7 @@ def open_run(
     if candidates is None:
         sampling()
         start = time.process_time()
-        candidates = sample_asked(scene, request.station, document)
+        candidates = sample_requested(scene, request.station, document)
         document = _with_grasps(document, scene, candidates, time.process_time() - start)
     document = replace(document, hash=run_hash(document))
     return create_run(folder, document, scene, request.station, candidates)
@@ -101,7 +101,7 @@ def extend_run(run: Run, document: RunDocument, scene: Scene, station: Station) 
     their hash: `open_run` then samples those of the document again.
     """
     start = time.process_time()
-    candidates = sample_asked(scene, station, document)
+    candidates = sample_requested(scene, station, document)
     cpu = document.grasps.cpu + time.process_time() - start
     document = _with_grasps(document, scene, candidates, cpu)
     candidates.save(run.path / GRASPS_FILE)

@@ -29,6 +29,6 @@ from .run_agreement import (
     MarginDifference as MarginDifference,
     RunAgreement as RunAgreement,
 )
-from .standing_out import StandingOut as StandingOut
+from .standing_out import OutlierGroup as OutlierGroup
 from .tables import comparison_tables as comparison_tables
 from .wording import interval as interval

@@ -20,7 +20,7 @@ from burg_drake.experiment.comparison.groups import (
     stopped,
 )
 from burg_drake.experiment.comparison.placement_error import PlacementAgreement
-from burg_drake.experiment.comparison.standing_out import StandingOut, standing_out
+from burg_drake.experiment.comparison.standing_out import OutlierGroup, standing_out
 from burg_drake.experiment.pairing import VerdictPairs
 from burg_drake.experiment.statistics import (
     Agreement,
@@ -73,17 +73,17 @@ class Strata:
 
 @dataclass(frozen=True, kw_only=True)
 class Unpredictable:
-    """Trials that ended as no verdict of the hand alone can predict, and the figures without them.
+    """Failures that a run of the hand alone does not predict, and figures without them.
 
     Attributes:
         outcomes: these trials by how they ended, the most frequent first.
-        promised: how many of them were predicted to succeed.
+        predicted_successes: number of these trials that were predicted to succeed.
         selected, all_grasps: figures of the other trials, and of the grasps that they stand for;
             see `Judgement`.
     """
 
     outcomes: dict[str, int]
-    promised: int
+    predicted_successes: int
     selected: Agreement
     all_grasps: Agreement | None
 
@@ -97,13 +97,13 @@ class Judgement:
         all_grasps: figures of all grasps that they were chosen from, each trial standing for so
             many; None if nothing says what they were chosen from.
         not_represented: grasps that could have been chosen and that no trial stands for.
-        unpredictable: trials that ended as no verdict of a run of the hand alone can predict; all
-            other figures count them as failures. None of other modes, and where there are none.
+        unpredictable: failures that a run of the hand alone does not predict; all other figures
+            count them as failures. None if there are none, and in other modes.
         bias: predicted against actual success of the trials themselves; `all_grasps.excess` says
             whether it promises too much or too little where trials stand for others.
         standing_out: objects and causes whose verdicts are wrong more often than those of others,
             without what is unpredictable. Of real trials alone.
-        looked_at: how many groups were tested for that.
+        tested_groups: number of groups tested for that.
         objects, scenes, stages: figures by object, by scene, and by the stage that decided.
         stopped: what became of the grasps by verdict and body in the way.
         outcomes: trials by verdict and what happened.
@@ -117,8 +117,8 @@ class Judgement:
     not_represented: int
     unpredictable: Unpredictable | None
     bias: Paired
-    standing_out: tuple[StandingOut, ...]
-    looked_at: int
+    standing_out: tuple[OutlierGroup, ...]
+    tested_groups: int
     objects: tuple[FactorGroup, ...]
     scenes: tuple[FactorGroup, ...]
     stages: tuple[FactorGroup, ...]
@@ -155,14 +155,14 @@ def judgement(
     selected, represented = _agreements(pairs, strata, seed)
     names = {outcome.value for outcome in unpredictable}
     apart = pairs.ended.where([name in names for name in pairs.ended.names])
-    found, looked_at = standing_out(pairs.take(~apart)) if real else ((), 0)
+    found, tested_groups = standing_out(pairs.take(~apart)) if real else ((), 0)
     return Judgement(
         selected=selected,
         all_grasps=represented,
         not_represented=0 if strata is None else strata.missing,
         unpredictable=_without(pairs, strata, apart, seed) if apart.any() else None,
         standing_out=found,
-        looked_at=looked_at,
+        tested_groups=tested_groups,
         bias=paired(pairs.predicted, pairs.actual, seed=seed),
         objects=by_factor(pairs, pairs.object, seed=seed),
         scenes=by_factor(pairs, pairs.scene, scenes, seed=seed),
@@ -193,7 +193,7 @@ def _without(pairs: VerdictPairs, strata: Strata | None, apart: Flags, seed: int
     ended = Counter(pairs.ended.names[k] for k in pairs.ended.index[apart].tolist())
     return Unpredictable(
         outcomes=dict(ended.most_common()),
-        promised=int(pairs.predicted[apart].sum()),
+        predicted_successes=int(pairs.predicted[apart].sum()),
         selected=selected,
         all_grasps=represented,
     )

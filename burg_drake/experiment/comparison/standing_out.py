@@ -16,13 +16,13 @@ import numpy as np
 from burg_drake.experiment.pairing import Factor, VerdictPairs
 from burg_drake.experiment.statistics import Flags, excess_p_value, holm
 
-LEVEL = 0.05
-"""Probability of naming anything where nothing stands out, at most."""
+SIGNIFICANCE_LEVEL = 0.05
+"""Maximum probability of naming any group if none stands out."""
 GroupKind = Literal["object", "verdict", "body in the way"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class StandingOut:
+class OutlierGroup:
     """Trials whose verdicts are wrong more often than those of others with the same prediction.
 
     Attributes:
@@ -33,7 +33,7 @@ class StandingOut:
         other_wrong, other_trials: the same of all other trials with this prediction.
         ended: the wrong ones by how they ended, the most frequent first.
         p_value: one-sided mid-p of Fisher's exact test.
-        corrected: the same by Holm's method, for all groups that were looked at.
+        corrected: the same by Holm's method, for all tested groups.
     """
 
     kind: GroupKind
@@ -48,15 +48,15 @@ class StandingOut:
     corrected: float
 
 
-def standing_out(pairs: VerdictPairs) -> tuple[tuple[StandingOut, ...], int]:
+def standing_out(pairs: VerdictPairs) -> tuple[tuple[OutlierGroup, ...], int]:
     """Looks for groups whose verdicts are wrong more often than those of others.
 
     Args:
         pairs: N trials that the verdicts can predict.
 
     Returns:
-        Those whose corrected p-value is below `LEVEL`, the least likely first, and how many groups
-        were tested: those in which enough trials, right or wrong, are for a p-value below `LEVEL`.
+        Groups with a corrected p-value below `SIGNIFICANCE_LEVEL`, the smallest first, and the
+        number of tested groups. Groups with too few trials to reach that level are not tested.
     """
     factors: list[tuple[GroupKind, Factor]] = [
         ("object", pairs.object),
@@ -75,7 +75,7 @@ def standing_out(pairs: VerdictPairs) -> tuple[tuple[StandingOut, ...], int]:
                     groups.append((kind, factor.names[k], predicted, rows & wrong, counts))
     p_values = [excess_p_value(*counts) for *_, counts in groups]
     found = [
-        StandingOut(
+        OutlierGroup(
             kind=kind,
             name=name,
             predicted=predicted,
@@ -90,7 +90,7 @@ def standing_out(pairs: VerdictPairs) -> tuple[tuple[StandingOut, ...], int]:
         for (kind, name, predicted, rows, count), p_value, corrected in zip(
             groups, p_values, holm(p_values), strict=True
         )
-        if corrected < LEVEL
+        if corrected < SIGNIFICANCE_LEVEL
     ]
     return tuple(sorted(found, key=lambda one: one.p_value)), len(groups)
 
@@ -106,7 +106,7 @@ def _could_stand_out(wrong: int, trials: int, other_wrong: int, other_trials: in
     has room; that depends on the totals alone, so that others need not be corrected for."""
     total = wrong + other_wrong
     most = min(total, trials)
-    return excess_p_value(most, trials, total - most, other_trials) < LEVEL
+    return excess_p_value(most, trials, total - most, other_trials) < SIGNIFICANCE_LEVEL
 
 
 def _ended(ended: Factor, rows: Flags) -> dict[str, int]:

@@ -116,7 +116,7 @@ def figure_table(comparison: Comparison, judged: Judgement, name: str = "") -> T
 
 
 def unpredictable_table(judged: Judgement, name: str = "") -> TextTable:
-    """Figures with and without trials that ended as no verdict of the hand alone predicts."""
+    """Figures with and without failures that the hand alone does not predict."""
     table = TextTable(f"With and without outcomes that the hand alone cannot predict{name}")
     table.texts("of")
     for key in ABOUT_UNPREDICTABLE:
@@ -161,7 +161,7 @@ def standing_out_table(judged: Judgement, name: str = "") -> TextTable | str:
         )
     table.caption = (
         "wrong more often than others with the same prediction: Fisher's exact test, one-sided"
-        f" mid-p, corrected by Holm's method for {judged.looked_at} groups"
+        f" mid-p, corrected by Holm's method for {judged.tested_groups} groups"
     )
     if judged.unpredictable is not None:
         table.caption += "; without what the hand alone cannot predict"

@@ -8,7 +8,7 @@ from burg_drake.core.grasps import outcome_label
 from burg_drake.core.terminal import MISSING, format_number
 from burg_drake.experiment.comparison.comparison import Comparison
 from burg_drake.experiment.comparison.judge_assessment import Judgement
-from burg_drake.experiment.comparison.standing_out import StandingOut
+from burg_drake.experiment.comparison.standing_out import OutlierGroup
 from burg_drake.experiment.statistics import MEASURES, PROBABILITY, Agreement, Estimate
 
 IN_PERCENT = frozenset(name for name, measure in MEASURES.items() if measure.is_share) | {"excess"}
@@ -219,7 +219,7 @@ def bias_words(comparison: Comparison, judged: Judgement | None = None) -> str:
 
 
 def _more(difference: float, of: str) -> str:
-    """By how much something is more, or less, in percentage points."""
+    """A difference in percentage points, as words."""
     if difference == 0:
         return f"just as much {of.replace('than', 'as')}"
     more = "more" if difference > 0 else "less"
@@ -227,18 +227,19 @@ def _more(difference: float, of: str) -> str:
 
 
 def unpredictable_words(judged: Judgement) -> str:
-    """What ended trials that no verdict of the hand alone predicts, and precision without them;
-    empty where nothing did."""
+    """Failures that a run of the hand alone does not predict, and precision without them; empty if
+    there are none."""
     found = judged.unpredictable
     if found is None:
         return ""
     count = sum(found.outcomes.values())
     without = found.selected if weighted(judged) is None else found.all_grasps or found.selected
     return (
-        f"{count:,} trial{'' if count == 1 else 's'} ended as no verdict of the hand alone can"
-        f" predict ({counts_words(found.outcomes)}), {found.promised:,} of them after a predicted"
-        f" success. They count as failures; without them precision is"
-        f" {brief(without.precision)} instead of {brief(estimated(judged).precision)}."
+        f"{count:,} trial{'' if count == 1 else 's'} failed for reasons that a run of the hand"
+        f" alone does not predict ({counts_words(found.outcomes)}),"
+        f" {found.predicted_successes:,} of them after a predicted success. They count as"
+        f" failures; without them precision is {brief(without.precision)}"
+        f" instead of {brief(estimated(judged).precision)}."
     )
 
 
@@ -247,13 +248,13 @@ def counts_words(outcomes: Mapping[str, int]) -> str:
     return ", ".join(f"{n:,} {outcome_label(name)}" for name, n in outcomes.items())
 
 
-def standing_out_name(one: StandingOut) -> str:
-    """What an object or cause that stands out is called."""
+def standing_out_name(one: OutlierGroup) -> str:
+    """Name of an outlier group for people."""
     return outcome_label(one.name) if one.kind == "verdict" else one.name
 
 
 def standing_out_words(judged: Judgement) -> str:
-    """What stands out, in one sentence; empty if nothing does."""
+    """A sentence on the outlier groups; empty if there are none."""
     parts = [
         f"{standing_out_name(one)} ({one.kind}; {one.wrong} of {one.trials} predicted"
         f" {'successes failed' if one.predicted else 'failures succeeded'}, of all others"
@@ -264,10 +265,10 @@ def standing_out_words(judged: Judgement) -> str:
 
 
 def nothing_stands_out(judged: Judgement) -> str:
-    """What is said where no object or cause stands out."""
-    if not judged.looked_at:
+    """A sentence for judgements without outlier groups."""
+    if not judged.tested_groups:
         return "Too few trials to tell whether verdicts of an object or a cause stand out."
-    groups = f"{judged.looked_at} groups" if judged.looked_at > 1 else "group"
+    groups = f"{judged.tested_groups} groups" if judged.tested_groups > 1 else "group"
     return (
         f"No object, verdict or body in the way stands out among the {groups} that were tested"
         " (Fisher's exact test with Holm's correction)."

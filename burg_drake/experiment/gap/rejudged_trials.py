@@ -25,7 +25,7 @@ CAUSES: dict[TrialCause, str] = {
     "placement": "disagreed as planned, agree as measured: explained by the placement",
     "worsened": "agreed as planned, disagree as measured: worsened",
     "physics": "disagree either way: left to physics",
-    "unpredictable": "ended as no verdict of the hand alone can predict",
+    "unpredictable": "failed for reasons that a run of the hand alone does not predict",
 }
 """What a pair of verdicts says of a real one."""
 
@@ -141,7 +141,7 @@ class Rejudging:
 
     @cached_property
     def predictable(self) -> tuple[Rejudged, ...]:
-        """Those of them that ended as a verdict can predict."""
+        """Those of them whose outcome a verdict can predict."""
         return tuple(t for t in self.judged if not t.unpredictable)
 
     def agreement(self, *, measured: bool, every: bool = False) -> tuple[int, float, float]:

@@ -26,7 +26,7 @@ class StepAgreement:
         step: its name.
         found: confusion matrix and figures of the trials, each counted once.
         all_grasps: the same of all grasps that they were chosen from; None if that is not known.
-        unpredictable: trials, among them, that ended as no verdict of the step's mode can predict.
+        unpredictable: trials, among them, with a failure that the step's mode does not predict.
     """
 
     step: StepName

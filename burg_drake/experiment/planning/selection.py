@@ -78,7 +78,7 @@ def choose(
 
 
 def _rare_class(chosen: Chosen, selection: Selection) -> list[str]:
-    """A sentence where nearly all that was chosen succeeds, or nearly all fails."""
+    """A sentence if nearly all chosen grasps succeed, or nearly all fail."""
     pools = {pool.key: pool for pool, _, _ in chosen}
     outcomes = {key: pool.cells("outcome") for key, pool in pools.items()}
     found = [Outcome(str(outcomes[pool.key][k])) for pool, k, _ in chosen]
@@ -87,7 +87,8 @@ def _rare_class(chosen: Chosen, selection: Selection) -> list[str]:
         if good and count < RARE * len(good):
             return [
                 f"{count} of {len(good)} are {name} in simulation: almost nothing here measures"
-                f" how well {name} are predicted; evaluate with until_balanced finds more"
+                f" how well {name} are predicted; run burg-drake evaluate"
+                " --until-balanced 10 to get more"
             ]
     return []
 

@@ -84,15 +84,15 @@ class TrialBook:
         return read_entries(journal_path(self.path))
 
     def damage(self) -> str:
-        """Which lines of the journal cannot be read, and what that means; "" if all can be."""
+        """Damaged lines of the journal, and what to do about them; "" if there are none."""
         journal = journal_path(self.path)
         lines = damaged_lines(journal)
         if not lines:
             return ""
-        are, they = ("line", "it has") if len(lines) == 1 else ("lines", "they have")
+        entries, them = ("entry", "line") if len(lines) == 1 else ("entries", "lines")
         return (
-            f"{journal}: {are} {listing([str(line) for line in lines])} cannot be read, and what"
-            f" {they} cannot be restored; remove what cannot be read when the file is right"
+            f"{journal}:{listing([str(line) for line in lines])}: damaged {entries}, skipped;"
+            f" compare {self.path.name} with your notes, then delete the {them}"
         )
 
     def missing_values(self) -> list[MissingValues]:

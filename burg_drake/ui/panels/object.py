@@ -174,7 +174,7 @@ class _Numbers:
     def _move(self, X_SO: Array, field: str) -> None:
         session = self._actions.session
         name = session.view.selection[0]
-        session.do(MoveObjects({name: X_SO}, raises=True), field=field)
+        session.do(MoveObjects({name: X_SO}, changes_height=True), field=field)
 
 
 def _numbers(X_SO: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:

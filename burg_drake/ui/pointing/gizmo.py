@@ -26,11 +26,11 @@ from burg_drake.ui.pointing.handles import GIZMO_SIZE, Handle, handle_under
 from burg_drake.ui.pointing.pointer import PageCamera
 from burg_drake.ui.widgets import PageActions
 
-BESIDE = 0.02
-"""From what is selected to the arrow upwards, which must not cover it from above [m]."""
+ARROW_OFFSET = 0.02
+"""From the selection to the vertical arrow, which must not hide it when seen from above [m]."""
 EVERY_AXIS = (True, True, True)
-UP_ALONE, LEVEL = (False, False, True), (True, True, False)
-"""Axes of the arrow upwards, and those that a ring about the vertical lies along."""
+Z_AXIS_ONLY, XY_AXES = (False, False, True), (True, True, False)
+"""Active axes of the vertical arrow, and of the ring about the vertical."""
 
 
 @dataclass(eq=False)
@@ -88,7 +88,7 @@ class Gizmo:
                 part.node = self._made(part)
             axes = EVERY_AXIS
             if view.planar:
-                axes = UP_ALONE if part is self._arrows else LEVEL
+                axes = Z_AXIS_ONLY if part is self._arrows else XY_AXES
             if part.node.active_axes != axes:
                 part.node.active_axes = axes
                 part.node.disable_sliders = view.planar or part is self._rings
@@ -129,7 +129,7 @@ class Gizmo:
         middle = mean_center(view, names)
         if view.planar:
             right = max(float(bounds(view.state, name)[1, 0]) for name in names)
-            return make_pose(p_AB=(right + BESIDE, middle[1], middle[2]))
+            return make_pose(p_AB=(right + ARROW_OFFSET, middle[1], middle[2]))
         R_SO = view.X_SO(names[0])[:3, :3]
         alone = len(names) == 1
         return make_pose(R_SO if alone and self._along_object else np.eye(3), middle)
@@ -177,7 +177,7 @@ class Gizmo:
         if who != self._who or self._drag is None or self._drag.is_over:
             return
         X = X_SG @ inverse(self._X_SGi)
-        self._drag.move({name: X @ X_SO for name, X_SO in self._start.items()}, raises=True)
+        self._drag.move({name: X @ X_SO for name, X_SO in self._start.items()}, changes_height=True)
 
     def _end(self, who: int | None) -> None:
         if who != self._who:

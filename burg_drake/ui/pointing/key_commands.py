@@ -57,7 +57,7 @@ def shift(session: ComposeSession, offset: Any) -> None:
     X_SO = {name: view.X_SO(name) for name in view.selection}
     for X in X_SO.values():
         X[:3, 3] += offset
-    session.do(MoveObjects(X_SO, raises=True))
+    session.do(MoveObjects(X_SO, changes_height=True))
 
 
 def next_pose(session: ComposeSession) -> None:

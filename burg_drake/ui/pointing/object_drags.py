@@ -148,7 +148,7 @@ class ObjectDrags:
         try:
             held.drag.move(
                 {name: X @ X_SO for name, X_SO in held.X_SO.items()},
-                raises=held.handle is not None,
+                changes_height=held.handle is not None,
             )
         except BurgError:
             self._held.pop(client_id, None)  # one error; the rest of the gesture is ignored

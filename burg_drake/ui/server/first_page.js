@@ -121,7 +121,7 @@
   // on phones they are a sheet, whose head folds it.
   const FOLDED_AT = { left: 1100, right: 800 }; // width of the window [pixel]
   const PHONE = 576;
-  const LOOK_EVERY = 200; // for panels that are not there yet [ms]
+  const PANEL_POLL_INTERVAL = 200; // between checks for panels that are not there yet [ms]
   const toFold = Object.keys(FOLDED_AT).filter((side) => innerWidth < FOLDED_AT[side]);
   const fold = setInterval(() => {
     const sheet = document.querySelector(".mantine-Paper-root[style*='position: fixed']");
@@ -136,5 +136,5 @@
       toFold.splice(toFold.indexOf(side), 1);
     }
     if (toFold.length === 0) clearInterval(fold);
-  }, LOOK_EVERY);
+  }, PANEL_POLL_INTERVAL);
 })();

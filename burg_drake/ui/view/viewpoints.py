@@ -27,7 +27,8 @@ OBJECT_HEIGHT = 0.25
 FIRST_ASPECT = 0.9
 """Width over height of the scene before a new page has told it."""
 PHONE_ASPECT, PHONE_HEIGHT = 0.6, 0.55
-"""Where a scene is narrower, a panel may cover all but this share of it, from below."""
+"""Width over height below which a page is taken for a phone's; share of the page's height left free
+above a phone's panel."""
 TILT = 1e-3
 """Off the vertical, for the camera to know which way is up [rad]."""
 SAME_VIEW = 1e-3

@@ -41,18 +41,18 @@ def case_section(comparison: Comparison, judged: Judgement, photos: Path | None)
     tables = []
     apart = judged.unpredictable
     beyond = {} if apart is None else apart.outcomes
-    promised = 0 if apart is None else apart.promised
+    predicted_successes = 0 if apart is None else apart.predicted_successes
     of = [d for d in judged.disagreements if d.kind == "fp"]
     groups = [
         (
             cell_name(comparison, "fp"),
             [d for d in of if d.ended not in beyond],
-            round(judged.selected.fp) - promised,
+            round(judged.selected.fp) - predicted_successes,
         ),
         (
-            "success predicted, ended as the hand alone cannot predict",
+            "success predicted, failed for reasons that the hand alone does not predict",
             [d for d in of if d.ended in beyond],
-            promised,
+            predicted_successes,
         ),
         (
             cell_name(comparison, "fn"),

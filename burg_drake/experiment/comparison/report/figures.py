@@ -121,7 +121,7 @@ def figure_cell(found: Estimate, *, percent: bool) -> Html:
 
 
 def unpredictable_section(judged: Judgement) -> Html | None:
-    """Figures with and without trials that ended as no verdict of the hand alone predicts."""
+    """Figures with and without failures that the hand alone does not predict."""
     if judged.unpredictable is None:
         return None
     rows = [
@@ -161,7 +161,7 @@ def standing_out_section(judged: Judgement) -> Html:
                 *(element("td", c) for c in cells),
             )
         )
-    apart = " Trials that ended as the hand alone cannot predict are left out."
+    apart = " Failures that the hand alone does not predict are left out."
     if judged.unpredictable is None:
         apart = ""
     names = ["", "what", "predicted", "wrong", "others wrong", "how the wrong ones ended", "p"]
@@ -169,7 +169,7 @@ def standing_out_section(judged: Judgement) -> Html:
         "What stands out",
         "Objects, verdicts and bodies in the way whose trials ended otherwise than predicted more"
         " often than others with the same prediction. p: one-sided mid-p of Fisher's exact test,"
-        f" corrected by Holm's method for the {judged.looked_at} groups that were tested, so that"
+        f" corrected by Holm's method for the {judged.tested_groups} tested groups, so that"
         f" nothing is named in 19 of 20 experiments in which nothing differs.{apart}",
         table(names, rows),
     )

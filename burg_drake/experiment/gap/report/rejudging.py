@@ -81,8 +81,9 @@ def _unpredictable(found: Rejudging) -> list[str]:
         for name, m in (("as planned", False), ("as measured", True))
     )
     return [
-        f"{len(apart)} trial{plural} ended as no verdict of the hand alone can predict ({texts}):"
-        f" counted apart, and left to neither placement nor physics. Precision {precision}."
+        f"{len(apart)} trial{plural} failed for reasons that a run of the hand alone does not"
+        f" predict ({texts}). They are counted separately, as caused neither by placement nor by"
+        f" physics. Precision {precision}."
     ]
 
 

@@ -235,9 +235,9 @@ def reality_section(agreement: Sequence[StepAgreement]) -> Html | None:
         "Beside the robot",
         "Real trials beside each step's verdicts on the same grasps, with 95 % intervals. Positive"
         " means that success is predicted; in displaced scenes, in more than half of them. Here"
-        f" {reality_words(agreement)}. {NOT_PREDICTABLE.capitalize()} are trials, among them, that"
-        " ended as no verdict of the step can predict, such as without a path of the arm where the"
-        " hand is judged alone.",
+        f" {reality_words(agreement)}. {NOT_PREDICTABLE.capitalize()} are trials, among them,"
+        " with a failure that the step does not predict: if it judges the hand alone, for example"
+        " that the arm has no path.",
         table(names, rows, numbers=(1, 2, 3, 4, 5, 6)),
     )
 

@@ -19,7 +19,7 @@ TITLES: dict[StepName, str] = {
     "placed": "objects displaced",
 }
 NOT_PREDICTABLE = "not predictable"
-"""Column of trials that ended as no verdict of a step's mode can predict."""
+"""Column of trials that failed for reasons that a step's mode does not predict."""
 VERBS: dict[Success, str] = {"lifted": "lifts", "held": "holds"}
 
 
