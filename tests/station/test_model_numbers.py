@@ -132,6 +132,11 @@ def test_messages(tmp_path: Path, old: str, new: str, message: str) -> None:
     assert said.startswith(message) and bool(said) == bool(message)
 
 
+def test_an_inertia_outside_of_links_is_left_to_drake(tmp_path: Path) -> None:
+    inertial = "<inertial><mass>0</mass></inertial>"
+    assert found_wrong(tmp_path, SDF.replace('<link name="base"/>', inertial, 1)) == ""
+
+
 @pytest.mark.parametrize("name", builtin_names("models/hands"))
 def test_built_in_hands_are_sound(name: str) -> None:
     require_sound_numbers(resolve(load_hand(name).model))

@@ -105,7 +105,7 @@ def _check(text: bytes, path: Path) -> None:
                 _require_direction(element.figures())
             if element.name == "limit":
                 _require_order(element.figures())
-            if element.name == "inertial":
+            if element.name == "inertial" and named:
                 _require_inertia(element, massless=named[-1].attributes.get("name") in welded)
         except ValueError as error:
             where = ", ".join(f"{e.name} {quoted(e.attributes.get('name', ''))}" for e in named)
