@@ -137,6 +137,12 @@ def test_an_inertia_outside_of_links_is_left_to_drake(tmp_path: Path) -> None:
     assert found_wrong(tmp_path, SDF.replace('<link name="base"/>', inertial, 1)) == ""
 
 
+@pytest.mark.parametrize("depth", [200, 201, 3_000])
+def test_deeply_nested_elements(tmp_path: Path, depth: int) -> None:
+    said = found_wrong(tmp_path, "<sdf>\n" + (depth - 1) * "<a>" + (depth - 1) * "</a>" + "</sdf>")
+    assert said == ("" if depth == 200 else "2: more than 200 nested elements")
+
+
 @pytest.mark.parametrize("name", builtin_names("models/hands"))
 def test_built_in_hands_are_sound(name: str) -> None:
     require_sound_numbers(resolve(load_hand(name).model))

@@ -45,6 +45,8 @@ UNREAD = ("gazebo", "light", "plugin", "ros2_control", "sensor")
 """Elements that are for other programs."""
 PLACES = ("link", "joint", "frame", "collision", "visual", "transmission")
 """Elements that a message names."""
+MAX_DEPTH = 200
+"""Nested elements; models have some ten, and Drake's parser refuses more than 500."""
 
 
 @dataclass
@@ -90,7 +92,7 @@ def require_sound_numbers(path: Path) -> None:
 
 @lru_cache(maxsize=32)
 def _check(text: bytes, path: Path) -> None:
-    root = _parsed(text)
+    root = _parsed(text, path)
     if root is None:
         return
     rules = URDF_RULES if root.name == "robot" else RULES
@@ -114,13 +116,21 @@ def _check(text: bytes, path: Path) -> None:
             ) from error
 
 
-def _parsed(text: bytes) -> _Element | None:
-    """The root of a model; None if it is not XML, or nested deeper than any model."""
+def _parsed(text: bytes, path: Path) -> _Element | None:
+    """The root of a model; None if it is not XML.
+
+    Raises:
+        InvalidInputError: it is nested deeper than `MAX_DEPTH`.
+    """
     parser = expat.ParserCreate()
     parser.buffer_text = True
     opened = [_Element("", {}, 0)]
 
     def start(name: str, attributes: dict[str, str]) -> None:
+        if len(opened) > MAX_DEPTH:
+            raise InvalidInputError(
+                f"{path}:{parser.CurrentLineNumber}: more than {MAX_DEPTH} nested elements"
+            )
         element = _Element(name.removeprefix("drake:"), attributes, parser.CurrentLineNumber)
         opened[-1].children.append(element)
         opened.append(element)
