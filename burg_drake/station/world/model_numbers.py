@@ -96,7 +96,7 @@ def _check(text: bytes, path: Path) -> None:
     if root is None:
         return
     rules = URDF_RULES if root.name == "robot" else RULES
-    welded = set(_welded_links(root))
+    massless = _massless_links(root)
     for element, outer in root.walk():
         named = [e for e in (*outer, element) if e.name in PLACES]
         try:
@@ -108,7 +108,7 @@ def _check(text: bytes, path: Path) -> None:
             if element.name == "limit":
                 _require_order(element.figures())
             if element.name == "inertial" and named:
-                _require_inertia(element, massless=named[-1].attributes.get("name") in welded)
+                _require_inertia(element, massless=named[-1].attributes.get("name") in massless)
         except ValueError as error:
             where = ", ".join(f"{e.name} {quoted(e.attributes.get('name', ''))}" for e in named)
             raise InvalidInputError(
@@ -148,13 +148,20 @@ def _parsed(text: bytes, path: Path) -> _Element | None:
     return opened[0].children[0]
 
 
-def _welded_links(root: _Element) -> Iterator[str]:
-    """Names of links at fixed joints, which may be mere frames without mass."""
-    for joint, _ in root.walk():
-        if joint.name == "joint" and joint.attributes.get("type") == "fixed":
-            for end in joint.children:
-                if end.name in ("parent", "child"):
-                    yield end.attributes.get("link", end.text.strip())
+def _massless_links(root: _Element) -> set[str]:
+    """Names of links that need no mass, as they may be mere frames: those at fixed joints, and,
+    where there are joints, those that are no joint's child, which the station welds."""
+    links, fixed, children = set(), set(), set()
+    for element, outer in root.walk():
+        if element.name == "link":
+            links.add(element.attributes.get("name", ""))
+        elif element.name in ("parent", "child") and outer and outer[-1].name == "joint":
+            link = element.attributes.get("link", element.text.strip())
+            if outer[-1].attributes.get("type") == "fixed":
+                fixed.add(link)
+            if element.name == "child":
+                children.add(link.rpartition("::")[2])
+    return fixed | (links - children if children else set())
 
 
 def _require(key: str, text: str, rule: str) -> None:
@@ -204,7 +211,9 @@ def _require_inertia(inertial: _Element, massless: bool) -> None:
     if massless and mass == principal.max() == 0.0:
         return
     if mass == 0.0:
-        raise ValueError("mass is 0; it has to be above 0, unless a fixed joint holds the link")
+        raise ValueError(
+            "mass is 0; it has to be above 0, unless a fixed joint or the station holds the link"
+        )
     if not inertia.CouldBePhysicallyValid() or principal.max() == 0.0:
         moments = ", ".join(f"{moment:g}" for moment in principal)
         raise ValueError(
