@@ -76,6 +76,11 @@ def test_sound_models_pass(tmp_path: Path, text: str) -> None:
     assert found_wrong(tmp_path, text) == ""
 
 
+def test_a_changed_model_is_checked_again(tmp_path: Path) -> None:
+    wrong = SDF.replace("<mass>0.2<", "<mass>nan<")
+    assert [bool(found_wrong(tmp_path, text)) for text in (SDF, wrong, SDF, wrong)] == [0, 1, 0, 1]
+
+
 @pytest.mark.parametrize("number", ["nan", "inf", "-inf", "-0.5", "abc"])
 @pytest.mark.parametrize(
     "old, key",

@@ -7,10 +7,10 @@ Drake reads it.
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import lru_cache
 from pathlib import Path
 from xml.parsers import expat
 
@@ -47,6 +47,8 @@ PLACES = ("link", "joint", "frame", "collision", "visual", "transmission")
 """Elements that a message names."""
 MAX_DEPTH = 200
 """Nested elements; models have some ten, and Drake's parser refuses more than 500."""
+_SOUND: set[tuple[Path, bytes]] = set()
+"""Paths and hashes of models that were checked: stations are built again and again."""
 
 
 @dataclass
@@ -87,10 +89,13 @@ def require_sound_numbers(path: Path) -> None:
         InvalidInputError: it cannot be read, or has such a number; the message names file, line,
             link or joint, and the value.
     """
-    _check(read_bytes(path, DOCUMENT.size), path)
+    text = read_bytes(path, DOCUMENT.size)
+    checked = (path, hashlib.sha256(text).digest())
+    if checked not in _SOUND:
+        _check(text, path)
+        _SOUND.add(checked)
 
 
-@lru_cache(maxsize=32)
 def _check(text: bytes, path: Path) -> None:
     root = _parsed(text, path)
     if root is None:
