@@ -24,7 +24,7 @@ RANGES = {
 
 
 def _require_gains(values: Vector3, name: str) -> None:
-    if not 0.0 <= min(values) <= max(values) <= BRIGHTEST:
+    if not all(0.0 <= value <= BRIGHTEST for value in values):
         raise FieldError(f"{name} {list(values)} must be 0 to {BRIGHTEST:g} each", name)
 
 

@@ -119,7 +119,7 @@ class Camera:
         if min(self.width, self.height, *self.focal) <= 0:
             raise InvalidInputError("camera width, height and focal must be positive")
         low, high = FOCAL_RANGE
-        if not low <= min(self.focal) <= max(self.focal) <= high:
+        if not all(low <= value <= high for value in self.focal):
             raise FieldError(
                 f"focal {list(self.focal)} of a camera must be {low:g} to {high:g} pixels", "focal"
             )
