@@ -22,7 +22,7 @@ from burg_drake.apps import ar, camera, dataset, grasps, hand, library, ros, sce
 from burg_drake.apps.comparison import compare, gap
 from burg_drake.apps.dataset import render
 from burg_drake.apps.grasps import frames
-from burg_drake.apps.options import Parser, examples
+from burg_drake.apps.options import Parser, examples, with_given_names
 from burg_drake.apps.runs import evaluate, merge, reach, replay, report, robustness, status
 from burg_drake.apps.scene import printout, setup
 from burg_drake.apps.terminal import terminated_as_interrupted
@@ -157,7 +157,7 @@ def _end(message: str, code: int) -> int:
     """Says in one line of printable text how it ended."""
     _drop_unread_output()
     sys.stdout.flush()
-    words = " ".join(shown(word, LONGEST_WORD) for word in message.split())
+    words = " ".join(shown(word, LONGEST_WORD) for word in with_given_names(message).split())
     line = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in words)
     print(f"burg-drake: {line}", file=sys.stderr)
     return code

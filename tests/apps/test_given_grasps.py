@@ -162,6 +162,12 @@ def test_a_file_that_does_not_say_which_scene_it_is_of(tmp_path: Path) -> None:
         (["--scene-id", "a"], "--scene-id is for grasp files; add --grasps FILE"),
         (["--grasps", "a.npy", "--blind"], "--blind is for sampled grasps; leave out either it or"),
         (["--grasps", "a.npy", "--approach-angle", "30"], "--approach-angle is for sampled"),
+        (["--max-grasps-per-object", "50"], "(--max-grasps-per-object, --until-balanced)"),
+        (["--balanced-among", "all"], "balanced_among has an effect only with until_balanced; add"),
+        (
+            ["--until-balanced", "3", "--balanced-among", "reachable", "--mode", "hand"],
+            "does not ask what the arm can reach; balance among executed, clear or all, or give",
+        ),
         (["--grasps", "missing.npy"], "missing.npy does not exist"),
         (["--grasps", "a.npy", "--camera-pose", "missing.npy"], "cannot read missing.npy"),
         (["--grasps", "a.npy", "--grasps-format", "vgm"], "no grasp format 'vgm'; did you mean"),

@@ -87,6 +87,25 @@ def test_the_standard_input(tmp_path: Path, name: str) -> None:
     assert "focal: [600.0, 610.0]" in (tmp_path / "K.yaml").read_text()
 
 
+@pytest.mark.parametrize("name", ["-", "/dev/stdin"])
+def test_errors_name_the_standard_input(tmp_path: Path, name: str) -> None:
+    command = [sys.executable, "-m", "burg_drake.apps.cli", "camera", "show", name]
+    wrong = INTRINSICS.replace("600", "abc")
+    done = subprocess.run(command, input=wrong, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert done.stderr.startswith("burg-drake: error: standard input:4: focal")
+
+
+def test_errors_name_the_pipe(
+    piped: Callable[[bytes], str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    for verb in (("camera", "show"), ("grasps", "stats")):
+        pipe = piped(INTRINSICS.replace("600", "abc").encode())
+        assert main([*verb, pipe]) == 2
+        error = capsys.readouterr().err
+        assert pipe in error and "burg-drake-pipe" not in error
+
+
 def test_a_pipe_that_never_ends_is_read_within_bounds(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

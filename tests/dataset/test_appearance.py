@@ -107,6 +107,10 @@ def test_settings_that_contradict_themselves_and_data_that_do_not_fit() -> None:
     ):
         with pytest.raises(DocumentError, match=f"look:1: .*{said}"):
             read_appearance({"version": 1, **wrong}, "look")
+    for k in range(3):
+        gains = np.where(np.arange(3) == k, np.nan, 1.0).tolist()
+        with pytest.raises(InvalidInputError, match=r"object_gains .* must be 0 to 10000 each"):
+            Appearance(object_gains=(tuple(gains),))
     with pytest.raises(UnknownNameError, match="houshold"):
         drawn(0, distractors=(1, 1), distractor_library="houshold")
 

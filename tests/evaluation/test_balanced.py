@@ -117,6 +117,15 @@ def test_the_bound_ends_it_and_what_is_missing_is_said(
         ({"shard": "1/2"}, "leave out until_balanced or shard"),
         ({"max_grasps_per_object": 3}, "give a larger maximum"),
         ({"balanced_among": "cleared"}, "there is no balanced_among 'cleared'"),
+        (
+            {"balanced_among": "reachable", "mode": "hand"},
+            "mode hand does not ask what the arm can",
+        ),
+        ({"until_balanced": None, "balanced_among": "all"}, "balanced_among has an effect only"),
+        (
+            {"until_balanced": None, "max_grasps_per_object": 50},
+            "max_grasps_per_object has an effect only with until_balanced",
+        ),
     ],
 )
 def test_what_cannot_be_balanced(

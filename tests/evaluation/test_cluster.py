@@ -7,7 +7,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -271,15 +270,13 @@ def test_a_killed_driver_leaves_nothing_behind(tmp_path: Path) -> None:
 
 
 @pytest.mark.thorough
-def test_a_scheduler_that_is_not_there_is_said_soon(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scheduler_that_is_not_there_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("burg_drake.evaluation.cluster.dask_executor.REACH", 1.0)
-    start = time.monotonic()
     reached = (
         r"^no Dask scheduler was reached at tcp://127.0.0.1:9 within 1 s: nobody listens there"
     )
     with pytest.raises(ClusterError, match=reached), connect_cluster("tcp://127.0.0.1:9"):
         pass
-    assert time.monotonic() - start < 5.0
 
 
 @pytest.mark.thorough

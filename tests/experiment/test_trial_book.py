@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import fcntl
+import json
 import os
 import signal
 import subprocess
@@ -152,6 +153,34 @@ def test_a_torn_line_of_the_journal_is_left_behind(tmp_path: Path) -> None:
         file.write(b"\xff")
     assert "trials.entries.jsonl:1, 2: damaged entries, skipped;" in book.damage()
     assert [entry.number for entry in book.entries()] == [3]
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        *(("number", value) for value in ("1", 1.0, True, None)),
+        *((field, value) for field in ("grasp", "content", "at") for value in (7, None)),
+        *(("how", value) for value in (7, "guessed", ["recorded"], None)),
+        *((f, value) for f in ("before", "after") for value in (None, [], "", {"colour": "red"})),
+        ("colour", "red"),
+    ],
+)
+def test_a_line_with_wrong_fields_is_damaged(tmp_path: Path, field: str, value: object) -> None:
+    path = write_sheet(tmp_path)
+    book = TrialBook(path)
+    book.record(1, outcome="lifted")
+    journal = tmp_path / "trials.entries.jsonl"
+    line = json.dumps(json.loads(journal.read_text()) | {field: value})
+    with journal.open("a") as file:
+        file.write(line + "\n")
+    assert "trials.entries.jsonl: line 2 cannot be read" in book.damage()
+    assert len(book.entries()) == 1 and book.missing_values() == []
+
+
+def test_a_line_that_lacks_a_field_or_is_no_mapping_is_damaged(tmp_path: Path) -> None:
+    book = TrialBook(write_sheet(tmp_path))
+    (tmp_path / "trials.entries.jsonl").write_text('{"number": 1}\n[]\nnull\n7\n')
+    assert "lines 1, 2, 3, 4 cannot be read" in book.damage() and book.entries() == []
 
 
 def test_comments_and_layout_of_people_stay(tmp_path: Path) -> None:

@@ -1,10 +1,11 @@
 """A camera in ROS 2, by rclpy and nothing of ours: publishes images, writes down what comes back.
 
-    python ros2_camera.py PICTURE.npy INFO.json reliable|best_effort IMAGES
+    python ros2_camera.py PICTURE.npy INFO.json reliable|best_effort IMAGES SECONDS
 
 One image at a time goes out to `/camera/image_raw`; the next follows when the pose of the node
 `burg_board` has come back. With best effort an image may be lost on the way, and is sent again.
-Prints one line of JSON: the pose and overlay of each image, and how often each was sent.
+Prints one line of JSON: the pose and overlay of each image, and how often each was sent; or ends
+with an error after SECONDS.
 """
 
 import array
@@ -20,11 +21,11 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import CameraInfo, Image
 
 RESEND_PERIOD = 0.2  # seconds
-HANG = 60.0  # seconds without any answer
 
 
 class Camera:
-    def __init__(self, picture, info, reliable):
+    def __init__(self, picture, info, reliable, seconds):
+        self.deadline = time.monotonic() + seconds
         policy = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
         qos = QoSProfile(depth=1, reliability=policy)
         self.node = rclpy.create_node("camera")
@@ -54,9 +55,9 @@ class Camera:
         for message in (self.info, self.image):
             message.header.stamp.sec = number
             message.header.frame_id = "eye"
-        deadline, again, sent = time.monotonic() + HANG, 0.0, 0
+        again, sent = 0.0, 0
         while number not in self.poses or number not in self.overlays:
-            if time.monotonic() > deadline:
+            if time.monotonic() > self.deadline:
                 sys.exit(f"no answer to image {number} of {sorted(self.poses)}")
             if not sent or (resend and time.monotonic() > again):
                 self.infos.publish(self.info)
@@ -70,9 +71,8 @@ def main():
     picture, info = np.load(sys.argv[1]), json.loads(Path(sys.argv[2]).read_text())
     reliable, count = sys.argv[3] == "reliable", int(sys.argv[4])
     rclpy.init()
-    camera = Camera(picture, info, reliable)
-    deadline = time.monotonic() + HANG
-    while not camera.images.get_subscription_count() and time.monotonic() < deadline:
+    camera = Camera(picture, info, reliable, float(sys.argv[5]))
+    while not camera.images.get_subscription_count() and time.monotonic() < camera.deadline:
         rclpy.spin_once(camera.node, timeout_sec=0.05)
     # The first image finds the node while endpoints are still being matched.
     camera.answer(1, resend=True)

@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.core.arrays import Array
 from burg_drake.core.frames import inverse, make_pose, rotation_angle, rotation_from_quaternion
+from tests.hang_guard import HANG_GUARD
 from tests.ros.test_ros1 import camera_info
 
 ROS2_PYTHON = Path(__file__).parents[2] / ".venv-ros2" / "bin" / "python"
 CAMERA = Path(__file__).with_name("ros2_camera.py")
-HANG = 120.0  # seconds
 NODE = ("ros", "tabletop_six", "--tf-parent", "none")
 
 
@@ -83,15 +83,16 @@ def test_a_node_in_a_real_ros(
                     info_file,
                     reliability,
                     str(images),
+                    str(HANG_GUARD),
                 ],
                 env=environment(),
                 capture_output=True,
                 text=True,
-                timeout=HANG,
+                timeout=2 * HANG_GUARD,  # the camera says first what it waited for
                 check=False,
             )
             node.send_signal(signal.SIGINT)
-            code = node.wait(HANG)
+            code = node.wait(HANG_GUARD)
         finally:
             node.kill()
             node.wait()

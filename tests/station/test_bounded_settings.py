@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -29,6 +30,8 @@ from burg_drake.station.document.station_document import Arm, Camera, Pose
         (lambda: Arm(home=(0.0,), velocity=(1e-300,)), "velocity limits must be 0.001 or more"),
         (lambda: ArmControl(kp=(1e300,)), "kp .* must be one number or one a joint, 0.001 to 1e"),
         (lambda: Camera(X_WC=Pose(), width=10**9), "a side has at most 16,384"),
+        (lambda: Camera(X_WC=Pose(), focal=(math.nan, 600.0)), "must be 1 to 1e\\+06 pixels"),
+        (lambda: Camera(X_WC=Pose(), focal=(600.0, math.nan)), "must be 1 to 1e\\+06 pixels"),
         (lambda: Board(size=(1e9, 0.4)), "at most 100 m"),
     ],
 )

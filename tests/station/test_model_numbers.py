@@ -76,6 +76,11 @@ def test_sound_models_pass(tmp_path: Path, text: str) -> None:
     assert found_wrong(tmp_path, text) == ""
 
 
+def test_a_changed_model_is_checked_again(tmp_path: Path) -> None:
+    wrong = SDF.replace("<mass>0.2<", "<mass>nan<")
+    assert [bool(found_wrong(tmp_path, text)) for text in (SDF, wrong, SDF, wrong)] == [0, 1, 0, 1]
+
+
 @pytest.mark.parametrize("number", ["nan", "inf", "-inf", "-0.5", "abc"])
 @pytest.mark.parametrize(
     "old, key",
@@ -130,6 +135,44 @@ def test_messages(tmp_path: Path, old: str, new: str, message: str) -> None:
     (text,) = (text for text in (SDF, URDF) if old in text)
     said = found_wrong(tmp_path, text.replace(old, new))
     assert said.startswith(message) and bool(said) == bool(message)
+
+
+MASSLESS = {
+    SDF: "<inertial><mass>0</mass><inertia><ixx>0</ixx><iyy>0</iyy><izz>0</izz></inertia>",
+    URDF: '<inertial><mass value="0"/><inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/>',
+}
+
+
+@pytest.mark.parametrize("text", [SDF, URDF], ids=["sdf", "urdf"])
+def test_a_root_link_needs_no_mass(tmp_path: Path, text: str) -> None:
+    """The station welds it; without joints it is the only link, and free."""
+    link = f'<link name="base">{MASSLESS[text]}</inertial></link>'
+    assert found_wrong(tmp_path, text.replace('<link name="base"/>', link)) == ""
+    alone = re.sub(r'<link name="base"/>.*(?=</model|</robot)', link, text, flags=re.DOTALL)
+    assert "link 'base': mass is 0; it has to be above 0, unless" in found_wrong(tmp_path, alone)
+
+
+def test_a_hand_whose_body_has_no_mass(tmp_path: Path) -> None:
+    source = data_root() / "models/panda"
+    text = (source / "panda_hand.sdf").read_text(encoding="utf-8")
+    text = text.replace("meshes/", f"{source}/meshes/")
+    (tmp_path / "hand.sdf").write_text(
+        re.sub(r"<inertial>.*?(?=</inertial>)", MASSLESS[SDF], text, count=1, flags=re.DOTALL)
+    )
+    hand = load_hand("panda_hand")
+    massive = check_hand(hand, source / "panda_hand.sdf")
+    assert check_hand(hand, tmp_path / "hand.sdf") == massive
+
+
+def test_an_inertia_outside_of_links_is_left_to_drake(tmp_path: Path) -> None:
+    inertial = "<inertial><mass>0</mass></inertial>"
+    assert found_wrong(tmp_path, SDF.replace('<link name="base"/>', inertial, 1)) == ""
+
+
+@pytest.mark.parametrize("depth", [200, 201, 3_000])
+def test_deeply_nested_elements(tmp_path: Path, depth: int) -> None:
+    said = found_wrong(tmp_path, "<sdf>\n" + (depth - 1) * "<a>" + (depth - 1) * "</a>" + "</sdf>")
+    assert said == ("" if depth == 200 else "2: more than 200 nested elements")
 
 
 @pytest.mark.parametrize("name", builtin_names("models/hands"))

@@ -83,4 +83,5 @@ from .values import (
     seed as seed,
     two_numbers as two_numbers,
     unit as unit,
+    with_given_names as with_given_names,
 )

@@ -20,6 +20,8 @@ MOST = 10_000_000
 """What is counted: grasps, trials, rows."""
 MOST_WORKERS = 1024
 STANDARD_INPUT = ("-", "/dev/stdin")
+_NAMES_OF_COPIES: dict[str, str] = {}
+"""What messages call copies of what came through pipes, by the paths of the copies."""
 
 
 def input_file(text: str) -> str:
@@ -31,12 +33,20 @@ def input_file(text: str) -> str:
     except (OSError, ValueError):  # whoever opens it says what is wrong
         return text
     name = "stdin" if text in STANDARD_INPUT else Path(text).name
-    copy = Path(tempfile.mkdtemp(dir=_copies().name)) / name
+    copy = Path(tempfile.mkdtemp(dir=_copies().name)).resolve() / name
+    _NAMES_OF_COPIES[str(copy)] = "standard input" if text in STANDARD_INPUT else text
     try:
         copy.write_bytes(read_pipe(0 if text in STANDARD_INPUT else text))
     except InvalidInputError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
     return str(copy)
+
+
+def with_given_names(message: str) -> str:
+    """A message in which copies of what came through pipes go by the names that the user gave."""
+    for copy, name in _NAMES_OF_COPIES.items():
+        message = message.replace(copy, name)
+    return message
 
 
 @cache

@@ -15,11 +15,16 @@ import numpy as np
 from burg_drake.cameras.optics.fisheye import COEFFICIENTS, fisheye_lens
 from burg_drake.cameras.optics.known_parts import PARTS
 from burg_drake.core import Array, FieldError, InvalidInputError, nearest
-from burg_drake.station.document import HALF_PIXEL as HALF_PIXEL, MAX_SIDE, Camera
+from burg_drake.station.document import (
+    FOCAL_RANGE,
+    HALF_PIXEL as HALF_PIXEL,
+    Camera,
+    require_image_size,
+)
 
 DISTORTION_SIZES = (0, 4, 5, 8, 12, 14)
 """Numbers of coefficients that OpenCV's model of a lens may have."""
-INTRINSICS_RANGES = {"focal": (1.0, 1e6), "center": (-1e6, 1e6), "distortion": (-1e12, 1e12)}
+INTRINSICS_RANGES = {"focal": FOCAL_RANGE, "center": (-1e6, 1e6), "distortion": (-1e12, 1e12)}
 """Allowed values, far beyond those of any camera; projections overflow with larger ones."""
 LensModel = Literal["perspective", "fisheye"]
 
@@ -70,11 +75,7 @@ class Intrinsics:
             )
         if min(self.width, self.height, *self.focal) <= 0:
             raise InvalidInputError("width, height and focal of a camera must be positive")
-        if max(self.width, self.height) > MAX_SIDE:
-            raise FieldError(
-                f"image of {self.width} x {self.height} pixels; a side has at most {MAX_SIDE:,}",
-                "width" if self.width > MAX_SIDE else "height",
-            )
+        require_image_size(self.width, self.height)
         for name, (low, high) in INTRINSICS_RANGES.items():
             for value in getattr(self, name):
                 if not low <= value <= high:

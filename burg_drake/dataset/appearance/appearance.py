@@ -24,7 +24,7 @@ CAMERA_RANGES = {
 
 
 def _require_gains(values: Vector3, name: str) -> None:
-    if not 0.0 <= min(values) <= max(values) <= MAX_GAIN:
+    if not all(0.0 <= value <= MAX_GAIN for value in values):
         raise FieldError(f"{name} {list(values)} must be 0 to {MAX_GAIN:g} each", name)
 
 

@@ -160,6 +160,8 @@ class EvaluationSettings:
             )
         if self.until_balanced is not None:
             self._require_balance()
+        else:
+            self._require_no_balance()
         if not 0.0 < self.tilt_limit_deg <= 180.0:
             raise InvalidInputError(
                 f"tilt_limit_deg is {self.tilt_limit_deg:g}; give more than 0, and 180 for no limit"
@@ -168,6 +170,14 @@ class EvaluationSettings:
             raise InvalidInputError(
                 f"slip_limit_mm is {self.slip_limit_mm:g}; give more than 0, and inf for no limit"
             )
+
+    def _require_no_balance(self) -> None:
+        """Refuses what would have no effect without `until_balanced`."""
+        for name in ("balanced_among", "max_grasps_per_object"):
+            if getattr(self, name) != getattr(EvaluationSettings, name):
+                raise InvalidInputError(
+                    f"{name} has an effect only with until_balanced; add that, or leave it out"
+                ).about(name, "until_balanced")
 
     def _require_balance(self) -> None:
         """Refuses what cannot be had with `until_balanced`."""

@@ -99,6 +99,11 @@ class Request:
                 f"the approach of the hand is to be simulated, and the standoff {where} is 0 mm, so"
                 " that there is none; give a standoff above 0, or leave approach out"
             ).about("approach", "standoff_mm")
+        if settings.balanced_among == "reachable" and mode == "hand":
+            raise InvalidInputError(
+                "balanced_among is 'reachable', and mode hand does not ask what the arm can reach;"
+                " balance among executed, clear or all, or give mode reach or arm"
+            ).about("balanced_among", "mode")
         require_engine_for(engine, mode)
         return cls(
             station=station,

@@ -13,7 +13,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from burg_drake.core import InvalidInputError
 from burg_drake.core.documents import Reader, dump_document, parse_json, parse_nodes, plain_data
@@ -121,9 +121,27 @@ def _lines(path: Path) -> Iterator[tuple[int, Entry | None]]:
         lines = iter(lambda: stream.readline(LONGEST_LINE), b"")
         for number, line in enumerate(lines, 1):
             try:
-                yield number, Entry(**parse_json(line.decode(), "a line"))
+                yield number, _read_entry(line.decode())
             except (ValueError, TypeError):
                 yield number, None
+
+
+def _read_entry(line: str) -> Entry:
+    """The entry of a line.
+
+    Raises:
+        ValueError, TypeError: it is not JSON, or its fields or their types are not those of an
+            entry.
+    """
+    entry = Entry(**parse_json(line, "a line"))
+    if type(entry.number) is not int or entry.how not in get_args(How):
+        raise TypeError("number or how")
+    if not all(isinstance(text, str) for text in (entry.grasp, entry.content, entry.at)):
+        raise TypeError("grasp, content or at")
+    for values in (entry.before, entry.after):
+        if not isinstance(values, dict) or not values.keys() <= set(FIELDS):
+            raise TypeError("before or after")
+    return entry
 
 
 def append_entry(path: Path, entry: Entry) -> None:

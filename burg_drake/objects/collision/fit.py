@@ -192,8 +192,8 @@ def _points_in_box(surface: trimesh.Trimesh, box: Array) -> Array:
         middle = (a + b) / 2.0
         found.append(middle)
         triangles = np.concatenate([np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)])
-    points: Array = np.concatenate(found)
-    return points[((points > box[0]) & (points < box[1])).all(axis=1)]
+    points = np.concatenate(found)
+    return np.asarray(points[((points > box[0]) & (points < box[1])).all(axis=1)])
 
 
 def _points(surface: trimesh.Trimesh) -> tuple[Array, Array]:

@@ -21,6 +21,7 @@ from .gripper_document import (
     locate_hand as locate_hand,
 )
 from .station_document import (
+    FOCAL_RANGE as FOCAL_RANGE,
     HALF_PIXEL as HALF_PIXEL,
     MAX_SIDE as MAX_SIDE,
     MODEL_NAMES as MODEL_NAMES,
@@ -33,4 +34,5 @@ from .station_document import (
     Table as Table,
     as_station as as_station,
     load_station as load_station,
+    require_image_size as require_image_size,
 )

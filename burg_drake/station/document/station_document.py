@@ -39,6 +39,19 @@ MAX_SAMPLES = 8
 """Of a camera; 64 rays a pixel bring nothing more, and take seconds an image."""
 
 
+def require_image_size(width: int, height: int) -> None:
+    """Refuses a camera's image with a side above `MAX_SIDE`.
+
+    Raises:
+        FieldError: of the field `width` or `height`.
+    """
+    if max(width, height) > MAX_SIDE:
+        raise FieldError(
+            f"image of {width} x {height} pixels; a side has at most {MAX_SIDE:,}",
+            "width" if width > MAX_SIDE else "height",
+        )
+
+
 @dataclass(frozen=True, kw_only=True)
 class Arm:
     """An arm on its base.
@@ -119,15 +132,11 @@ class Camera:
         if min(self.width, self.height, *self.focal) <= 0:
             raise InvalidInputError("camera width, height and focal must be positive")
         low, high = FOCAL_RANGE
-        if not low <= min(self.focal) <= max(self.focal) <= high:
+        if not all(low <= value <= high for value in self.focal):
             raise FieldError(
                 f"focal {list(self.focal)} of a camera must be {low:g} to {high:g} pixels", "focal"
             )
-        if max(self.width, self.height) > MAX_SIDE:
-            raise FieldError(
-                f"image of {self.width} x {self.height} pixels; a side has at most {MAX_SIDE:,}",
-                "width" if self.width > MAX_SIDE else "height",
-            )
+        require_image_size(self.width, self.height)
         if not 0.0 < self.depth_range[0] < self.depth_range[1]:
             raise InvalidInputError("camera depth_range must rise from above 0 [m]")
         if not 1 <= self.samples <= MAX_SAMPLES:

@@ -7,10 +7,10 @@ Drake reads it.
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import lru_cache
 from pathlib import Path
 from xml.parsers import expat
 
@@ -45,6 +45,10 @@ UNREAD = ("gazebo", "light", "plugin", "ros2_control", "sensor")
 """Elements that are for other programs."""
 PLACES = ("link", "joint", "frame", "collision", "visual", "transmission")
 """Elements that a message names."""
+MAX_DEPTH = 200
+"""Nested elements; models have some ten, and Drake's parser refuses more than 500."""
+_SOUND: set[tuple[Path, bytes]] = set()
+"""Paths and hashes of models that were checked: stations are built again and again."""
 
 
 @dataclass
@@ -85,16 +89,19 @@ def require_sound_numbers(path: Path) -> None:
         InvalidInputError: it cannot be read, or has such a number; the message names file, line,
             link or joint, and the value.
     """
-    _check(read_bytes(path, DOCUMENT.size), path)
+    text = read_bytes(path, DOCUMENT.size)
+    checked = (path, hashlib.sha256(text).digest())
+    if checked not in _SOUND:
+        _check(text, path)
+        _SOUND.add(checked)
 
 
-@lru_cache(maxsize=32)
 def _check(text: bytes, path: Path) -> None:
-    root = _parsed(text)
+    root = _parsed(text, path)
     if root is None:
         return
     rules = URDF_RULES if root.name == "robot" else RULES
-    welded = set(_welded_links(root))
+    massless = _massless_links(root)
     for element, outer in root.walk():
         named = [e for e in (*outer, element) if e.name in PLACES]
         try:
@@ -105,8 +112,8 @@ def _check(text: bytes, path: Path) -> None:
                 _require_direction(element.figures())
             if element.name == "limit":
                 _require_order(element.figures())
-            if element.name == "inertial":
-                _require_inertia(element, massless=named[-1].attributes.get("name") in welded)
+            if element.name == "inertial" and named:
+                _require_inertia(element, massless=named[-1].attributes.get("name") in massless)
         except ValueError as error:
             where = ", ".join(f"{e.name} {quoted(e.attributes.get('name', ''))}" for e in named)
             raise InvalidInputError(
@@ -114,13 +121,21 @@ def _check(text: bytes, path: Path) -> None:
             ) from error
 
 
-def _parsed(text: bytes) -> _Element | None:
-    """The root of a model; None if it is not XML, or nested deeper than any model."""
+def _parsed(text: bytes, path: Path) -> _Element | None:
+    """The root of a model; None if it is not XML.
+
+    Raises:
+        InvalidInputError: it is nested deeper than `MAX_DEPTH`.
+    """
     parser = expat.ParserCreate()
     parser.buffer_text = True
     opened = [_Element("", {}, 0)]
 
     def start(name: str, attributes: dict[str, str]) -> None:
+        if len(opened) > MAX_DEPTH:
+            raise InvalidInputError(
+                f"{path}:{parser.CurrentLineNumber}: more than {MAX_DEPTH} nested elements"
+            )
         element = _Element(name.removeprefix("drake:"), attributes, parser.CurrentLineNumber)
         opened[-1].children.append(element)
         opened.append(element)
@@ -138,13 +153,20 @@ def _parsed(text: bytes) -> _Element | None:
     return opened[0].children[0]
 
 
-def _welded_links(root: _Element) -> Iterator[str]:
-    """Names of links at fixed joints, which may be mere frames without mass."""
-    for joint, _ in root.walk():
-        if joint.name == "joint" and joint.attributes.get("type") == "fixed":
-            for end in joint.children:
-                if end.name in ("parent", "child"):
-                    yield end.attributes.get("link", end.text.strip())
+def _massless_links(root: _Element) -> set[str]:
+    """Names of links that need no mass, as they may be mere frames: those at fixed joints, and,
+    where there are joints, those that are no joint's child, which the station welds."""
+    links, fixed, children = set(), set(), set()
+    for element, outer in root.walk():
+        if element.name == "link":
+            links.add(element.attributes.get("name", ""))
+        elif element.name in ("parent", "child") and outer and outer[-1].name == "joint":
+            link = element.attributes.get("link", element.text.strip())
+            if outer[-1].attributes.get("type") == "fixed":
+                fixed.add(link)
+            if element.name == "child":
+                children.add(link.rpartition("::")[2])
+    return fixed | (links - children if children else set())
 
 
 def _require(key: str, text: str, rule: str) -> None:
@@ -194,7 +216,9 @@ def _require_inertia(inertial: _Element, massless: bool) -> None:
     if massless and mass == principal.max() == 0.0:
         return
     if mass == 0.0:
-        raise ValueError("mass is 0; it has to be above 0, unless a fixed joint holds the link")
+        raise ValueError(
+            "mass is 0; it has to be above 0, unless a fixed joint or the station holds the link"
+        )
     if not inertia.CouldBePhysicallyValid() or principal.max() == 0.0:
         moments = ", ".join(f"{moment:g}" for moment in principal)
         raise ValueError(
