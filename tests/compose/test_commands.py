@@ -152,7 +152,7 @@ def test_what_hovers_is_put_on_what_is_below(session: ComposeSession) -> None:
     view = session.do(PutDown(("marble",)))
     assert span(view, "marble")[0, 2] == pytest.approx(0.0, abs=ROUNDED)
     X_SO = view.X_SO("box")
-    X_SO[2, 3] -= 1e-3
+    X_SO[2, 3] -= 1.2e-3
     assert session.do(MoveObjects({"box": X_SO})).status["box"] == "sunken"
 
 

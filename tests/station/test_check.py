@@ -215,9 +215,9 @@ def test_what_stands_on_a_tip_sinks_into_the_table(
 def test_only_what_touches_no_other_is_to_be_lifted_out_of_the_table(
     library: Path, panda: Station, tmp_path: Path
 ) -> None:
-    """A cube that stands 1 mm deep, alone; then with another one on it."""
-    alone, below = (0.3, 0.3, HEIGHT - 1e-3), (0.1, 0.1, HEIGHT - 1e-3)
-    on_top = (0.1, 0.1, HEIGHT + EDGE - 1e-3)
+    """A cube that stands 1.2 mm deep, alone; then with another one on it."""
+    alone, below = (0.3, 0.3, HEIGHT - 1.2e-3), (0.1, 0.1, HEIGHT - 1.2e-3)
+    on_top = (0.1, 0.1, HEIGHT + EDGE - 1.2e-3)
     issues = check_scene(scene_of(library, tmp_path, alone, below, on_top), bare_station(panda))
     assert [(issue.instance, issue.kind) for issue in issues] == [("cube_0", "sunken")]
 
