@@ -27,8 +27,8 @@ from burg_drake.evaluation.store import Run
 from burg_drake.formats import FORMATS
 from burg_drake.formats.common import GraspFormat, Gripper, PoseFrame
 from burg_drake.objects.library import ObjectLibrary
-from burg_drake.scene.document import Scene
-from burg_drake.station.document import Station
+from burg_drake.scene.document import Scene, SceneLike, as_scene
+from burg_drake.station.document import Station, StationLike, as_station
 
 if TYPE_CHECKING:
     from burg_drake.geometry import Surface
@@ -79,7 +79,7 @@ Fits = NDArray[np.bool_]
 
 
 def find_mistake(
-    grasps: Mapping[str, GraspSet], station: Station, source: Scene | ObjectLibrary
+    grasps: Mapping[str, GraspSet], station: StationLike, source: SceneLike | ObjectLibrary
 ) -> MistakeFound | None:
     """Finds the usual mistake that a set of grasps shows, if it shows one.
 
@@ -97,6 +97,8 @@ def find_mistake(
         return None
     from burg_drake.station.world import station_gripper
 
+    station = as_station(station)
+    source = source if isinstance(source, ObjectLibrary) else as_scene(source)
     search = _Search(held, station, source, station_gripper(station))
     mistakes = search.mistakes()
     alone, in_scene = search.fits(mistakes)
