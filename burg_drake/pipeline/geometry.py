@@ -32,6 +32,7 @@ from burg_drake.objects.library import (
 from burg_drake.objects.meshes import Preparation, SurfaceMesh, load_mesh, texture_image
 from burg_drake.objects.physics import (
     Solid,
+    SymmetrySearch,
     mass_properties,
     solid_of_pieces,
     solid_of_shell,
@@ -91,7 +92,8 @@ def build_geometry(
             write_piece(mesh.surface, folder / SURFACE_FILE)
     with _timed(seconds, "stable_poses"):
         p_OOcm = solid.p_OOcm if source.center_of_mass is None else np.array(source.center_of_mass)
-        poses = stable_poses(mesh.surface, _support(contact, pieces), p_OOcm)
+        search = SymmetrySearch(mesh.surface, p_OOcm)
+        poses = stable_poses(mesh.surface, _support(contact, pieces), p_OOcm, search)
     lower, upper = mesh.surface.bounds
     geometry = Geometry(
         repairs=mesh.repairs,
@@ -113,7 +115,7 @@ def build_geometry(
     if not confirm:
         return geometry
     with _timed(seconds, "confirm"):
-        poses, notes = _confirmed(source, geometry, folder)
+        poses, notes = _confirmed(source, geometry, folder, search)
     return replace(geometry, stable_poses=poses, notes=notes)
 
 
@@ -148,7 +150,7 @@ def _support(contact: ContactGeometry, pieces: PieceMeshes) -> Array:
 
 
 def _confirmed(
-    source: ObjectSource, geometry: Geometry, folder: Path
+    source: ObjectSource, geometry: Geometry, folder: Path, search: SymmetrySearch
 ) -> tuple[tuple[StablePose, ...], tuple[str, ...]]:
     """The poses that stand the test of simulation, and remarks on the others.
 
@@ -175,7 +177,7 @@ def _confirmed(
         build="",
     )
     document = LibraryDocument(name="resting", objects={name: entry})
-    confirmation = confirm_poses(ObjectLibrary(document, folder.parent), name)
+    confirmation = confirm_poses(ObjectLibrary(document, folder.parent), name, search)
     return confirmation.poses, confirmation.notes
 
 

@@ -10,6 +10,7 @@ from burg_drake.core.arrays import Array
 from burg_drake.objects.physics.landscape import PotentialLandscape
 from burg_drake.objects.physics.pose_classes import PoseClasses, angle_between
 from burg_drake.objects.physics.stability import stable_poses
+from burg_drake.objects.physics.symmetry import SymmetrySearch
 
 X, Y, Z = np.eye(3)
 
@@ -17,7 +18,9 @@ X, Y, Z = np.eye(3)
 def classes(mesh: trimesh.Trimesh) -> PoseClasses:
     center, points = np.asarray(mesh.center_mass), np.asarray(mesh.vertices)
     poses = stable_poses(mesh, points, center)
-    return PoseClasses(poses, PotentialLandscape(points, center), lambda: mesh, center)
+    return PoseClasses(
+        poses, PotentialLandscape(points, center), lambda: SymmetrySearch(mesh, center)
+    )
 
 
 def tilted(down: Array, towards: Array, angle: float) -> Array:

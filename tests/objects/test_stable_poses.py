@@ -12,6 +12,7 @@ from burg_drake.core.frames import rotation_angle, transform_points
 from burg_drake.objects.library.entry import StablePose
 from burg_drake.objects.physics.landscape import PotentialLandscape
 from burg_drake.objects.physics.stability import resting_pose, stable_poses
+from tests.thorough import thorough
 
 
 def _poses(mesh: trimesh.Trimesh, p_OOcm: Array | None = None) -> tuple[StablePose, ...]:
@@ -134,14 +135,15 @@ def thirty_shapes() -> list[trimesh.Trimesh]:
     return shapes
 
 
-def test_probabilities_by_height_are_those_of_trimesh() -> None:
+@pytest.mark.parametrize("every", [3, thorough(1)])
+def test_probabilities_by_height_are_those_of_trimesh(every: int) -> None:
     """trimesh does not merge poses, so that it has each height at least as probably as we have.
 
     Symmetric poses are at one height, to rounding. What trimesh has at other heights are poses that
     topple from a tilt of a few degrees; their probability is all that ours may have more.
     """
     lost = []
-    for mesh in thirty_shapes():
+    for mesh in thirty_shapes()[::every]:
         center = np.asarray(mesh.center_mass)
         X, probability = compute_stable_poses(mesh, center_mass=center, n_samples=1)
         theirs = X[:, 2, :3] @ center + X[:, 2, 3]
@@ -157,7 +159,7 @@ def test_probabilities_by_height_are_those_of_trimesh() -> None:
             )
             same = probability[np.abs(theirs - height) < 1e-6].sum()
             assert same - 1e-5 <= here <= same + unknown + 1e-5
-    assert sum(share < 0.01 for share in lost) >= 20
+    assert sum(share < 0.01 for share in lost) >= 2 * len(lost) // 3
 
 
 def test_a_flat_bar_has_two_poses() -> None:
@@ -250,7 +252,7 @@ def test_subdividing_the_mesh_changes_nothing() -> None:
             np.testing.assert_allclose(abs(a.X_SO.matrix()), abs(b.X_SO.matrix()), atol=1e-6)
 
 
-@pytest.mark.parametrize("sections", [24, 32, 64])
+@pytest.mark.parametrize("sections", [24, thorough(32), thorough(64)])
 def test_cans_lie_and_roll_however_finely_they_are_cut(sections: int) -> None:
     lying, upright = _poses(trimesh.creation.cylinder(0.03, 0.1, sections=sections))
     assert (lying.rolls, upright.rolls) == (True, False)

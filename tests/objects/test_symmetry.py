@@ -8,6 +8,7 @@ import trimesh
 
 from burg_drake.core.arrays import Array
 from burg_drake.objects.physics.symmetry import Symmetries, SymmetrySearch, sample_surface
+from tests.thorough import thorough
 
 X, Y, Z = np.eye(3)
 
@@ -32,7 +33,16 @@ def orders() -> dict[str, tuple[trimesh.Trimesh, int]]:
     }
 
 
-@pytest.mark.parametrize("name", orders())
+@pytest.mark.parametrize(
+    "name",
+    [
+        "brick",
+        "hexagonal bar",
+        "cube",
+        "icosahedron",
+        *map(thorough, ("square bar", "pyramid", "tetrahedron")),
+    ],
+)
 def test_the_number_of_rotations_is_that_of_the_group(name: str) -> None:
     """Of the rotation groups of prisms and regular polyhedra; each takes vertices to vertices."""
     mesh, order = orders()[name]
@@ -83,6 +93,29 @@ def test_any_turn_takes_a_ball_onto_itself() -> None:
     assert found.sphere and found.same(X, Y, TURN)
 
 
+def test_lumpy_balls_are_not_tried_in_every_direction(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As scans of fruit are: no direction is singled out, and no turn fits."""
+    tried = []
+    refined = SymmetrySearch._refined
+
+    def counted(search: SymmetrySearch, R: Array) -> Array | None:
+        tried.append(R)
+        return refined(search, R)
+
+    monkeypatch.setattr(SymmetrySearch, "_refined", counted)
+    ball = trimesh.creation.icosphere(4, 0.04)
+    rng = np.random.default_rng(0)
+    lumps = rng.normal(size=(60, 3))
+    lumps /= np.linalg.norm(lumps, axis=1)[:, None]
+    near = np.exp((ball.vertices @ lumps.T / 0.04 - 1.0) / 0.02)
+    ball.vertices *= 1.0 + 0.02 * (near @ rng.uniform(-1.0, 1.0, 60))[:, None]
+    search = SymmetrySearch(ball, np.asarray(ball.center_mass))
+    found = search.find()
+    assert (len(found.rotations), found.axis, found.sphere) == (1, None, False)
+    assert len(tried) < 100
+    assert search.find() is found
+
+
 def test_mirror_images_are_not_the_same() -> None:
     """Two cranks in space: a bent rod out of a plane is chiral."""
     rods = [
@@ -93,7 +126,7 @@ def test_mirror_images_are_not_the_same() -> None:
     assert len(find(trimesh.util.concatenate(rods)).rotations) == 1
 
 
-@pytest.mark.parametrize("lid", [0.0, 0.03])
+@pytest.mark.parametrize("lid", [0.0, thorough(0.03)])
 def test_a_hollow_can_with_one_end_open_is_not_the_same_upside_down(lid: float) -> None:
     """The hulls are the same; what is inside tells."""
     outer = trimesh.creation.annulus(0.028, 0.03, 0.08, sections=48)

@@ -8,17 +8,22 @@ import shutil
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
 
 from burg_drake.core.errors import InvalidInputError
-from burg_drake.objects.library.document import load_library
+from burg_drake.objects.library.document import ObjectLibrary, load_library
+from burg_drake.objects.library.entry import StablePose
+from burg_drake.objects.physics.stability import stable_poses
+from burg_drake.objects.physics.symmetry import SymmetrySearch
 from burg_drake.pipeline import cutting, geometry, keys
 from burg_drake.pipeline.build import BuildReport, build_library
 from burg_drake.pipeline.source import ObjectSource
 from burg_drake.pipeline.target import SCRATCH
+from burg_drake.simulation.settling.resting_poses import Confirmation
 
 
 def _box(size: tuple[float, float, float] = (0.1, 0.06, 0.03)) -> trimesh.Trimesh:
@@ -441,3 +446,22 @@ def test_a_document_that_was_edited_is_written_again(meshes: Path, tmp_path: Pat
     document.write_text(before.replace("mass: 0.2", "mass: 7.5"))
     assert build(_sources(meshes), tmp_path / "lib").built == ("box",)
     assert document.read_text() == before
+
+
+def test_symmetries_are_searched_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the stable poses are merged by is what they are confirmed by."""
+    searches = []
+
+    def confirmed(library: ObjectLibrary, name: str, search: SymmetrySearch) -> Confirmation:
+        searches.append(search)
+        return Confirmation(library.entry(name).stable_poses, ())
+
+    def merged(*args: Any) -> tuple[StablePose, ...]:
+        searches.append(args[3])
+        return stable_poses(*args)
+
+    monkeypatch.setattr("burg_drake.simulation.settling.confirm_poses", confirmed)
+    monkeypatch.setattr(geometry, "stable_poses", merged)
+    build([ObjectSource(name="box", mesh=_box())], tmp_path / "lib", confirm=True)
+    first, second = searches
+    assert first is second

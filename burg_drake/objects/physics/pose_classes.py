@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
-import trimesh
 
 from burg_drake.core import Array
 from burg_drake.objects.library import StablePose
@@ -17,7 +16,7 @@ from burg_drake.objects.physics.landscape import (
     PotentialLandscape,
 )
 from burg_drake.objects.physics.stability import same_minimum
-from burg_drake.objects.physics.symmetry import Symmetries, SymmetrySearch
+from burg_drake.objects.physics.symmetry import SymmetrySearch
 
 NEAR_ANGLE = TILT_MARGIN
 """What is tilted from a pose by less than this is in the pose [rad]; as for quasi-static poses, of
@@ -37,8 +36,8 @@ class PoseClasses:
     Args:
         poses: the known poses.
         landscape: of the object.
-        surface: gives the surface in O [m]; called if symmetry has to be looked for.
-        p_OOcm: (3,) centre of mass [m].
+        search: gives that for the symmetries of the surface about the centre of mass; called if
+            they are needed.
 
     Attributes:
         downs: (3,) unit vector of O that points down, of each pose.
@@ -48,12 +47,11 @@ class PoseClasses:
         self,
         poses: Sequence[StablePose],
         landscape: PotentialLandscape,
-        surface: Callable[[], trimesh.Trimesh],
-        p_OOcm: Array,
+        search: Callable[[], SymmetrySearch],
     ) -> None:
         self.poses, self.landscape = tuple(poses), landscape
         self.downs = [-pose.X_SO.matrix()[2, :3] for pose in poses]
-        self._surface, self._p_OOcm = surface, p_OOcm
+        self._make_search = search
         self._neutral: dict[int, NeutralEquilibrium] = {}
 
     def angle(self, k: int, down: Array) -> float:
@@ -86,17 +84,13 @@ class PoseClasses:
             near = abs(level - float(self.landscape.height(self.downs[k])))
             if near > self._search.tolerance:
                 continue
-            if same_minimum(self.landscape, self._symmetries, lowest, self.downs[k]):
+            if same_minimum(self.landscape, self._search.find(), lowest, self.downs[k]):
                 return k, angle_between(lowest, down)
         return None
 
     @cached_property
     def _search(self) -> SymmetrySearch:
-        return SymmetrySearch(self._surface(), self._p_OOcm)
-
-    @cached_property
-    def _symmetries(self) -> Symmetries:
-        return self._search.find()
+        return self._make_search()
 
 
 def angle_between(a: Array, b: Array) -> float:

@@ -23,19 +23,25 @@ MIN_PROBABILITY = 0.01
 """Rarer poses are left out, and the others scaled to a sum of one."""
 
 
-def stable_poses(surface: trimesh.Trimesh, support: Array, p_OOcm: Array) -> tuple[StablePose, ...]:
+def stable_poses(
+    surface: trimesh.Trimesh,
+    support: Array,
+    p_OOcm: Array,
+    search: SymmetrySearch | None = None,
+) -> tuple[StablePose, ...]:
     """Resting poses, most probable first.
 
     Args:
         surface: in O [m]; tells which poses are the same by symmetry.
         support: (N, 3) points of O whose hull rests on the plane [m].
         p_OOcm: (3,) centre of mass [m].
+        search: of the surface about `p_OOcm`, where others need it as well; made if None.
 
     Returns:
         At least one pose; probabilities sum to one.
     """
     landscape = PotentialLandscape(support, p_OOcm)
-    classes = _merge_symmetric(landscape, surface, p_OOcm)
+    classes = _merge_symmetric(landscape, search or SymmetrySearch(surface, p_OOcm))
     most = max(c.probability for c in classes)
     kept = [c for c in classes if c.probability >= min(MIN_PROBABILITY, most)]
     total = sum(c.probability for c in kept)
@@ -57,11 +63,8 @@ def resting_pose(down: Array, height: float, p_OOcm: Array) -> Array:
     return make_pose(R_SO, np.array([0.0, 0.0, height]) - R_SO @ p_OOcm)
 
 
-def _merge_symmetric(
-    landscape: PotentialLandscape, surface: trimesh.Trimesh, p_OOcm: Array
-) -> list[RestingFacet]:
+def _merge_symmetric(landscape: PotentialLandscape, search: SymmetrySearch) -> list[RestingFacet]:
     facets = landscape.minima()
-    search = SymmetrySearch(surface, p_OOcm)
     heights = np.sort([facet.height for facet in facets])
     if not (np.diff(heights) <= search.tolerance).any():
         return facets

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import trimesh
@@ -56,6 +57,14 @@ another, so that prisms do not pass."""
 
 SAME_TURN = np.deg2rad(3.0)
 """Rotations that differ by less are one [rad]."""
+
+SAME_DIRECTION = np.deg2rad(8.0)
+"""Directions to the farthest corners that differ by less are one [rad]."""
+
+MAX_FARTHEST = 12
+"""Directions to the farthest corners that are tried. Solids with more of them, all alike, have
+turns for many of these, whose products are the others; what is nearly a ball has any number, and
+no turn for them."""
 
 MAX_TURNS = 120
 """Rotations that are kept; polyhedra have at most 60."""
@@ -141,7 +150,12 @@ class SymmetrySearch:
         self._tree = cKDTree(np.hstack([self._points, weight * self._normals]))
 
     def find(self) -> Symmetries:
-        """All symmetries of the surface. The order depends on nothing but the surface."""
+        """All symmetries of the surface, looked for once. The order depends on nothing but the
+        surface."""
+        return self._symmetries
+
+    @cached_property
+    def _symmetries(self) -> Symmetries:
         radius = np.linalg.norm(self._points, axis=1)
         if np.ptp(radius) <= 2.0 * self.tolerance:
             return Symmetries(np.eye(3)[None], sphere=True)
@@ -150,9 +164,9 @@ class SymmetrySearch:
         pairs = [(axis, sign * axis) for axis in axes.T for sign in (1.0, -1.0)]
         candidates = list(axes.T)
         if not any(unequal):
-            far = _spread_directions(self._points[np.argsort(-radius, kind="stable")], self)
-            pairs += [(far[0], b) for b in far]
-            candidates += [np.asarray(v) for v in far]
+            far = self._farthest()
+            pairs = [(far[0], b) for b in far]
+            candidates += far
         axis = next((a for a in candidates if self.turns_about(a)), None)
         if axis is not None:
             pairs = [(axis, -axis)]
@@ -180,6 +194,23 @@ class SymmetrySearch:
         """Whether a rotation (3, 3) lays the surface onto itself."""
         few = self._share_near(R, COARSE_POINTS)
         return few > self._covered - 0.1 and self._share_near(R, PROBE_POINTS) >= self._covered
+
+    def _farthest(self) -> list[Array]:
+        """Unit vectors to the farthest corners, farthest first, none near another.
+
+        The farthest point of a surface is a corner, and where a turn takes it the surface has a
+        corner that is as far, within the tolerance.
+        """
+        corners = self._triangles.reshape(-1, 3)
+        radius = np.linalg.norm(corners, axis=1)
+        far = np.flatnonzero(radius >= radius.max() - self.tolerance)
+        far = far[np.argsort(-radius[far], kind="stable")]
+        left = corners[far] / radius[far, None]
+        directions: list[Array] = []
+        while len(left) and len(directions) < MAX_FARTHEST:
+            directions.append(left[0])
+            left = left[left @ left[0] < np.cos(SAME_DIRECTION)]
+        return directions
 
     def _share_near(self, R: Array, count: int) -> float:
         """Share of the first `count` points that R (3, 3) takes to within the tolerance."""
@@ -283,21 +314,6 @@ def _known(R: Array, found: Sequence[Array]) -> bool:
     """Whether a rotation is near one of those found."""
     traces = np.einsum("kij,ij->k", np.stack(found), R)
     return bool(traces.max() >= 1.0 + 2.0 * np.cos(SAME_TURN))
-
-
-def _spread_directions(points: Array, search: SymmetrySearch) -> list[Array]:
-    """Unit vectors to the farthest of points (N, 3), which come farthest first, none near
-    another."""
-    limit = np.linalg.norm(points[0]) - 2.0 * search.tolerance - 0.01 * search.diagonal
-    directions: list[Array] = []
-    for point in points:
-        length = float(np.linalg.norm(point))
-        if length < limit or len(directions) == MAX_TURNS:
-            break
-        direction = point / length
-        if all(direction @ other < np.cos(np.deg2rad(8.0)) for other in directions):
-            directions.append(direction)
-    return directions
 
 
 def sample_surface(surface: trimesh.Trimesh, count: int) -> tuple[Array, Array]:

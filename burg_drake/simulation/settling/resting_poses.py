@@ -22,7 +22,7 @@ import numpy as np
 from burg_drake.core import Array, BurgError
 from burg_drake.objects.collision import primitive_mesh
 from burg_drake.objects.library import ObjectLibrary, StablePose
-from burg_drake.objects.physics import PoseClasses, PotentialLandscape
+from burg_drake.objects.physics import PoseClasses, PotentialLandscape, SymmetrySearch
 from burg_drake.simulation.settling.drop_test import DropTest
 
 TILTS = 4
@@ -68,12 +68,16 @@ class _Outcome:
     confirmed: bool
 
 
-def confirm_poses(library: ObjectLibrary, name: str) -> Confirmation:
+def confirm_poses(
+    library: ObjectLibrary, name: str, search: SymmetrySearch | None = None
+) -> Confirmation:
     """Drops an object on each of its stable poses, and keeps those that it stays in.
 
     Args:
         library: the library; its folder holds the object's SDF, pieces and surface mesh.
         name: the object, with its quasi-static poses.
+        search: for the symmetries of its surface about its centre of mass, if there is one already;
+            else it is made where needed.
 
     Returns:
         The confirmed poses. The probability of a pose that topples goes to the one it ends in; if
@@ -85,18 +89,22 @@ def confirm_poses(library: ObjectLibrary, name: str) -> Confirmation:
     """
     poses = library.entry(name).stable_poses
     try:
-        return _judge(poses, _outcomes(library, name))
+        return _judge(poses, _outcomes(library, name, search))
     except (BurgError, RuntimeError, SystemExit) as error:  # some of Drake's checks end so
         reason = " ".join(str(error).split())
         return Confirmation(poses, (f"stable poses are not confirmed by simulation: {reason}",))
 
 
-def _outcomes(library: ObjectLibrary, name: str) -> list[_Outcome]:
+def _outcomes(library: ObjectLibrary, name: str, search: SymmetrySearch | None) -> list[_Outcome]:
     """Drops the object on all its poses."""
     entry = library.entry(name)
     p_OOcm = np.array(entry.mass_properties.center_of_mass)
     landscape = PotentialLandscape(support_points(library, name), p_OOcm)
-    classes = PoseClasses(entry.stable_poses, landscape, lambda: library.surface(name), p_OOcm)
+    classes = PoseClasses(
+        entry.stable_poses,
+        landscape,
+        lambda: search or SymmetrySearch(library.surface(name), p_OOcm),
+    )
     drop = DropTest(library, name, landscape.points + p_OOcm)
     return [_outcome(drop, classes, k) for k in range(len(entry.stable_poses))]
 
