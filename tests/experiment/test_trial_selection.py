@@ -91,7 +91,7 @@ def test_shortfalls_of_a_kind_are_one_line_and_a_class_that_is_missing_is_said(
     assert planned(run, per_object=4).notes == (
         "box, mug of run two: 0 of 2 with failure; others make up for it",
         "0 of 8 are failures in simulation: almost nothing here measures how well failures are"
-        " predicted; run burg-drake evaluate --until-balanced 10 to get more",
+        " predicted; evaluate with until_balanced=10 to get more",
     )
     verdicts = {"mug": [*lifted, ended("slipped")], "box": lifted}
     uneven = make_run(tmp_path / "uneven", make_scene(tmp_path), verdicts)

@@ -54,7 +54,7 @@ def test_surfaces_of_what_touches_are_hardly_in_each_other(
     for one, other in itertools.combinations(surfaces, 2):
         common = trimesh.boolean.intersection([one, other], engine="manifold", check_volume=False)
         for surface in (one, other) if len(common.vertices) else ():
-            samples, _ = trimesh.sample.sample_surface(surface, 100_000, seed=0)
+            samples, _ = trimesh.sample.sample_surface(surface, 1_000_000, seed=0)
             assert cKDTree(samples).query(common.vertices)[0].max() < 1.15e-3
 
 

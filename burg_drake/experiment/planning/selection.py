@@ -87,8 +87,7 @@ def _rare_class(chosen: Chosen, selection: Selection) -> list[str]:
         if good and count < RARE * len(good):
             return [
                 f"{count} of {len(good)} are {name} in simulation: almost nothing here measures"
-                f" how well {name} are predicted; run burg-drake evaluate"
-                " --until-balanced 10 to get more"
+                f" how well {name} are predicted; evaluate with until_balanced=10 to get more"
             ]
     return []
 

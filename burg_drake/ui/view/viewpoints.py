@@ -82,7 +82,7 @@ class _Fitted:
     target: Array
     aspect: float
     arrived: bool = False
-    repeats: int = 3
+    repeats: int = 20
 
 
 class PageViews:
