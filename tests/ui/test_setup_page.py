@@ -132,11 +132,11 @@ def test_a_scene_is_composed_checked_and_saved(setup: Setup, tmp_path: Path) -> 
     before = setup.view.X_SO("box")
 
     setup.drag("box", np.array([-0.15, 0.03, 0.0]))
-    until(lambda: setup.view.X_SO("box")[0, 3] < before[0, 3] - 0.13, "the box has moved")
+    until(lambda: setup.view.X_SO("box")[0, 3] < before[0, 3] - 0.11, "the box has moved")
     setup.let_go()
     moved = setup.view.X_SO("box")
-    # the pointer takes hold of the box's top, which is nearer to the camera than its middle
-    np.testing.assert_allclose(moved[:3, 3] - before[:3, 3], [-0.15, 0.03, 0.0], atol=0.012)
+    # the pointer takes hold of the standing box's top, nearer to the camera than its middle
+    np.testing.assert_allclose(moved[:3, 3] - before[:3, 3], [-0.15, 0.03, 0.0], atol=0.025)
     np.testing.assert_allclose(moved[:3, :3], before[:3, :3], atol=1e-6)
 
     setup.tab.keyboard.press("Control+z")
