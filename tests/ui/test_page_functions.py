@@ -186,8 +186,8 @@ def test_objects_have_the_colours_that_were_chosen(
 
 @pytest.mark.thorough
 def test_grasps_are_counted_again_after_a_move(session: ComposeSession, client: PageClient) -> None:
-    session.do(AddObject("can", position=(0.12, 0.15)))
-    session.do(AddObject("mug", position=(0.3, 0.15)))
+    session.do(AddObject("can", stable_pose=0, position=(0.12, 0.15)))
+    session.do(AddObject("mug", stable_pose=0, position=(0.3, 0.15)))
 
     def counted() -> bool:
         view = session.view
