@@ -45,18 +45,18 @@ def test_either_depth_in_any_unit(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     sample = drawn_sample()
-    image = "train_pbr/000012/depth/000000.png"
-    assert export(data, tmp_path / "exact", "bop") == 0
-    assert LEFT_OUT.format("BOP", "depth of the sensor") in capsys.readouterr().err
-    assert np.abs(depth_of(tmp_path / "exact" / image) * 1e-4 - sample.images.depth).max() < 6e-5
+    image = "scenes/scene_0012/realsense/depth/0000.png"
+    assert export(data, tmp_path / "exact", "graspnet") == 0
+    assert LEFT_OUT.format("GraspNet", "depth of the sensor") in capsys.readouterr().err
+    assert np.abs(depth_of(tmp_path / "exact" / image) * 1e-3 - sample.images.depth).max() < 6e-4
     assert export(data, tmp_path / "bop", "bop", "--sensor-depth", "--depth-unit", "0.002") == 0
     assert LEFT_OUT.format("BOP", "exact depth") in capsys.readouterr().err
-    measured = depth_of(tmp_path / "bop" / image)
+    measured = depth_of(tmp_path / "bop/train_pbr/000012/depth/000000.png")
     assert np.abs(measured * 2e-3 - sample.sensor_depth).max() < 1.1e-3
     assert json.loads((tmp_path / "bop/camera.json").read_text())["depth_scale"] == 2.0
     assert export(data, tmp_path / "graspnet", "graspnet", "--sensor-depth") == 0
     assert LEFT_OUT.format("GraspNet", "exact depth") in capsys.readouterr().err
-    measured = depth_of(tmp_path / "graspnet/scenes/scene_0012/realsense/depth/0000.png")
+    measured = depth_of(tmp_path / "graspnet" / image)
     assert np.abs(measured * 1e-3 - sample.sensor_depth).max() < 6e-4
 
 

@@ -58,13 +58,12 @@ def test_without_limits_all_that_is_held_is_lifted(unlimited: dict[float, TrialR
 def test_each_limit_decides_between_lifted_and_turned(
     run: Callable[..., TrialResult], unlimited: dict[float, TrialResult], friction: float, name: str
 ) -> None:
-    """Just below and just above what the whole trial ends with; the same when it may end early."""
+    """A trial that may end early, with limits just below and above what the whole one ends with."""
     end = getattr(unlimited[friction].margins, name)
     for share, outcome in ((0.97, Outcome.LIFTED_TURNED), (1.03, Outcome.LIFTED)):
-        for whole in (False, True):
-            result = run(friction, whole=whole, **{f"{name}_limit": share * end})
-            assert result.outcome is outcome, (share, whole)
-            assert result.outcome.held
+        result = run(friction, **{f"{name}_limit": share * end})
+        assert result.outcome is outcome, share
+        assert result.outcome.held
 
 
 def test_a_limit_near_by_has_the_trial_go_on_and_one_far_off_does_not(
