@@ -83,7 +83,7 @@ GROUPS: dict[str, Modules] = {
         "experiment/trials/given_entry": ("experiment/test_trial_book",),
         "experiment/trials/sheet_text": ("experiment/test_trial_book",),
         "evaluation/run/balancing": ("evaluation/test_balanced",),
-        "evaluation/results/balance": ("evaluation/test_balanced",),
+        "evaluation/results/notes": ("evaluation/test_balanced", "evaluation/test_run_notes"),
     },
     "frames": {
         "core/frames": ("core/test_frames",),

@@ -117,7 +117,7 @@ def _read(path: Path, made_by: str) -> Arrays | None:
             origin = archive.array(VERSION_KEY).read("U", ()).item()
             found = _arrays(archive) if origin == made_by else None
     except InvalidInputError as error:
-        _log.warning("cache: %s; it is computed anew", error)
+        _log.warning("burg-drake: %s; it is only a copy, and is computed again", error)
         return None
     if found is None:
         _log_other_version(path.parent)
@@ -142,7 +142,12 @@ def _log_other_version(folder: Path) -> None:
         if other != mark:
             with contextlib.suppress(OSError):
                 other.unlink()
-    _log.warning("cache: %s was made by another version; what is needed is computed anew", folder)
+    _log.warning(
+        "burg-drake: the results kept in %s are of another version of burg_drake or of a package"
+        " that it uses; this command computes what it needs again, and takes longer. There is"
+        " nothing for you to do",
+        folder,
+    )
 
 
 def _arrays(archive: NpzFile) -> Arrays:

@@ -117,7 +117,7 @@ def _draw_ruler(pen: Pen, start: Array, *, turned: bool) -> None:
         pen.line(at(millimetre * 1e-3, 0.0), at(millimetre * 1e-3, tick), width=width)
     for millimetre in (50, 100) if turned else (0, 50, 100):
         words = f"{millimetre} mm" if millimetre == 100 else str(millimetre)
-        off = 2.6e-3 if turned else 4.9e-3  # baselines are on the other side of the letters
+        off = 2.6e-3 if turned else 4.3e-3  # baselines are on the other side of the letters
         pen.text(*at(millimetre * 1e-3, off), words, 6, align=0.5, turned=turned)
 
 
@@ -134,7 +134,7 @@ def _draw_caption(
     pen.text(left, base + 6.8e-3, caption.board, _fitting(caption.board, right - left, 6.5))
     start = left - RULER - 8e-3  # below the ruler, too
     pen.text(start, base + 4.2e-3, caption.facts, _fitting(caption.facts, right - start, 6.5))
-    pen.text(start, base + 0.9e-3, caption.how, _fitting(caption.how, right - start, 10))
+    pen.text(start, base + 0.75e-3, caption.how, _fitting(caption.how, right - start, 10))
 
 
 def _fitting(text: str, room: float, size: float, font: str = "Helvetica") -> float:

@@ -204,6 +204,7 @@ def test_an_object_without_grasps_is_said(
     [
         (["tabletop", "-o", "x.h5"], "tabletop is neither a scene nor an object library"),
         (["household", "--only", "bxo", "-o", "x.h5"], "has no object 'bxo'; did you mean 'box'?"),
+        (["household", "--only", "mug, bxo", "-o", "x.h5"], "has no object 'bxo'; did you mean"),
         (["household", "--approach-angle", "60", "-o", "x.h5"], "limit the approach in a scene"),
         (["tabletop_six", "--only", "can", "-o", "x.h5"], "has no free object 'can'"),
         (["tabletop_six", "-o", "x.txt"], "no format of grasps has the suffix '.txt'"),

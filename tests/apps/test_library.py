@@ -45,8 +45,8 @@ def test_build_and_check_say_what_pads_touch(mesh: Path, tmp_path: Path, capsys:
     assert build(mesh, tmp_path / "ring.ply", QUICK, "-o", library, *masses) == 0
     faces = len(load_library(library).mesh("ring/contact.obj").faces)
     expected = [
-        "block: pads touch a box, within ",
-        f"ring: pads touch a surface of {faces} faces, within 0.",
+        "block: gripper pads touch a box, within ",
+        f"ring: gripper pads touch a surface of {faces} faces, within 0.",
     ]
 
     def told() -> list[str]:

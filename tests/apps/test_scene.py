@@ -77,8 +77,8 @@ def test_built_in_scenes_are_sound(name: str, capsys: Capture) -> None:
     assert main(["scene", "validate", name]) == 0
     path = resolve(name, "scenes")
     assert capsys.readouterr().out == (
-        f"{path}: {len(load_scene(name).instances)} objects stand free and in bounds on station"
-        " panda_tabletop\n"
+        f"{path}: nothing is wrong with the {len(load_scene(name).instances)} objects on station"
+        " panda_tabletop: all stand, within the board, and none overlaps another\n"
     )
 
 
@@ -172,7 +172,7 @@ def test_live_view_ends_with_ctrl_c() -> None:
     ) as process:
         assert process.stdout is not None and process.stderr is not None
         assert "http://localhost:" in process.stdout.readline()
-        assert process.stdout.readline() == "Press Ctrl-C to end.\n"
+        assert process.stdout.readline() == "It is served until you press Ctrl-C.\n"
         process.send_signal(signal.SIGINT)
         assert process.wait(timeout=HANG_GUARD) == 0
         assert process.stderr.read() == ""

@@ -141,7 +141,8 @@ def test_what_hovers_is_put_on_what_is_below(session: ComposeSession) -> None:
     session.restrict_movement(False)
     X_SO = session.view.X_SO("marble")
     X_SO[2, 3] += 0.4
-    assert session.do(MoveObjects({"marble": X_SO})).status["marble"] == "hovering"
+    status = session.do(MoveObjects({"marble": X_SO})).status
+    assert (status["marble"], status["box"]) == ("hovering", "ok")
     view = session.do(PutDown(("marble",)))
     assert set(view.status.values()) == {"ok"}
     top = span(view, "box")[1, 2]

@@ -79,7 +79,9 @@ def test_a_damaged_entry_is_told_and_replaced(
     damage(entry(folder))
     assert_same(cached("thing", KEY, compute))
     (line,) = caplog.messages
-    assert str(entry(folder)) in line and line.endswith("; it is computed anew")
+    assert str(entry(folder)) in line and line.endswith(
+        "; it is only a copy, and is computed again"
+    )
     assert_same(cached("thing", KEY, never))
 
 
@@ -92,9 +94,9 @@ def test_an_entry_of_another_version_is_told_and_replaced(
     monkeypatch.setattr(cache, "_code_version", lambda: ("another",))
     for kind in kinds:
         assert_same(cached(kind, KEY, compute))
-    assert caplog.messages == [
-        f"cache: {folder} was made by another version; what is needed is computed anew"
-    ]
+    (line,) = caplog.messages
+    assert line.startswith(f"burg-drake: the results kept in {folder} are of another version")
+    assert line.endswith("There is nothing for you to do")
     for kind in kinds:
         assert_same(cached(kind, KEY, never))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,14 +14,15 @@ from known_judge import expected, install
 
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.evaluation.candidates.sampling import sample_candidates
+from burg_drake.evaluation.candidates.sampling import sample_candidates, sample_on_scene
 from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
 from burg_drake.evaluation.cascade import evaluate
 from burg_drake.evaluation.report.sections.commands import reproduce_command
 from burg_drake.evaluation.results.notes import run_notes
+from burg_drake.evaluation.run.balancing import sample_requested
 from burg_drake.evaluation.store.run_folder import Run, save_run
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.station_document import Station
+from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.station.document.station_document import Station, load_station
 
 OPTIONS = {"grasps_per_object": 4, "until_balanced": 3, "blind": True, "progress": False}
 
@@ -57,6 +59,36 @@ def test_each_object_gets_enough_of_both(
     other = judged(scene, station, tmp_path / "clear", balanced_among="all")
     assert other.document.grasps.count < run.document.grasps.count  # collisions count, too
     assert other.document.hash != run.document.hash
+
+
+@pytest.mark.parametrize("blind", [True, False])
+def test_only_what_lacks_something_is_sampled_again(
+    scene: Scene,
+    station: Station,
+    tmp_path: Path,
+    known_judge: None,
+    monkeypatch: pytest.MonkeyPatch,
+    blind: bool,
+) -> None:
+    """And all grasps are those that sampling everything at once gives, for points of contact alone
+    and for a hand that is clear of the scene."""
+    if not blind:
+        scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")
+    asked_of: list[set[str]] = []
+
+    def noted(*arguments: Any) -> Any:
+        asked_of.append(set(arguments[-1]))
+        return sample_on_scene(*arguments)
+
+    monkeypatch.setattr("burg_drake.evaluation.run.balancing.sample_on_scene", noted)
+    only = {"left", "right", "bar"} if blind else {"bottle", "box"}
+    options = {"blind": blind, "only": sorted(only), "until_balanced": 3 if blind else 1}
+    run = judged(scene, station, tmp_path / "run", mode="hand", **options)
+    times = {name: sum(name in names for names in asked_of) for name in only}
+    assert times["left"] == 1 < times["bar"] if blind else times["bottle"] < times["box"]
+    whole = sample_requested(scene, station, run.document)
+    assert whole.content == run.candidates.content
+    assert np.array_equal(whole.grasps.X_OG, run.candidates.grasps.X_OG)
 
 
 @pytest.mark.parametrize("out", ["one", "two"])

@@ -296,7 +296,7 @@ def test_some_objects_only(
     everything = evaluate(scene, station, tmp_path / "b", **asked(**options))
     assert run.candidates.id == [i for i in everything.candidates.id if not i.startswith("left")]
     assert load_run(run.path).document.grasps.objects == {"cube": 3, "bar": 3}
-    assert "--blind --only right --only bar" in reproduce_command(run)
+    assert "--blind --only right,bar" in reproduce_command(run)
     given = {
         name: GraspSet.create(np.eye(4), object=object)
         for name, object in (("left", "cube"), ("bar", "bar"))
@@ -311,6 +311,8 @@ def test_some_objects_only(
         progress=False,
     )
     assert set(run.candidates.instance) == {"left"}
+    assert load_run(run.path).document.grasps.objects == {"cube": 1}  # and no bar without grasps
+    assert "grasps.npz --only left,right" in reproduce_command(run)
     with pytest.raises(InvalidInputError, match=r"no grasps are of right; .* some of left, bar"):
         evaluate(
             scene,

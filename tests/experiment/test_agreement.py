@@ -46,6 +46,35 @@ def test_tables_of_the_paper(cells: tuple[int, ...], precision: str, recall: str
     assert f"{100 * (found.recall.value or 0):.2f}" == recall
 
 
+@given(st.lists(Cells, min_size=1, max_size=3), st.booleans())
+@settings(max_examples=60, deadline=None)
+def test_intervals_stay_within_what_is_possible(
+    counts: list[tuple[int, ...]], weighted: bool
+) -> None:
+    """A share is in [0, 1], a difference of shares in [-1, 1], and above 0 where all were to
+    succeed, below 0 where none was: nothing succeeds more often than always."""
+    table = np.array(counts)
+    found = agreement(table, population=10.0 * table.sum(axis=1) if weighted else None)
+    for name, measure in MEASURES.items():
+        figure = found.figure(name)
+        if figure.low is not None and figure.high is not None and figure.value is not None:
+            assert measure.low <= figure.low <= figure.value <= figure.high <= measure.high
+    if not table.sum():
+        return
+    predicted = table[:, :2].sum() / table.sum()
+    low, high = found.excess.low, found.excess.high
+    assert low is not None and high is not None
+    if predicted in (0.0, 1.0):
+        assert predicted - 1.0 <= low <= high <= predicted
+
+
+def test_excess_where_all_were_to_succeed() -> None:
+    """It is the share of failures: Wilson's interval of 1 - 2 / 2."""
+    found = agreement(np.array([2, 0, 0, 0])).excess
+    low, high = proportion_confint(0, 2, method="wilson")
+    assert (found.value, found.low, found.high) == (0.0, pytest.approx(low), pytest.approx(high))
+
+
 ORACLES = {
     "precision": lambda y, p, w: metrics.precision_score(y, p, sample_weight=w),
     "recall": lambda y, p, w: metrics.recall_score(y, p, sample_weight=w),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import comb
+
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
@@ -49,7 +51,7 @@ def test_interval_of_the_area_meets_a_bootstrap() -> None:
     assert (found.low, found.high) == pytest.approx((low, high), abs=0.015)
 
 
-@pytest.mark.parametrize(("good", "bad"), [(4, 400), (6, 6), (30, 90)])
+@pytest.mark.parametrize(("good", "bad"), [(5, 400), (6, 6), (30, 90)])
 def test_interval_of_a_number_that_tells_nothing_is_that_of_mann_and_whitney(
     good: int, bad: int
 ) -> None:
@@ -87,8 +89,18 @@ def test_perfect_separation_is_not_certain() -> None:
     values = np.arange(20.0)
     found = ranking(Ordered.of(values, values >= 10))
     assert found.value == 1.0 and found.high == 1.0 and 0.6 < (found.low or 0) < 0.8
-    few = ranking(Ordered.of(np.r_[np.zeros(3), np.arange(1, 50)], np.arange(52) >= 3))
-    assert (few.low or 1) < 0.5
+    few = ranking(Ordered.of(np.r_[np.zeros(5), np.arange(1, 50)], np.arange(54) >= 5))
+    assert 0.5 < (few.low or 0) < 0.6
+
+
+def test_too_few_to_rank() -> None:
+    """Of ten numbers that tell nothing, one ranks all of n and n trials without an error with a
+    probability of 20 / binomial(2 n, n) at most: 29 % for 4, 8 % for 5."""
+    for good, bad in ((1, 1), (4, 4), (4, 60), (60, 4)):
+        found = ranking(Ordered.of(np.arange(good + bad), np.arange(good + bad) < good))
+        assert found.value is None and found.reason == "fewer than 5 successes or failures"
+    assert ranking(Ordered.of(np.arange(10), np.arange(10) >= 5)).value == 1.0
+    assert 20 / comb(2 * 4, 4) > 0.25 and 20 / comb(2 * 5, 5) < 0.1
 
 
 @pytest.mark.parametrize("weighted", [False, True])
@@ -140,7 +152,8 @@ def test_very_many_trials_share_rows(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_rows_that_are_shared_hardly_change_the_area(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ordered, "FINEST", 1000)
     values = np.r_[np.arange(20_000.0), np.full(20_000, 2e4)]  # as where a margin is cut off
-    for good in (np.arange(40_000) % 20_000 >= 19_995, np.arange(40_000) == 19_999):
+    last_five = (np.arange(40_000) >= 19_995) & (np.arange(40_000) < 20_000)
+    for good in (np.arange(40_000) % 20_000 >= 19_995, last_five):
         area = ranking(Ordered.of(values, good)).value
         assert area == pytest.approx(roc_auc_score(good, values), abs=2 / 1000)
 
@@ -155,8 +168,8 @@ def test_edges(rows: list[tuple[float, bool]], weighted: bool) -> None:
     good = np.array([g for _, g in rows], dtype=bool)
     found = calibration("clearance", values, good, np.ones(len(rows)) if weighted else None)
     known = np.isfinite(values)
-    one_kind = not known.any() or good[known].all() or not good[known].any()
-    assert (found.auroc.value is None) == one_kind == bool(found.auroc.reason)
+    few = min(good[known].sum(), (~good[known]).sum()) < 5
+    assert (found.auroc.value is None) == few == bool(found.auroc.reason)
     assert sum(b.trials for b in found.bins) == known.sum()
     assert all(0.0 <= step.share <= 1.0 for step in found.isotonic)
     shares = [step.share for step in found.isotonic]

@@ -7,6 +7,7 @@ import json
 import re
 import shutil
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,7 @@ from burg_drake.experiment.pairing.pairs import VerdictPairs
 from burg_drake.experiment.pairing.phases import unpredictable_outcomes
 from burg_drake.experiment.pairing.text_codes import Factor, Ids
 from burg_drake.experiment.statistics.exact_tests import excess_p_value, holm
+from burg_drake.experiment.statistics.margin_calibration import calibration
 from burg_drake.experiment.trials.sheet import (
     RealTrial,
     Selection,
@@ -129,7 +131,7 @@ def test_sentences_hold_for_all_grasps_that_were_chosen_from(tmp_path: Path) -> 
     lead = headline(found)
     # (639 + 10) of 740 are judged rightly, and 639 of 659 successes foreseen
     assert lead.startswith("Estimated for the 740 grasps that 100 trials on the robot stand for")
-    assert "right in 88 %" in lead and "had predicted 97 %" in lead
+    assert "right for 88 %" in lead and "had expected 97 %" in lead
     page = re.sub(r"<[^>]+>", "\n", comparison_page(found)).replace("\u00a0", " ")
     tiles = page.split("Right verdicts")[1][:40]
     assert "88 %" in tiles and "estimated for the 740 grasps" in page
@@ -351,3 +353,24 @@ def test_outcomes_are_called_what_the_buttons_of_the_lab_call_them(
     assert main(["compare", str(run.path), str(sheet), "--json"]) == 0
     ended = json.loads(capsys.readouterr().out)["judgement"]["outcomes"]["lifted"]
     assert "hand_collision_approach" in ended  # other programs have the values
+
+
+def test_two_trials_do_not_tell_which_margins_predict(tmp_path: Path) -> None:
+    """Nor what becomes of a kind of grasps that no trial is of, which is named."""
+    told = {
+        "mug": [("lifted", "lifted"), ("lifted", "slipped")],
+        "box": [("slipped", "not_attempted")],
+    }
+    run, sheet = tried(tmp_path, told, {"success": 7, "failure": 3})
+    found = compare(run, sheet)
+    margin = calibration("slip", np.array([0.1, 0.2]), np.array([True, False]))
+    found = replace(found, judgement=replace(found.judgement, calibration=(margin,)))
+    text = "\n".join(str(part) for part in comparison_tables(found) if isinstance(part, str))
+    words = "Too few trials to tell which margins predict actual success: that takes 5 successes"
+    assert f"{words} and 5 failures; there are 1 and 1." in text
+    assert words in comparison_page(found)
+    assert "AUROC" not in text and "interval" in text
+    assert found.notes[-1] == (
+        "figures for all grasps leave out 3 of the 10 grasps that the trials were chosen from, as"
+        " no trial was compared of box (failure)"
+    )

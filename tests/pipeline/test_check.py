@@ -184,7 +184,7 @@ def test_missing_textures_are_told(tmp_path: Path) -> None:
     source = ObjectSource.from_file(tmp_path / "box.obj", mass=0.1, contact="pieces")
     report = build_library([source], tmp_path / "lib", confirm=False)
     assert not report.failed
-    told = "box.mtl names front.png, which is missing: the object has no picture"
+    told = "box.mtl names front.png, which is missing: the object is shown without its texture"
     assert any(note.startswith(told) for note in report.notes["box"])
     assert any(issue.message.startswith(told) for issue in check_library(report.library))
     Image.new("RGB", (4, 4)).save(tmp_path / "front.png")

@@ -183,6 +183,19 @@ def small(scene: Scene, size: tuple[float, float], **markers: object) -> Scene:
     return changed(scene, board=Board(size=size, markers=Markers(**markers)))
 
 
+@pytest.mark.parametrize("page", ["A4", "A3", "letter"])
+def test_ruler_its_labels_and_the_lines_at_the_foot_are_apart(page: str) -> None:
+    """Below the board there are four rows of ink, with white between them."""
+    printout = print_board(loaded("tabletop_six"), PrintSettings(page=page, height_map=False))
+    paper, per_metre = printout.tiling.paper, 300 / 0.0254
+    (image,) = rasterised(printout.pdf, 300, only=[1])
+    left, right = (round(per_metre * (paper.lower[0] + x)) for x in (-1e-3, 0.101))
+    foot = image[image.shape[0] - round(per_metre * (paper.lower[1] - 1e-3)) :, left:right]
+    ink = np.flatnonzero((foot < 200).any(axis=1))
+    gaps = np.diff(ink)[np.diff(ink) > 1] / per_metre
+    assert len(gaps) == 3 and gaps[1] > 0.6e-3 and gaps.min() > 0.3e-3
+
+
 def test_the_edge_is_told_and_the_origin_marked_where_they_are_on_paper() -> None:
     scene = small(load_scene("tabletop_six"), (0.297, 0.21), side=0.04)
     whole = print_board(scene, PrintSettings(page="A3", height_map=False))

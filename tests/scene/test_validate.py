@@ -94,6 +94,14 @@ def test_standing_on_another_object_is_not_hovering(make_scene: MakeScene) -> No
     assert [issue.kind for issue in validate_scene(beside)] == ["hovering"]
 
 
+def test_hovering_names_the_box_below(make_scene: MakeScene) -> None:
+    high = make_scene(("slab", (0.3, 0.2, 0.0)), ("cube", (0.3, 0.2, 0.2)), ("slab", (0.3, 0.1, 0)))
+    top = read_vertices(high.library.path("slab/mesh.obj"))[:, 2].max()
+    (issue,) = validate_scene(high)
+    assert (issue.instance, issue.other) == ("cube_1", "slab_0")
+    assert issue.amount == pytest.approx(0.2 - top, abs=1e-9)
+
+
 def test_background_may_stand_anywhere(make_scene: MakeScene) -> None:
     assert validate_scene(make_scene(background=(("cube", (2.0, 0.2, -0.5)),))) == ()
 

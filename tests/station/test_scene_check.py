@@ -190,6 +190,66 @@ def test_kinds_of_issues(check: SceneCheck, scene: MakeScene) -> None:
     assert kinds(1e5, 0.2, 0.0) == ["out_of_bounds", "out_of_bounds"]
 
 
+@pytest.mark.parametrize("gap", [0.9e-3, 5e-3])
+def test_what_hovers_is_told_with_what_is_below_it(
+    gap: float, check: SceneCheck, scene: MakeScene
+) -> None:
+    """Above the board, another object, an obstacle of the station, and nothing."""
+    stack = scene(
+        instance("box", "box", 0.15, 0.2, gap),
+        instance("can", "can", 0.15, 0.2, 0.21 + 2 * gap),
+        background=(instance("shelf", "box", 0.4, 0.2),),
+    )
+    on_shelf = scene(
+        instance("can", "can", 0.4, 0.2, 0.21 + gap), background=tuple(stack.background.values())
+    )
+    found = [(i.kind, i.instance, i.other, i.amount) for i in check.issues(stack)]
+    found += [(i.kind, i.instance, i.other, i.amount) for i in check.issues(on_shelf)]
+    expected = [("box", "board"), ("can", "box"), ("can", "shelf")] if gap > 1e-3 else []
+    assert found == [("hovering", *names, pytest.approx(gap, abs=1e-6)) for names in expected]
+    if expected:
+        assert check.issues(stack)[1].message == (
+            "'can' hovers 5.0 mm above 'box'; it will fall when simulated"
+        )
+    over_wall = scene(instance("can", "can", *_over_the_wall(), 0.2 + gap))
+    issues = [i for i in check.issues(over_wall) if i.kind == "hovering"]
+    assert [(i.other, i.amount) for i in issues] == [
+        ("wall", pytest.approx(gap, abs=1e-6)) for _ in expected[:1]
+    ]
+    found_beside = check.issues(scene(instance("can", "can", 5.0, 0.2, 0.3)))
+    (beside,) = [i for i in found_beside if i.kind == "hovering"]
+    assert beside.message == "'can' has nothing below it; it will fall when simulated"
+
+
+def _over_the_wall() -> tuple[float, float]:
+    """x and y of the wall's middle in the scene frame [m]."""
+    turned = math.radians(30.0)
+    x, y = -1.0 - 0.3, 0.0 + 0.2
+    return (
+        math.cos(turned) * x + math.sin(turned) * y,
+        math.cos(turned) * y - math.sin(turned) * x,
+    )
+
+
+def test_a_marble_floats_in_a_mug(
+    check: SceneCheck, scene: MakeScene, library: ObjectLibrary
+) -> None:
+    """Its height over the mug's floor is that of a ray down the mug's own surface."""
+    floor = max(
+        p[2]
+        for p in library.surface("mug").ray.intersects_location([[0.0, 0.0, 0.09]], [[0, 0, -1]])[0]
+    )
+    mug = instance("mug", "mug", 0.2, 0.2)
+    for height in (0.05, 0.02, floor):
+        issues = check.issues(scene(mug, instance("marble", "marble", 0.2, 0.2, height)))
+        if height == floor:
+            assert issues == ()
+            continue
+        (issue,) = issues
+        assert (issue.kind, issue.instance, issue.other) == ("hovering", "marble", "mug")
+        assert issue.amount == pytest.approx(height - floor, abs=1.5e-3)  # pieces, and their excess
+
+
 @pytest.mark.parametrize(
     ("pose", "message"),
     [

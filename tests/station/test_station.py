@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
+import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import DocumentError, UnknownNameError
+from burg_drake.core.documents.schema import Pose
+from burg_drake.core.errors import DocumentError, FieldError, UnknownNameError
 from burg_drake.core.frames import inverse
 from burg_drake.core.paths.resources import builtin_names, resolve
+from burg_drake.scene.document.board import Board
 from burg_drake.station.document.station_document import Camera, Station, load_station
 
 A2 = np.array([[0, 0, 0], [0.594, 0, 0], [0.594, 0.42, 0], [0, 0.42, 0]])
@@ -155,6 +160,49 @@ def test_principal_point() -> None:
 def test_what_does_not_fit_is_named(tmp_path: Path, old: str, new: str, message: str) -> None:
     with pytest.raises((DocumentError, UnknownNameError), match=message):
         load_station(station_file(tmp_path, (old, new)))
+
+
+NUMBER = re.compile(r"(?<=[\[ ])-?\d+\.\d+(?=[,\]])")
+
+
+@pytest.mark.parametrize("number", [".nan", ".inf", "-.inf"])
+def test_every_number_of_a_file_has_to_be_finite(tmp_path: Path, number: str) -> None:
+    """Each in its turn, so that the error names its line and key."""
+    found = list(NUMBER.finditer(STATION))
+    assert len(found) == 27
+    for one in found:
+        path = tmp_path / "mine.yaml"
+        path.write_text(STATION[: one.start()] + number + STATION[one.end() :])
+        line = STATION.count("\n", 0, one.start()) + 1
+        with pytest.raises(DocumentError) as refused:
+            load_station(path)
+        told = (
+            rf"{re.escape(str(path))}:{line}: [\w.]+\[\d\]: '{re.escape(number)}' is not a finite"
+        )
+        assert re.match(told, str(refused.value))
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf])
+def test_every_number_of_a_program_has_to_be_finite(tmp_path: Path, number: float) -> None:
+    """Also where the least and the greatest one are compared, of which NaN can be neither."""
+    good = load_station(station_file(tmp_path)).document
+    assert good.arm is not None
+    wrong = {
+        "table.size[1]": {"table": replace(good.table, size=(1.2, number, 0.1))},
+        "table.friction": {"table": replace(good.table, friction=number)},
+        "arm.velocity[1]": {"arm": replace(good.arm, velocity=(1.0, number))},
+        "arm.home[0]": {"arm": replace(good.arm, home=(number, *good.arm.home[1:]))},
+        "X_WS.translation[2]": {"X_WS": Pose((0.0, 0.0, number))},
+        "background.wall.size[2]": {
+            "background": {"wall": replace(good.background["wall"], size=(0.02, 1.0, number))}
+        },
+    }
+    for key, field in wrong.items():
+        with pytest.raises(FieldError) as refused:
+            replace(good, **field)
+        assert str(refused.value) == f"{key} is {number}; it must be a finite number"
+    with pytest.raises(FieldError, match=rf"^size\[1\] is {number}; it must be a finite number"):
+        Board(size=(0.5, number))
 
 
 def test_a_base_beside_the_table_may_be_lower(tmp_path: Path) -> None:

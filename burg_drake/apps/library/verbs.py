@@ -17,6 +17,7 @@ from burg_drake.apps.options import (
     friction,
     input_file,
     named_positive,
+    names,
     positive,
     unit,
 )
@@ -173,7 +174,7 @@ def _add_views(group: Any) -> None:
         run_show,
         "show objects, their convex pieces, contact surfaces and stable poses in Meshcat",
         "burg-drake library show household",
-        "burg-drake library show my_library --only mug --only bowl",
+        "burg-drake library show my_library --only mug,bowl",
         "burg-drake library show my_library --html gallery.html --sheet sheet.html",
     )
     for verb in (listing, check, show):
@@ -182,9 +183,10 @@ def _add_views(group: Any) -> None:
         )
     show.add_argument(
         "--only",
-        metavar="OBJECT",
-        action="append",
-        help="this object alone; may be given several times",
+        metavar="A,B",
+        type=names,
+        action="extend",
+        help="these objects alone",
     )
     show.add_argument(
         "--sheet", metavar="FILE", help="write a contact sheet: one page with pictures and figures"

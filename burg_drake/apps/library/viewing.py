@@ -89,7 +89,7 @@ def print_contact(library: ObjectLibrary, names: Iterable[str]) -> None:
     for name in names:
         if not library.entry(name).contact.reason:
             with contextlib.suppress(BurgError):
-                print(f"{name}: pads touch {touched_by_pads(library, name)}")
+                print(f"{name}: gripper pads touch {touched_by_pads(library, name)}")
 
 
 def library_table(objects: Mapping[str, ObjectEntry]) -> TextTable:

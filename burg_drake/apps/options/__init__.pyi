@@ -76,6 +76,7 @@ from .values import (
     friction as friction,
     input_file as input_file,
     named_positive as named_positive,
+    names as names,
     not_negative as not_negative,
     number as number,
     positive as positive,

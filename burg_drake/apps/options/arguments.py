@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Callable
 from typing import Any, NoReturn
 
-from burg_drake.apps.options.values import measured_mm, renaming, workers
+from burg_drake.apps.options.values import measured_mm, names, renaming, workers
 from burg_drake.core import did_you_mean, nearest, quoted
 
 DEFAULT_STATION = "panda_tabletop"
@@ -179,9 +179,10 @@ def add_only(parser: Parser, what: str) -> None:
     """
     parser.add_argument(
         "--only",
-        metavar="OBJECT",
-        action="append",
-        help=f"{what} of this object, or instance of a scene, alone; may be given several times",
+        metavar="A,B",
+        type=names,
+        action="extend",
+        help=f"{what} of these objects, or instances of a scene, alone",
     )
 
 

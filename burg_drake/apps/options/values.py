@@ -168,6 +168,14 @@ def renaming(text: str) -> tuple[str, str]:
     return theirs, ours
 
 
+def names(text: str) -> list[str]:
+    """`A` or `A,B`: names of objects or instances, which have no commas."""
+    found = [name for part in text.split(",") if (name := part.strip())]
+    if not found:
+        raise argparse.ArgumentTypeError(f"{quoted(text)} has no name; give A, or A,B for several")
+    return found
+
+
 def measured_mm(text: str) -> tuple[float, float]:
     """`X` or `X,Y`: what printed rulers of 100 mm measure along x and y [mm]."""
     values = [positive(part) for part in text.split(",")]

@@ -58,7 +58,7 @@ def add_to(verbs: Any) -> None:
         "judge grasps of scenes on a station: clear, reachable, planned, executed",
         "burg-drake evaluate tabletop_six --grasps-per-object 100 -o runs/first",
         "burg-drake evaluate my_scene.yaml --station my_station.yaml --table parquet -o runs/mine",
-        "burg-drake evaluate tabletop_six --only mug --only bowl -n 500 -o runs/two",
+        "burg-drake evaluate tabletop_six --only mug,bowl -n 500 -o runs/two",
         "burg-drake evaluate tabletop_six --until-balanced 10 -o runs/lab",
         "burg-drake evaluate my_scene.yaml --grasps my_grasps.npz --mode hand",
         "burg-drake evaluate tabletop_six --grasps-per-object 20 --mode arm -o runs/arm",

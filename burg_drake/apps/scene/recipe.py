@@ -11,6 +11,7 @@ from burg_drake.apps.options import (
     add_options,
     add_station,
     add_workers,
+    names,
     positive_int,
     settings_from,
 )
@@ -56,7 +57,9 @@ def _add_objects(parser: Any) -> None:
         default=SceneRecipe.count,
         help="objects in a scene (default: %(default)d)",
     )
-    group.add_argument("--only", metavar="A,B", help="draw from these objects alone")
+    group.add_argument(
+        "--only", metavar="A,B", type=names, action="extend", help="draw from these objects alone"
+    )
     add_options(group, SceneRecipe, "repeat", "poses", "seed")
     group.add_argument(
         "--count",
@@ -112,14 +115,13 @@ def recipe_of(
         raise InvalidInputError(
             f"-n {arguments.objects}: a scene has {MOST_OBJECTS} objects at most"
         )
-    names = [name.strip() for name in (arguments.only or "").split(",")]
     layout: Any = "packed" if arguments.packed else "heap" if arguments.heap else arguments.spacing
     return settings_from(
         arguments,
         SceneRecipe,
         library=library_reference(arguments.library, library, folder),
         count=arguments.objects,
-        only=tuple(sorted(set(filter(None, names)))),
+        only=tuple(sorted(set(arguments.only or ()))),
         board=Board(size=board_extents(arguments.size, upright=arguments.portrait)),
         layout=layout or "random",
         station=station_reference(arguments.station, station, folder),

@@ -147,8 +147,8 @@ def run_validate(arguments: argparse.Namespace) -> int:
         print(f"{'error' if issue.is_error else 'warning'}: {issue.message}")
     if not issues:
         print(
-            f"{scene.path}: {len(scene.instances)} objects stand free and in bounds"
-            f" on station {station.name}"
+            f"{scene.path}: nothing is wrong with the {len(scene.instances)} objects on station"
+            f" {station.name}: all stand, within the board, and none overlaps another"
         )
     return 1 if any(issue.is_error for issue in issues) else 0
 

@@ -88,7 +88,8 @@ def wait(poll: Callable[[], None] | None = None) -> None:
     """
     terminal = sys.stdin is not None and sys.stdin.isatty()
     try:
-        print(f"Press {'Enter' if terminal else 'Ctrl-C'} to end.", flush=True)
+        key = "Enter" if terminal else "Ctrl-C"
+        print(f"It is served until you press {key}.", flush=True)
         while True:
             if poll is not None:
                 poll()

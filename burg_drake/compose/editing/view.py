@@ -122,7 +122,8 @@ def status_of(state: State, issues: Iterable[SceneIssue] | None) -> dict[str, In
     found_statuses: dict[str, set[InstanceStatus]] = {name: set() for name in state.instances}
     for issue in issues:
         for name in (issue.instance, issue.other):
-            if name in found_statuses:
+            stands_below = issue.kind == "hovering" and name == issue.other
+            if name in found_statuses and not stands_below:
                 found_statuses[name].add(STATUS[issue.kind])
     found: dict[str, InstanceStatus] = {
         name: next((status for status in WORST_FIRST if status in all_said), "ok")

@@ -8,7 +8,10 @@ from .plain_yaml import (
     load_plain_yaml as load_plain_yaml,
     parse_plain_yaml as parse_plain_yaml,
 )
-from .ranges import require_ranges as require_ranges
+from .ranges import (
+    require_finite as require_finite,
+    require_ranges as require_ranges,
+)
 from .reader import Reader as Reader
 from .schema import (
     Pose as Pose,

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import dataclasses
+import math
+from collections.abc import Iterable, Mapping
 
 from burg_drake.core.errors import FieldError
 
@@ -25,3 +27,33 @@ def require_ranges(settings: object, ranges: Ranges, what: str = "") -> None:
     for name, (low, high) in ranges.items():
         if not low <= (value := getattr(settings, name)) <= high:
             raise FieldError(f"{name}{of} is {value:g}; it must be {low:g} to {high:g}", name)
+
+
+def require_finite(document: object) -> None:
+    """Refuses numbers that are NaN or infinite, of a document that a program has made: `min`, `max`
+    and comparisons let some of them pass. Those of a file are checked when it is read.
+
+    Raises:
+        FieldError: names the first one by its key.
+    """
+    for place, number in _numbers(document, ()):
+        if not math.isfinite(number):
+            key = "".join(f"[{k}]" if isinstance(k, int) else f".{k}" for k in place)
+            raise FieldError(f"{key.lstrip('.')} is {number}; it must be a finite number", *place)
+
+
+def _numbers(
+    value: object, place: tuple[str | int, ...]
+) -> Iterable[tuple[tuple[str | int, ...], float]]:
+    """All numbers of a document with their places in it."""
+    parts: Iterable[tuple[str | int, object]] = ()
+    if isinstance(value, float):
+        yield place, value
+    elif dataclasses.is_dataclass(value):
+        parts = ((f.name, getattr(value, f.name)) for f in dataclasses.fields(value))
+    elif isinstance(value, Mapping):
+        parts = value.items()
+    elif isinstance(value, (list, tuple)):
+        parts = enumerate(value)
+    for key, part in parts:
+        yield from _numbers(part, (*place, key))

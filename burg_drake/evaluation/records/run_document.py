@@ -70,7 +70,7 @@ class Grasps:
         approach_angle_deg: largest angle between their approach and straight down, if sampled.
         blind: whether they were sampled without regard to the hand, as they were in runs that do
             not say.
-        only: instances that grasps were sampled on; all if empty.
+        only: instances that grasps were sampled or judged on; all if empty.
         until_balanced, balanced_among, max_per_object: as `EvaluationSettings` has them; 0 where
             grasps were sampled once.
         asked: with `until_balanced`, how many grasps were sampled so far for each instance of an

@@ -1,4 +1,3 @@
-from .balance import lifted_and_failed as lifted_and_failed
 from .best_grasps import (
     RankedGrasps as RankedGrasps,
     best_of_each as best_of_each,
@@ -14,6 +13,7 @@ from .counts import (
     pushes as pushes,
 )
 from .notes import (
+    lifted_and_failed as lifted_and_failed,
     missing_grasps_note as missing_grasps_note,
     run_notes as run_notes,
     shortfalls as shortfalls,

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import listing
-from burg_drake.core.grasps import Outcome, Stage
+from burg_drake.core.grasps import STAGES_AMONG, Outcome, Stage
 from burg_drake.evaluation.candidates import SELF, TABLE, shortfall
 from burg_drake.evaluation.records import Columns, motion_in
-from burg_drake.evaluation.results.balance import unbalanced_notes
 from burg_drake.evaluation.store import Run
 from burg_drake.station.document import GraspMotion
 
@@ -45,7 +44,7 @@ def run_notes(run: Run) -> tuple[str, ...]:
         *_without_grasps(run),
         *shortfalls(run),
         *_unexecuted(run),
-        *unbalanced_notes(run),
+        *_unbalanced(run),
     )
 
 
@@ -193,3 +192,38 @@ def _words(outcome: Outcome, blocker: str) -> str:
     if outcome.stage is Stage.CLEAR:
         return f"the open hand hits {HIT.get(outcome, blocker)}"
     return outcome.value.replace("_", " ") + (f" ({blocker})" if blocker else "")
+
+
+def lifted_and_failed(run: Run) -> dict[str, tuple[int, int]]:
+    """Numbers of lifted and of failing grasps by object, among the judged grasps that the run
+    counts; see `EvaluationSettings.balanced_among`."""
+    columns, grasps = run.results, run.document.grasps
+    counted = np.isin(columns["stage"], [s.value for s in STAGES_AMONG[grasps.balanced_among]])
+    counted &= columns["outcome"] != Outcome.SIMULATION_FAILED.value
+    lifted = columns["outcome"] == Outcome.LIFTED.value
+    own = {name: counted & (columns["object"] == name) for name in grasps.objects}
+    return {name: (int((m & lifted).sum()), int((m & ~lifted).sum())) for name, m in own.items()}
+
+
+def _unbalanced(run: Run) -> list[str]:
+    """A sentence for each object with fewer lifted or failing grasps than asked for, once all
+    grasps are judged."""
+    grasps = run.document.grasps
+    if not grasps.until_balanced or not run.complete:
+        return []
+    notes = []
+    for name, counts in lifted_and_failed(run).items():
+        parts = [
+            f"{n} of the {grasps.until_balanced} {what}"
+            for n, what in zip(counts, ("lifted", "failing"), strict=True)
+            if n < grasps.until_balanced
+        ]
+        if parts:
+            among = grasps.balanced_among
+            counted = "" if among == "all" else f" ({among} ones count)"
+            notes.append(
+                f"{name}: {' and '.join(parts)} grasps asked for{counted}, after"
+                f" {grasps.objects[name]:,} grasps (max_grasps_per_object is"
+                f" {grasps.max_per_object:,})"
+            )
+    return notes

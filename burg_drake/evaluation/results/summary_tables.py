@@ -70,14 +70,15 @@ def _stage_table(summary: Summary) -> TextTable:
             group.name, *(format_count(group.funnel[name]) for name in names), share, interval
         )
     table.caption = (
-        "held: to the end; lifted: held, not turned in the hand, and no other object disturbed\n"
+        "held: still in the hand at the end; lifted: held, not turned in the hand, and no other"
+        " object disturbed\n"
     )
     if summary.mode != "hand":
         table.caption += (
-            "reach, plan: the arm reaches the grasp; it has a path there, for the approach and"
-            " the lift\n"
+            "reach: the arm can be at the grasp; plan: it has a path to it without collision, and"
+            " can follow approach and lift\n"
         )
-    table.caption += "success: lifted of executed; CI: Wilson's interval"
+    table.caption += "success: share of executed grasps that were lifted; CI: Wilson's interval"
     return table
 
 
@@ -91,8 +92,8 @@ def _certainty_table(summary: Summary) -> TextTable:
         numbers = [group.executed, group.surely_lifted, group.surely_lost, group.contested]
         table.row(group.name, *map(format_count, [*numbers, *([group.settled] * settled)]))
     table.caption = (
-        f"contested: held to the end or lost with a confidence below {CONTESTED:g}; another engine"
-        " can settle them"
+        "contested: the simulation is not sure whether the object was held (confidence below"
+        f" {CONTESTED:g}); --rejudge contested asks another engine"
     )
     if settled:
         table.caption += "\nsettled: judged again by another engine, lifted or failed"

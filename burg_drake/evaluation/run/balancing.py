@@ -30,20 +30,25 @@ RequestedCounts = dict[str, tuple[int, int]]
 """Numbers of ordinary and of slippery grasps to sample, by object."""
 
 
-def sample_requested(scene: Scene, station: Station, document: RunDocument) -> Candidates:
+def sample_requested(
+    scene: Scene, station: Station, document: RunDocument, before: Run | None = None
+) -> Candidates:
     """The grasps that a run's document asks for.
 
     Args:
         scene: that they are sampled on.
         station: gives hand and arm.
         document: of the run; without `Grasps.asked` every object gets `per_object` ordinary ones.
+        before: the run with the grasps that its own document asks for; objects of which no more are
+            asked for keep theirs. None: all are sampled.
     """
     grasps = document.grasps
     names = grasps.only or tuple(scene.instances)
-    found: defaultdict[str, list[GraspSet]] = defaultdict(list)
+    kept = {} if before is None else _kept(scene, before, grasps)
+    found: defaultdict[str, list[GraspSet]] = defaultdict(list, kept)
     for slippery in (False, True):
         by_count: defaultdict[int, list[str]] = defaultdict(list)
-        for name in names:
+        for name in (name for name in names if name not in kept):
             by_count[_requested(grasps, scene.instance(name).object)[slippery]].append(name)
         for count, those in sorted(by_count.items()):
             if count:
@@ -56,6 +61,19 @@ def sample_requested(scene: Scene, station: Station, document: RunDocument) -> C
                 for name, part in sampled:
                     found[name].append(part)
     return join_candidates({name: _joined(found[name]) for name in names})
+
+
+def _kept(scene: Scene, before: Run, grasps: Grasps) -> dict[str, list[GraspSet]]:
+    """The grasps of the instances that a run has as many of as are asked for now."""
+    there = before.candidates
+    provenance = there.grasps.provenance["parts"]
+    kept = {}
+    for name in provenance:
+        object = scene.instance(name).object
+        if _requested(grasps, object) == _requested(before.document.grasps, object):
+            own = there.grasps.select(there.instance == name)
+            kept[name] = [replace(own, provenance=provenance[name])]
+    return kept
 
 
 def next_round(run: Run) -> RunDocument | None:

@@ -83,7 +83,8 @@ def open_run(
         require_same_run(folder, run.document, document)
         write_copies(folder, scene, request.station)
         if document.grasps.until_balanced and run.candidates.content != run.document.grasps.content:
-            return extend_run(run, run.document, scene, request.station)  # killed between two files
+            # killed between the two files of a round, of which the grasps are the newer one
+            return _resampled(run, run.document, scene, request.station)
         return run
     if candidates is None:
         sampling()
@@ -95,13 +96,21 @@ def open_run(
 
 
 def extend_run(run: Run, document: RunDocument, scene: Scene, station: Station) -> Run:
-    """Samples the grasps that a run's new document asks for, those that it has among them.
+    """Samples the grasps that a run's new document asks for, those that it has among them, of the
+    objects of which it asks for more.
 
     The candidates come before run.yaml, so that a call that is killed between them is found out by
     their hash: `open_run` then samples those of the document again.
     """
+    return _resampled(run, document, scene, station, before=run)
+
+
+def _resampled(
+    run: Run, document: RunDocument, scene: Scene, station: Station, before: Run | None = None
+) -> Run:
+    """With the grasps of a document; see `sample_requested`."""
     start = time.process_time()
-    candidates = sample_requested(scene, station, document)
+    candidates = sample_requested(scene, station, document, before)
     cpu = document.grasps.cpu + time.process_time() - start
     document = _with_grasps(document, scene, candidates, cpu)
     candidates.save(run.path / GRASPS_FILE)

@@ -168,11 +168,9 @@ class Request:
         Raises:
             UnknownNameError: `only` has a name that is not in the scene.
         """
-        requested = self.requested_of_all()
-        if self.grasps is not None:
-            return requested
         chosen = chosen_instances(scene, self.only)
-        return replace(requested, only=() if chosen == tuple(scene.instances) else chosen)
+        only = () if chosen == tuple(scene.instances) else chosen
+        return replace(self.requested_of_all(), only=only)
 
     def _balance(self) -> dict[str, Any]:
         """What a run that grows says of its grasps; nothing where they are sampled once."""
@@ -187,7 +185,7 @@ class Request:
     def requested_of_all(self) -> Grasps:
         """The same, whatever the scene."""
         if self.grasps is not None:
-            return Grasps(origin="given", count=0, objects={}, content="")
+            return Grasps(origin="given", only=self.only, count=0, objects={}, content="")
         return Grasps(
             origin="sampled",
             per_object=self.settings.grasps_per_object,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -163,7 +163,7 @@ def judgement(
         unpredictable=_without(pairs, strata, apart, seed) if apart.any() else None,
         standing_out=found,
         tested_groups=tested_groups,
-        bias=paired(pairs.predicted, pairs.actual, seed=seed),
+        bias=replace(paired(pairs.predicted, pairs.actual, seed=seed), difference=selected.excess),
         objects=by_factor(pairs, pairs.object, seed=seed),
         scenes=by_factor(pairs, pairs.scene, scenes, seed=seed),
         stages=by_factor(pairs, pairs.stage, seed=seed),

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from burg_drake.core import Array, InvalidInputError
+from burg_drake.core import Array, InvalidInputError, listing
 from burg_drake.evaluation.records import Columns
 from burg_drake.evaluation.store import Campaign, Run
 from burg_drake.experiment.comparison.comparison import Comparison, Coverage
@@ -212,9 +212,13 @@ def _notes(
                 f" such as trial {changed[0]}; those of the run count"
             )
     if judged.not_represented:
+        tried = {trial.stratum for trial in trials}
+        without = [s for key, s in sheet.strata.items() if s.population and key not in tried]
+        kinds = listing([f"{s.object} ({s.label})" for s in without])
+        every = sum(s.population for s in sheet.strata.values())
         notes.append(
-            f"no trial represents {judged.not_represented} grasps that could have been chosen;"
-            " figures for all grasps leave them out"
+            f"figures for all grasps leave out {judged.not_represented} of the {every} grasps that"
+            f" the trials were chosen from, as no trial was compared of {kinds}"
         )
     twice = len(trials) - len({(t.run, t.grasp) for t in trials})
     if twice:

@@ -26,6 +26,7 @@ from burg_drake.experiment.comparison.wording import (
     of_selected,
     standing_out_name,
     success_of,
+    too_few_for_margins,
     unpredictable_words,
 )
 from burg_drake.experiment.statistics import MEASURES, Agreement, MarginCalibration
@@ -62,7 +63,10 @@ def comparison_tables(comparison: Comparison) -> Iterator[TextTable | str]:
         telling = [m for m in judged.calibration if m.auroc.value is not None]
         if telling:
             yield calibration_table(c, telling, name)
-        if judged.placement is not None:
+        elif words := too_few_for_margins(c, judged):
+            yield words
+        p = judged.placement
+        if p is not None and p.within.trials + p.beyond.trials:
             yield placement_table(judged, of)
     yield coverage_words(c)
     yield from (f"differs: {text}" for text in c.settings)
@@ -100,7 +104,7 @@ def figure_table(comparison: Comparison, judged: Judgement, name: str = "") -> T
         grasps = format_count(round(sum(judged.all_grasps.cells)))
         table.caption = (
             f"selected trials: the {found[0].trials} that were compared; all grasps: the {grasps}"
-            " that they were chosen from, each trial standing for its share"
+            " that they stand for, each for its share of those that it was chosen from"
         )
     for key in MEASURES:
         cells = []
@@ -110,7 +114,7 @@ def figure_table(comparison: Comparison, judged: Judgement, name: str = "") -> T
         table.row(measure_name(comparison, key), *cells)
     reasons = {f.reason for a in found for f in (a.figure(k) for k in MEASURES) if f.reason}
     if reasons:
-        undefined = f"-: undefined, as {'; '.join(sorted(reasons))}"
+        undefined = f"-: cannot be calculated ({'; '.join(sorted(reasons))})"
         table.caption = f"{table.caption}\n{undefined}" if table.caption else undefined
     return table
 
@@ -239,7 +243,7 @@ def placement_table(judged: Judgement, name: str = "") -> TextTable:
     assert p is not None
     limit = f"{p.limit_mm:g} mm"
     groups = [
-        FactorGroup(name=f"every object within {limit}", agreement=p.within),
+        FactorGroup(name=f"all within {limit}", agreement=p.within),
         FactorGroup(name="one farther off", agreement=p.beyond),
         FactorGroup(name="not all measured", agreement=p.unmeasured),
     ]

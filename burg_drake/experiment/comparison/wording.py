@@ -9,7 +9,13 @@ from burg_drake.core.terminal import MISSING, format_number
 from burg_drake.experiment.comparison.comparison import Comparison
 from burg_drake.experiment.comparison.judge_assessment import Judgement
 from burg_drake.experiment.comparison.standing_out import OutlierGroup
-from burg_drake.experiment.statistics import MEASURES, PROBABILITY, Agreement, Estimate
+from burg_drake.experiment.statistics import (
+    MEASURES,
+    MIN_OF_EACH_OUTCOME,
+    PROBABILITY,
+    Agreement,
+    Estimate,
+)
 
 IN_PERCENT = frozenset(name for name, measure in MEASURES.items() if measure.is_share) | {"excess"}
 CELL_NAMES = {
@@ -96,7 +102,7 @@ def headline(comparison: Comparison) -> str:
     where = f"In {trials}"
     if weighted(c.judgement) is not None:
         stand = "stand" if plural else "stands"
-        where = f"Estimated for the {round(sum(found.cells)):,} grasps that {trials} {stand} for:"
+        where = f"Estimated for the {round(sum(found.cells)):,} grasps that {trials} {stand} for,"
     if c.other is not None and c.second is not None and c.difference is not None:
         first, second = f"the first simulator ({c.first.label})", f"the second ({c.second.label})"
         p = (
@@ -108,14 +114,14 @@ def headline(comparison: Comparison) -> str:
             f"{where} {first} was right in {brief(found.accuracy)}, {second} in"
             f" {brief(estimated(c.other).accuracy)}; {difference_words(c)}{p}."
         )
-    true = f"of the successes that it predicted {brief(found.precision)} came true"
-    foreseen = f"of those that came about it had predicted {brief(found.recall)}"
+    true = f"Of the grasps that it expected to succeed, {brief(found.precision)} succeeded"
+    foreseen = f"of the grasps that succeeded, it had expected {brief(found.recall)}"
     if found.precision.value is None:
-        true = "it predicted no success"
+        true = "It expected no grasp to succeed"
     if found.recall.value is None:
-        foreseen = "none came about"
-    right = f"{where} the simulator's verdict was right in {brief(found.accuracy)}"
-    return f"{right}; {true}, {foreseen}."
+        foreseen = "no grasp succeeded"
+    right = f"{where} the simulator's verdict was right for {brief(found.accuracy)} of the grasps"
+    return f"{right}. {true}; {foreseen}. In brackets: 95 % intervals."
 
 
 def estimated(judged: Judgement) -> Agreement:
@@ -191,8 +197,8 @@ def bias_words(comparison: Comparison, judged: Judgement | None = None) -> str:
     if b.difference.value is None:
         return "no trials"
     parted = (
-        f"{b.only_first:,} predicted successes did not come true, {b.only_second:,} came about"
-        " against the prediction"
+        f"{b.only_first:,} that it expected to succeed failed, {b.only_second:,} that it expected"
+        " to fail succeeded"
     )
     who, other = "simulator promises", "the robot achieved"
     if comparison.kind == "runs":
@@ -209,11 +215,12 @@ def bias_words(comparison: Comparison, judged: Judgement | None = None) -> str:
         return (
             f"Over all these grasps the {who} {_more(every.excess.value, 'success than')} {other}"
             f" {interval(every.excess, percent=True)}. In the selected trials alone, each counted"
-            f" once, it promises {_more(b.difference.value, 'than')} {other}: {parted}."
+            f" once, it promises {_more(b.difference.value, 'than')} {other}: of {b.trials:,}"
+            f" grasps, {parted}."
         )
     return (
         f"The {who} {_more(b.difference.value, 'success than')} {other}"
-        f" {interval(b.difference, percent=True)}: {parted}"
+        f" {interval(b.difference, percent=True)}: of {b.trials:,} grasps, {parted}"
         f" (McNemar's exact test: p = {format_number(b.p_value)})."
     )
 
@@ -240,6 +247,20 @@ def unpredictable_words(judged: Judgement) -> str:
         f" {found.predicted_successes:,} of them after a predicted success. They count as"
         f" failures; without them precision is {brief(without.precision)}"
         f" instead of {brief(estimated(judged).precision)}."
+    )
+
+
+def too_few_for_margins(comparison: Comparison, judged: Judgement) -> str:
+    """Why nothing is said of how margins rank trials; empty where something is, or where there are
+    no margins."""
+    found = judged.calibration
+    if not found or any(c.auroc.value is not None for c in found):
+        return ""
+    most = max(found, key=lambda c: min(c.successes, c.trials - c.successes))
+    return (
+        f"Too few trials to tell which margins predict {success_of(comparison)}: that takes"
+        f" {MIN_OF_EACH_OUTCOME} successes and {MIN_OF_EACH_OUTCOME} failures; there are"
+        f" {most.successes} and {most.trials - most.successes}."
     )
 
 

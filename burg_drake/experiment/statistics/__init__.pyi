@@ -32,3 +32,4 @@ from .margin_calibration import (
     calibration as calibration,
     calibrations as calibrations,
 )
+from .rank_statistics import MIN_OF_EACH_OUTCOME as MIN_OF_EACH_OUTCOME

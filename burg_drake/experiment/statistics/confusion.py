@@ -168,5 +168,16 @@ def _agreement(
         else:
             low, high = float(interval[0][k]), float(interval[1][k])
             figures[name] = Estimate.between(float(values[k]), low, high)
+    figures["excess"] = _within_prediction(figures["excess"], figures["actual"], cells)
     tp, fp, fn, tn = cells
     return Agreement(trials=trials, tp=tp, fp=fp, fn=fn, tn=tn, **figures)
+
+
+def _within_prediction(excess: Estimate, actual: Estimate, cells: Sequence[float]) -> Estimate:
+    """The difference of predicted and actual success, which follows from actual success where all
+    verdicts are alike: nothing succeeds more often than always."""
+    tp, fp, fn, tn = cells
+    if excess.value is None or actual.low is None or actual.high is None or (tp + fp and fn + tn):
+        return excess
+    predicted = 1.0 if tp + fp else 0.0
+    return Estimate.between(excess.value, predicted - actual.high, predicted - actual.low)

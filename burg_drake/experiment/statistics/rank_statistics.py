@@ -15,6 +15,11 @@ from burg_drake.experiment.statistics.estimates import Estimate, share
 from burg_drake.experiment.statistics.ordered import Ordered
 
 ALIKE = "all ended alike"
+MIN_OF_EACH_OUTCOME = 5
+"""Successes and failures that a ranking takes: tables show ten margins, and of ten that tell
+nothing one ranks all trials without an error by chance with a probability of 8 %, but of 29 % with
+four of each."""
+TOO_FEW = f"fewer than {MIN_OF_EACH_OUTCOME} successes or failures"
 USUAL = 1 / 12
 """Variance of the placements of trials by a number that tells nothing. Two such trials are added
 to each kind, so that three failures that happen to be alike do not look certain."""
@@ -26,7 +31,7 @@ def ranking(trials: Ordered, *, weighted: bool = False) -> Estimate:
 
     The interval is DeLong's on the scale of log odds. Where the two kinds are told apart without
     error there is no spread to measure; it is then Wilson's for as many trials as there are of the
-    rarer kind.
+    rarer kind. Undefined with fewer than `MIN_OF_EACH_OUTCOME` of either kind.
 
     Args:
         trials: sorted by the number.
@@ -35,6 +40,8 @@ def ranking(trials: Ordered, *, weighted: bool = False) -> Estimate:
     good, bad = trials.good, trials.count - trials.good
     if not good.sum() or not bad.sum():
         return Estimate.undefined(ALIKE if trials.count.sum() else "no trials with this number")
+    if min(good.sum(), bad.sum()) < MIN_OF_EACH_OUTCOME:
+        return Estimate.undefined(TOO_FEW)
     if weighted:
         up, down = trials.good_weight, trials.weight - trials.good_weight
         up2, down2 = trials.good_squares, trials.squares - trials.good_squares

@@ -74,11 +74,13 @@ def _notes(grasps: GraspSet, dialect: Dialect) -> tuple[str, ...]:
     notes = []
     known = grasps.score[~np.isnan(grasps.score)]
     if len(known) < len(grasps):
-        notes.append(f"confidence is .nan for {len(grasps) - len(known)} grasps without a score.")
+        without = len(grasps) - len(known)
+        whose = "1 grasp has" if without == 1 else f"{without} grasps have"
+        notes.append(f"{whose} no score: confidence is .nan there.")
     if len(known) and not (known.min() >= 0.0 and known.max() <= 1.0):
         notes.append(
-            f"confidence is meant to be from 0 to 1; the scores reach from {known.min():.3g} to"
-            f" {known.max():.3g}."
+            f"{dialect.title} expects a confidence from 0 to 1; the scores, {known.min():.3g} to"
+            f" {known.max():.3g}, are written as they are."
         )
     of_hand = ("object", "width", PREGRASP_WIDTH) if dialect.names_gripper_frame else ()
     return (*notes, *conversion_losses(grasps, ("score", NAME, *of_hand), dialect.title))

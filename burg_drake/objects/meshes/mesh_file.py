@@ -173,8 +173,8 @@ def missing_textures(path: Path) -> list[str]:
     elif suffix == ".gltf":
         found += [(path, uri) for uri in _image_uris(path)]
     return [
-        f"{file.name} names {name}, which is missing: the object has no picture; put it beside"
-        f" {file.name} and build again"
+        f"{file.name} names {name}, which is missing: the object is shown without its texture;"
+        f" put it beside {file.name} and build again"
         for file, name in dict.fromkeys(found)
         if not (file.parent / name.replace("\\", "/")).is_file()
     ]

@@ -27,13 +27,16 @@ from .scene import (
     save_scene as save_scene,
 )
 from .validation import (
+    BOARD as BOARD,
     GROUND_TOLERANCE as GROUND_TOLERANCE,
+    HOVER_TOLERANCE as HOVER_TOLERANCE,
     IN_BOUNDS_TOLERANCE as IN_BOUNDS_TOLERANCE,
     SINK_TOLERANCE as SINK_TOLERANCE,
     SUNKEN_TOLERANCE as SUNKEN_TOLERANCE,
     TOUCH_TOLERANCE as TOUCH_TOLERANCE,
     Extent as Extent,
     SceneIssue as SceneIssue,
+    hovering_issue as hovering_issue,
     is_below as is_below,
     length_text as length_text,
     placed_vertices as placed_vertices,

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from burg_drake.core import InvalidInputError
+from burg_drake.core.documents import require_finite
 from burg_drake.scene.document.markers import MarkerLayout, Markers, marker_layout
 
 LARGEST = 100.0
@@ -25,6 +26,7 @@ class Board:
     markers: Markers = Markers()
 
     def __post_init__(self) -> None:
+        require_finite(self)
         if not 0.0 < min(self.size) <= max(self.size) <= LARGEST:
             raise InvalidInputError(
                 f"board size {list(self.size)} must be positive [m], and at most {LARGEST:g} m;"

@@ -42,10 +42,13 @@ HOVER_TOLERANCE = 1e-3
 """How far an object may start above the board [m] before that is worth a word: trials count its
 fall among what was moved."""
 SUPPORT_TOLERANCE = 5e-3
-"""How far an object may start above another one that it may rest on [m]; only bounds are looked
-at."""
+"""How far the box around an object may be above the box around another one that it may rest on [m]:
+pieces reach beyond the surface."""
 MILLIMETRES_SUSPECTED = 5.0
 """A coordinate on a table of this size [m] or more was probably meant in millimetres."""
+
+BOARD = "board"
+"""What an object hovers over where no other object is below it."""
 
 IssueKind = Literal[
     "out_of_bounds", "in_ground", "sunken", "hovering", "overlap", "surface_overlap"
@@ -63,7 +66,8 @@ class SceneIssue:
             warnings, all else are errors.
         amount: how far beyond, below, above or into something [m].
         message: one clear line.
-        other: what it overlaps: another instance, the table, or a body of the station.
+        other: what it overlaps or hovers above: another instance, the table, the board, or a body
+            of the station.
     """
 
     instance: str
@@ -102,6 +106,9 @@ def validate_scene(
 ) -> tuple[SceneIssue, ...]:
     """Checks where the instances of a scene stand on the board.
 
+    What hovers above another object goes by the boxes around both, so that nothing is told of what
+    may be in a mug; `SceneCheck` looks at their shapes.
+
     Args:
         scene: the scene; fixed background objects may stand anywhere.
         extents: of all instances, background included, if they are known; read from the library's
@@ -116,10 +123,11 @@ def validate_scene(
         extents = {name: _placed_extent(scene, name) for name in names}
     issues: list[SceneIssue] = []
     for name in scene.instances:
-        others = [extent for other, extent in extents.items() if other != name]
+        others = {other: extent for other, extent in extents.items() if other != name}
         found = (
             _bounds_issue(scene, name, extents[name]),
-            _ground_issue(scene, name, extents[name], others),
+            _ground_issue(scene, name, extents[name])
+            or _hovering_issue(name, extents[name], others),
         )
         issues += [issue for issue in found if issue is not None]
     return tuple(issues)
@@ -224,11 +232,8 @@ def _bounds_issue(scene: Scene, name: str, extent: Extent) -> SceneIssue | None:
     )
 
 
-def _ground_issue(
-    scene: Scene, name: str, extent: Extent, others: Iterable[Extent]
-) -> SceneIssue | None:
+def _ground_issue(scene: Scene, name: str, extent: Extent) -> SceneIssue | None:
     surface, support = float(extent.low[2]), extent.support
-    lowest = min(surface, support)
     if support < -GROUND_TOLERANCE and is_below(surface):
         height = round(scene.instance(name).X_SO.translation[2] - support, 4) + 0.0
         return SceneIssue(
@@ -238,29 +243,47 @@ def _ground_issue(
             message=f"{name!r} is in the ground: it reaches {length_text(-support)} below the"
             f" board; z = {height:.4f} would put it on top",
         )
-    if lowest > HOVER_TOLERANCE and not any(_can_support(other, extent) for other in others):
-        return SceneIssue(
-            instance=name,
-            kind="hovering",
-            amount=lowest,
-            message=f"{name!r} hovers {length_text(lowest)} above the board;"
-            " it will fall when simulated",
-        )
     return None
+
+
+def _hovering_issue(name: str, extent: Extent, others: Mapping[str, Extent]) -> SceneIssue | None:
+    height = min(float(extent.low[2]), extent.support)
+    if height <= HOVER_TOLERANCE:
+        return None
+    below = BOARD
+    for other, box in others.items():
+        if (box.low[:2] >= extent.high[:2]).any() or (extent.low[:2] >= box.high[:2]).any():
+            continue
+        if box.low[2] < extent.low[2] and extent.low[2] - box.high[2] < height:
+            height, below = float(extent.low[2] - box.high[2]), other
+    if below != BOARD and height < SUPPORT_TOLERANCE:
+        return None
+    return hovering_issue(name, height, below)
+
+
+def hovering_issue(name: str, height: float, below: str) -> SceneIssue:
+    """Says that an instance hovers.
+
+    Args:
+        name: of the instance.
+        height: how far it falls [m].
+        below: name of what it falls on; `BOARD`, or empty if nothing is below it.
+    """
+    where = "the board" if below == BOARD else repr(below)
+    hovers = f"hovers {length_text(height)} above {where}" if below else "has nothing below it"
+    return SceneIssue(
+        instance=name,
+        kind="hovering",
+        amount=height,
+        message=f"{name!r} {hovers}; it will fall when simulated",
+        other=below,
+    )
 
 
 def is_below(surface: float) -> bool:
     """Whether a surface whose lowest point is at this height over the ground [m] reaches into it:
     if not, the object stands there, however far what it rests with in simulation reaches."""
     return surface < -STANDING_TOLERANCE
-
-
-def _can_support(below: Extent, above: Extent) -> bool:
-    """Whether the bounding boxes let `above` rest on `below`."""
-    overlap = (below.low < above.high) & (above.low < below.high)
-    lowest = above.low[2]
-    reach = below.low[2] < lowest < below.high[2] + SUPPORT_TOLERANCE
-    return bool(overlap[:2].all() and reach)
 
 
 def length_text(length: float) -> str:

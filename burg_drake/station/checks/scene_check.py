@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,9 @@ from pydrake.math import RigidTransform
 from burg_drake.core import Array, InvalidInputError, check_pose, transform_points
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.document import (
+    BOARD,
     GROUND_TOLERANCE,
+    HOVER_TOLERANCE,
     SINK_TOLERANCE,
     SUNKEN_TOLERANCE,
     TOUCH_TOLERANCE,
@@ -29,6 +31,7 @@ from burg_drake.scene.document import (
     SceneIssue,
     SceneLike,
     as_scene,
+    hovering_issue,
     is_below,
     length_text,
     support_vertices,
@@ -47,6 +50,8 @@ GRAVITY = 9.81
 """[m/s^2]."""
 DEEPEST = 0.006
 """A tip may be so deep in the table [m], if the table bears it there."""
+DOWN = np.array([0.0, 0.0, -1.0])
+"""In the world."""
 PUSH_ERROR = 1.05
 """What lies still was pushed up by its weight; the table's force is known to 2 %."""
 
@@ -94,7 +99,6 @@ class SceneCheck:
         fixed = surrounding_shapes(self._around)
         shapes = partial(object_shapes, library, packages=station.packages)
         self._world = CollisionWorld(fixed, shapes)
-        self._travel: Travel | None = None
         self._vertices: dict[str, tuple[Array, Array]] = {}
         self._placed: dict[str, _PlacedInstance] = {}
 
@@ -119,6 +123,9 @@ class SceneCheck:
         placed = self._placed
         issues = list(validate_scene(scene, {name: one.extent for name, one in placed.items()}))
         issues = [i for i in issues if i.kind != "in_ground" or not self._may_sink(i, scene)]
+        issues = [i for i in issues if i.kind != "hovering"]  # of which boxes say too little
+        hovering = (self._hovering_issue(name) for name in scene.instances)
+        issues += [issue for issue in hovering if issue is not None]
         buried = {issue.instance for issue in issues if issue.kind == "in_ground"}
         beside = (self._table_issue(name) for name in scene.instances)
         issues += [issue for issue in beside if issue is not None]
@@ -174,9 +181,13 @@ class SceneCheck:
         if not limit >= 0.0:
             raise InvalidInputError(f"limit {limit} must be a distance of at least 0 [m]")
         self._place(scene)
-        if self._travel is None:
-            self._travel = Travel(self._world)
-        return self._travel.free_distance(chosen, self._X_WS[:3, :3] @ direction / length, limit)
+        direction_W = self._X_WS[:3, :3] @ direction / length
+        return self._travel.first_contact(chosen, direction_W, limit)[0]
+
+    @cached_property
+    def _travel(self) -> Travel:
+        """Ways in the world; most scenes need none."""
+        return Travel(self._world)
 
     def _overlaps(self, scene: Scene) -> list[tuple[str, str, float]]:
         """Instances, what they overlap, and how deep [m], in the order of the document."""
@@ -255,6 +266,25 @@ class SceneCheck:
                 raise obstacle_name_error(self._station, name)
             if name in ROBOT_MODELS or self._around.plant.HasModelInstanceNamed(name):
                 raise name_taken_error(scene, name)
+
+    def _hovering_issue(self, name: str) -> SceneIssue | None:
+        """Whether an object would fall: onto what, and how far."""
+        placed = self._placed[name]
+        height = min(placed.surface, placed.support)
+        if height <= HOVER_TOLERANCE:
+            return None
+        fall, below = self._travel.first_contact([name], DOWN, np.inf)
+        if below in ("table", ""):
+            fall, below = height, BOARD if below else ""
+        elif fall <= HOVER_TOLERANCE + sum(self._gap_to_surface(n) for n in (name, below)):
+            return None
+        return hovering_issue(name, fall, below)
+
+    def _gap_to_surface(self, name: str) -> float:
+        """How far a body's surface may stand out of what it touches others with, at most [m]: by
+        so much, objects whose surfaces meet are apart."""
+        placed = self._placed.get(name)
+        return self._library.entry(placed.instance.object).contact.excess if placed else 0.0
 
     def _sunken_issue(self, name: str) -> SceneIssue | None:
         """Whether an object alone stands in the table, as deep as the table bears it in simulation.

@@ -50,11 +50,13 @@ class Travel:
 
     def __init__(self, world: CollisionWorld) -> None:
         self._world = world
-        self._fixed = [_convex_shapes(shapes) for shapes in world.fixed.values() if shapes]
+        self._fixed = {n: _convex_shapes(shapes) for n, shapes in world.fixed.items() if shapes}
         self._known: dict[str, ConvexShapes] = {}
 
-    def free_distance(self, names: Sequence[str], direction: Array, limit: float) -> float:
-        """How far bodies can be moved together.
+    def first_contact(
+        self, names: Sequence[str], direction: Array, limit: float
+    ) -> tuple[float, str]:
+        """How far bodies can be moved together, and what they meet there.
 
         Args:
             names: of movable bodies, at least one.
@@ -62,11 +64,13 @@ class Travel:
             limit: [m].
 
         Returns:
-            The way [m], at most `limit`.
+            The way [m], at most `limit`, and the name of the body that is met, movable or fixed;
+            none ("") where there is none within the limit.
         """
         others = [name for name in self._world.bodies if name not in names]
         moving = ConvexShapes.joined([self._shapes(name) for name in names])
-        still = ConvexShapes.joined([*map(self._shapes, others), *self._fixed])
+        shapes = [*map(self._shapes, others), *self._fixed.values()]
+        still = ConvexShapes.joined(shapes)
         i, j = (index.ravel() for index in np.indices((len(moving), len(still))))
         offsets, against = np.zeros((len(i), 3)), np.zeros(len(i))
         near = np.flatnonzero(_near(moving, still))
@@ -78,7 +82,11 @@ class Travel:
         found = contact_distances(moving, still, (i, j), direction, limit, offsets)
         pressing = against > ALONG
         found[pressing & (found <= 2.0 * CLEAR / np.maximum(against, ALONG))] = 0.0
-        return float(found.min(initial=limit))
+        first = int(found.argmin())
+        if not np.isfinite(found[first]):
+            return limit, ""
+        owners = np.repeat([*others, *self._fixed], [len(s) for s in shapes])
+        return float(found[first]), str(owners[j[first]])
 
     def _shapes(self, name: str) -> ConvexShapes:
         """Those of a movable body, in the world."""

@@ -9,7 +9,14 @@ from functools import cached_property
 from pathlib import Path
 
 from burg_drake.core import FieldError, InvalidInputError, UnknownNameError, content_hash, nearest
-from burg_drake.core.documents import Pose, Vector3, dump_document, load_document, plain_data
+from burg_drake.core.documents import (
+    Pose,
+    Vector3,
+    dump_document,
+    load_document,
+    plain_data,
+    require_finite,
+)
 from burg_drake.core.paths import (
     NO_PACKAGES,
     Packages,
@@ -197,6 +204,7 @@ class StationDocument:
     packages: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        require_finite(self)
         require_name(self.name, "name")
         require_names(self.cameras, "cameras")
         require_names(self.background, "background")

@@ -34,6 +34,8 @@ def reproduce_command(run: Run) -> str:
         words += ["--grasps", str(run.path / GRASPS_FILE)]
     else:
         words += _sampling(document)
+    if document.grasps.only:
+        words += ["--only", ",".join(document.grasps.only)]
     words += _settings(document, run.path / STATION_FILE)
     return shlex.join([*words, "-o", str(run.path)])
 
@@ -46,6 +48,8 @@ def reproduce_campaign_command(campaign: Campaign) -> str:
         return document.command
     words = ["--station", document.station.path, *_words(mode=document.mode)]
     words += _sampling(document)
+    if document.grasps.only:
+        words += ["--only", ",".join(document.grasps.only)]
     begun = (place.folder / STATION_FILE for place in campaign.places)
     words += _settings(document, next((path for path in begun if path.is_file()), None))
     scenes = _scenes([entry.path for entry in document.scenes])
@@ -75,7 +79,7 @@ def _sampling(document: RunDocument | CampaignDocument) -> list[str]:
             balanced_among=grasps.balanced_among,
             max_grasps_per_object=grasps.max_per_object,
         )
-    return words + [word for name in grasps.only for word in ("--only", name)]
+    return words
 
 
 def _settings(document: RunDocument | CampaignDocument, station: Path | None) -> list[str]:

@@ -9,7 +9,11 @@ from burg_drake.experiment.comparison.groups import FactorGroup
 from burg_drake.experiment.comparison.judge_assessment import Judgement
 from burg_drake.experiment.comparison.report.figures import figure_cell, group_section
 from burg_drake.experiment.comparison.report.plots import reliability_plot
-from burg_drake.experiment.comparison.wording import margin_title, success_of
+from burg_drake.experiment.comparison.wording import (
+    margin_title,
+    success_of,
+    too_few_for_margins,
+)
 from burg_drake.experiment.statistics import Estimate, MarginCalibration
 
 MOST_PLOTS = 4
@@ -20,7 +24,8 @@ def margin_section(comparison: Comparison, judged: Judgement) -> Html | None:
     defined = [c for c in judged.calibration if c.auroc.value is not None]
     found = sorted(defined, key=_informative, reverse=True)
     if not found:
-        return None
+        words = too_few_for_margins(comparison, judged)
+        return section(f"Do margins predict {success_of(comparison)}?", words) if words else None
     weighted = any(c.auroc_weighted is not None for c in found)
     head = ["margin", "trials"]
     head += ["AUROC, selected trials", "AUROC, all grasps"] if weighted else ["AUROC"]
