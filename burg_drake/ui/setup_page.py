@@ -103,9 +103,7 @@ class SetupPage:
             show_share_button=False, show_logo=False, control_width="large", brand_color=BLUE
         )
         gui.set_panel_label("Setup")
-        self._views = PageViews(
-            self._server, lambda: self._session.view.document.board, self.actions.submit
-        )
+        self._views = PageViews(self._server, lambda: self._session.view.document.board)
 
     def _build(self) -> None:
         gui, actions = self._server.gui, self.actions
