@@ -42,7 +42,7 @@ from burg_drake.ui.view import (
     SceneView,
     ShownInstance,
 )
-from burg_drake.ui.widgets import ActionCall, PageActions, register, show_overlay, style
+from burg_drake.ui.widgets import ActionCall, PageActions, register, show_overlay
 
 LEFT_WIDTH, RIGHT_WIDTH = 290, 330
 """Of the panels [pixel]."""
@@ -109,11 +109,9 @@ class SetupPage:
         gui, actions = self._server.gui, self.actions
         left = gui.add_panel()
         with left.add_tab("Library", viser.Icon.PACKAGE):
-            gui.add_html(style())
             self._library = LibraryPanel(gui, actions)
         left.dock_left()
         left.set_width(LEFT_WIDTH)
-        gui.add_html(style())
         self._summary = SummaryPanel(gui, actions)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Object", viser.Icon.CUBE):

@@ -29,7 +29,6 @@ from .texts import (
     notice as notice,
     quiet as quiet,
     status_chip as status_chip,
-    style as style,
     table as table,
     title as title,
 )
