@@ -81,7 +81,7 @@ UNCOVERED = """buttons => buttons.filter(button => {
 }).length"""
 
 
-@pytest.mark.parametrize("size", [(390, 844), (360, 640), (844, 390), (768, 1024)])
+@pytest.mark.parametrize("size", [(390, 844), (360, 640), (844, 390), (768, 1024), (1024, 600)])
 def test_outcomes_are_in_view_on_small_screens(
     page: Page, trials: Path, size: tuple[int, int]
 ) -> None:
