@@ -42,7 +42,7 @@ from burg_drake.ui.view import (
     SceneView,
     ShownInstance,
 )
-from burg_drake.ui.widgets import ActionCall, PageActions, register, show_overlay
+from burg_drake.ui.widgets import ActionCall, KeysDialog, PageActions, register
 
 LEFT_WIDTH, RIGHT_WIDTH = 290, 330
 """Of the panels [pixel]."""
@@ -107,12 +107,13 @@ class SetupPage:
 
     def _build(self) -> None:
         gui, actions = self._server.gui, self.actions
+        self._keys = KeysDialog(actions)
         left = gui.add_panel()
         with left.add_tab("Library", viser.Icon.PACKAGE):
             self._library = LibraryPanel(gui, actions)
         left.dock_left()
         left.set_width(LEFT_WIDTH)
-        self._summary = SummaryPanel(gui, actions)
+        self._summary = SummaryPanel(gui, actions, self._keys)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Object", viser.Icon.CUBE):
             self._object = ObjectPanel(gui, actions, self._gizmo.switch_axes)
@@ -163,10 +164,12 @@ class SetupPage:
             "top": self._display.look_from_above,
             "front": self._display.look_from_front,
             "colors": anywhere(self._display.next_colors),
-            "help": show_overlay,
+            "help": self._keys.toggle,
         }
 
     def _release_drags(self, client: viser.ClientHandle | None) -> None:
+        if client is not None and self._keys.close(client):
+            return
         who = None if client is None else client.client_id
         if who is None or not (self._drags.put_back(who) or self._gizmo.put_back(who)):
             self._session.select(())

@@ -24,6 +24,7 @@ from burg_drake.ui.pointing.pointer import PageCamera
 from burg_drake.ui.server.door import ServedPage, serve
 from burg_drake.ui.setup_page import SetupPage
 from tests.hang_guard import until
+from tests.ui.conftest import open_page
 
 ONE_TRY = 0.7
 UNDER_POINTER = """([x, y]) => {
@@ -46,14 +47,20 @@ class Setup:
         return self.session.view
 
     def open(self) -> None:
-        """Opens the page, and waits until the server knows where its camera is."""
+        """Opens the page, and waits until it shows the view that it was given."""
         self.tab.goto(self.door.url)
         self.tab.get_by_text("click one to add it").wait_for()
-        until(self.door.server.get_clients, "a browser")
-        # A page that keeps another view than the one it was given is as good: points are found
-        # with the camera that it reports.
-        with contextlib.suppress(AssertionError):
-            until(lambda: any(v.arrived for v in self.page._views._fitted.values()), "", 10.0)
+        self.tab.locator("[data-dock-region-collapse=right]").wait_for()
+        until(self.has_view, "the stated view on a page that is complete")
+
+    def has_view(self) -> bool:
+        """Whether the newest page has reported the view that was given for its canvas of now."""
+        clients = self.door.server.get_clients()
+        given = self.page._views._given.get(max(clients, default=0))
+        if given is None or not given.arrived:
+            return False
+        box = self.tab.locator("canvas").first.bounding_box()
+        return abs(given.aspect - box["width"] / box["height"]) < 0.01
 
     def on_screen(self, p_SQ: Any) -> tuple[float, float]:
         """Where a point of the scene is on the tab [pixel]."""
@@ -118,19 +125,51 @@ class Setup:
         self.tab.get_by_text(name, exact=True).first.click()
 
 
-@pytest.fixture
-def setup(page: Any, tmp_path: Path) -> Iterator[Setup]:
-    session = ComposeSession.open("household", load_station("panda_tabletop"), folder=tmp_path)
+@contextlib.contextmanager
+def open_setup(tab: Any, folder: Path) -> Iterator[Setup]:
+    session = ComposeSession.open("household", load_station("panda_tabletop"), folder=folder)
     with serve(port=0) as door:
-        built = SetupPage(door.server, session)
-        page.set_viewport_size({"width": 1120, "height": 640})
-        yield Setup(session, built, door, page)
-        built.close()
+        page = SetupPage(door.server, session)
+        yield Setup(session, page, door, tab)
+        page.close()
+
+
+@pytest.fixture(scope="module")
+def opened(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Setup]:
+    """A page in a tab, both for all tests that need none of their own: loading it takes longer than
+    most of what they do."""
+    with (
+        open_page(browser, {"width": 1120, "height": 640}) as tab,
+        open_setup(tab, tmp_path_factory.mktemp("scenes")) as setup,
+    ):
+        setup.open()
+        yield setup
+
+
+@pytest.fixture
+def setup(opened: Setup) -> Setup:
+    """The page on a new scene, seen from the front."""
+    opened.session.new("household", discard=True)
+    opened.session.restrict_movement(True)
+    opened.tab_of("Object")
+    until(lambda: len(opened.door.server.get_clients()) == 1, "no other page")
+    (client,) = opened.door.server.get_clients().values()
+    opened.page._views.look(client, above=False)
+    until(lambda: opened.page.actions.queue.idle(0.1), "nothing left to do")
+    until(opened.has_view, "the view from the front")
+    return opened
+
+
+@pytest.fixture
+def setup_alone(page: Any, tmp_path: Path) -> Iterator[Setup]:
+    """A page of one's own, that is not opened yet."""
+    page.set_viewport_size({"width": 1120, "height": 640})
+    with open_setup(page, tmp_path) as setup:
+        yield setup
 
 
 @pytest.mark.thorough
-def test_a_scene_is_composed_checked_and_saved(setup: Setup, tmp_path: Path) -> None:
-    setup.open()
+def test_a_scene_is_composed_checked_and_saved(setup: Setup) -> None:
     setup.click("box")
     until(lambda: "box" in setup.view.instances, "a box")
     before = setup.view.X_SO("box")
@@ -167,7 +206,7 @@ def test_a_scene_is_composed_checked_and_saved(setup: Setup, tmp_path: Path) -> 
     setup.fill("Name", "breakfast")
     setup.click("Save scene")
     until(lambda: setup.view.saved, "saved")
-    document = yaml.safe_load((tmp_path / "breakfast.yaml").read_text())
+    document = yaml.safe_load((Path(setup.session.folder) / "breakfast.yaml").read_text())
     assert document["name"] == "breakfast"
     assert [i["object"] for i in document["instances"]] == ["box", "can"]
     np.testing.assert_allclose(
@@ -187,7 +226,10 @@ def test_a_scene_is_composed_checked_and_saved(setup: Setup, tmp_path: Path) -> 
 
 
 @pytest.mark.thorough
-def test_two_pages_show_the_same_and_come_back_after_a_kill(setup: Setup, tmp_path: Path) -> None:
+def test_two_pages_show_the_same_and_come_back_after_a_kill(
+    setup_alone: Setup, tmp_path: Path
+) -> None:
+    setup = setup_alone
     setup.open()
     with setup.tab.context.new_page() as other:
         other.goto(setup.door.url)
@@ -230,7 +272,6 @@ def test_the_mouse_selects_and_keys_change_what_is_selected(setup: Setup) -> Non
     setup.session.do(AddObject("box", stable_pose=0, position=(0.1, 0.1)))
     setup.session.do(AddObject("can", position=(0.3, 0.2)))
     setup.session.select(())
-    setup.open()
     keys, mouse = setup.tab.keyboard, setup.tab.mouse
 
     def select(name: str, selection: tuple[str, ...]) -> None:
@@ -280,7 +321,10 @@ def test_the_mouse_selects_and_keys_change_what_is_selected(setup: Setup) -> Non
         "moved by keys",
     )
     keys.press("h")
-    setup.tab.get_by_role("dialog").get_by_text("Ctrl+click").wait_for()
+    dialog = setup.tab.get_by_role("dialog")
+    dialog.get_by_text("Ctrl+click").wait_for()
+    keys.press("Escape")
+    dialog.wait_for(state="hidden")
 
 
 def press_until_held(setup: Setup, x: float, y: float, direction: tuple[float, float]) -> None:
@@ -306,7 +350,8 @@ def test_an_arrow_over_another_object_moves_what_is_selected(setup: Setup) -> No
     setup.session.do(AddObject("box", stable_pose=0, position=(0.3, 0.22)))
     setup.session.select(("can",))
     setup.session.restrict_movement(False)
-    setup.open()
+    until(lambda: setup.page.actions.queue.idle(0.1), "the larger board")
+    until(setup.has_view, "all of the larger board")
     start, box = setup.view.X_SO("can"), setup.view.X_SO("box")
     middle = setup.middle("can")
     over = middle + np.array([0.095, 0.0, 0.0])  # beyond the rings
@@ -342,7 +387,8 @@ def test_turning_with_shift_keeps_the_selection(setup: Setup) -> None:
     setup.session.do(AddObject("box", stable_pose=0, position=(0.1, 0.15)))
     setup.session.do(AddObject("can", position=(0.3, 0.15)))
     setup.session.select(("box", "can"))
-    setup.open()
+    setup.drag("can", np.zeros(3))  # until it is drawn: what is not there, Shift takes no hold of
+    setup.let_go()
     before = setup.view.X_SO("can")
     setup.drag("can", np.array([0.02, -0.06, 0.0]), key="Shift")
     until(lambda: not np.allclose(setup.view.X_SO("can"), before), "turned")
@@ -361,16 +407,17 @@ def test_turning_with_shift_keeps_the_selection(setup: Setup) -> None:
     ],
 )
 def test_all_of_the_board_is_in_view_beside_the_panels(
-    setup: Setup, width: int, height: int
+    setup_alone: Setup, width: int, height: int
 ) -> None:
     """From the beginning, and again when the board has got another size: what the browser finds at
     the board's corners is the scene and no panel."""
+    setup = setup_alone
     setup.tab.set_viewport_size({"width": width, "height": height})
     setup.tab.goto(setup.door.url)
     setup.tab.locator("canvas").first.wait_for()
 
     def covered() -> list[str]:
-        if not setup.page._views._fitted:
+        if not setup.page._views._given:
             return ["no page yet"]
         found = []
         for x in (0.0, setup.view.document.board.size[0]):

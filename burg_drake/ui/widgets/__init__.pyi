@@ -10,8 +10,8 @@ from .page_actions import PageActions as PageActions
 from .scene_files import scene_names as scene_names
 from .shortcuts import (
     ActionCall as ActionCall,
+    KeysDialog as KeysDialog,
     register as register,
-    show_overlay as show_overlay,
 )
 from .status_colors import (
     FIXED as FIXED,
