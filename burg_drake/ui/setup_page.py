@@ -46,7 +46,7 @@ from burg_drake.ui.widgets import ActionCall, KeysDialog, PageActions, register
 
 LEFT_WIDTH, RIGHT_WIDTH = 290, 330
 """Of the panels [pixel]."""
-BLUE = (34, 139, 230)
+BRAND_COLOR = (34, 139, 230)
 
 
 class _Panel(Protocol):
@@ -100,7 +100,7 @@ class SetupPage:
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
         gui.configure_theme(
-            show_share_button=False, show_logo=False, control_width="large", brand_color=BLUE
+            show_share_button=False, show_logo=False, control_width="large", brand_color=BRAND_COLOR
         )
         gui.set_panel_label("Setup")
         self._views = PageViews(self._server, lambda: self._session.view.document.board)

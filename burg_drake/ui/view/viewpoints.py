@@ -26,7 +26,7 @@ FRONT_FOV = float(np.deg2rad(42.0))
 TOP_FOV = float(np.deg2rad(18.0))
 """Narrow, so that from above hardly any perspective is left [rad]."""
 FRONT_ELEVATION = float(np.deg2rad(50.0))
-ROOM = 1.22
+VIEW_MARGIN_FACTOR = 1.22
 """How much more than the board is in view."""
 OBJECT_HEIGHT = 0.25
 """Of objects that are to be in view at the far edge of the board [m]."""
@@ -35,15 +35,15 @@ FIRST_ASPECT = 0.9
 PHONE_ASPECT, PHONE_HEIGHT = 0.6, 0.55
 """Width over height below which a page is taken for a phone's; share of the page's height left free
 above a phone's panel."""
-TILT = 1e-3
+TOP_VIEW_TILT = 1e-3
 """Off the vertical, for the camera to know which way is up [rad]."""
-SAME_VIEW = 1e-3
+VIEW_TOLERANCE = 1e-3
 """Cameras that are nearer to each other have not been moved [m]."""
 
 
 def direction_from(*, above: bool) -> Array:
     """(3,) unit vector in S from the board to a camera above it or in front of it."""
-    elevation = np.pi / 2.0 - TILT if above else FRONT_ELEVATION
+    elevation = np.pi / 2.0 - TOP_VIEW_TILT if above else FRONT_ELEVATION
     return np.array([0.0, -np.cos(elevation), np.sin(elevation)])
 
 
@@ -63,9 +63,9 @@ def viewpoint(board: Board, back: Array, fov: float, aspect: float) -> tuple[Arr
     level = float(np.hypot(back[0], back[1]))
     ahead = -back[:2] / level
     width, depth = float(size @ np.abs(ahead[::-1])), float(size @ np.abs(ahead))
-    tall = 0.0 if level <= TILT else OBJECT_HEIGHT * level
+    tall = 0.0 if level <= TOP_VIEW_TILT else OBJECT_HEIGHT * level
     share = PHONE_HEIGHT if aspect < PHONE_ASPECT else 1.0
-    half = ROOM * max((depth * back[2] + tall) / 2.0 / share, width / 2.0 / aspect)
+    half = VIEW_MARGIN_FACTOR * max((depth * back[2] + tall) / 2.0 / share, width / 2.0 / aspect)
     distance = half / np.tan(fov / 2.0) + depth / 2.0 * level
     up = np.array([*ahead * back[2], level])
     target = np.array([*size / 2.0, 0.0])
@@ -97,7 +97,7 @@ class _GivenView:
         return (
             _same(camera.position, self.position)
             and _same(camera.look_at, self.target)
-            and abs(camera.fov - self.fov) <= SAME_VIEW
+            and abs(camera.fov - self.fov) <= VIEW_TOLERANCE
         )
 
 
@@ -154,7 +154,7 @@ class PageViews:
         if given is None:
             return
         camera = client.camera
-        if abs(camera.aspect - given.aspect) > SAME_VIEW:
+        if abs(camera.aspect - given.aspect) > VIEW_TOLERANCE:
             given = self._fitted(camera, given.back, given.fov)
             self._given[client.client_id] = given
         if given.is_seen_by(camera):
@@ -171,7 +171,7 @@ class PageViews:
                 continue
             back = client.camera.position - client.camera.look_at
             back = back / np.linalg.norm(back)
-            if np.hypot(back[0], back[1]) < TILT / 2.0:
+            if np.hypot(back[0], back[1]) < TOP_VIEW_TILT / 2.0:
                 back = direction_from(above=True)
             self._give(client, back, float(client.camera.fov))
 
@@ -198,4 +198,4 @@ class PageViews:
 
 
 def _same(p_SA: Array, p_SB: Array) -> bool:
-    return bool(np.linalg.norm(np.subtract(p_SA, p_SB)) <= SAME_VIEW)
+    return bool(np.linalg.norm(np.subtract(p_SA, p_SB)) <= VIEW_TOLERANCE)

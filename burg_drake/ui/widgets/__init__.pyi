@@ -32,4 +32,4 @@ from .texts import (
     table as table,
     title as title,
 )
-from .typed_field import NAMING as NAMING
+from .typed_field import NAME_TYPING_DELAY as NAME_TYPING_DELAY
