@@ -16,12 +16,13 @@ T = TypeVar("T")
 
 HANG_GUARD = 900.0
 """After this a test counts as hanging, whatever it does [s]."""
-STALL_GUARD = 120.0
-"""A test counts as hanging after this time [s] in which its processes used hardly any processor."""
-STALL_CPU_SHARE = 0.1
-"""Share of one core that waiting itself, and a page that shows nothing new, stay below."""
-CHECK_INTERVAL = 20.0
-"""Between looks at the processor time [s]."""
+STALL_WINDOW = 120.0
+"""A test hangs if its processes use hardly any processor time for so long [s]."""
+STALL_CPU_SHARE = 0.04
+"""Share of one core: waiting, and a page on which nothing happens, use less; on a machine with ten
+times as much to do as it can, work gets more."""
+SHORT_WAIT = 5.0
+"""So long waits [s] are not looked into."""
 
 
 def until(condition: Callable[[], T], what: str = "", seconds: float = HANG_GUARD) -> T:
@@ -32,40 +33,37 @@ def until(condition: Callable[[], T], what: str = "", seconds: float = HANG_GUAR
         what: is waited for, for the message.
         seconds: less where a test tries again what may have been too early.
     """
-    start = looked = busy_at = time.monotonic()
-    cpu = 0.0
+    start = time.monotonic()
+    window, before = start, None
     while not (found := condition()):
         now = time.monotonic()
         assert now < start + seconds, f"waited {seconds:g} s in vain: {what}"
-        if now - looked > CHECK_INTERVAL:
-            used = processor_time()
-            if used - cpu > STALL_CPU_SHARE * (now - looked):
-                busy_at = now
-            looked, cpu = now, used
-            assert now - busy_at < STALL_GUARD, (
-                f"waited {now - start:.0f} s in vain, the last {now - busy_at:.0f} s without any"
-                f" work done: {what}"
+        if before is None and now > start + SHORT_WAIT:
+            window, before = now, processor_times()
+        elif before is not None and now > window + STALL_WINDOW:
+            after = processor_times()
+            used = sum(max(after[pid] - before.get(pid, 0.0), 0.0) for pid in after)
+            assert used > STALL_CPU_SHARE * (now - window), (
+                f"waited {now - start:.0f} s in vain, and in the last {now - window:.0f} s the"
+                f" processes of this test used {used:.0f} s of processor time: {what}"
             )
+            window, before = now, after
         time.sleep(min(0.005 + 0.01 * (now - start), 0.5))
     return found
 
 
-def processor_time() -> float:
-    """Of this process and all that it has started, which still run [s]."""
+def processor_times() -> dict[int, float]:
+    """Of this process and of all that it has started and that still run, by their ids [s]."""
     lines = subprocess.run(
         ["ps", "-A", "-o", "pid=,ppid=,time="], capture_output=True, text=True, check=True
     ).stdout.splitlines()
-    rows = [line.split() for line in lines]
-    family, total = {os.getpid()}, 0.0
-    grown = True
-    while grown:
-        children = {int(pid) for pid, parent, _ in rows if int(parent) in family}
-        grown = not children <= family
+    rows = [(int(pid), int(parent), used) for pid, parent, used in map(str.split, lines)]
+    family: set[int] = set()
+    children = {os.getpid()}
+    while children:
         family |= children
-    for pid, _, used in rows:
-        if int(pid) in family:
-            total += _seconds(used)
-    return total
+        children = {pid for pid, parent, _ in rows if parent in family} - family
+    return {pid: _seconds(used) for pid, _, used in rows if pid in family}
 
 
 def _seconds(text: str) -> float:
