@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,10 +28,11 @@ from burg_drake.station.document.station_document import load_station
 from burg_drake.ui.pointing.pointer import PageCamera
 from burg_drake.ui.server.door import ServedPage, serve
 from burg_drake.ui.setup_page import SetupPage
-from tests.hang_guard import until
-from tests.ui.conftest import open_page
+from tests import hang_guard
+from tests.ui.conftest import BROWSER_TIMEOUT, open_page
 
 ONE_TRY = 0.7
+until = partial(hang_guard.until, seconds=BROWSER_TIMEOUT)
 UNDER_POINTER = """([x, y]) => {
   const element = document.elementFromPoint(x, y);
   return element?.closest(".mantine-Notifications-root") ? "MESSAGE" : element?.tagName;
@@ -94,7 +96,7 @@ class Setup:
             mouse.move(x + 6, y)
             mouse.move(x + 8, y)
             try:
-                until(lambda: self.view.dragging, f"hold of {name}", ONE_TRY)
+                until(lambda: self.view.dragging, f"hold of {name}", seconds=ONE_TRY)
                 break
             except AssertionError:
                 mouse.up()
@@ -283,7 +285,7 @@ def test_the_mouse_selects_and_keys_change_what_is_selected(setup: Setup) -> Non
         for _ in range(20):
             mouse.click(*setup.on_screen(setup.middle(name)))
             try:
-                until(lambda: setup.view.selection != before, f"click on {name}", ONE_TRY)
+                until(lambda: setup.view.selection != before, f"click on {name}", seconds=ONE_TRY)
                 break
             except AssertionError:
                 continue
@@ -339,7 +341,7 @@ def press_until_held(setup: Setup, x: float, y: float, direction: tuple[float, f
         for step in (6, 9, 12):
             mouse.move(x + step * direction[0], y + step * direction[1])
         try:
-            until(lambda: setup.view.dragging, "hold", ONE_TRY)
+            until(lambda: setup.view.dragging, "hold", seconds=ONE_TRY)
             return
         except AssertionError:
             mouse.up()
@@ -429,9 +431,9 @@ def test_all_of_the_board_is_in_view_beside_the_panels(
                 found.append(setup.tab.evaluate(UNDER_POINTER, list(place)))
         return [tag for tag in found if tag not in ("CANVAS", "MESSAGE")]
 
-    until(lambda: covered() == [], "all four corners of the first board", 20.0)
+    until(lambda: covered() == [], "all four corners of the first board")
     setup.session.do(SetBoard(Board(size=(0.841, 1.189))))
-    until(lambda: covered() == [], "all four corners of a board that is larger", 20.0)
+    until(lambda: covered() == [], "all four corners of a board that is larger")
 
 
 @pytest.mark.thorough
@@ -484,7 +486,7 @@ def test_a_finger_selects_moves_and_raises(setup_alone: Setup, browser: Any) -> 
                 for share in np.linspace(0.1, 1.0, 8):
                     touch("touchMove", *(a + share * (b - a)))
                 try:
-                    until(lambda: setup.view.dragging, "hold", ONE_TRY)
+                    until(lambda: setup.view.dragging, "hold", seconds=ONE_TRY)
                     break
                 except AssertionError:
                     touch("touchEnd")
