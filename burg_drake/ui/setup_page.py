@@ -42,11 +42,11 @@ from burg_drake.ui.view import (
     SceneView,
     ShownInstance,
 )
-from burg_drake.ui.widgets import ActionCall, PageActions, register, show_overlay, style
+from burg_drake.ui.widgets import ActionCall, KeysDialog, PageActions, register
 
 LEFT_WIDTH, RIGHT_WIDTH = 290, 330
 """Of the panels [pixel]."""
-BLUE = (34, 139, 230)
+BRAND_COLOR = (34, 139, 230)
 
 
 class _Panel(Protocol):
@@ -100,23 +100,20 @@ class SetupPage:
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
         gui.configure_theme(
-            show_share_button=False, show_logo=False, control_width="large", brand_color=BLUE
+            show_share_button=False, show_logo=False, control_width="large", brand_color=BRAND_COLOR
         )
         gui.set_panel_label("Setup")
-        self._views = PageViews(
-            self._server, lambda: self._session.view.document.board, self.actions.submit
-        )
+        self._views = PageViews(self._server, lambda: self._session.view.document.board)
 
     def _build(self) -> None:
         gui, actions = self._server.gui, self.actions
+        self._keys = KeysDialog(actions)
         left = gui.add_panel()
         with left.add_tab("Library", viser.Icon.PACKAGE):
-            gui.add_html(style())
             self._library = LibraryPanel(gui, actions)
         left.dock_left()
         left.set_width(LEFT_WIDTH)
-        gui.add_html(style())
-        self._summary = SummaryPanel(gui, actions)
+        self._summary = SummaryPanel(gui, actions, self._keys)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Object", viser.Icon.CUBE):
             self._object = ObjectPanel(gui, actions, self._gizmo.switch_axes)
@@ -167,10 +164,12 @@ class SetupPage:
             "top": self._display.look_from_above,
             "front": self._display.look_from_front,
             "colors": anywhere(self._display.next_colors),
-            "help": show_overlay,
+            "help": self._keys.toggle,
         }
 
     def _release_drags(self, client: viser.ClientHandle | None) -> None:
+        if client is not None and self._keys.close(client):
+            return
         who = None if client is None else client.client_id
         if who is None or not (self._drags.put_back(who) or self._gizmo.put_back(who)):
             self._session.select(())

@@ -11,7 +11,7 @@ import pytest
 
 from burg_drake import load_scene
 from burg_drake.compose import AddObject, ComposeSession, Delete, MoveObjects, Rename
-from burg_drake.compose.document import amending
+from burg_drake.compose.document import history as history_module
 from burg_drake.compose.storage import scene_lock
 from burg_drake.compose.storage.journal import journal_path, recover
 from burg_drake.compose.storage.scene_file import FileChanged, UnsavedChanges
@@ -41,7 +41,7 @@ def test_steps_are_undone_and_redone(session: ComposeSession) -> None:
 
 @pytest.fixture
 def slow_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(amending, "AMENDING", 3600.0)
+    monkeypatch.setattr(history_module, "AMEND_PERIOD", 3600.0)
 
 
 @pytest.mark.usefixtures("slow_machine")
@@ -88,9 +88,9 @@ def test_what_was_typed_stays_a_step_once_something_else_was_done(
     assert steps(lambda: session.do(MoveObjects({"mug": next(poses)}), field="y")) == 3
     assert steps(lambda: session.do(MoveObjects({"mug": next(poses)}))) == 3
     assert steps(session.save) == 2
-    assert steps(lambda: monkeypatch.setattr(amending, "AMENDING", 0.0)) == 1
+    assert steps(lambda: monkeypatch.setattr(history_module, "AMEND_PERIOD", 0.0)) == 1
     assert steps(lambda: None) == 2  # too late
-    monkeypatch.setattr(amending, "AMENDING", 3600.0)
+    monkeypatch.setattr(history_module, "AMEND_PERIOD", 3600.0)
     # typed back to what it was, there is nothing to undo; and nothing typed, nothing to amend
     start = session.view
     session.do(MoveObjects({"mug": next(poses)}), field="x")

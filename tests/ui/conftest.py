@@ -1,17 +1,17 @@
 """A real Chromium without a window, for pages.
 
-It renders WebGL in software: tests wait for what a page says, never for frames or for time.
+It renders WebGL in software: tests wait for what a page says, never for frames or for time. A test
+that fails tells what its page said last.
 """
 
 from __future__ import annotations
 
+import contextlib
 import shutil
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from typing import Any
 
 import pytest
-
-from tests.hang_guard import HANG_GUARD
 
 viser = pytest.importorskip("viser", reason="pages need viser: pip install 'burg-drake[ui]'")
 sync_api = pytest.importorskip("playwright.sync_api", reason="driven by playwright")
@@ -24,8 +24,15 @@ ARGUMENTS = (
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 )
-PATIENCE_MS = 1000.0 * HANG_GUARD
+BROWSER_TIMEOUT = 180.0
+"""For one thing that a browser is to do or to show [s], of which the slowest takes 3 s of processor
+time. Pages use some all the time, by which `until` could not tell that one hangs."""
+BROWSER_TIMEOUT_MS = 1000.0 * BROWSER_TIMEOUT
 SIZE = {"width": 1280, "height": 800}
+LAST_WORDS = 3000
+"""Characters of a page's text in the report of a test that failed."""
+_open_pages: dict[Any, list[str]] = {}
+"""With what each has said on its console."""
 
 
 @pytest.fixture(scope="session")
@@ -48,7 +55,7 @@ def playwright(chromium: str) -> Iterator[sync_api.Playwright]:
 def browser(playwright: sync_api.Playwright, chromium: str) -> Iterator[sync_api.Browser]:
     """One a process, which all tests share; each has cookies of its own by `page`."""
     browser = playwright.chromium.launch(
-        executable_path=chromium, args=list(ARGUMENTS), timeout=PATIENCE_MS
+        executable_path=chromium, args=list(ARGUMENTS), timeout=BROWSER_TIMEOUT_MS
     )
     yield browser
     browser.close()
@@ -73,15 +80,42 @@ def lamps_alone() -> Iterator[None]:
         yield
 
 
-@pytest.fixture
-def page(browser: sync_api.Browser) -> Iterator[sync_api.Page]:
-    """A fresh tab of a fresh profile; the test fails if a script of the page does."""
-    with browser.new_context(viewport=SIZE) as context:
-        sync_api.expect.set_options(timeout=PATIENCE_MS)
-        context.set_default_timeout(PATIENCE_MS)
-        context.set_default_navigation_timeout(PATIENCE_MS)
+@contextlib.contextmanager
+def open_page(browser: sync_api.Browser, size: dict[str, int]) -> Iterator[sync_api.Page]:
+    """A fresh tab of a fresh profile; an error if a script of the page has one."""
+    with browser.new_context(viewport=size) as context:
+        sync_api.expect.set_options(timeout=BROWSER_TIMEOUT_MS)
+        context.set_default_timeout(BROWSER_TIMEOUT_MS)
+        context.set_default_navigation_timeout(BROWSER_TIMEOUT_MS)
         page = context.new_page()
         errors: list[str] = []
+        said = _open_pages[page] = []
         page.on("pageerror", lambda error: errors.append(f"{error} {error.stack}"))
-        yield page
+        page.on("console", lambda message: said.append(f"{message.type}: {message.text}"))
+        try:
+            yield page
+        finally:
+            del _open_pages[page]
         assert errors == []
+
+
+@pytest.fixture
+def page(browser: sync_api.Browser) -> Iterator[sync_api.Page]:
+    """A fresh tab for one test."""
+    with open_page(browser, SIZE) as page:
+        yield page
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, Any, Any]:
+    """Adds to the report of a test that failed what its pages show, and said on their consoles."""
+    report = yield
+    if report.failed:
+        for page, said in _open_pages.items():
+            try:
+                text = page.locator("body").inner_text(timeout=5000.0)
+            except sync_api.Error as error:
+                text = f"(it does not answer: {error.message.splitlines()[0]})"
+            shown = text[:LAST_WORDS] + "\n\nConsole:\n" + "\n".join(said[-20:])
+            report.sections.append((f"page {page.url}", shown))
+    return report

@@ -20,6 +20,13 @@ from burg_drake.ui.server.door import ServedPage
 from tests.hang_guard import HANG_GUARD
 
 POSING = ("SetSceneNodeVisibilityMessage", "SetPositionMessage", "SetOrientationMessage")
+CAMERA_FIELDS = {
+    "SetCameraPositionMessage": ("position", "position"),
+    "SetCameraLookAtMessage": ("look_at", "look_at"),
+    "SetCameraUpDirectionMessage": ("position", "up_direction"),
+    "SetCameraFovMessage": ("fov", "fov"),
+}
+"""By the messages that set one: what it is called there, and in what pages report."""
 CAMERA = {
     "wxyz": (1.0, 0.0, 0.0, 0.0),
     "position": (0.0, 0.0, 1.0),
@@ -66,19 +73,23 @@ class PageClient:
         nodes: properties of what is in the scene, by its name; `visible` and `position` as well.
         told: titles and lines of notifications, and titles of dialogs.
         notes: notifications that have not been taken away.
+        first_view: position of the camera that the server wants pages to begin with.
+        camera: as it was last set or reported.
     """
 
     def __init__(self, door: ServedPage) -> None:
         self.nodes: dict[str, dict[str, Any]] = {}
         self.told: list[str] = []
         self.notes: dict[str, str] = {}
+        self.first_view: list[float] = []
+        self.camera: dict[str, Any] = dict(CAMERA)
         self._controls: dict[str, dict[str, Any]] = {}
         self._commands: dict[tuple[str, str | None], str] = {}
         self._complete = threading.Event()
         self._connection = coming_in(door)
         self._thread = threading.Thread(target=self._listen, daemon=True)
         self._thread.start()
-        send(self._connection, "ViewerCameraMessage", **CAMERA)
+        self.report_camera()
         assert self._complete.wait(HANG_GUARD)
 
     def __enter__(self) -> PageClient:
@@ -92,6 +103,11 @@ class PageClient:
     ) -> None:
         self._connection.close()
         self._thread.join(HANG_GUARD)
+
+    def report_camera(self, **changes: Any) -> None:
+        """Says where the camera is, after it was moved or the room for the scene has changed."""
+        self.camera.update(changes)
+        send(self._connection, "ViewerCameraMessage", **self.camera)
 
     def value(self, folder: str, label: str) -> Any:
         """What stands in a field of a folder."""
@@ -174,6 +190,11 @@ class PageClient:
         kind, name = message["type"], message.get("name", "")
         if kind == "ReplayDoneMessage":
             self._complete.set()
+        elif kind == "SetCameraPositionMessage" and message["initial"]:
+            self.first_view = list(message["position"])
+        elif kind in CAMERA_FIELDS and not message["initial"]:
+            given, field = CAMERA_FIELDS[kind]
+            self.camera[field] = message[given]
         elif kind == "NotificationShowMessage":
             props = message["props"]
             self.notes[message["uuid"]] = f"{props['title']}: {props['body']}"

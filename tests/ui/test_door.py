@@ -229,7 +229,7 @@ def test_a_token_that_is_no_text_is_a_wrong_one(open_to_all: ServedPage) -> None
 
 
 def test_browsers_are_counted(door: ServedPage, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(admission, "MOST_CONNECTIONS", 0)
+    monkeypatch.setattr(admission, "MAX_CONNECTIONS", 0)
     own = ("Origin", "http://127.0.0.1")
     code, _, text = answer(door, "/", own, *HANDSHAKE.items())
     assert code == 503 and "too many browsers" in text

@@ -28,6 +28,7 @@ from burg_drake.ui.server.door import ServedPage, serve
 from burg_drake.ui.setup_page import SetupPage
 from burg_drake.ui.view.board import sheet_picture
 from burg_drake.ui.view.object_pictures import ObjectPictures
+from burg_drake.ui.view.viewpoints import FRONT_FOV, direction_from, viewpoint
 from burg_drake.ui.widgets.status_colors import STATUS_STYLES
 from tests.hang_guard import HANG_GUARD, until
 from tests.ui.page_client import PageClient
@@ -70,6 +71,37 @@ def session(page: SetupPage) -> ComposeSession:
 def client(page: SetupPage, opened: tuple[SetupPage, ServedPage]) -> Iterator[PageClient]:
     with PageClient(opened[1]) as client:
         yield client
+
+
+def test_a_page_has_the_stated_view_whatever_it_shows_while_it_loads(
+    page: SetupPage, session: ComposeSession, client: PageClient
+) -> None:
+    """A page puts the server's first view over the one that it was given as late as it likes."""
+
+    def given(aspect: float) -> bool:
+        position, target = viewpoint(
+            session.view.document.board, direction_from(above=False), FRONT_FOV, aspect
+        )
+        camera = client.camera
+        return np.allclose([camera["position"], camera["look_at"]], [position, target], atol=1e-6)
+
+    until(lambda: given(640 / 480), "the stated view")
+    client.report_camera(position=client.first_view)  # before the page has applied it
+    until(lambda: given(640 / 480), "the stated view again")
+    client.report_camera()
+    client.report_camera(position=client.first_view)  # after that
+    until(lambda: given(640 / 480), "the stated view after it had arrived")
+    client.report_camera(image_width=480, position=client.first_view)  # panels have come
+    until(lambda: given(1.0), "the stated view of a narrower scene")
+    client.report_camera()
+    client.report_camera(image_width=400)
+    until(lambda: given(400 / 480), "the stated view of an even narrower one")
+    client.report_camera()
+    views = page._views._given
+    client.report_camera(position=[0.3, -0.5, 0.4])
+    until(lambda: not views, "that somebody has moved the camera")
+    client.press("F")
+    until(lambda: given(400 / 480), "the view from the front, which was asked for")
 
 
 @pytest.mark.thorough

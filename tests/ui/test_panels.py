@@ -17,7 +17,7 @@ from burg_drake.scene.document.scene import Board
 from burg_drake.ui.panels.check import findings
 from burg_drake.ui.view.board import sheet_picture
 from burg_drake.ui.view.live_picture import LivePicture
-from burg_drake.ui.view.outlines import footprint
+from burg_drake.ui.view.objects import footprint
 from burg_drake.ui.widgets.scene_files import scene_names
 from burg_drake.ui.widgets.shortcuts import SHORTCUTS, overlay_text
 from burg_drake.ui.widgets.texts import all_of, notice, table

@@ -15,7 +15,7 @@ from burg_drake.station.document import Station
 if TYPE_CHECKING:
     from burg_drake.evaluation.stages import GraspCount
 
-PAUSE = 0.4
+COUNTING_DELAY = 0.4
 """After the last change before grasps are counted [s]."""
 
 
@@ -99,7 +99,7 @@ class GraspWatch:
             self._timer.cancel()
         names = tuple(sorted(scene.instances, key=lambda name: name not in first))
         task = CountGrasps(scene, self._station, names, self._grasps_per_object)
-        self._timer = threading.Timer(PAUSE, self._count, (task, revision))
+        self._timer = threading.Timer(COUNTING_DELAY, self._count, (task, revision))
         self._timer.daemon = True
         self._timer.start()
 

@@ -112,7 +112,7 @@ class BackgroundJob(Generic[T]):
         self._notify.set()
 
 
-CLOSE = 5.0
+SHUTDOWN_TIMEOUT = 5.0
 """Time in which a worker has to end that is closed [s]."""
 
 
@@ -171,7 +171,7 @@ class BackgroundWorker:
         with self._lock:
             if self._newest is not None:
                 self._newest.cancelled = True
-        self._pool.kill_workers(CLOSE)
+        self._pool.kill_workers(SHUTDOWN_TIMEOUT)
 
 
 def do_in_background(task: BackgroundTask[T]) -> T:

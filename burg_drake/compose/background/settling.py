@@ -14,9 +14,9 @@ from burg_drake.station.document import Station
 if TYPE_CHECKING:
     from burg_drake.simulation.rest import Displacement
 
-STAYS = 5e-4
+MIN_MOTION = 5e-4
 """What moves by less stays, for people [m]."""
-STAYS_DEG = 0.1
+MIN_TURN_DEG = 0.1
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Settle:
 
 
 def moved_names(
-    proposal: SettlingProposal, distance: float = STAYS, angle_deg: float = STAYS_DEG
+    proposal: SettlingProposal, distance: float = MIN_MOTION, angle_deg: float = MIN_TURN_DEG
 ) -> list[str]:
     """Instances that would move further, or turn by more, than given [m, degrees]."""
     return [

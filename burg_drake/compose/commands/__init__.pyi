@@ -32,6 +32,6 @@ from .placing import (
     SetFixed as SetFixed,
 )
 from .random_configuration import (
-    MOST as MOST,
+    MAX_OBJECTS as MAX_OBJECTS,
     RandomConfiguration as RandomConfiguration,
 )

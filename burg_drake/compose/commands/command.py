@@ -8,7 +8,7 @@ from typing import Protocol
 from burg_drake.compose.document import State, Surroundings
 from burg_drake.core import InvalidInputError
 
-FARTHEST = 100.0
+MAX_COORDINATE = 100.0
 """Largest coordinate that an object may be given [m]; as the largest side of a board."""
 
 

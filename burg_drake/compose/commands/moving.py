@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from burg_drake.compose.commands.command import FARTHEST, label_of, require_number
+from burg_drake.compose.commands.command import MAX_COORDINATE, label_of, require_number
 from burg_drake.compose.document import (
     State,
     Surroundings,
@@ -185,5 +185,7 @@ def _checked(X_SO: ArrayLike, name: str) -> Array:
         raise InvalidInputError(f"the pose of {name!r} has shape {X.shape}; expected (4, 4)")
     if np.isfinite(X).all():
         for axis, value in zip("xyz", X[:3, 3], strict=True):
-            require_number(float(value), f"{axis} of {name!r}", -FARTHEST, FARTHEST, "m")
+            require_number(
+                float(value), f"{axis} of {name!r}", -MAX_COORDINATE, MAX_COORDINATE, "m"
+            )
     return check_pose(X, f"the pose of {name!r}")

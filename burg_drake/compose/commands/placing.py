@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from burg_drake.compose.commands.command import FARTHEST, label_of, require_number
+from burg_drake.compose.commands.command import MAX_COORDINATE, label_of, require_number
 from burg_drake.compose.commands.moving import stable_pose_matrix, standing
 from burg_drake.compose.document import (
     State,
@@ -29,7 +29,7 @@ from burg_drake.scene.arrangement import convex_polygon
 from burg_drake.scene.document import Instance
 from burg_drake.station.document import boxes_in_scene
 
-GAP = 0.01
+COPY_GAP = 0.01
 """Gap between the board's objects and copies for which the board has no room [m]."""
 
 
@@ -65,7 +65,9 @@ class AddObject:
             X_SO, yaw_deg, position = self._free_place(state, surroundings, yaw_deg)
         yaw = np.deg2rad(yaw_deg)
         x, y = (
-            require_number(value, f"{axis} of the new {self.object!r}", -FARTHEST, FARTHEST, "m")
+            require_number(
+                value, f"{axis} of the new {self.object!r}", -MAX_COORDINATE, MAX_COORDINATE, "m"
+            )
             for axis, value in zip("xy", position, strict=True)
         )
         name = unused_name(self.object, surroundings.taken_names(state))
@@ -135,7 +137,7 @@ class Duplicate:
         names = require_some(self.names, state)
         offset = _beside(state, surroundings, names) if self.offset is None else self.offset
         x, y = (
-            require_number(value, f"offset along {axis}", -FARTHEST, FARTHEST, "m")
+            require_number(value, f"offset along {axis}", -MAX_COORDINATE, MAX_COORDINATE, "m")
             for axis, value in zip("xy", offset, strict=True)
         )
         X = make_pose(p_AB=(x, y, 0.0))
@@ -241,5 +243,5 @@ def _beside(
         lost = missing_objects(state)
         others = [shadow(state, name) for name in state.instances if name not in lost]
         right = max(float(polygon[:, 0].max()) for polygon in (*others, *obstacles))
-        return right + GAP - min(float(polygon[:, 0].min()) for polygon in polygons), 0.0
+        return right + COPY_GAP - min(float(polygon[:, 0].min()) for polygon in polygons), 0.0
     return float(offset[0]), float(offset[1])

@@ -19,7 +19,7 @@ from burg_drake.scene.arrangement import ObjectRequest, area, arrange, choose
 from burg_drake.scene.document import LayoutName, PoseChoice
 from burg_drake.station.document import boxes_in_scene
 
-MOST = 60
+MAX_OBJECTS = 60
 """Objects of one configuration."""
 
 
@@ -79,7 +79,7 @@ class RandomConfiguration:
             if not scene.instances:
                 raise InvalidInputError("there is nothing to arrange; add objects, or give a count")
             return tuple(ObjectRequest(name=n, object=i.object) for n, i in scene.instances.items())
-        count = int(require_number(self.count, "number of objects", 1, MOST, ""))
+        count = int(require_number(self.count, "number of objects", 1, MAX_OBJECTS, ""))
         taken = set(surroundings.taken_names(state)) - set(scene.instances)
         return choose(state.library, count, rng, repeat=self.repeat, taken=sorted(taken))
 

@@ -1,4 +1,3 @@
-from .amending import Amending as Amending
 from .bounds_on_board import (
     bounds as bounds,
     nearest_stable_pose as nearest_stable_pose,
@@ -20,6 +19,7 @@ from .free_place import (
     free_spot as free_spot,
 )
 from .history import (
+    Amending as Amending,
     History as History,
     HistoryStep as HistoryStep,
 )

@@ -13,7 +13,7 @@ from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.arrangement import convex_polygon, simplified
 from burg_drake.scene.document import read_vertices
 
-ROUNDED = 2e-4
+SHADOW_TOLERANCE = 2e-4
 """How far polygons with few corners reach beyond a side of the true ones [m]."""
 
 
@@ -69,9 +69,9 @@ def shadow(state: State, name: str) -> Array:
 
 
 def object_shadow(library: ObjectLibrary, object: str, X_SO: Array) -> Array:
-    """(N, 2) what an object covers of the board, and at most `ROUNDED` more [m]."""
+    """(N, 2) what an object covers of the board, and at most `SHADOW_TOLERANCE` more [m]."""
     p_SV = transform_points(X_SO, object_vertices(library, object))
-    return simplified(convex_polygon(p_SV[:, :2]), ROUNDED)
+    return simplified(convex_polygon(p_SV[:, :2]), SHADOW_TOLERANCE)
 
 
 def yaw_between(R_SA: Array, R_SB: Array) -> float:

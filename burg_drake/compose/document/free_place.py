@@ -12,7 +12,7 @@ from burg_drake.compose.document.state import State
 from burg_drake.core import Array
 from burg_drake.scene.arrangement import distances, no_fit_polygon
 
-PITCH = 0.01
+PLACE_SPACING = 0.01
 """Between the places that are tried [m]; of large boards, a sixtieth of their longer side."""
 CLEARANCE = 0.005
 """Between the new objects and others, seen from above [m]."""
@@ -55,7 +55,7 @@ def free_offset(
         (2,) the way [m]; None if there is no room.
     """
     size = np.array(state.document.board.size)
-    pitch = max(PITCH, float(size.max()) / 60)
+    pitch = max(PLACE_SPACING, float(size.max()) / 60)
     ticks = [np.arange(-(s // pitch), s // pitch + 1) * pitch for s in size]
     offsets = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, 2)
     offsets = offsets[np.argsort((offsets**2).sum(axis=1), kind="stable")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, replace
 
 from burg_drake.compose.document.state import State, name_of
@@ -119,3 +120,37 @@ def _selecting_changes(state: State, other: State) -> State:
         if there.get(name) != instance or (instance in fixed[0]) != (instance in fixed[1])
     ]
     return replace(state, selection=tuple(changed))
+
+
+AMEND_PERIOD = 3.0
+"""A step is amended no later than that after it was taken [s]."""
+
+
+class Amending:
+    """The last step, as long as a further one may take its place: a number that is typed digit by
+    digit is one step."""
+
+    def __init__(self) -> None:
+        self._field = ""
+        self._step: HistoryStep | None = None
+        self._end = 0.0
+
+    def allows(self, field: str, history: History) -> bool:
+        """Whether the last step is of the same field, recent, and nothing has happened since."""
+        return (
+            bool(field)
+            and field == self._field
+            and history.steps[-1] is self._step
+            and history.position == len(history.steps) - 1
+            and time.monotonic() < self._end
+        )
+
+    def begin(self, field: str, step: HistoryStep) -> None:
+        """A step of a field is taken; of none if that is empty."""
+        self._field = field
+        self._step = step
+        self._end = time.monotonic() + AMEND_PERIOD
+
+    def end(self) -> None:
+        """What comes next is a step of its own."""
+        self._field = ""

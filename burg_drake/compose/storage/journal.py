@@ -16,7 +16,7 @@ from burg_drake.core.files import atomic_write, read_bytes
 from burg_drake.objects.library import ObjectLibrary, load_library
 from burg_drake.scene.document import SceneDocument
 
-LARGEST = 1 << 30
+MAX_JOURNAL_SIZE = 1 << 30
 """Bytes of a journal; a step takes some hundred."""
 
 
@@ -126,7 +126,7 @@ def recover(path: Path) -> Recovered | None:
     if not path.exists():
         return None
     try:
-        text = read_bytes(path, LARGEST).decode("utf-8", errors="replace")
+        text = read_bytes(path, MAX_JOURNAL_SIZE).decode("utf-8", errors="replace")
     except InvalidInputError as error:
         return Recovered(damage=str(error))
     whole, _, _ = text.rpartition("\n")

@@ -9,7 +9,7 @@ import viser
 
 from burg_drake.compose.editing import SessionView
 from burg_drake.core import InvalidInputError
-from burg_drake.ui.view import LETS_GO, BoardLayers, BoardOverlay, LivePicture
+from burg_drake.ui.view import CAMERA_RELEASE_TIMEOUT, BoardLayers, BoardOverlay, LivePicture
 from burg_drake.ui.widgets import (
     PageActions,
     all_of,
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 CAMERAS = ("0", "1", "2", "3")
 """Numbers of cameras of this machine that the page may open; it can name nothing else."""
-OPACITY = 0.8
+PHOTO_OPACITY = 0.8
 
 
 class BackdropPanel:
@@ -56,7 +56,7 @@ class BackdropPanel:
                 self._watch,
             )
             self._opacity = actions.chosen(
-                gui.add_slider("Opacity", 0.0, 1.0, 0.05, OPACITY),
+                gui.add_slider("Opacity", 0.0, 1.0, 0.05, PHOTO_OPACITY),
                 self._set_opacity,
                 key="backdrop",
             )
@@ -104,7 +104,7 @@ class BackdropPanel:
         if live is not None:
             self._watch(False)
             self._on.value = False
-            live.wait(LETS_GO)
+            live.wait(CAMERA_RELEASE_TIMEOUT)
         with open_source(number) as source:
             frame = source.read()
         self._use_image(None if frame is None else frame.image, f"camera {number}")

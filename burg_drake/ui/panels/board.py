@@ -10,9 +10,9 @@ from burg_drake.compose.commands import BOARD_SIZES, SetBoard, board_size, board
 from burg_drake.compose.editing import SessionView
 from burg_drake.ui.widgets import PageActions
 
-OWN = "own size"
+OWN_SIZE = "own size"
 ACROSS, UPRIGHT = "across", "upright"
-LARGEST_MM = 100_000.0
+MAX_SIDE_MM = 100_000.0
 
 
 class BoardPanel:
@@ -27,7 +27,9 @@ class BoardPanel:
         self._actions = actions
         self._own = False
         with gui.add_folder("Board"):
-            self._size = actions.chosen(gui.add_dropdown("Size", (*BOARD_SIZES, OWN)), self._choose)
+            self._size = actions.chosen(
+                gui.add_dropdown("Size", (*BOARD_SIZES, OWN_SIZE)), self._choose
+            )
             self._orientation = actions.chosen(
                 gui.add_dropdown("Lies", (ACROSS, UPRIGHT)), self._turn
             )
@@ -36,7 +38,7 @@ class BoardPanel:
                     "Width, depth [mm]",
                     (594.0, 420.0),
                     min=(1.0, 1.0),
-                    max=(LARGEST_MM, LARGEST_MM),
+                    max=(MAX_SIDE_MM, MAX_SIDE_MM),
                     step=0.1,
                 ),
                 self._resize,
@@ -47,14 +49,14 @@ class BoardPanel:
         size = view.document.board.size
         name = board_size_name(size)
         self._own = self._own or name is None
-        self._size.value = OWN if self._own or name is None else name
+        self._size.value = OWN_SIZE if self._own or name is None else name
         self._orientation.value = UPRIGHT if size[1] > size[0] else ACROSS
         self._orientation.visible = not self._own
         self._extents.handle.visible = self._own
         self._extents.show(tuple(round(1e3 * side, 3) for side in size))
 
     def _choose(self, name: str) -> None:
-        self._own = name == OWN
+        self._own = name == OWN_SIZE
         if self._own:
             self.show(self._actions.session.view)
             return

@@ -9,7 +9,7 @@ from burg_drake.core import listing as names_of
 from burg_drake.ui.widgets import all_of, box, dot, listing, quiet, style_of
 from burg_drake.visualization.style import Child, element
 
-MOST = 30
+MAX_ROWS = 30
 """Lines that are shown."""
 
 
@@ -40,10 +40,10 @@ def findings(view: SessionView) -> list[Child]:
         return [dot(style_of("ok").hex), "All objects are on the board, free and supported."]
     rows = [
         element("span", dot(style_of(STATUS[issue.kind]).hex), issue.message)
-        for issue in view.issues[:MOST]
+        for issue in view.issues[:MAX_ROWS]
     ]
     if unknown:
         line = f"cannot be checked: {names_of(unknown)}"
         rows.insert(0, element("span", dot(style_of("unknown").hex), line))
-    more = len(view.issues) - MOST
+    more = len(view.issues) - MAX_ROWS
     return [listing(rows), quiet(f"and {more} more" if more > 0 else None)]

@@ -6,12 +6,12 @@ from typing import Any
 
 import viser
 
-from burg_drake.compose.commands import MOST, Clear, RandomConfiguration
+from burg_drake.compose.commands import MAX_OBJECTS, Clear, RandomConfiguration
 from burg_drake.compose.editing import SessionView
 from burg_drake.scene.document import LAYOUTS
 from burg_drake.ui.widgets import PageActions, confirm, counted, quiet_button
 
-LARGEST_SEED = 2**31 - 1
+MAX_SEED = 2**31 - 1
 
 
 class FillPanel:
@@ -27,11 +27,11 @@ class FillPanel:
         icon = viser.Icon
         with gui.add_folder("Random configuration"):
             self._count = gui.add_number(
-                "Objects", 0, min=0, max=MOST, step=1, hint="0: those that are on the board"
+                "Objects", 0, min=0, max=MAX_OBJECTS, step=1, hint="0: those that are on the board"
             )
             self._layout = gui.add_dropdown("Layout", LAYOUTS)
             self._seed: Any = gui.add_number(
-                "Seed", 1, min=0, max=LARGEST_SEED, step=1, hint="Of the next configuration"
+                "Seed", 1, min=0, max=MAX_SEED, step=1, hint="Of the next configuration"
             )
             actions.clicked(
                 quiet_button(gui, "Shuffle", width=6, icon=icon.ARROWS_SHUFFLE), self._shuffle
@@ -60,7 +60,7 @@ class FillPanel:
 
     def _shuffle(self) -> None:
         seed = self._seed.value
-        self._seed.value = min(seed + 1, LARGEST_SEED)  # also if there is no room this time
+        self._seed.value = min(seed + 1, MAX_SEED)  # also if there is no room this time
         self._actions.session.do(
             RandomConfiguration(seed, self._count.value or None, self._layout.value)
         )

@@ -11,7 +11,7 @@ from burg_drake.compose.commands import Delete, Duplicate, MoveObjects, Rename, 
 from burg_drake.compose.editing import SessionView
 from burg_drake.core import Array, rotation_from_rpy, rpy_from_rotation
 from burg_drake.ui.widgets import (
-    NAMING,
+    NAME_TYPING_DELAY,
     PageActions,
     all_of,
     box,
@@ -22,9 +22,9 @@ from burg_drake.ui.widgets import (
     title,
 )
 
-QUARTER_DEG = 90.0
+QUARTER_TURN_DEG = 90.0
 DECIMALS_MM, DECIMALS_DEG = 2, 2
-LARGEST_MM = 100_000.0
+MAX_COORDINATE_MM = 100_000.0
 
 
 class ObjectPanel:
@@ -43,7 +43,9 @@ class ObjectPanel:
         self._text = gui.add_html("")
         self._one = gui.add_folder(None)
         with self._one:
-            self._name = actions.typed(gui.add_text("Name", ""), self._rename, after=NAMING)
+            self._name = actions.typed(
+                gui.add_text("Name", ""), self._rename, after=NAME_TYPING_DELAY
+            )
             self._fixed = actions.chosen(
                 gui.add_checkbox(
                     "Background", False, hint="It stays where it is when the scene is simulated"
@@ -99,11 +101,11 @@ class ObjectPanel:
         icon, selected = viser.Icon, actions.with_selection
         actions.clicked(
             quiet_button(gui, "−90°", width=2, hint="Turn clockwise"),
-            selected(lambda names: Turn(names, -QUARTER_DEG)),
+            selected(lambda names: Turn(names, -QUARTER_TURN_DEG)),
         )
         actions.clicked(
             quiet_button(gui, "+90°", width=2, hint="Turn counter-clockwise"),
-            selected(lambda names: Turn(names, QUARTER_DEG)),
+            selected(lambda names: Turn(names, QUARTER_TURN_DEG)),
         )
         actions.clicked(
             quiet_button(gui, "Copy", width=4, icon=icon.COPY, hint="Duplicate (Ctrl+D)"),
@@ -125,7 +127,9 @@ class _Numbers:
             gui.add_vector3("x, y, z [mm]", zeros, step=0.01), self._place
         )
         self._yaw = actions.typed(
-            gui.add_number("yaw [°]", 0.0, step=0.01, min=-LARGEST_MM, max=LARGEST_MM),
+            gui.add_number(
+                "yaw [°]", 0.0, step=0.01, min=-MAX_COORDINATE_MM, max=MAX_COORDINATE_MM
+            ),
             self._turn,
         )
         self._angles = actions.typed(

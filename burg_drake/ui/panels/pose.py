@@ -15,9 +15,9 @@ from burg_drake.objects.library import ObjectEntry
 from burg_drake.ui.view import ObjectPictures
 from burg_drake.ui.widgets import PageActions, all_of, box, picture_button, quiet, show_picture
 
-MOST = 12
+MAX_POSES = 12
 """Poses that are offered; further ones are rare."""
-SAME_POSE = 0.02
+SAME_POSE_ANGLE = 0.02
 """An object is in a stable pose if it is tilted no further from it [rad]."""
 
 
@@ -73,7 +73,7 @@ class PosePanel:
             missing = "It has no stable poses." if entry else "Select objects of one kind."
             self._text.content = all_of(box(quiet(missing)))
         with self._folder:
-            for k, pose in enumerate(poses[:MOST]):
+            for k, pose in enumerate(poses[:MAX_POSES]):
                 tested = "confirmed by dropping it" if pose.residual is not None else "not dropped"
                 button = picture_button(
                     self._gui,
@@ -99,4 +99,4 @@ def _pose_of(view: SessionView) -> int | None:
     k, yaw = found
     R_SO: Array = view.X_SO(name)[:3, :3]
     R_k = rot_z(yaw) @ view.state.entry(name).X_SO(k)[:3, :3]
-    return k if float(rotation_angle(R_k.T @ R_SO)) < SAME_POSE else None
+    return k if float(rotation_angle(R_k.T @ R_SO)) < SAME_POSE_ANGLE else None

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from burg_drake.motion.workspace import ReachLayer
 
 HEIGHT_MM = 50.0
-HIGHEST_MM = 1000.0
-OPACITY = 0.55
-PIXELS = 8
+MAX_HEIGHT_MM = 1000.0
+LAYER_OPACITY = 0.55
+PIXELS_PER_CELL = 8
 """Of the picture, a cell; so that its cells keep sharp edges."""
 
 
@@ -46,7 +46,7 @@ class ReachPanel:
                 "Height [mm]",
                 HEIGHT_MM,
                 min=0.0,
-                max=HIGHEST_MM,
+                max=MAX_HEIGHT_MM,
                 step=5.0,
                 hint="Of the middle between the fingers above the board",
             )
@@ -100,8 +100,8 @@ class ReachPanel:
 
         layer = job.wait()
         width, depth = self._actions.session.view.document.board.size
-        pixels = reach_image(layer, pixels=PIXELS)
-        self._layers.show("reach", BoardOverlay(pixels, (0.0, 0.0), (width, depth), OPACITY))
+        pixels = reach_image(layer, pixels=PIXELS_PER_CELL)
+        self._layers.show("reach", BoardOverlay(pixels, (0.0, 0.0), (width, depth), LAYER_OPACITY))
         share = f"Some orientation of the hand reaches {layer.covered:.0%} of the board."
         self._text.content = all_of(box(reachability_key(), quiet(share)))
 

@@ -20,7 +20,7 @@ from burg_drake.ui.widgets import (
 )
 from burg_drake.visualization.style import Child
 
-MOST = 20
+MAX_ROWS = 20
 """Rows that are shown."""
 
 
@@ -82,7 +82,7 @@ def _outcome(proposal: SettlingProposal, *, outdated: bool) -> list[Child]:
     lines += [notice(f"{name} falls off the table") for name in proposal.fallen]
     lines += [notice(f"{name} still moves: {how}") for name, how in proposal.moving.items()]
     if rows:
-        lines.append(table(("Moves", "by", "turns by"), rows[:MOST], numbers=2))
+        lines.append(table(("Moves", "by", "turns by"), rows[:MAX_ROWS], numbers=2))
     elif not proposal.fallen:
         lines.append("Everything stays where it is.")
     lines.append(quiet(f"{proposal.duration:.1f} s were simulated."))

@@ -10,13 +10,13 @@ import viser
 from burg_drake.compose.editing import SessionView
 from burg_drake.ui.widgets import (
     STATUS_STYLES,
+    KeysDialog,
     PageActions,
     all_of,
     box,
     notice,
     quiet,
     quiet_button,
-    show_overlay,
     status_chip,
     title,
 )
@@ -29,9 +29,10 @@ class SummaryPanel:
     Args:
         gui: of viser, in whose container the panel goes.
         actions: what it may do.
+        keys: the list of mouse and keys.
     """
 
-    def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
+    def __init__(self, gui: viser.GuiApi, actions: PageActions, keys: KeysDialog) -> None:
         icon, session = viser.Icon, actions.session
         self._text = gui.add_html("")
         self._dismiss = actions.clicked(quiet_button(gui, "I have read this"), self._read)
@@ -43,7 +44,7 @@ class SummaryPanel:
         )
         actions.clicked_by(
             quiet_button(gui, "Keys", width=4, icon=icon.KEYBOARD, hint="Mouse and keys (H)"),
-            show_overlay,
+            keys.toggle,
         )
         self._session = session
 

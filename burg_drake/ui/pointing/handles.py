@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from burg_drake.core import Array, make_pose
 from burg_drake.ui.pointing.centers import motion_about
-from burg_drake.ui.pointing.pointer import GRAZING, PageCamera
+from burg_drake.ui.pointing.pointer import MIN_RAY_SLOPE, PageCamera
 
 GIZMO_SIZE = 0.11
 """Length of the arrows [m]; that of rings and squares follows, as in drei's PivotControls."""
@@ -109,7 +109,7 @@ class Handle:
         eye, axis = camera.X_SC[:3, 3], self._direction
         ray = (p_SQ - eye) / np.linalg.norm(p_SQ - eye)
         slope = float(ray @ axis)
-        if 1.0 - slope**2 < GRAZING:
+        if 1.0 - slope**2 < MIN_RAY_SLOPE:
             return None
         between = self._origin - eye
         return float((slope * (between @ ray) - between @ axis) / (1.0 - slope**2))

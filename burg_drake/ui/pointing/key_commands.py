@@ -13,7 +13,7 @@ from burg_drake.compose.commands import Delete, Duplicate, MoveObjects, PutDown,
 from burg_drake.compose.document import nearest_stable_pose
 from burg_drake.core import InvalidInputError
 
-STEP, FINE_STEP = 5e-3, 1e-3
+MOVE_STEP, FINE_MOVE_STEP = 5e-3, 1e-3
 """By which an arrow moves what is selected [m]."""
 TURN_DEG = 15.0
 
@@ -45,7 +45,7 @@ def selection_calls(session: ComposeSession) -> dict[str, Callable[[], Any]]:
         "next_pose": lambda: next_pose(session),
     }
     for name, direction in DIRECTIONS.items():
-        for kind, step in ((name, STEP), (f"{name}_finely", FINE_STEP)):
+        for kind, step in ((name, MOVE_STEP), (f"{name}_finely", FINE_MOVE_STEP)):
             offset = step * np.array(direction)
             calls[kind] = partial(shift, session, offset)
     return calls

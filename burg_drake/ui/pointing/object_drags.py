@@ -21,9 +21,9 @@ from burg_drake.ui.pointing.pointer import PageCamera
 from burg_drake.ui.widgets import PageActions
 
 UP = np.array([0.0, 0.0, 1.0])
-FULL_TURN = 2.0 * np.pi
+TURN_PER_PAGE_WIDTH = 2.0 * np.pi
 """By which an object turns while the pointer goes across the whole page [rad]."""
-SAME_PLACE = 5e-3
+SAME_PLACE_TOLERANCE = 5e-3
 """Places on a page that differ by less are one, as a share of its width and height."""
 
 
@@ -82,7 +82,9 @@ class ObjectDrags:
             corners: (2, 2) lower and upper corner of the rectangle, 0 to 1 on the page.
         """
         start = self._turned_from.pop(client_id, None)
-        return start is not None and bool((np.abs(corners - start) < SAME_PLACE).any(axis=0).all())
+        return start is not None and bool(
+            (np.abs(corners - start) < SAME_PLACE_TOLERANCE).any(axis=0).all()
+        )
 
     def drop(self, client_id: int) -> None:
         """A page is gone; what it held stays where it is."""
@@ -137,7 +139,7 @@ class ObjectDrags:
         if held.handle is not None:
             X = held.handle.motion(camera, held.p_SG, p_SQ)
         elif x is not None:
-            X = motion_about(held.p_SM, rot_z(FULL_TURN * (x - held.x)), np.zeros(3))
+            X = motion_about(held.p_SM, rot_z(TURN_PER_PAGE_WIDTH * (x - held.x)), np.zeros(3))
         elif (p_SP := camera.on_plane(p_SQ, held.p_SG, UP)) is not None:
             X = make_pose(p_AB=p_SP - held.p_SG)
         if X is not None:

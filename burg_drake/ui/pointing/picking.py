@@ -12,7 +12,7 @@ from burg_drake.ui.pointing.object_drags import ObjectDrags
 from burg_drake.ui.pointing.pointer import PageCamera
 from burg_drake.ui.widgets import PageActions
 
-ADD = "cmd/ctrl"
+ADD_MODIFIER = "cmd/ctrl"
 
 
 class Picking:
@@ -52,14 +52,14 @@ class Picking:
             self._actions.submit(lambda: self._toggle(name), event.client)
 
         handle.on_click(choose)
-        handle.on_click(modifier=ADD)(add)
+        handle.on_click(modifier=ADD_MODIFIER)(add)
 
     async def _rectangle(self, event: Any) -> None:
         camera = PageCamera.of(event.client.camera)
         lower, upper = np.array(event.screen_min), np.array(event.screen_max)
         if self._drags.is_end_of_turn(event.client_id, np.stack([lower, upper])):
             return
-        more = ADD in (event.modifier or "")
+        more = ADD_MODIFIER in (event.modifier or "")
         self._actions.submit(lambda: self._within(camera, lower, upper, more), event.client)
 
     def _within(self, camera: PageCamera, lower: Any, upper: Any, more: bool) -> None:

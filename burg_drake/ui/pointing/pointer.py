@@ -16,9 +16,9 @@ from burg_drake.core import (
     transform_points,
 )
 
-GRAZING = 0.02
+MIN_RAY_SLOPE = 0.02
 """Sine of the least angle between a ray and a plane; a flatter one would hit it anywhere."""
-FARTHEST = 20.0
+MAX_DRAG_DISTANCE = 20.0
 """From the camera to a point that a pointer may drag to [m]."""
 
 
@@ -60,10 +60,10 @@ class PageCamera:
             return None
         ray /= length
         slope = float(ray @ np.asarray(normal_S, dtype=float))
-        if abs(slope) < GRAZING:
+        if abs(slope) < MIN_RAY_SLOPE:
             return None
         distance = float((np.asarray(p_SP) - eye) @ np.asarray(normal_S)) / slope
-        return eye + distance * ray if 0.0 < distance <= FARTHEST else None
+        return eye + distance * ray if 0.0 < distance <= MAX_DRAG_DISTANCE else None
 
     def on_screen(self, p_SQ: ArrayLike) -> Array:
         """(N, 2) where points (N, 3) are seen: 0 to 1 from left to right and from top to bottom.

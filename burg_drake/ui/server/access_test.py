@@ -7,8 +7,8 @@ from http import HTTPStatus
 
 from burg_drake.core import MissingDependencyError
 
-FOREIGN = "foreign.invalid"
-PATIENCE = 10.0
+FOREIGN_HOST = "foreign.invalid"
+ANSWER_TIMEOUT = 10.0
 """For an answer [s]."""
 _HANDSHAKE = {
     "Connection": "Upgrade",
@@ -31,11 +31,11 @@ def require_guarded(address: str, port: int) -> None:
     near = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(address, address)
     own = f"[{near}]:{port}" if ":" in near else f"{near}:{port}"
     foreign = (
-        {"Host": own, "Origin": f"http://{FOREIGN}", **_HANDSHAKE},
-        {"Host": f"{FOREIGN}:{port}", "Origin": f"http://{FOREIGN}:{port}", **_HANDSHAKE},
+        {"Host": own, "Origin": f"http://{FOREIGN_HOST}", **_HANDSHAKE},
+        {"Host": f"{FOREIGN_HOST}:{port}", "Origin": f"http://{FOREIGN_HOST}:{port}", **_HANDSHAKE},
         {"Host": own, **_HANDSHAKE},
-        {"Host": f"{FOREIGN}:{port}"},
-        {"Host": own, "Origin": f"http://{FOREIGN}"},
+        {"Host": f"{FOREIGN_HOST}:{port}"},
+        {"Host": own, "Origin": f"http://{FOREIGN_HOST}"},
     )
     for headers in foreign:
         if _status(near, port, headers) != HTTPStatus.FORBIDDEN:
@@ -46,7 +46,7 @@ def require_guarded(address: str, port: int) -> None:
 
 
 def _status(address: str, port: int, headers: dict[str, str]) -> int:
-    connection = http.client.HTTPConnection(address, port, timeout=PATIENCE)
+    connection = http.client.HTTPConnection(address, port, timeout=ANSWER_TIMEOUT)
     try:
         connection.putrequest("GET", "/", skip_host=True, skip_accept_encoding=True)
         for name, value in headers.items():

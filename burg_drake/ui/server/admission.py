@@ -17,9 +17,9 @@ from websockets.http11 import Request, Response
 from burg_drake.core import HEADERS, BrowserToken, RequestError, require_local_host
 from burg_drake.ui.server.html_page import POLICY, first_page
 
-MOST_CONNECTIONS = 32
+MAX_CONNECTIONS = 32
 """Of browsers, each of which costs memory for what has yet to be sent to it."""
-ONCE = ("Host", "Origin", "Sec-Fetch-Site", "Cookie", "Upgrade")
+SINGLE_HEADERS = ("Host", "Origin", "Sec-Fetch-Site", "Cookie", "Upgrade")
 """Headers that decide; twice in a request they would mean one thing here, another thing there."""
 
 
@@ -60,7 +60,7 @@ class Admission:
             return self._response(connection, error.code, f"burg_drake: {error}\n")
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
-        for name in ONCE:
+        for name in SINGLE_HEADERS:
             if len(request.headers.get_all(name)) > 1:
                 raise RequestError(HTTPStatus.BAD_REQUEST, f"{name} is given twice")
         path, _, query = request.path.partition("?")
@@ -81,7 +81,7 @@ class Admission:
             raise RequestError(HTTPStatus.FORBIDDEN, "a websocket of no page is refused")
         if not self._has_cookie(request):
             raise RequestError(HTTPStatus.FORBIDDEN, NO_TOKEN)
-        if len(connection.server.connections) >= MOST_CONNECTIONS:
+        if len(connection.server.connections) >= MAX_CONNECTIONS:
             raise RequestError(
                 HTTPStatus.SERVICE_UNAVAILABLE, "too many browsers have the page open"
             )

@@ -1,7 +1,7 @@
 // Runs before viser's page does: says what is missing where it cannot run, and what cannot be sent.
 "use strict";
 (() => {
-  const LARGEST_UPLOAD = 0; // put in by first_page.py [bytes]
+  const LARGEST_UPLOAD = 0; // put in by html_page.py [bytes]
 
   const styled = (tag, style, text = "") => {
     const element = document.createElement(tag);
@@ -132,7 +132,10 @@
     for (const side of [...toFold]) {
       const handle = document.querySelector(`[data-dock-region-collapse=${side}]`);
       if (handle === null) continue;
-      if (handle.getAttribute("aria-expanded") === "true") handle.click();
+      if (handle.getAttribute("aria-expanded") === "true") {
+        handle.click();
+        setTimeout(() => document.activeElement?.blur(), 0); // nobody has gone there by keyboard
+      }
       toFold.splice(toFold.indexOf(side), 1);
     }
     if (toFold.length === 0) clearInterval(fold);

@@ -1,4 +1,5 @@
-"""The one file that the door serves: viser's page, with words for browsers that cannot run it."""
+"""The one file that the door serves: viser's page in our style, with words for browsers that cannot
+run it."""
 
 from __future__ import annotations
 
@@ -22,17 +23,20 @@ WITHOUT_SCRIPTS = (
 
 
 def first_page(title: str) -> str:
-    """viser's page under another title, with a script before its own.
+    """viser's page under another title, with a script before its own and a style sheet after its
+    own, which counts whether panels are open or folded.
 
     Args:
         title: of the page.
     """
     script = _read("burg_drake", "ui/server/first_page.js")
     script = script.replace("LARGEST_UPLOAD = 0;", f"LARGEST_UPLOAD = {LARGEST_UPLOAD};")
+    style = _read("burg_drake", "ui/server/page.css")
     page = _read("viser", "client/build/index.html")
     for old, new in (
         ("<title>Viser</title>", f"<title>{html.escape(title)}</title>\n<script>{script}</script>"),
         ("You need to enable JavaScript to run this app.", WITHOUT_SCRIPTS),
+        ("</body>", f"<style>{style}</style>\n</body>"),
     ):
         page = page.replace(old, new, 1)
     return page

@@ -1,12 +1,14 @@
-from .board import BoardView as BoardView
-from .board_layers import (
+from .annotations import (
+    GhostView as GhostView,
+    HeightView as HeightView,
+)
+from .board import (
     BoardLayers as BoardLayers,
     BoardOverlay as BoardOverlay,
+    BoardView as BoardView,
 )
-from .ghosts import GhostView as GhostView
-from .heights import HeightView as HeightView
 from .live_picture import (
-    LETS_GO as LETS_GO,
+    CAMERA_RELEASE_TIMEOUT as CAMERA_RELEASE_TIMEOUT,
     LivePicture as LivePicture,
 )
 from .object_meshes import ObjectMeshes as ObjectMeshes

@@ -1,6 +1,12 @@
-"""The board and the station around it in the browser."""
+"""The board, what lies on it and the station around it in the browser.
+
+On the board lie pictures: what the arm reaches, and a photo of the real board.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import viser
@@ -12,13 +18,13 @@ from burg_drake.station.document import Station
 from burg_drake.station.world import marker_grid
 from burg_drake.ui.widgets import FIXED
 
-PIXELS = 1600
+LONG_SIDE_PIXELS = 1600
 """Of the longer side of the board's picture."""
 PAPER, INK, RIM = 252, 40, 200
 """Grey values of the paper, of its markers, and of its edge."""
-BELOW = 3e-4
+BOARD_DEPTH = 3e-4
 """The board's picture is that far below the plane on which objects stand [m]."""
-TABLE_BELOW = 2e-3
+TABLE_DEPTH = 2e-3
 TABLE_COLOR = (222, 216, 206)
 
 
@@ -27,7 +33,7 @@ def sheet_picture(board: Board, *, markers: bool = True) -> NDArray[np.uint8]:
 
     A board that its markers do not fit on is white.
     """
-    scale = PIXELS / max(board.size)
+    scale = LONG_SIDE_PIXELS / max(board.size)
     width, height = (max(2, round(scale * side)) for side in board.size)
     gray = np.full((height, width), PAPER, dtype=np.uint8)
     if markers:
@@ -70,7 +76,7 @@ class BoardView:
             width,
             height,
             format="png",
-            position=(width / 2.0, height / 2.0, -BELOW),
+            position=(width / 2.0, height / 2.0, -BOARD_DEPTH),
             wxyz=(0.0, 1.0, 0.0, 0.0),  # viser's pictures hang with y down
             cast_shadow=False,
         )
@@ -79,7 +85,7 @@ class BoardView:
         X_SW = inverse(station.document.X_WS.matrix())
         table = station.document.table
         X_WT = np.eye(4)
-        X_WT[:3, 3] = *table.center, -table.size[2] / 2.0 - TABLE_BELOW
+        X_WT[:3, 3] = *table.center, -table.size[2] / 2.0 - TABLE_DEPTH
         self._box("/station/table", X_SW @ X_WT, table.size, TABLE_COLOR)
         for name, obstacle in station.document.background.items():
             self._box(f"/station/{name}", X_SW @ obstacle.X_WB.matrix(), obstacle.size, FIXED)
@@ -95,3 +101,63 @@ class BoardView:
             wxyz=quaternion_from_rotation(X_SB[:3, :3]),
             cast_shadow=False,
         )
+
+
+LAYER_HEIGHTS = {"backdrop": -2e-4, "reach": -1e-4}
+"""By name: how far each is above the plane on which objects stand [m]; the board is below all."""
+
+
+@dataclass(frozen=True, eq=False)
+class BoardOverlay:
+    """A picture that lies on the board.
+
+    Attributes:
+        pixels: (H, W, 3 or 4) its first row along the far edge.
+        lower, upper: corners of what it covers in S [m].
+        opacity: 0 to 1.
+    """
+
+    pixels: NDArray[np.uint8]
+    lower: tuple[float, float]
+    upper: tuple[float, float]
+    opacity: float = 1.0
+
+    def rgba(self) -> NDArray[np.uint8]:
+        """(H, W, 4) with its opacity."""
+        alpha = self.pixels[..., 3:] if self.pixels.shape[2] == 4 else np.uint8(255)
+        faint = np.round(self.opacity * np.broadcast_to(alpha, (*self.pixels.shape[:2], 1)))
+        return np.concatenate([self.pixels[..., :3], faint.astype(np.uint8)], axis=2)
+
+
+class BoardLayers:
+    """Shows pictures on the board.
+
+    Args:
+        scene: of viser.
+    """
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        self._scene = scene
+        self._shown: dict[str, tuple[BoardOverlay, Any]] = {}
+
+    def show(self, name: str, sheet: BoardOverlay | None) -> None:
+        """Brings one of `LAYER_HEIGHTS` to a picture, or to none."""
+        shown = self._shown.get(name)
+        if shown is not None and shown[0] is sheet:
+            return
+        if shown is not None:
+            self._shown.pop(name)[1].remove()
+        if sheet is None:
+            return
+        (x0, y0), (x1, y1) = sheet.lower, sheet.upper
+        handle = self._scene.add_image(
+            f"/layers/{name}",
+            sheet.rgba(),
+            x1 - x0,
+            y1 - y0,
+            format="png",
+            position=((x0 + x1) / 2.0, (y0 + y1) / 2.0, LAYER_HEIGHTS[name]),
+            wxyz=(0.0, 1.0, 0.0, 0.0),  # viser's pictures hang with y down
+            cast_shadow=False,
+        )
+        self._shown[name] = sheet, handle

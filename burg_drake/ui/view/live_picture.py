@@ -12,10 +12,10 @@ if TYPE_CHECKING:
     from burg_drake.cameras.rectification import BoardPicture
     from burg_drake.scene.document import Board
 
-PAUSE = 0.5
+PICTURE_INTERVAL = 0.5
 """Between two pictures [s]; each is some hundred kilobytes for every page."""
 
-LETS_GO = 10.0
+CAMERA_RELEASE_TIMEOUT = 10.0
 """For a camera that is closed to be free for others [s]."""
 
 
@@ -60,7 +60,7 @@ class LivePicture:
         from burg_drake.cameras.sources import open_source
 
         if after is not None:
-            after.wait(LETS_GO)
+            after.wait(CAMERA_RELEASE_TIMEOUT)
         try:
             rectifier = BoardRectifier(self.board)
             with open_source(self.camera) as source:
@@ -72,7 +72,7 @@ class LivePicture:
                         self._report(rectifier.picture(frame.image))
                     except BurgError as error:  # the board is hidden, or the camera unplugged
                         self._report(str(error))
-                    self._over.wait(PAUSE)
+                    self._over.wait(PICTURE_INTERVAL)
         except BurgError as error:
             self._report(str(error))
 

@@ -13,9 +13,8 @@ from burg_drake.core import BurgError, MissingDependencyError, WorkerDied, cache
 from burg_drake.core.workers import WorkerPool
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.system_libraries import describe_missing, missing_render_libraries
-from burg_drake.ui.view.picture_worker import render_picture
 
-SIZE = (176, 132)
+PICTURE_SIZE = (176, 132)
 """Width and height [pixel]; shown at half of that where the screen is fine enough."""
 Wanted = tuple[str, int | None]
 """An object, and in which stable pose; None: as it looks best."""
@@ -86,7 +85,7 @@ class ObjectPictures:
         if self.missing:
             return None
         try:
-            content = content_hash(self.library.content[name], str(stable_pose), list(SIZE))
+            content = content_hash(self.library.content[name], str(stable_pose), list(PICTURE_SIZE))
             arrays = cached("picture", content, lambda: {"png": self._rendered(wanted)})
             return bytes(np.asarray(arrays["png"], dtype=np.uint8))
         except MissingDependencyError as error:
@@ -101,7 +100,7 @@ class ObjectPictures:
             raise MissingDependencyError(describe_missing(missing))
         try:
             png = self._worker.submit(
-                render_picture, str(self.library.root), *wanted, SIZE
+                render_picture, str(self.library.root), *wanted, PICTURE_SIZE
             ).result()
         except Exception as error:
             if self._closed:
@@ -110,3 +109,22 @@ class ObjectPictures:
                 raise BurgError(str(error)) from error
             raise MissingDependencyError(str(error)) from error
         return np.frombuffer(png, dtype=np.uint8)
+
+
+def render_picture(root: str, name: str, stable_pose: int | None, size: tuple[int, int]) -> bytes:
+    """A PNG of an object.
+
+    Args:
+        root: folder of the library.
+        name: of the object.
+        stable_pose: in which it stands; None: as it looks best.
+        size: width and height [pixel].
+
+    Raises:
+        BurgError: it cannot be rendered.
+    """
+    from burg_drake.objects.library import load_library
+    from burg_drake.visualization.pictures import ObjectRenderer
+
+    renderer = ObjectRenderer(load_library(root), [name])
+    return renderer.portrait(name, size, stable_pose=stable_pose).png()

@@ -8,12 +8,12 @@ from typing import Any, Literal
 
 import numpy as np
 import viser
+from scipy.spatial import ConvexHull, QhullError
 
-from burg_drake.core import Array, BurgError, quaternion_from_rotation
+from burg_drake.core import Array, BurgError, quaternion_from_rotation, transform_points
 from burg_drake.core.terminal import distinct_colors
 from burg_drake.geometry import hull_mesh
 from burg_drake.ui.view.object_meshes import ObjectMeshes
-from burg_drake.ui.view.outlines import footprint
 from burg_drake.ui.widgets import FIXED, Rgb8, style_of
 
 Coloring = Literal["objects", "random", "status"]
@@ -21,9 +21,9 @@ Coloring = Literal["objects", "random", "status"]
 ROOT = "/objects"
 OUTLINE_HEIGHT = 4e-4
 """Of outlines over the board [m]; at the board's own height they would flicker."""
-THIN, THICK = 2.0, 6.0
+LINE_WIDTH, SELECTED_LINE_WIDTH = 2.0, 6.0
 """Lines of outlines and of those of selected objects [pixel]."""
-MISSING: Rgb8 = (200, 60, 200)
+MISSING_COLOR: Rgb8 = (200, 60, 200)
 UNKNOWN_RADIUS = 0.03
 """Of the ball in place of an object whose shape cannot be read [m]."""
 
@@ -112,7 +112,7 @@ class SceneView:
             shape = self._shapes[shown.object]
         except BurgError:  # what is wrong with it is told elsewhere; here is where it stands
             mesh = self._scene.add_icosphere(
-                f"{ROOT}/{name}/look", radius=UNKNOWN_RADIUS, color=MISSING
+                f"{ROOT}/{name}/look", radius=UNKNOWN_RADIUS, color=MISSING_COLOR
             )
             p_OV = UNKNOWN_RADIUS * np.vstack([np.eye(3), -np.eye(3)])
         else:
@@ -123,7 +123,7 @@ class SceneView:
             f"/outlines/{name}",
             np.zeros((1, 2, 3)),
             FIXED,
-            thickness=THIN,
+            thickness=LINE_WIDTH,
             thickness_units="screen",
         )
         self._made += 1
@@ -141,7 +141,7 @@ class SceneView:
             line = footprint(nodes.p_OV, shown.X_SO, OUTLINE_HEIGHT)
             nodes.outline.points = line.astype(np.float32)
             nodes.outline.colors = np.array(_status_color(shown), dtype=np.uint8)
-            nodes.outline.thickness = THICK if shown.selected else THIN
+            nodes.outline.thickness = SELECTED_LINE_WIDTH if shown.selected else LINE_WIDTH
 
     def _paint(self, nodes: _Nodes, name: str, shown: ShownInstance) -> None:
         if self._coloring == "objects":
@@ -172,3 +172,38 @@ class SceneView:
 
 def _status_color(shown: ShownInstance) -> Rgb8:
     return FIXED if shown.fixed and shown.status == "ok" else style_of(shown.status).color
+
+
+OUTLINE_MARGIN = 0.004
+"""Between an object and the outline around it [m]."""
+CORNER_POINTS = 6
+"""Points of an outline's rounded corner."""
+
+
+def footprint(p_OV: Array, X_SO: Array, height: float, margin: float = OUTLINE_MARGIN) -> Array:
+    """The outline of an object's convex hull from above.
+
+    Args:
+        p_OV: (N, 3) vertices of the object [m].
+        X_SO: (4, 4) its pose.
+        height: z of the outline in S [m].
+        margin: by which it is larger than the object [m].
+
+    Returns:
+        (M, 2, 3) segments of a closed line in S [m].
+    """
+    p_SV = transform_points(X_SO, p_OV)[:, :2]
+    around = np.linspace(0.0, 2.0 * np.pi, 4 * CORNER_POINTS, endpoint=False)
+    disc = margin * np.stack([np.cos(around), np.sin(around)], axis=-1)
+    points = (_hull(p_SV)[:, None] + disc).reshape(-1, 2)
+    line = _hull(points)
+    line = np.column_stack([line, np.full(len(line), height)])
+    return np.stack([line, np.roll(line, -1, axis=0)], axis=1)
+
+
+def _hull(points: Array) -> Array:
+    """(M, 2) corners of a planar hull, counter-clockwise; all points where it is flat."""
+    try:
+        return np.asarray(points[ConvexHull(points).vertices])
+    except QhullError:
+        return points

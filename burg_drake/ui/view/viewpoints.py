@@ -2,10 +2,16 @@
 
 A page shows all of the board from the beginning, and does so again when the board or the room for
 the scene gets another size, until somebody moves the camera.
+
+While a page loads it also moves its camera by itself: it begins with a view of its own, and puts
+the server's `initial_camera` over it as late as its scheduler likes, even over a view that it was
+given meanwhile. Only what pages report tells where their cameras are; `client.camera` has what was
+last set as well, so reports are taken and views are given in one thread, that of the server.
 """
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -20,7 +26,7 @@ FRONT_FOV = float(np.deg2rad(42.0))
 TOP_FOV = float(np.deg2rad(18.0))
 """Narrow, so that from above hardly any perspective is left [rad]."""
 FRONT_ELEVATION = float(np.deg2rad(50.0))
-ROOM = 1.22
+VIEW_MARGIN_FACTOR = 1.22
 """How much more than the board is in view."""
 OBJECT_HEIGHT = 0.25
 """Of objects that are to be in view at the far edge of the board [m]."""
@@ -29,15 +35,15 @@ FIRST_ASPECT = 0.9
 PHONE_ASPECT, PHONE_HEIGHT = 0.6, 0.55
 """Width over height below which a page is taken for a phone's; share of the page's height left free
 above a phone's panel."""
-TILT = 1e-3
+TOP_VIEW_TILT = 1e-3
 """Off the vertical, for the camera to know which way is up [rad]."""
-SAME_VIEW = 1e-3
+VIEW_TOLERANCE = 1e-3
 """Cameras that are nearer to each other have not been moved [m]."""
 
 
 def direction_from(*, above: bool) -> Array:
     """(3,) unit vector in S from the board to a camera above it or in front of it."""
-    elevation = np.pi / 2.0 - TILT if above else FRONT_ELEVATION
+    elevation = np.pi / 2.0 - TOP_VIEW_TILT if above else FRONT_ELEVATION
     return np.array([0.0, -np.cos(elevation), np.sin(elevation)])
 
 
@@ -57,9 +63,9 @@ def viewpoint(board: Board, back: Array, fov: float, aspect: float) -> tuple[Arr
     level = float(np.hypot(back[0], back[1]))
     ahead = -back[:2] / level
     width, depth = float(size @ np.abs(ahead[::-1])), float(size @ np.abs(ahead))
-    tall = 0.0 if level <= TILT else OBJECT_HEIGHT * level
+    tall = 0.0 if level <= TOP_VIEW_TILT else OBJECT_HEIGHT * level
     share = PHONE_HEIGHT if aspect < PHONE_ASPECT else 1.0
-    half = ROOM * max((depth * back[2] + tall) / 2.0 / share, width / 2.0 / aspect)
+    half = VIEW_MARGIN_FACTOR * max((depth * back[2] + tall) / 2.0 / share, width / 2.0 / aspect)
     distance = half / np.tan(fov / 2.0) + depth / 2.0 * level
     up = np.array([*ahead * back[2], level])
     target = np.array([*size / 2.0, 0.0])
@@ -68,21 +74,31 @@ def viewpoint(board: Board, back: Array, fov: float, aspect: float) -> tuple[Arr
 
 
 @dataclass(eq=False)
-class _Fitted:
+class _GivenView:
     """A view that was given to a page.
 
     Attributes:
-        position, target: (3,) of the camera, and what it looks at, in S [m].
+        back: (3,) unit vector in S from the board to the camera.
+        fov: vertical angle of view [rad].
         aspect: width over height that it was made for.
+        position, target: (3,) of the camera, and what it looks at, in S [m].
         arrived: the page has reported it; reports from before may come later than it was given.
-        repeats: how often it may be given again until then.
     """
 
+    back: Array
+    fov: float
+    aspect: float
     position: Array
     target: Array
-    aspect: float
     arrived: bool = False
-    repeats: int = 20
+
+    def is_seen_by(self, camera: Any) -> bool:
+        """Whether a camera of viser has this view."""
+        return (
+            _same(camera.position, self.position)
+            and _same(camera.look_at, self.target)
+            and abs(camera.fov - self.fov) <= VIEW_TOLERANCE
+        )
 
 
 class PageViews:
@@ -90,15 +106,12 @@ class PageViews:
 
     Args:
         server: of viser.
-        board: gives the board of now.
-        submit: has something done in the thread that all actions are done in.
+        board: gives the board of now, in any thread.
     """
 
-    def __init__(
-        self, server: viser.ViserServer, board: Callable[[], Board], submit: Callable[..., Any]
-    ) -> None:
-        self._server, self._board, self._submit = server, board, submit
-        self._fitted: dict[int, _Fitted] = {}
+    def __init__(self, server: viser.ViserServer, board: Callable[[], Board]) -> None:
+        self._server, self._board = server, board
+        self._given: dict[int, _GivenView] = {}
         self._shown = board().size
         camera = server.initial_camera
         camera.position, camera.look_at = viewpoint(
@@ -109,56 +122,80 @@ class PageViews:
 
     def look(self, client: viser.ClientHandle, *, above: bool) -> None:
         """Brings a page's camera above the board, or in front of it."""
-        self._set(client, direction_from(above=above), TOP_FOV if above else FRONT_FOV)
+        fov = TOP_FOV if above else FRONT_FOV
+        self._in_server_thread(lambda: self._give(client, direction_from(above=above), fov))
 
     def show(self) -> None:
         """Brings a board of another size into view on all pages, from where they look."""
         if (size := self._board().size) != self._shown:
             self._shown = size
-            for client in self._server.get_clients().values():
-                self._fit(client)
+            self._in_server_thread(self._fit_all)
 
     def drop(self, client_id: int) -> None:
         """A page is gone."""
-        self._fitted.pop(client_id, None)
+        self._given.pop(client_id, None)
+
+    def _in_server_thread(self, action: Callable[[], None]) -> None:
+        with contextlib.suppress(RuntimeError):  # the server has stopped, and no page is left
+            self._server.get_event_loop().call_soon_threadsafe(action)
 
     async def _on_connect(self, client: viser.ClientHandle) -> None:
         async def follow(camera: Any) -> None:
-            self._submit(lambda: self._follow(client), client, key=f"view {client.client_id}")
+            self._follow(client)
 
         client.camera.on_update(follow)
-        self._submit(lambda: self.look(client, above=False), client)
+        # `follow` is called next, with the report that made the page connect, and sends this view.
+        back = direction_from(above=False)
+        self._given[client.client_id] = self._fitted(client.camera, back, FRONT_FOV)
 
     def _follow(self, client: viser.ClientHandle) -> None:
-        """The camera was moved, or the room for the scene has changed."""
-        known = self._fitted.get(client.client_id)
-        if known is None:
+        """A page has reported its camera: it was moved, or the room for the scene has changed."""
+        given = self._given.get(client.client_id)
+        if given is None:
             return
         camera = client.camera
-        if abs(camera.aspect - known.aspect) > SAME_VIEW:
-            self._fit(client)
-        elif np.linalg.norm(camera.position - known.position) <= SAME_VIEW:
-            known.arrived = True
-        elif known.arrived:
-            del self._fitted[client.client_id]
-        elif known.repeats:  # a page that is still loading may put its first view over this one
-            known.repeats -= 1
-            with client.atomic():
-                camera.position, camera.look_at = known.position, known.target
+        if abs(camera.aspect - given.aspect) > VIEW_TOLERANCE:
+            given = self._fitted(camera, given.back, given.fov)
+            self._given[client.client_id] = given
+        if given.is_seen_by(camera):
+            given.arrived = True
+        elif not given.arrived or _same(camera.position, self._server.initial_camera.position):
+            self._send(client, given)  # it is not there yet, or the page has put its first over it
+        else:
+            del self._given[client.client_id]
 
-    def _fit(self, client: viser.ClientHandle) -> None:
-        back = client.camera.position - client.camera.look_at
-        back = back / np.linalg.norm(back)
-        if np.hypot(back[0], back[1]) < TILT / 2.0:
-            back = direction_from(above=True)
-        self._set(client, back, float(client.camera.fov))
+    def _fit_all(self) -> None:
+        for client in self._server.get_clients().values():
+            if (given := self._given.get(client.client_id)) is not None:
+                self._give(client, given.back, given.fov)
+                continue
+            back = client.camera.position - client.camera.look_at
+            back = back / np.linalg.norm(back)
+            if np.hypot(back[0], back[1]) < TOP_VIEW_TILT / 2.0:
+                back = direction_from(above=True)
+            self._give(client, back, float(client.camera.fov))
 
-    def _set(self, client: viser.ClientHandle, back: Array, fov: float) -> None:
+    def _give(self, client: viser.ClientHandle, back: Array, fov: float) -> None:
+        if client.client_id not in self._server.get_clients():
+            return
+        before = self._given.get(client.client_id)
+        given = self._given[client.client_id] = self._fitted(client.camera, back, fov)
+        is_reported = before is None or before.arrived
+        given.arrived = is_reported and given.is_seen_by(client.camera)
+        self._send(client, given)
+
+    def _send(self, client: viser.ClientHandle, given: _GivenView) -> None:
         camera = client.camera
-        position, target = viewpoint(self._board(), back, fov, camera.aspect)
-        self._fitted[client.client_id] = _Fitted(position, target, camera.aspect)
         with client.atomic():
             camera.up_direction = np.array([0.0, 0.0, 1.0])
-            camera.fov = fov
-            camera.position = position
-            camera.look_at = target
+            camera.fov = given.fov
+            camera.position = given.position
+            camera.look_at = given.target
+
+    def _fitted(self, camera: Any, back: Array, fov: float) -> _GivenView:
+        position, target = viewpoint(self._board(), back, fov, camera.aspect)
+        return _GivenView(back, fov, camera.aspect, position, target)
+
+
+def _same(p_SA: Array, p_SB: Array) -> bool:
+    return bool(np.linalg.norm(np.subtract(p_SA, p_SB)) <= VIEW_TOLERANCE)

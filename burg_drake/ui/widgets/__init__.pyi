@@ -10,8 +10,8 @@ from .page_actions import PageActions as PageActions
 from .scene_files import scene_names as scene_names
 from .shortcuts import (
     ActionCall as ActionCall,
+    KeysDialog as KeysDialog,
     register as register,
-    show_overlay as show_overlay,
 )
 from .status_colors import (
     FIXED as FIXED,
@@ -29,8 +29,7 @@ from .texts import (
     notice as notice,
     quiet as quiet,
     status_chip as status_chip,
-    style as style,
     table as table,
     title as title,
 )
-from .typed_field import NAMING as NAMING
+from .typed_field import NAME_TYPING_DELAY as NAME_TYPING_DELAY

@@ -6,11 +6,13 @@ it is and how it looks.
 
 from __future__ import annotations
 
+import zipfile
+from functools import cache
+from importlib.resources import files
 from typing import Any
 
 import viser
 
-from burg_drake.ui.widgets.icons import icon_svg
 from burg_drake.ui.widgets.texts import picture
 
 
@@ -66,3 +68,19 @@ def _marked(button: Any, icon: str | None, width: int, look: str) -> Any:
     drawn, bare = ("", " bd-bare") if icon is None else (icon_svg(icon), "")
     button._icon_html = f'<span class="bd-mark bd-{width} {look}{bare}">{drawn}</span>'
     return button
+
+
+@cache
+def icon_svg(name: str) -> str:
+    """The icon that viser calls `name`, as an element of HTML.
+
+    Args:
+        name: one of `viser.Icon`.
+    """
+    with _archive().open(f"{name}.svg") as file:
+        return file.read().decode()
+
+
+@cache
+def _archive() -> zipfile.ZipFile:
+    return zipfile.ZipFile(str(files("viser") / "_icons" / "tabler-icons.zip"))

@@ -11,9 +11,9 @@ import viser
 from burg_drake.compose import ComposeSession
 from burg_drake.compose.commands import Command
 from burg_drake.ui.widgets.action_queue import ActionQueue
-from burg_drake.ui.widgets.typed_field import TYPING, TypedField
+from burg_drake.ui.widgets.typed_field import TYPING_DELAY, TypedField
 
-SHORT, LONG = 5.0, 12.0
+MESSAGE_DURATION, WARNING_DURATION = 5.0, 12.0
 """Messages stay for that time [s]: those that tell what was done, those that tell what failed."""
 MAX_MESSAGES = 3
 """On a page at a time: older ones make room, so that a new one is never out of view."""
@@ -90,21 +90,21 @@ class PageActions:
         return field
 
     def typed(
-        self, field: Any, action: Callable[[Any], Any], *, after: float = TYPING
+        self, field: Any, action: Callable[[Any], Any], *, after: float = TYPING_DELAY
     ) -> TypedField:
         """The same of a field that is typed in: `after` the last key, or when typing ends."""
         return TypedField(field, self.submit, action, after)
 
     def show_message(self, client: viser.ClientHandle | None, line: str, title: str = "") -> None:
         """Shows a page what was done; every page if `client` is None."""
-        self._show(client, title or "Done", line, "green", SHORT)
+        self._show(client, title or "Done", line, "green", MESSAGE_DURATION)
 
     def show_warning(self, client: viser.ClientHandle | None, line: str, title: str = "") -> None:
         """Shows a page what it should know."""
-        self._show(client, title or "Please note", line, "orange", LONG)
+        self._show(client, title or "Please note", line, "orange", WARNING_DURATION)
 
     def _refused(self, client: viser.ClientHandle | None, line: str) -> None:
-        self._show(client, "That cannot be done", line, "red", LONG)
+        self._show(client, "That cannot be done", line, "red", WARNING_DURATION)
         self.on_refused()
 
     def _show(

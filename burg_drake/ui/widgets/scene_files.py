@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-MOST = 500
+MAX_FILES = 500
 """Files that are looked into."""
-HEAD = 4096
+HEAD_BYTES = 4096
 """Bytes of a file in which a scene names its library."""
 _LIBRARY = re.compile(rb"^library:", re.MULTILINE)
 
@@ -23,10 +23,10 @@ def scene_names(folder: Path) -> tuple[str, ...]:
         files = sorted(folder.glob("*.yaml"))
     except OSError:
         return ()
-    for path in files[:MOST]:
+    for path in files[:MAX_FILES]:
         try:
             with path.open("rb") as file:
-                if _LIBRARY.search(file.read(HEAD)):
+                if _LIBRARY.search(file.read(HEAD_BYTES)):
                     found.append(path.stem)
         except OSError:
             continue

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
+from weakref import WeakKeyDictionary
 
 import viser
 
+from burg_drake.ui.widgets.buttons import quiet_button
 from burg_drake.ui.widgets.page_actions import PageActions
 from burg_drake.ui.widgets.texts import all_of, box, table
 from burg_drake.visualization.style import element
@@ -58,7 +60,7 @@ SHORTCUTS: tuple[Shortcut, ...] = (
     Shortcut("redo", "Y", "cmd/ctrl", "Redo"),
     Shortcut("save", "S", "cmd/ctrl", "Save the scene"),
     Shortcut("all", "A", "cmd/ctrl", "Select all objects"),
-    Shortcut("none", "escape", None, "Select nothing, or cancel a drag"),
+    Shortcut("none", "escape", None, "Select nothing, cancel a drag, or close this list"),
     Shortcut("delete", "delete", None, "Delete what is selected"),
     Shortcut("delete", "backspace", None, "Delete what is selected"),
     Shortcut("duplicate", "D", "cmd/ctrl", "Duplicate what is selected"),
@@ -127,12 +129,33 @@ def register(gui: viser.GuiApi, actions: PageActions, calls: dict[str, ActionCal
         actions.submit(lambda: None, event.client)
 
 
-def show_overlay(client: viser.ClientHandle | None) -> None:
-    """Lists mouse and keys on a page."""
-    if client is None:
-        return
-    with client.gui.add_modal("Mouse and keys"):
-        client.gui.add_html(overlay_text())
+class KeysDialog:
+    """Lists mouse and keys on pages; viser gives its dialogs no way to be closed.
+
+    Args:
+        actions: what may be done.
+    """
+
+    def __init__(self, actions: PageActions) -> None:
+        self._actions = actions
+        self._open: WeakKeyDictionary[viser.ClientHandle, Any] = WeakKeyDictionary()
+
+    def toggle(self, client: viser.ClientHandle | None) -> None:
+        """Shows the list on a page, or closes it."""
+        if client is None or self.close(client):
+            return
+        modal = self._open[client] = client.gui.add_modal("Mouse and keys")
+        with modal:
+            button = quiet_button(client.gui, "Close", hint="Close (H or Esc)")
+            client.gui.add_html(overlay_text())
+        self._actions.clicked(button, lambda: self.close(client))
+
+    def close(self, client: viser.ClientHandle) -> bool:
+        """Closes the list on a page; False if it shows none."""
+        modal = self._open.pop(client, None)
+        if modal is not None:
+            modal.close()
+        return modal is not None
 
 
 def overlay_text() -> str:

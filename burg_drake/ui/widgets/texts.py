@@ -4,20 +4,9 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Iterable
-from functools import cache
-from importlib.resources import files
 
 from burg_drake.ui.widgets.status_colors import style_of
 from burg_drake.visualization.style import Child, Html, element, join
-
-STYLE_FILE = "panels.css"
-
-
-@cache
-def style() -> str:
-    """The page's style sheet, as an element to put into any panel."""
-    text = files("burg_drake.ui.widgets").joinpath(STYLE_FILE).read_text(encoding="utf-8")
-    return f"<style>{text}</style>"
 
 
 def box(*children: Child) -> Html:

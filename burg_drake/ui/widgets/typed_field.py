@@ -9,10 +9,10 @@ from typing import Any, Protocol
 
 import viser
 
-TYPING, NAMING = 0.8, 2.0
+TYPING_DELAY, NAME_TYPING_DELAY = 0.8, 2.0
 """After the last key in a field before it counts [s], unless Enter or another action ends the
 typing; words mean something else before they are complete."""
-CROSSING = 2.0
+CROSSING_TIME = 2.0
 """What is typed so soon after the field was set may have crossed that on its way [s]."""
 
 
@@ -48,7 +48,7 @@ class TypedField:
         self.handle = handle
         self._action = action
         self._typed = self._taken = 0
-        self._set_at = -CROSSING
+        self._set_at = -CROSSING_TIME
         self._crossed = False
 
         @handle.on_update
@@ -56,7 +56,7 @@ class TypedField:
             if event.client_id is None:  # it was this program
                 return
             self._typed += 1
-            self._crossed |= time.monotonic() - self._set_at < CROSSING
+            self._crossed |= time.monotonic() - self._set_at < CROSSING_TIME
             number, value = self._typed, event.target.value
             ask(
                 lambda: self._take(number, value),
