@@ -16,7 +16,8 @@ from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownName
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.core.paths.references import portable_reference
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.run_document import RunDocument, require_same_run, run_hash
+from burg_drake.evaluation.records.identity import require_same_run, run_hash
+from burg_drake.evaluation.records.run_document import RunDocument
 from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.records.table_file import read_table
 from burg_drake.evaluation.report import write_report
