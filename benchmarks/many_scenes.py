@@ -25,9 +25,9 @@ from burg_drake.core.grasps import MARGINS, Verdict
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.evaluation.candidates.candidates import Candidates
+from burg_drake.evaluation.records.identity import run_hash
 from burg_drake.evaluation.records.journal import encode
 from burg_drake.evaluation.records.ledger import Ledger, SceneState
-from burg_drake.evaluation.records.run_document import run_hash
 from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.records.shard import Shard
 from burg_drake.evaluation.run.many_scenes import _document

@@ -53,10 +53,7 @@ GROUPS: dict[str, Modules] = {
         "core/statistics": ("core/test_statistics",),
         "experiment/statistics/confusion": ("experiment/test_agreement",),
         "experiment/statistics/estimates": ("experiment/test_agreement",),
-        "experiment/statistics/exact_tests": (
-            "experiment/test_agreement",
-            "experiment/test_sim_to_real",
-        ),
+        "experiment/statistics/paired_answers": ("experiment/test_agreement",),
         "experiment/statistics/resampling": ("experiment/test_agreement",),
         "experiment/statistics/margin_calibration": ("experiment/test_calibration",),
         "experiment/statistics/rank_statistics": ("experiment/test_calibration",),

@@ -56,7 +56,13 @@ class DocumentError(InvalidInputError):
 
 
 class MeshError(InvalidInputError):
-    """A mesh that cannot be made into a simulated object."""
+    """A mesh that cannot be made into a simulated object.
+
+    Attributes:
+        units: units in which its size would be a usual one, best first, if its unit is the cause.
+    """
+
+    units: tuple[str, ...] = ()
 
 
 class UnknownNameError(BurgError, KeyError):

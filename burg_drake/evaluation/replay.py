@@ -31,7 +31,7 @@ from burg_drake.scene.document import Scene
 from burg_drake.simulation.trials import TrialResult
 from burg_drake.station.document import GraspMotion, Station
 
-ROUNDING = 1e-14
+MAX_ROUNDING_ERROR = 1e-14
 """Relative difference that a table gets which a program wrote again with 15 digits, as
 spreadsheets do, or has read without care for the last bit."""
 
@@ -54,7 +54,7 @@ class Difference:
         """Whether a table that was written again by another program explains it."""
         if isinstance(self.recorded, str) or isinstance(self.now, str):
             return False
-        return math.isclose(self.recorded, self.now, rel_tol=ROUNDING)
+        return math.isclose(self.recorded, self.now, rel_tol=MAX_ROUNDING_ERROR)
 
     def __str__(self) -> str:
         return f"{self.name}: recorded {self.recorded!r}, now {self.now!r}"

@@ -23,7 +23,6 @@ from burg_drake.objects.library import (
     ObjectLibrary,
     load_library,
 )
-from burg_drake.objects.meshes import check_size
 from burg_drake.pipeline.keys import StageKeys, stage_keys
 from burg_drake.pipeline.pool import BuildTask, build_all
 from burg_drake.pipeline.source import ObjectSource, object_name
@@ -33,8 +32,9 @@ from burg_drake.pipeline.target import check_targets, opened_for_build, scratch_
 OnObjectBuilt = Callable[[str, str, int, int], None]
 """Called after each object with its name, its state (`built`, `cached` or `failed`), the number of
 objects done and the number of all."""
-OnObjectFailed = Callable[[str, str], None]
-"""Called with the name and the message of an object that cannot be built."""
+OnObjectFailed = Callable[[str, str, BaseException], None]
+"""Called with the name of an object that cannot be built, its line in `BuildReport.failed`, and the
+error."""
 
 SAVING_INTERVAL = 1.0
 """Least time between two writings of `library.yaml` during a build [s]."""
@@ -120,7 +120,6 @@ def _build(named: Sequence[ObjectSource], tally: _Tally, confirm: bool, workers:
             tally.count(source.name, "cached")
         else:
             todo.append((source, keys))
-    todo = [item for item in todo if _has_plausible_size(item[0], tally)]
     with scratch_folder(root) as scratch:
         work = [
             BuildTask(s, keys, root, scratch / s.name, _confirms(s, confirm))
@@ -134,16 +133,6 @@ def _build(named: Sequence[ObjectSource], tally: _Tally, confirm: bool, workers:
                     tally.fail(item.source.name, outcome)
         finally:
             tally.save()
-
-
-def _has_plausible_size(source: ObjectSource, tally: _Tally) -> bool:
-    """Whether an object can be on a table: a wrong unit is told before anything is built."""
-    try:
-        check_size(source.mesh, source.scale)
-    except Exception as error:
-        tally.fail(source.name, error)
-        return False
-    return True
 
 
 def _confirms(source: ObjectSource, confirm: bool) -> bool:
@@ -195,7 +184,7 @@ class _Tally:
         text = " ".join(str(error).split())
         self.failed[name] = text if isinstance(error, BurgError) else one_line(error)
         if self.on_failure is not None:
-            self.on_failure(name, self.failed[name])
+            self.on_failure(name, self.failed[name], error)
         self.count(name, "failed")
 
     def publish(self, source: ObjectSource, built: Built, scratch: Path) -> None:

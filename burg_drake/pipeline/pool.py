@@ -8,6 +8,7 @@ from pathlib import Path
 
 from burg_drake.core import SimulationError
 from burg_drake.core.workers import map_unordered
+from burg_drake.objects.meshes import check_size
 from burg_drake.pipeline.keys import StageKeys
 from burg_drake.pipeline.source import ObjectSource
 from burg_drake.pipeline.stages import Built, build_object
@@ -35,8 +36,18 @@ class BuildTask:
 def build_all(
     work: Sequence[BuildTask], workers: int
 ) -> Iterator[tuple[BuildTask, Built | BaseException]]:
-    """Builds objects, each with what came of it; see `core.workers.map_unordered`."""
-    return map_unordered(build, work, workers)
+    """Builds objects, each with what came of it; see `core.workers.map_unordered`. The sizes of all
+    meshes are checked first: a wrong unit is told before anything takes long."""
+    return map_unordered(build, work, workers, check=check_task_size)
+
+
+def check_task_size(item: BuildTask) -> None:
+    """Refuses an object that is too small or too large for a table.
+
+    Raises:
+        MeshError: the file cannot be read, or its size tells of a wrong unit.
+    """
+    check_size(item.source.mesh, item.source.scale)
 
 
 def build(item: BuildTask) -> Built:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import shutil
+import shlex
+import sys
 from pathlib import Path
 
 import h5py
@@ -16,6 +17,7 @@ from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.frames import grasp_from_axes, make_pose, rotation_from_rpy
 from burg_drake.core.grasps.grasp_set import GraspSet
 from burg_drake.evaluation.records.table_file import read_table
+from burg_drake.evaluation.run.request import GraspsLike, given_content, given_correction
 from burg_drake.formats.grasp_files import write_grasp_file
 from burg_drake.scene.document.scene import load_scene
 from burg_drake.station.document.station_document import load_station
@@ -97,27 +99,89 @@ def test_a_data_set_s_grasps_of_an_object(tmp_path: Path, capsys: Capture) -> No
     )
 
 
-def test_turned_grasps_are_told_and_corrected(tmp_path: Path, capsys: Capture) -> None:
-    """Grasps that lift a box, turned by a quarter about the approach: the note counts them, names
-    the option, which leads to the lifts, and speaks of no sampling."""
+def turned_grasps(folder: Path) -> Path:
+    """A file of grasps that lift a box, turned by a quarter about the approach."""
     heights = [ABOVE @ make_pose(p_AB=(0.0, y, 0.0)) for y in (-0.004, 0.0, 0.004)]
     turned = np.stack(heights) @ make_pose(rotation_from_rpy(np.deg2rad([0.0, 0.0, 90.0])))
-    path = tmp_path / "turned.npz"
-    GraspSet.create(turned, object="box").save(path)
-    results = judged(tmp_path, "--grasps", str(path), "--mode", "hand")
-    assert "lifted" not in results["outcome"].tolist()
-    printed = " ".join(capsys.readouterr().out.split())
-    assert "note: 0 of 3 grasps are clear and held by the pads as they were read; turned by 90" in (
-        printed
+    GraspSet.create(turned, object="box").save(folder / "turned.npz")
+    return folder / "turned.npz"
+
+
+def typed(words: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
+    """The exit code of a command line."""
+    monkeypatch.setattr(sys, "argv", ["/usr/bin/burg-drake", *words])
+    return main(words)
+
+
+def test_turned_grasps_are_told_and_the_printed_command_corrects_them(
+    tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The note counts grasps that are turned about the approach, and speaks of no sampling. The
+    command in it works as printed, and leads to the lifts; in the same folder it is refused."""
+    (tmp_path / "two.yaml").write_text(TWO)
+    run = tmp_path / "run"
+    words = ["evaluate", str(tmp_path / "two.yaml"), "--grasps", str(turned_grasps(tmp_path))]
+    words += ["--mode", "hand", "-o", str(run), *QUICK]
+    assert typed(words, monkeypatch) == 0
+    assert "lifted" not in read_table(run / "results.csv")["outcome"].tolist()
+    printed = capsys.readouterr().out
+    told = " ".join(printed.split())
+    assert "note: 0 of the 3 grasps fit as they were read: the open hand is clear of the" in told
+    assert "Turned by 90 degrees about the approach, 3 of 3 fit." in told
+    assert "The file perhaps means them so; --correction turn:z90 reads them that way." in told
+    assert "sample grasps" not in told
+    (line,) = [line for line in printed.splitlines() if line.startswith("    burg-drake ")]
+    assert line.strip() in (run / "report.html").read_text(encoding="utf-8")
+    assert typed(shlex.split(line)[1:], monkeypatch) == 0
+    corrected = read_table(tmp_path / "run_corrected" / "results.csv")
+    assert corrected["outcome"].tolist() == ["lifted"] * 3
+    assert "fit as they were read" not in capsys.readouterr().out
+    assert typed([*words, "--correction", "turn:z90"], monkeypatch) == 2
+    assert (
+        f"{run} holds another run (correction is none there, turn:z90 here); choose another folder"
+        in capsys.readouterr().err
     )
-    assert "3 of 3 are; if they are meant so, give --correction turn:z90" in printed
-    assert "sample grasps" not in printed
-    report = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
-    assert "--correction turn:z90" in report
-    shutil.rmtree(tmp_path / "run")
-    options = ["--grasps", str(path), "--mode", "hand", "--correction", "turn:z90"]
-    assert judged(tmp_path, *options)["outcome"].tolist() == ["lifted"] * 3
-    assert "clear and held by the pads" not in capsys.readouterr().out
+
+
+def test_a_run_over_scenes_tells_the_mistake_of_its_file_once(
+    tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("pyarrow")
+    scenes = tmp_path / "scenes"
+    scenes.mkdir()
+    for name, x in (("first", "0.475"), ("second", "0.47")):
+        (scenes / f"{name}.yaml").write_text(TWO.replace("tabletop_two", name).replace("0.475", x))
+    words = ["evaluate", str(scenes), "--grasps", str(turned_grasps(tmp_path)), "--mode", "hand"]
+    words += ["-o", str(tmp_path / "all"), "--no-scene-reports", *QUICK]
+    assert typed(words, monkeypatch) == 0
+    printed = capsys.readouterr().out
+    assert printed.count("grasps fit as they were read") == 1
+    assert "note: Scene first: 0 of the 3 grasps fit" in printed
+    (line,) = [line for line in printed.splitlines() if line.startswith("    burg-drake ")]
+    assert line.strip() in (tmp_path / "all" / "report.html").read_text(encoding="utf-8")
+    assert typed([*words, "--correction", "turn:z90"], monkeypatch) == 2
+    assert "(correction is none there, turn:z90 here)" in capsys.readouterr().err
+    assert line.endswith(f"--correction turn:z90 -o {tmp_path / 'all_corrected'}")
+
+
+def test_another_file_of_grasps_of_scenes_is_not_taken_for_the_first(tmp_path: Path) -> None:
+    """Grasps in the frame of a scene are read scene by scene: what they come from has to tell."""
+    station, parser = load_station("panda_tabletop"), Parser()
+    evaluate.add_to(parser.add_subparsers())
+
+    def given(name: str, height: float, *options: str) -> GraspsLike | None:
+        X_SG = X_OG[:1] @ make_pose(p_AB=(0.0, 0.0, height))
+        columns = {"scene_id": ["tabletop_two"], "label": [1]}
+        grasps = GraspSet.create(X_SG, object="", width=0.05, columns=columns)
+        write_grasp_file(grasps, tmp_path / name, "vgn")
+        words = ["evaluate", "scenes", "--grasps", str(tmp_path / name), *options]
+        return campaign._given(parser.parse_args(words), station)
+
+    first, same, other = given("a.csv", 0.0), given("b.csv", 0.0), given("a.csv", 0.001)
+    corrected = given("a.csv", 0.0, "--correction", "inverse")
+    assert given_content(first) == given_content(same) != given_content(other)
+    assert given_content(corrected) not in (given_content(first), given_content(other), "")
+    assert given_correction(first) == () and given_correction(corrected) == ("inverse",)
 
 
 def test_the_link_of_another_gripper_names_its_option(tmp_path: Path, capsys: Capture) -> None:
@@ -146,11 +210,11 @@ def test_a_file_that_does_not_say_which_scene_it_is_of(tmp_path: Path) -> None:
     scene = load_scene("tabletop_six")
     arguments = parser.parse_args(["evaluate", scene.name, "--grasps", str(path)])
     with pytest.raises(InvalidInputError) as error:
-        campaign._FileOfScenes(arguments, station)(scene)
+        campaign._FileOfScenes(arguments, station, "", ())(scene)
     assert "without saying which; evaluate that scene alone" in str(error.value)
     arguments.grasps = str(tmp_path / "no scene ids.npz")  # another error is not taken for it
     with pytest.raises(InvalidInputError, match=r"no scene ids\.npz does not exist"):
-        campaign._FileOfScenes(arguments, station)(scene)
+        campaign._FileOfScenes(arguments, station, "", ())(scene)
 
 
 @pytest.mark.parametrize(

@@ -350,6 +350,15 @@ def test_unordered_results(workers: int) -> None:
         iterator.close()  # type: ignore[attr-defined]
 
 
+@pytest.mark.parametrize("workers", [1, 2])
+def test_all_work_is_checked_before_any_is_begun(workers: int, tmp_path: Path) -> None:
+    """What fails the check is told first, and is not begun."""
+    files = [tmp_path / name for name in ("a", "b", "bad", "c", "d")]
+    (what, error), *others = map_unordered(jobs.count_checked, files, workers, jobs.check_file)
+    assert what.name == "bad" and isinstance(error, InvalidInputError)
+    assert dict(others) == {file: 4 for file in files if file.name != "bad"}
+
+
 def test_results_ahead_come_in_order_and_not_far_ahead() -> None:
     asked: list[int] = []
 

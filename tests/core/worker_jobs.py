@@ -31,6 +31,19 @@ def spin() -> None:
         pass
 
 
+def check_file(path: Path) -> None:
+    """Takes a while; refuses a file that is called `bad`, and notes the others."""
+    time.sleep(0.05)
+    if path.name == "bad":
+        raise InvalidInputError("bad cannot be used")
+    path.write_text("checked")
+
+
+def count_checked(path: Path) -> int:
+    """How many files beside this one are checked by now."""
+    return len(list(path.parent.iterdir()))
+
+
 def refuse(what: str) -> None:
     raise InvalidInputError(f"{what} cannot be used")
 

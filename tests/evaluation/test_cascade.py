@@ -250,8 +250,8 @@ def test_another_run_is_not_mixed_in(
             progress=False,
         )
     assert str(error.value) == (
-        f"{run} holds another run (engine is standard there, reference here; grasps is 5 an object,"
-        " sampled blind there, 6 an object, sampled blind here); choose another folder, or"
+        f"{run} holds another run (engine is standard there, reference here; grasps are 5 an"
+        " object, sampled blind there, 6 an object, sampled blind here); choose another folder, or"
         " delete it"
     )
     with pytest.raises(InvalidInputError) as error:
@@ -282,7 +282,7 @@ def test_another_run_is_not_mixed_in(
     assert whole.complete
     grasps = {"bar": GraspSet.create(np.eye(4), object="bar")}
     with pytest.raises(
-        InvalidInputError, match="5 an object, sampled blind there, given, content"
+        InvalidInputError, match="5 an object, sampled blind there, 1 given ones here"
     ) as error:
         evaluate(scene, station, run, grasps=grasps, progress=False)
     assert "approach angle" not in str(error.value)  # it goes with the sampling

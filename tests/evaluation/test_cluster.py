@@ -78,7 +78,7 @@ def clusters() -> Iterator[list[Cluster]]:
 @pytest.fixture
 def cluster(clusters: list[Cluster], monkeypatch: pytest.MonkeyPatch) -> Cluster:
     """One for all tests; a new one if its scheduler has been killed."""
-    monkeypatch.setattr("burg_drake.evaluation.cluster.dispatch.LOOK", 0.2)
+    monkeypatch.setattr("burg_drake.evaluation.cluster.dispatch.WORKER_POLL_INTERVAL", 0.2)
     if not clusters or clusters[-1].nodes.scheduler.poll() is not None:
         clusters.append(Cluster())
     return clusters[-1]

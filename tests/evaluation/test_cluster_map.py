@@ -43,7 +43,7 @@ def nodes() -> Iterator[LocalNodes]:
 
 @pytest.fixture
 def executor(nodes: LocalNodes, monkeypatch: pytest.MonkeyPatch) -> Iterator[DaskExecutor]:
-    monkeypatch.setattr("burg_drake.evaluation.cluster.cluster_map.LOOK", 0.2)
+    monkeypatch.setattr("burg_drake.evaluation.cluster.cluster_map.WORKER_POLL_INTERVAL", 0.2)
     client = distributed.Client(nodes.address, set_as_default=False, timeout=HANG_GUARD)
     nodes.restart_workers()  # those that another test has killed
     until(lambda: len(threads_by_address(client)) == 2)

@@ -49,7 +49,7 @@ def cluster(workers: int = 0) -> Iterator[tuple[Any, Any]]:
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Looks often, and judges without children, unless a test wants them."""
-    monkeypatch.setattr("burg_drake.evaluation.cluster.dispatch.LOOK", 0.1)
+    monkeypatch.setattr("burg_drake.evaluation.cluster.dispatch.WORKER_POLL_INTERVAL", 0.1)
     monkeypatch.setattr(Supervisor, "judge", judge_here)
 
 
@@ -85,7 +85,7 @@ def test_without_work_nobody_is_waited_for() -> None:
 
 
 def test_workers_that_never_come_are_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("burg_drake.evaluation.cluster.waiting.PATIENCE", 0.3)
+    monkeypatch.setattr("burg_drake.evaluation.cluster.waiting.WORKER_TIMEOUT", 0.3)
     job = Job("job", Make(KnownJudge()), grasps(3))
     with cluster() as (_, client), pytest.raises(ClusterError, match="has had no worker for"):
         list(DaskExecutor(client).judge([job]))

@@ -42,6 +42,12 @@ def reordered(X: np.ndarray, shift: int) -> np.ndarray:
     return found
 
 
+def transposed(X: np.ndarray) -> np.ndarray:
+    found = X.copy()
+    found[:, :3, :3] = X[:, :3, :3].transpose(0, 2, 1)
+    return found
+
+
 BASE = (0.0, 0.0, -0.1034)
 PLANTED = {
     "turn:z90": lambda X: X @ pose((0, 0, 90)),
@@ -90,12 +96,57 @@ def test_a_planted_mistake_is_named_and_undone(
     assert found is not None
     assert ",".join(found.mistake.correction) == correction
     assert found.before <= 2 and found.after == found.count == 12
-    assert f"{found.before} of 12 grasps are clear" in found.text()
-    assert f"give --correction {correction}" in found.text()
+    assert found.text().startswith(f"{found.before} of the 12 grasps fit as they were read: the ")
+    assert "12 of 12 fit." in found.text()
+    assert f"very likely means them so; --correction {correction} reads" in found.text()
     undone = corrected_poses(spoiled, np.eye(4), correction.split(","))
     fingers_swapped = undone @ pose((0, 0, 180))
     same = [np.abs(X - right.X_OG).max(axis=(1, 2)) < 1e-9 for X in (undone, fingers_swapped)]
     assert np.logical_or(*same).all()
+
+
+def test_transposed_rotations_that_change_few_grasps(six: Scene, panda: Station) -> None:
+    """A grasp from straight above is turned by 180 degrees, and its transposed rotation is the
+    same: most grasps fit either way, and those that do not tell the mistake."""
+    grasps = sample_grasps(six, panda, 60, only=["mug"])
+    found = find_mistake(of_mug(transposed(grasps.X_OG)), panda, six)
+    assert found is not None and found.mistake.correction == ("transposed",)
+    assert 30 <= found.before < 50 and found.after == found.count == 60
+
+
+@pytest.mark.parametrize("euler", [(90, 0, 0), (180, 0, 0)])
+def test_turns_about_the_closing_direction_before_the_pads(
+    euler: tuple[float, float, float], right: GraspSet, six: Scene, panda: Station, tmp_path: Path
+) -> None:
+    """The origin of GraspNet's frame is 10 mm before the pads, which such a turn moves to another
+    part of the wall: the pads still close on it, and the rest of the hand is in the mug."""
+    X_SF = pose((175, 5, 30), (0.3, 0.25, 0.7))
+    X_GF = pose(p=(0, 0, -0.0105))  # with the depth that is written where a set has none
+    turned = np.linalg.inv(X_SF) @ six.X_SO("mug") @ right.X_OG
+    turned = turned @ X_GF @ pose(euler) @ np.linalg.inv(X_GF)
+    write_grasp_file(GraspSet.create(turned, object=""), tmp_path / "turned.npy", "graspnet")
+    given = read_grasps(six, tmp_path / "turned.npy", PANDA, X_SF=X_SF).by_instance
+    found = find_mistake(given, panda, six)
+    assert found is not None and found.after == 12
+    assert found.mistake.correction == (f"turn:x{'-90' if euler[0] == 90 else '180'}",)
+
+
+def test_a_second_correction_is_told_with_the_first(
+    right: GraspSet, six: Scene, panda: Station, tmp_path: Path
+) -> None:
+    """A file that was read with one correction and shows another mistake needs both; what a file of
+    ours was once read with is in its poses already."""
+    spoiled = reordered(right.X_OG, 1) @ pose((0, 0, -90))
+    path = tmp_path / "twice.npz"
+    GraspSet.create(spoiled, object="mug").save(path)
+    first = read_input(path, correction=["turn:z90"]).grasps
+    found = find_mistake({"mug": first}, panda, six)
+    assert found is not None and found.options() == ["--correction", "turn:z90,wxyz"]
+    both = read_input(path, correction=["turn:z90", "wxyz"]).grasps
+    np.testing.assert_allclose(both.X_OG, right.X_OG, atol=1e-9)
+    first.save(tmp_path / "again.npz")
+    found = find_mistake({"mug": read_input(tmp_path / "again.npz").grasps}, panda, six)
+    assert found is not None and found.options() == ["--correction", "wxyz"]
 
 
 def test_a_distance_that_no_format_has_is_told_with_its_range(
@@ -104,7 +155,8 @@ def test_a_distance_that_no_format_has_is_told_with_its_range(
     found = find_mistake(of_mug(right.X_OG @ pose(p=(0, 0, -0.03))), panda, six)
     assert found is not None and found.after == 12 and found.reach_mm is not None
     assert found.reach_mm[0] <= 30.0 <= found.reach_mm[1]
-    assert "mm does) 12 of 12 are" in found.text()
+    low, high = found.reach_mm
+    assert f"12 of 12 fit. Any distance from {low:g} to {high:g} mm fits as well." in found.text()
 
 
 def test_right_grasps_and_exchanged_fingers_are_no_mistake(
@@ -157,7 +209,7 @@ def test_files_of_every_format(
             continue
         other = {"isaac_grasp": "graspgen_yaml", "graspgen_yaml": "isaac_grasp"}.get(name)
         remedy = f"--grasps-format {other}" if other else "--correction turn:z90"
-        assert remedy in text and "12 of 12 are" in text
+        assert remedy in text and "12 of 12 fit" in text
         more = {"format": other or FileReading(correction=("turn:z90",))}
         corrected = read_grasps(six, path, PANDA, **options, **more)
         assert find_mistake(corrected.by_instance, panda, six) is None
@@ -168,20 +220,20 @@ def test_frames_that_are_measured_in_and_poses_of_cameras(
 ) -> None:
     X_SO, X_SC = six.X_SO("mug"), pose((175, 5, 30), (0.3, 0.25, 0.7))
     found = find_mistake(of_mug(X_SO @ right.X_OG), panda, six)
-    assert found is not None and "give --grasps-frame scene" in found.text()
+    assert found is not None and "--grasps-frame scene" in found.text()
     in_object = tmp_path / "object.npy"
     write_grasp_file(right, in_object, "burg")
     with pytest.raises(MisplacedGraspsError) as error:
         read_grasps(six, in_object, PANDA)
     found = find_mistake(error.value.grasps, panda, six)
-    assert found is not None and "give --grasps-frame object" in found.text()
+    assert found is not None and "--grasps-frame object" in found.text()
     seen = tmp_path / "seen.npy"
     in_camera = GraspSet.create(np.linalg.inv(X_SC) @ X_SO @ right.X_OG, object="")
     write_grasp_file(in_camera, seen, "graspnet")
     with pytest.raises(MisplacedGraspsError) as error:
         read_grasps(six, seen, PANDA, X_SF=np.linalg.inv(X_SC))
     found = find_mistake(error.value.grasps, panda, six)
-    assert found is not None and "pose of the camera inverted 12 of 12 are" in found.text()
+    assert found is not None and "pose of the camera inverted, 12 of 12 fit" in found.text()
 
 
 def test_millimetres_in_a_file(right: GraspSet, six: Scene, panda: Station, tmp_path: Path) -> None:
@@ -192,7 +244,7 @@ def test_millimetres_in_a_file(right: GraspSet, six: Scene, panda: Station, tmp_
     with pytest.raises(MisplacedGraspsError, match="metres") as error:
         read_grasps(six, path, PANDA)
     found = find_mistake(error.value.grasps, panda, six)
-    assert found is not None and "give --correction millimetres" in found.text()
+    assert found is not None and "--correction millimetres reads" in found.text()
     corrected = read_grasps(six, path, PANDA, format=FileReading(correction=("millimetres",)))
     np.testing.assert_allclose(corrected.by_instance["mug"].X_OG, right.X_OG, atol=1e-12)
 
@@ -202,7 +254,9 @@ def test_half_widths_and_widths_beyond_the_opening(
 ) -> None:
     halved = of_mug(right.X_OG, width=right.width / 2.0)
     (note,) = mistake_notes(halved, panda, six)
-    assert note.startswith("widths of 12 of 12 grasps") and "--correction half_widths" in note
+    assert (
+        note.startswith("The widths of 12 of the 12 grasps") and "--correction half_widths" in note
+    )
     path = tmp_path / "half.npz"
     halved["mug"].save(path)
     read = read_input(path, correction=["half_widths"])

@@ -7,6 +7,7 @@ import importlib.metadata
 import json
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,8 @@ from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownName
 from burg_drake.core.grasps.outcome import Outcome
 from burg_drake.core.paths.references import portable_reference
 from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.run_document import RunDocument, require_same_run, run_hash
+from burg_drake.evaluation.records.identity import require_same_run, run_hash
+from burg_drake.evaluation.records.run_document import RunDocument
 from burg_drake.evaluation.records.settings import EvaluationSettings
 from burg_drake.evaluation.records.table_file import read_table
 from burg_drake.evaluation.report import write_report
@@ -183,6 +185,39 @@ def test_an_engine_of_the_same_name_and_other_settings_is_another_run(
             settings=EvaluationSettings(grasps_per_object=30, blind=True, engine=engine),
             progress=False,
         )
+
+
+def test_what_makes_another_run_is_told_without_hashes(run: Run) -> None:
+    there = run.document
+
+    def told(**changes: Any) -> str:
+        with pytest.raises(InvalidInputError) as error:
+            require_same_run(run.path, there, dataclasses.replace(there, **changes))
+        return str(error.value).partition("another run (")[2].partition("); choose another")[0]
+
+    replace = dataclasses.replace
+    assert told(trial={**there.trial, "lift_time": 9.0}) == (
+        f"lift_time is {there.trial['lift_time']} there, 9.0 here"
+    )
+    station, scene = there.station, there.scene
+    moved = replace(station, content="0", path="other.yaml")
+    assert told(station=moved) == f"station is {station.path} there, other.yaml here"
+    assert told(station=replace(station, content="0")) == (
+        f"station {station.path} has changed, or models that it names have"
+    )
+    built = replace(there.library, objects={**there.library.objects, "bar": "0"})
+    assert told(scene=replace(scene, content="0"), library=built) == (
+        f"scene {scene.path} has objects that were built anew: bar"
+    )
+    given = replace(there.grasps, origin="given", content="0", count=5)
+    there = replace(there, grasps=given)
+    assert told(grasps=replace(given, content="1", correction=("turn:z90", "inverse"))) == (
+        "correction is none there, turn:z90,inverse here"
+    )
+    assert told(grasps=replace(given, content="1", count=4)) == (
+        "grasps are 5 given ones there, 4 given ones here"
+    )
+    assert told(grasps=replace(given, content="1")) == "the given grasps are others"
 
 
 def test_a_run_goes_on_with_the_version_of_its_engine_only(run: Run) -> None:

@@ -20,13 +20,13 @@ from burg_drake.core.versions import (
     software_versions,
 )
 from burg_drake.evaluation.candidates.candidates import Candidates
+from burg_drake.evaluation.records.identity import run_hash
 from burg_drake.evaluation.records.journal import Journal
 from burg_drake.evaluation.records.run_document import (
     Grasps,
     Library,
     RunDocument,
     input_of,
-    run_hash,
 )
 from burg_drake.evaluation.store.run_folder import JOURNAL_FILE, Run, create_run, load_run
 from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene, save_scene

@@ -21,7 +21,7 @@ from burg_drake.experiment.statistics.confusion import (
     matrix_of,
 )
 from burg_drake.experiment.statistics.estimates import MEASURES
-from burg_drake.experiment.statistics.exact_tests import paired, paired_counts
+from burg_drake.experiment.statistics.paired_answers import paired, paired_counts
 from burg_drake.experiment.statistics.resampling import PRIOR, bounds, prior
 
 PAPER = (

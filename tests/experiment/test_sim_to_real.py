@@ -21,14 +21,13 @@ from burg_drake.core.grasps.outcome import Outcome, RealOutcome
 from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.experiment.comparison.comparing import compare
 from burg_drake.experiment.comparison.report.page import comparison_page
-from burg_drake.experiment.comparison.standing_out import standing_out
+from burg_drake.experiment.comparison.standing_out import excess_p_value, holm, standing_out
 from burg_drake.experiment.comparison.tables import comparison_tables
 from burg_drake.experiment.comparison.wording import bias_words, headline
 from burg_drake.experiment.pages.words import SHORT_LIST
 from burg_drake.experiment.pairing.pairs import VerdictPairs
 from burg_drake.experiment.pairing.phases import unpredictable_outcomes
 from burg_drake.experiment.pairing.text_codes import Factor, Ids
-from burg_drake.experiment.statistics.exact_tests import excess_p_value, holm
 from burg_drake.experiment.statistics.margin_calibration import calibration
 from burg_drake.experiment.trials.sheet import (
     RealTrial,

@@ -99,6 +99,7 @@ def test_errors(kind: str) -> None:
     with pytest.raises(MeshError) as caught:
         load_mesh(make())
     assert str(caught.value) == f"mesh in memory: {expected}"
+    assert caught.value.units == (("mm", "cm") if kind == "millimetres" else ())
 
 
 def _stl() -> bytes:

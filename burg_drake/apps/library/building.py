@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import re
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,7 +15,7 @@ from burg_drake.apps.library.object_values import (
     with_common_values,
     with_frictions,
 )
-from burg_drake.core import InvalidInputError, listing
+from burg_drake.core import InvalidInputError, MeshError, listing
 
 if TYPE_CHECKING:
     from burg_drake.pipeline import BuildReport, ObjectSource
@@ -125,10 +124,10 @@ def _build(
 
         by_name = {source.name: source for source in sources}
 
-        def on_failure(name: str, message: str) -> None:
+        def on_failure(name: str, message: str, error: BaseException) -> None:
             """Told at once, as the others may take long; an only object's ends the command."""
             if len(sources) > 1:
-                text = _failure(by_name[name], message) + _unit_option(name, message)
+                text = _failure(by_name[name], message) + _unit_option(name, error)
                 print(f"burg-drake: error: {text}", file=sys.stderr)
 
         report = build_library(
@@ -176,7 +175,7 @@ def _failure(source: ObjectSource, message: str) -> str:
     return message if is_named else f"{source.name}: {message}"
 
 
-def _unit_option(name: str, message: str) -> str:
-    """How the unit that a message proposes is given for one of several meshes."""
-    proposed = re.search(r"try unit (\w+)", message)
-    return f"; for this mesh alone --unit {name}={proposed[1]}" if proposed else ""
+def _unit_option(name: str, error: BaseException) -> str:
+    """How the unit that an error proposes is given for one of several meshes."""
+    units = error.units if isinstance(error, MeshError) else ()
+    return f"; for this mesh alone --unit {name}={units[0]}" if units else ""

@@ -100,4 +100,4 @@ def read_given(arguments: argparse.Namespace, scene: Scene, station: Station) ->
         mistake = find_mistake(error.grasps, station, scene)
         if mistake is None:
             raise
-        raise InvalidInputError(f"{error}; {mistake.text()}") from error
+        raise InvalidInputError(f"{error}. {mistake.text()}") from error

@@ -6,6 +6,7 @@ import argparse
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from burg_drake.apps.options import chosen_motion, how_to_retry, read_given, require_standoff_of_arm
@@ -16,7 +17,7 @@ from burg_drake.apps.runs.second_opinion import (
     settled_line,
 )
 from burg_drake.apps.runs.settings import requested_settings
-from burg_drake.core import InvalidInputError, listing
+from burg_drake.core import InvalidInputError, content_hash, listing
 
 if TYPE_CHECKING:
     from burg_drake.core.grasps import GraspSet
@@ -84,7 +85,7 @@ def print_campaign(campaign: Campaign) -> None:
     from burg_drake.evaluation.store import PARTS_FOLDER, REPORT_FILE
 
     summary = summarize(campaign)
-    Console().print(summary_view(summary))
+    Console().print(summary_view(summary), crop=False)
     _scene_table(summary).show()
     if campaign.document.shard:
         print(f"shard   {campaign.document.shard}; merge all of them with burg-drake merge")
@@ -140,7 +141,7 @@ def _given(arguments: argparse.Namespace, station: Station) -> GraspsLike | None
     """The grasps of the file: those in the frames of their objects as a set for all scenes."""
     from burg_drake.apps.options import FRAMES, gripper_for
     from burg_drake.evaluation.grasp_sets import read_input
-    from burg_drake.formats.common import with_objects_renamed
+    from burg_drake.formats.common import read_poses, with_objects_renamed
 
     if arguments.grasps is None:
         return None
@@ -154,7 +155,10 @@ def _given(arguments: argparse.Namespace, station: Station) -> GraspsLike | None
         print(f"note: {note}")
     frame = FRAMES.get(arguments.grasps_frame) or imported.frame
     if frame != "object":
-        return _FileOfScenes(arguments, station)
+        poses = arguments.camera_pose
+        placing = [read_poses(poses) if poses else None, sorted(arguments.object_ids.items())]
+        content = content_hash(Path(arguments.grasps), arguments.correction, frame, *placing)
+        return _FileOfScenes(arguments, station, content, arguments.correction)
     return with_objects_renamed(imported.grasps, dict(arguments.grasps_object))
 
 
@@ -166,10 +170,14 @@ class _FileOfScenes:
     Attributes:
         arguments: of the verb.
         station: has the hand.
+        content: hash of the grasps and of what places them.
+        correction: with which they are read.
     """
 
     arguments: argparse.Namespace
     station: Station
+    content: str
+    correction: tuple[str, ...]
 
     def __call__(self, scene: Scene) -> Mapping[str, GraspSet]:
         from burg_drake.core import UnknownNameError

@@ -205,4 +205,4 @@ def print_summary(run: Run) -> None:
 
     from burg_drake.evaluation.results import summarize, summary_view
 
-    Console().print(summary_view(summarize(run)))
+    Console().print(summary_view(summarize(run)), crop=False)

@@ -17,11 +17,12 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib.resources import files
-from typing import Any
+from typing import Any, Literal
 
 from burg_drake.apps.web.limits import MOST_CONNECTIONS
 from burg_drake.apps.web.requests import json_body
@@ -51,6 +52,14 @@ REFUSAL_TIMEOUT = 2.0
 
 Handler = Callable[[Any], None]
 """Answers a request, with the body of a POST, or the query of a GET."""
+
+
+@dataclass
+class _Connection:
+    """An open connection: of which address, and what becomes of it."""
+
+    address: str
+    state: Literal["new", "admitted", "refused", "ending"] = "new"
 
 
 class PageServer(ThreadingHTTPServer):
@@ -94,10 +103,7 @@ class PageServer(ThreadingHTTPServer):
     ) -> None:
         self.host, self.connections = host, connections
         self._lock = threading.Lock()
-        self._served: dict[socket.socket, str] = {}  # with their addresses, in order
-        self._admitted: set[socket.socket] = set()
-        self._ending: set[socket.socket] = set()
-        self._refused: set[socket.socket] = set()
+        self._open: dict[socket.socket, _Connection] = {}  # in the order in which they came
         if ":" in host:
             self.address_family = socket.AF_INET6
         first = self.first_port if port is None else port
@@ -134,57 +140,57 @@ class PageServer(ThreadingHTTPServer):
 
     def refuses(self, connection: socket.socket) -> bool:
         """Whether a connection is one too many, and is to be told so."""
-        return connection in self._refused
+        return connection in self._in_state("refused")
 
     def admit(self, connection: socket.socket) -> None:
         """Notes that a connection has made a request that was not refused."""
         with self._lock:
-            if connection in self._served:
-                self._admitted.add(connection)
+            if connection in self._in_state("new"):
+                self._open[connection].state = "admitted"
 
     def is_admitted(self, connection: socket.socket) -> bool:
         """Whether a connection was admitted."""
-        return connection in self._admitted
+        return connection in self._in_state("admitted")
 
     def process_request(self, request: Any, client_address: Any) -> None:
         """Answers a connection in a thread of its own, as long as there are not too many."""
-        address = _address(str(client_address[0]))
+        connection = _Connection(_address(str(client_address[0])))
         with self._lock:
-            if self._make_room(address):
-                self._served[request] = address
-            elif len(self._refused) + len(self._ending) < MAX_REFUSALS:
-                self._refused.add(request)
-            else:
-                super().shutdown_request(request)
-                return
+            if not self._make_room(connection.address):
+                if len(self._in_state("refused", "ending")) >= MAX_REFUSALS:
+                    super().shutdown_request(request)
+                    return
+                connection.state = "refused"
+            self._open[request] = connection
         super().process_request(request, client_address)
 
     def shutdown_request(self, request: Any) -> None:
         """Closes a connection, which makes room for the next one."""
         with self._lock:
-            self._served.pop(request, None)
-            for some in (self._admitted, self._ending, self._refused):
-                some.discard(request)
+            self._open.pop(request, None)
         super().shutdown_request(request)
+
+    def _in_state(self, *states: str) -> list[socket.socket]:
+        """Connections in one of the states, in the order in which they came."""
+        return [c for c, one in tuple(self._open.items()) if one.state in states]
 
     def _make_room(self, address: str) -> bool:
         """Whether one more connection from an address can be served. If there are too many, this
         closes one that is not admitted."""
-        own = [c for c, of in self._served.items() if of == address]
+        served = self._in_state("new", "admitted")
+        own = [c for c in served if self._open[c].address == address]
         share = max(BROWSER_CONNECTIONS, self.connections // 2)
         most = self.connections if address == LOOPBACK else share
-        if len(own) < most and len(self._served) < self.connections:
+        if len(own) < most and len(served) < self.connections:
             return True
-        among = own if len(own) >= most else list(self._served)
-        waiting = [c for c in among if c not in self._admitted]
-        if not waiting or len(self._ending) >= MAX_REFUSALS:
+        among = own if len(own) >= most else served
+        waiting = [c for c in among if self._open[c].state == "new"]
+        if not waiting or len(self._in_state("ending")) >= MAX_REFUSALS:
             return False
-        counts = Counter(self._served[c] for c in waiting)
-        oldest = max(
-            waiting, key=lambda c: counts[self._served[c]]
-        )  # the first of those with equal counts
-        del self._served[oldest]
-        self._ending.add(oldest)
+        counts = Counter(self._open[c].address for c in waiting)
+        # the first of those with equal counts
+        oldest = max(waiting, key=lambda c: counts[self._open[c].address])
+        self._open[oldest].state = "ending"
         with contextlib.suppress(OSError):
             oldest.shutdown(socket.SHUT_RDWR)  # its thread ends with it
         return True

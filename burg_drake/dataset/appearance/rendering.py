@@ -43,7 +43,7 @@ from burg_drake.station.diagram import StationDiagram
 from burg_drake.station.world import LIGHTS, add_renderer
 
 RENDERER = "appearance"
-FAR = 50.0
+POINT_LIGHT_DISTANCE = 50.0
 """Distance of lights that are points [m]."""
 SHADOW_MAP = 1024
 """Pixels along a side of the image that decides about shadows, which spans the whole table."""
@@ -162,7 +162,7 @@ def _light(light: DirectedLight, shadows: bool) -> LightParameter:
         attenuation_values=np.array([1.0, 0.0, 0.0]),
     )
     found.direction = direction
-    found.position = -FAR * direction
+    found.position = -POINT_LIGHT_DISTANCE * direction
     return found
 
 

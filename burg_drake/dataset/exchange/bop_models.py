@@ -25,8 +25,8 @@ DECIMALS = 6
 """Of lengths in `models_info.json`."""
 EVALUATION_FACES = 5000
 """Of a model that errors of poses are computed with."""
-AT_ONCE = 1000
-"""Points whose distances to all others are in memory at the same time."""
+DISTANCE_BATCH_POINTS = 1000
+"""Number of points whose distances to all others are in memory at the same time."""
 
 
 def write_models(library: ObjectLibrary, objects: Sequence[str], folder: Path) -> None:
@@ -67,5 +67,5 @@ def diameter(vertices: Array) -> float:
     points = np.unique(vertices, axis=0)
     with suppress(QhullError):  # of a flat model all of them
         points = points[convex_hull(points).vertices]
-    parts = np.array_split(points, 1 + len(points) // AT_ONCE)
+    parts = np.array_split(points, 1 + len(points) // DISTANCE_BATCH_POINTS)
     return float(max(cdist(part, points).max() for part in parts))

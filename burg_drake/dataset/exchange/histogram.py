@@ -14,7 +14,7 @@ LEFT, RIGHT, TOP, BOTTOM = 46, 14, 30, 40
 """Room around the bars [pixel]."""
 BINS = 20
 PAPER, INK, FAINT, BAR = "#ffffff", "#1d2328", "#5b656e", "#31688e"
-NICE = (1.0, 2.0, 2.5, 5.0, 10.0)
+AXIS_STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 """Steps of an axis, times powers of ten."""
 
 
@@ -67,7 +67,7 @@ def _edges(data: Array, limits: tuple[float, float] | None) -> Array:
 def _ticks(lower: float, upper: float, most: int = 6) -> list[float]:
     """Round numbers between two limits."""
     power = 10.0 ** np.floor(np.log10((upper - lower) / most))
-    step = next(n * power for n in NICE if (upper - lower) / (n * power) <= most)
+    step = next(n * power for n in AXIS_STEPS if (upper - lower) / (n * power) <= most)
     first, last = int(np.ceil(lower / step - 1e-9)), int(np.floor(upper / step + 1e-9))
     return [float(k * step) for k in range(first, last + 1)]
 

@@ -33,7 +33,7 @@ columns, or fewer."""
 SPREAD = 3.5
 """Side of a point, as a share of the distance between far neighbours: three.js draws points 2.4
 times too small for the eye's angle of view, and on slanted surfaces they are farther apart."""
-FAR = 0.9
+NEAR_POINT_SHARE = 0.9
 """Share of points that are nearer than far ones."""
 LIFT = 2e-3
 """By which points are drawn nearer to the camera [m]."""
@@ -129,7 +129,12 @@ def _draw_depth(
     if cloud.color is not None:
         colors = (1.0 - tint) * cloud.color / 255.0 + tint * colors
     if len(cloud):
-        side = SPREAD * step * float(np.quantile(cloud.points[:, 2], FAR)) / intrinsics.focal[0]
+        side = (
+            SPREAD
+            * step
+            * float(np.quantile(cloud.points[:, 2], NEAR_POINT_SHARE))
+            / intrinsics.focal[0]
+        )
         _draw_points(meshcat, path, cloud.points, colors, side)
         meshcat.SetTransform(path, RigidTransform(X_WC))
         meshcat.SetProperty(path, "visible", exact)

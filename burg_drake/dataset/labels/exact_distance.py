@@ -30,7 +30,7 @@ TINY = 1e-300
 """In place of the length of a normal of a face without area [m^2]."""
 POINTS = 4096
 """Whose candidates are looked up at a time."""
-LOOKS = ((0.36, 0.48, 0.80), (-0.64, 0.60, 0.48), (0.48, -0.80, -0.36))
+INSIDE_TEST_DIRECTIONS = ((0.36, 0.48, 0.80), (-0.64, 0.60, 0.48), (0.48, -0.80, -0.36))
 """Directions of rays that ask whether a point is inside. They lie along no face of usual objects;
 most of them decide, as a ray may pass through an edge between two faces."""
 
@@ -102,7 +102,7 @@ def mesh_distance(mesh: trimesh.Trimesh, points: Array, reach: float) -> Array:
 
     Args:
         mesh: closed, wound outward; of an open one the sign is that of the side which is seen by
-            most of `LOOKS`.
+            most of `INSIDE_TEST_DIRECTIONS`.
         points: (N, 3) in its frame [m].
         reach: distances above are this, and those below its negative are that [m].
 
@@ -223,8 +223,8 @@ def _inside(mesh: trimesh.Trimesh, points: Array) -> Booleans:
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     rays = RayCaster(np.asarray(mesh.vertices, float), faces)
     votes = np.zeros(len(points), int)
-    for look in np.array(LOOKS):
+    for look in np.array(INSIDE_TEST_DIRECTIONS):
         look = look / np.linalg.norm(look)
         face, _ = rays.first_hits(points, np.broadcast_to(look, points.shape))
         votes += (face >= 0) & (normals[face] @ look > 0.0)
-    return np.asarray(2 * votes > len(LOOKS))
+    return np.asarray(2 * votes > len(INSIDE_TEST_DIRECTIONS))

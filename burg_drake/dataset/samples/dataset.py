@@ -26,7 +26,7 @@ from burg_drake.objects.library import ObjectLibrary, load_library
 from burg_drake.scene.document import Scene, load_scene
 from burg_drake.station.document import Station, load_station
 
-ANEW = (
+REMAKE_SHARD_ADVICE = (
     "run the command that made the data set once more, which makes the shard anew; if it does not,"
     " delete the shard first"
 )
@@ -89,7 +89,7 @@ class Dataset(Sequence[Sample]):
         except DocumentError:  # of another version, or not as samples are: not mended so
             raise
         except InvalidInputError as error:
-            raise InvalidInputError(f"{error}; {ANEW}") from error
+            raise InvalidInputError(f"{error}; {REMAKE_SHARD_ADVICE}") from error
 
     def parts(self, index: int) -> tuple[str, ...]:
         """What a sample has of `read`'s images, and `grasps`; none is decoded.
@@ -229,15 +229,17 @@ class Dataset(Sequence[Sample]):
         try:
             shard = open_shard(path)
         except InvalidInputError as error:
-            raise InvalidInputError(f"{error}; {ANEW}") from error
+            raise InvalidInputError(f"{error}; {REMAKE_SHARD_ADVICE}") from error
         size = os.stat(path).st_size
         if size != entry.filesize:
             raise InvalidInputError(
-                f"shard {path} has {size} bytes, the index {entry.filesize}: it was changed; {ANEW}"
+                f"shard {path} has {size} bytes, the index {entry.filesize}: it was changed;"
+                f" {REMAKE_SHARD_ADVICE}"
             )
         if len(shard.keys) != entry.nsamples:
             raise DocumentError(
-                f"{path} has {len(shard.keys)} samples, the index {entry.nsamples}; {ANEW}"
+                f"{path} has {len(shard.keys)} samples, the index {entry.nsamples};"
+                f" {REMAKE_SHARD_ADVICE}"
             )
         return shard
 

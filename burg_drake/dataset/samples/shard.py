@@ -32,7 +32,7 @@ from burg_drake.dataset.samples.tar import (
 )
 
 FOLDER = "shards"
-AT_ONCE = 1 << 20
+CHECKSUM_CHUNK_BYTES = 1 << 20
 """Bytes that are read for a check sum."""
 KEPT = 256
 """Shards whose headers a process keeps; those of 20 samples take 40 kB."""
@@ -130,7 +130,7 @@ def file_sum(path: Path) -> tuple[int, str]:
     digest, size = hashlib.md5(usedforsecurity=False), 0
     with open_regular(path) as stream:
         try:
-            while data := stream.read(AT_ONCE):
+            while data := stream.read(CHECKSUM_CHUNK_BYTES):
                 digest.update(data)
                 size += len(data)
         except OSError as error:

@@ -11,7 +11,7 @@ from burg_drake.scene.document import Scene
 from burg_drake.station.diagram import build_station_diagram
 from burg_drake.station.document import Hand, Station
 
-BESIDE = (0.0, -0.07, -0.09)
+DEFAULT_CAMERA_POSITION = (0.0, -0.07, -0.09)
 """Usual place of the camera in the grasp frame G [m]: beside the hand in the plane between the
 fingers, and behind the fingertips, which it sees at the lower edge of its image."""
 LIMIT_MARGIN = 0.01
@@ -29,7 +29,7 @@ UNREACHABLE, COLLIDES = "are out of the arm's reach", "have the arm collide"
 
 def usual_X_HC(hand: Hand) -> Array:
     """(4, 4) a camera beside a hand that looks along its fingers."""
-    return np.asarray(hand.X_HG.matrix() @ make_pose(p_AB=BESIDE))
+    return np.asarray(hand.X_HG.matrix() @ make_pose(p_AB=DEFAULT_CAMERA_POSITION))
 
 
 class WristCamera:

@@ -29,7 +29,7 @@ DIRECTION_DIGITS = 3
 turned about the vertical, or settles by a hair, keeps its grasps ..."""
 HEIGHT_STEP = 0.001
 """... and so does one whose height changes by less than this, most often [m]."""
-TRIES = 40
+MAX_DRAWS_PER_GRASP = 40
 """Antipodal grasps that are tried for each that is wanted: an object that the hand hardly takes as
 it stands gets fewer, within a second."""
 CHUNK = 256
@@ -108,7 +108,7 @@ def _sampled(
     document = SceneDocument(name=object, library=str(library.root), instances=(placed,))
     alone = Scene(document, library, library.root)
     screen = HandClearance(build_station_diagram(alone, bare, robot="hand"))
-    sampler = ObjectSampler(library, station, TRIES * n, seed, SamplingSettings())
+    sampler = ObjectSampler(library, station, MAX_DRAWS_PER_GRASP * n, seed, SamplingSettings())
     tried = sampler(object, from_above(X_WO, DEFAULT_APPROACH_ANGLE_DEG))
     test = sampler.clear_test(object, screen, object, X_WO)
     rows = np.empty(0, dtype=np.intp)

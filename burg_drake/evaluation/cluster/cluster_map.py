@@ -27,11 +27,11 @@ from burg_drake.evaluation.cluster.members import ClusterWorkers, lost_scheduler
 from burg_drake.evaluation.cluster.sent_job import LOSSES
 from burg_drake.evaluation.cluster.waiting import Waiting
 
-LOOK = 1.0
-"""Between two looks for new and lost workers [s]."""
-FETCH = 60.0
-"""A result that is there is waited for so long at a time: it may have many megabytes, or its worker
-may be lost by now [s]."""
+WORKER_POLL_INTERVAL = 1.0
+"""Seconds between checks for new and lost workers."""
+RESULT_TIMEOUT = 60.0
+"""Seconds that a result may take to arrive: it may have many megabytes, or its worker may be lost
+by now."""
 
 
 @dataclass(eq=False)
@@ -73,7 +73,7 @@ class ClusterMap:
         self._deliveries: Counter[str] = Counter()
         self._ready: set[str] = set()
         self._waiting = Waiting(client)
-        self._seen = -LOOK
+        self._seen = -WORKER_POLL_INTERVAL
 
     def run(
         self, work: Sequence[Any], maintain: Callable[[], None]
@@ -88,7 +88,7 @@ class ClusterMap:
         register_plugin(self._client, self._cluster, CallChildren(self._name))
         try:
             while self._open or self._sent or self._outcomes:
-                if time.monotonic() > self._seen + LOOK:
+                if time.monotonic() > self._seen + WORKER_POLL_INTERVAL:
                     maintain()
                     self._look()
                 self._hand_out(self._cluster.workers)
@@ -154,7 +154,7 @@ class ClusterMap:
         if self._outcomes:
             return
         try:
-            futures = [self._done.get(timeout=LOOK)]
+            futures = [self._done.get(timeout=WORKER_POLL_INTERVAL)]
         except queue.Empty:
             return
         while not self._done.empty():
@@ -169,7 +169,7 @@ class ClusterMap:
     def _take(self, sent: SentCall) -> bool:
         """Deals with what became of a call; whether the worker has to be sent the bundle first."""
         try:
-            answer: CallAnswer = sent.future.result(timeout=FETCH)
+            answer: CallAnswer = sent.future.result(timeout=RESULT_TIMEOUT)
         except KilledWorker:
             self._take_back(sent, blamed=True)
             return False
@@ -182,7 +182,7 @@ class ClusterMap:
             raise ClusterError(f"worker {sent.address}: {one_line(error)}") from error
         if answer.missing or answer.ended:
             self._take_back(sent)
-            self._seen = -LOOK
+            self._seen = -WORKER_POLL_INTERVAL
             return answer.missing
         self._ready.add(sent.address)
         found = pickle.loads(answer.result) if answer.error is None else answer.error

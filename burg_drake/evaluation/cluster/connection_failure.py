@@ -5,8 +5,8 @@ from __future__ import annotations
 import socket
 from urllib.parse import urlsplit
 
-TRY = 2.0
-"""Time to try whether anybody listens [s]."""
+CONNECT_TIMEOUT = 2.0
+"""Seconds to wait for somebody to listen."""
 
 
 def unreached_reason(where: object, error: BaseException) -> str:
@@ -21,7 +21,9 @@ def unreached_reason(where: object, error: BaseException) -> str:
         return words
     parts = urlsplit(where)
     try:
-        socket.create_connection((parts.hostname or "", parts.port or 0), timeout=TRY).close()
+        socket.create_connection(
+            (parts.hostname or "", parts.port or 0), timeout=CONNECT_TIMEOUT
+        ).close()
     except ConnectionRefusedError:
         return "nobody listens there (connection refused)"
     except socket.gaierror:

@@ -31,10 +31,10 @@ from burg_drake.evaluation.cluster.sent_job import LOSSES, SentChunk, SentJob
 from burg_drake.evaluation.cluster.waiting import Waiting
 from burg_drake.evaluation.workers import Answer, Job, JobFailed, OnFailure, WorkerLimits
 
-LOOK = 1.0
-"""Between two looks for new and lost workers [s]."""
-FETCH = 3.0
-"""A result that is there is waited for so long at a time; its worker may be lost by now [s]."""
+WORKER_POLL_INTERVAL = 1.0
+"""Seconds between checks for new and lost workers."""
+RESULT_TIMEOUT = 3.0
+"""Seconds that a result may take to arrive; its worker may be lost by now."""
 
 
 class Dispatch:
@@ -59,7 +59,7 @@ class Dispatch:
         self._coming: Iterator[Job | None] = iter(())
         self._on_failure: OnFailure | None = None
         self._exhausted = False
-        self._seen = -LOOK
+        self._seen = -WORKER_POLL_INTERVAL
         self._waiting = Waiting(client)
 
     def run(
@@ -70,7 +70,7 @@ class Dispatch:
         register_plugin(self.client, self.cluster, Supervisor(self._name))
         try:
             while True:
-                if time.monotonic() > self._seen + LOOK:
+                if time.monotonic() > self._seen + WORKER_POLL_INTERVAL:
                     yield from self.update_workers()
                 self.hand_out()
                 if not self._sent and not any(job.left for job in self.jobs):
@@ -160,7 +160,7 @@ class Dispatch:
     def collect(self) -> Iterator[Answer]:
         """Waits a while for what comes, and takes all that has come."""
         try:
-            futures = [self._done.get(timeout=LOOK)]
+            futures = [self._done.get(timeout=WORKER_POLL_INTERVAL)]
         except queue.Empty:
             return
         while not self._done.empty():
@@ -171,7 +171,7 @@ class Dispatch:
                 continue  # was taken back
             chunk, worker = self._sent[future.key]
             try:
-                answers: Answers = future.result(timeout=FETCH)
+                answers: Answers = future.result(timeout=RESULT_TIMEOUT)
             except KilledWorker:
                 self.forget(chunk, worker)
                 yield from self.doubt(chunk)
@@ -186,7 +186,7 @@ class Dispatch:
             self.forget(chunk, worker)
             if answers.ended:
                 chunk.take_back()
-                self._seen = -LOOK
+                self._seen = -WORKER_POLL_INTERVAL
             elif answers.missing:
                 chunk.take_back()
                 missing.setdefault(chunk.job.recipe.bundle, (chunk.job, []))[1].append(
@@ -275,7 +275,7 @@ class Dispatch:
             raise lost_scheduler(self.client)
         if worker.address in self.cluster.workers:
             self._done.put(future)
-        self._seen = -LOOK
+        self._seen = -WORKER_POLL_INTERVAL
 
     def end(self) -> None:
         """Ends the children of this run."""

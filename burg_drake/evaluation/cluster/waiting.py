@@ -9,8 +9,8 @@ from typing import Any
 from burg_drake.core import ClusterError
 from burg_drake.evaluation.cluster.members import scheduler_errors
 
-PATIENCE = 600.0
-"""So long the run waits without any worker [s]."""
+WORKER_TIMEOUT = 600.0
+"""Seconds that a run waits without any worker."""
 
 
 class Waiting:
@@ -37,9 +37,9 @@ class Waiting:
             with scheduler_errors(self._client):
                 key = f"call-{uuid.uuid4().hex}"
                 self._call = self._client.submit(int, key=key, pure=False)
-        if time.monotonic() > self._since + PATIENCE:
+        if time.monotonic() > self._since + WORKER_TIMEOUT:
             raise ClusterError(
                 f"the scheduler at {self._client.scheduler.address} has had no worker for"
-                f" {PATIENCE / 60:.0f} minutes; what is done is kept; run the same command"
+                f" {WORKER_TIMEOUT / 60:.0f} minutes; what is done is kept; run the same command"
                 " to continue when there are workers"
             )

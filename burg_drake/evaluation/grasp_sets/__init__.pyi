@@ -17,6 +17,7 @@ from .input import (
     station_reference as station_reference,
 )
 from .mistake_search import (
+    campaign_hints as campaign_hints,
     find_mistake as find_mistake,
     given_hints as given_hints,
     mistake_notes as mistake_notes,
@@ -26,6 +27,7 @@ from .pose_mistakes import (
     FileReading as FileReading,
     Mistake as Mistake,
     MistakeFound as MistakeFound,
+    correction_of as correction_of,
 )
 from .provenance import set_documents as set_documents
 from .run_set import (

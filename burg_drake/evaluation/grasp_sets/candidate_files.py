@@ -35,7 +35,7 @@ from burg_drake.scene.document import Scene, SceneLike, as_scene
 
 OBJECT_ID, SCENE_ID = "object_id", "scene_id"
 """Columns by which files of several objects, or of several scenes, tell theirs apart."""
-ROUNDING = 1e-6
+WIDTH_TOLERANCE = 1e-6
 """By which a width may be beyond the hand's opening and still be its end [m]: single precision."""
 NO_OBJECT = -1
 """Object id of grasps of which it is not known."""
@@ -145,7 +145,7 @@ def _wide(grasps: GraspSet, path: str | Path, gripper: Gripper) -> tuple[str, ..
     widest, notes = gripper.opening[1], []
     arriving = grasps.columns.get(PREGRASP_WIDTH)
     for name, values in (("width", grasps.width), (PREGRASP_WIDTH, arriving)):
-        beyond = None if values is None else values[values > widest + ROUNDING]
+        beyond = None if values is None else values[values > widest + WIDTH_TOLERANCE]
         if beyond is not None and len(beyond):
             notes.append(
                 f"{name} of {len(beyond)} of {len(grasps)} grasps of {path} is beyond the"

@@ -4,6 +4,7 @@ open hand and where its pads meet the object."""
 from __future__ import annotations
 
 import contextlib
+import shlex
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -15,15 +16,17 @@ from burg_drake.core import Array, BurgError, inverse, make_pose, rot_z
 from burg_drake.core.grasps import GraspSet, Outcome
 from burg_drake.evaluation.candidates import Owners, held_instances
 from burg_drake.evaluation.grasp_sets.pose_mistakes import (
+    HALF_WIDTHS,
     Mistake,
     MistakeFound,
     corrected_poses,
+    correction_of,
     format_of_set,
     frames_of,
     usual_mistakes,
 )
 from burg_drake.evaluation.grasp_sets.run_set import of_instances
-from burg_drake.evaluation.store import Run
+from burg_drake.evaluation.store import Campaign, Run, load_run
 from burg_drake.formats import FORMATS
 from burg_drake.formats.common import GraspFormat, Gripper, PoseFrame
 from burg_drake.objects.library import ObjectLibrary
@@ -35,7 +38,7 @@ if TYPE_CHECKING:
     from burg_drake.grasping.clearance import HandClearance
     from burg_drake.station.diagram import StationDiagram
 
-MAX_GRASPS = 24
+MAX_GRASPS = 100
 """Maximum number of grasps of a set that are examined."""
 MIN_FITTING = 3
 """Minimum number of grasps that have to fit after the correction for a mistake to be reported."""
@@ -45,14 +48,22 @@ mistakes at once, and to distances that no known frame has. Of grasps sampled by
 points alone, which are often in a collision, up to 0.67 fit if a quarter turn and a distance are
 combined."""
 MIN_SHARE_ABOUT = 0.9
-"""The same of turns about the closing direction, which the pads do not notice."""
+"""The same of turns about the closing direction, which the pads do not notice, and of all mistakes
+where `MAX_CLOSING` is exceeded."""
 MIN_GAIN = 2.5
 """Minimum ratio of the grasps that fit after the correction to those that fit before."""
+MIN_GAINED, MAX_LOST_SHARE = 10, 0.1
+"""Where more grasps fit before, the least number of those that fit only after the correction, and
+the largest ratio to that of those that fit only before. Transposed rotations need this: a grasp
+from straight above is turned by 180 degrees, and transposing that changes nothing."""
 MAX_CLOSING = 0.4
 """Where the pads close on the object at a larger share of the grasps, whatever the rest of the hand
-hits, closing direction and origin are right, and only the approach can be wrong. On the built-in
-objects the share is 0.67 to 1 for right sets (0.17 for scissors), and at most 0.38 for grasps that
-are turned or moved, unless turned grasps of thin objects hold as well."""
+hits, the grasps may be right and only poor. On the built-in objects the share is 0.5 to 1 for right
+sets, and at most 0.38 for most grasps that are turned or moved; but about the closing direction and
+on thin objects the share is up to 1 for these, too. Of right sets at most a share of 0.33 fits once
+turned or read otherwise, if that is `MIN_GAIN` times as many as before."""
+MIN_FITTING_CLOSING = 8
+"""Minimum number of grasps that have to fit after the correction there."""
 TIE_RATIO = 0.9
 """Mistakes count as equally good if the ratio of their counts is above this."""
 MIN_FRICTION = 0.5
@@ -61,6 +72,11 @@ coefficients than ours."""
 HALF_WIDTH_RATIOS = (0.35, 0.6)
 """Range of the ratio of width to distance of the contact patches that is taken for half widths.
 For correct widths nearly all ratios are 0.75 to 1.07, the smallest at the curved wall of a mug."""
+MAX_TOUCHED_SHARE = 0.9
+"""Where both fingers touched the object at a larger share of a run's grasps, poses are taken as
+they are."""
+MAX_SCENES = 3
+"""Maximum number of scenes of a run over many that are examined."""
 MILLIMETRE_DISTANCE = 1.0
 """Lengths are also tried as millimetres if the median distance of the grasps from the origin is
 larger [m]."""
@@ -102,11 +118,6 @@ def find_mistake(
     search = _Search(held, station, source, station_gripper(station))
     mistakes = search.mistakes()
     alone, in_scene = search.fits(mistakes)
-    if search.closing_share() > MAX_CLOSING:
-        about = [k for k, mistake in enumerate(mistakes) if search.keeps_closing_line(mistake)]
-        mistakes = [mistakes[k] for k in about]
-        rows = [0, *(k + 1 for k in about)]
-        alone, in_scene = alone[rows], None if in_scene is None else in_scene[rows]
     found = _decide(search, mistakes, alone)
     return found if found is not None or in_scene is None else _decide(search, mistakes, in_scene)
 
@@ -118,8 +129,8 @@ def mistake_notes(
     *,
     format_option: str = "--grasps-format",
 ) -> tuple[str, ...]:
-    """A sentence about the usual mistake that a set of grasps shows, with what corrects it, and one
-    about widths that are half as large as they should be.
+    """What is said of the usual mistake that a set of grasps shows, with the option that corrects
+    it, and of widths that are half as large as they should be.
 
     Args:
         grasps, station, source: see `find_mistake`.
@@ -127,30 +138,70 @@ def mistake_notes(
     """
     found = find_mistake(grasps, station, source)
     mistaken = () if found is None else (found.text(format_option),)
-    return (*mistaken, *half_width_notes(grasps, station, source))
+    halved = half_width_note(grasps, station, source)
+    return (*mistaken, *([halved] if halved else []))
 
 
-def given_hints(run: Run) -> tuple[str, ...]:
-    """The notes of `mistake_notes` on a run whose grasps were given; none on sampled ones.
+def given_hints(run: Run, asked: Run | Campaign | None = None) -> tuple[str, ...]:
+    """The same of a run whose grasps were given, each with the command that evaluates them again
+    as they are meant, in a line of its own; none of sampled ones.
 
-    Mistakes about poses are looked for where most grasps did not get so far that both fingers
-    touched the object.
+    Mistakes about poses are looked for where both fingers did not touch the object at more than a
+    few grasps.
+
+    Args:
+        run: of one scene.
+        asked: run that the command made, of this scene or of many; `run` if None.
     """
     if run.document.grasps.origin != "given":
         return ()
     touched = np.isin(run.results["outcome"], CONTACT_OUTCOMES)
+    hints = []
     with contextlib.suppress(BurgError):
         scene, station = run.scene(), run.station()
         grasps = of_instances(run.candidates.grasps.with_columns(instance=run.candidates.instance))
-        search = half_width_notes if 2 * touched.sum() > len(touched) else mistake_notes
-        return search(grasps, station, scene)
+        if touched.sum() < MAX_TOUCHED_SHARE * len(touched):
+            found = find_mistake(grasps, station, scene)
+            if found is not None:
+                hints.append(found.text() + _again(asked or run, found.options()))
+        if halved := half_width_note(grasps, station, scene):
+            options = ["--correction", ",".join((*run.document.grasps.correction, HALF_WIDTHS))]
+            hints.append(halved + _again(asked or run, options))
+    return tuple(hints)
+
+
+def campaign_hints(campaign: Campaign) -> tuple[str, ...]:
+    """The same of a run over many scenes, all of which got their grasps from one file: what the
+    first scene shows, of a few with many grasps at which the fingers did not touch the object."""
+    if campaign.document.grasps.origin != "given":
+        return ()
+    rows = campaign.rows(["outcome"])
+    codes, texts = rows.codes("outcome")
+    missed = ~np.isin(texts, CONTACT_OUTCOMES)[codes]
+    by_scene = np.bincount(rows.run[missed], minlength=len(campaign.names))
+    for place in np.argsort(-by_scene, kind="stable")[:MAX_SCENES].tolist():
+        name = campaign.names[place]
+        with contextlib.suppress(BurgError):
+            hints = given_hints(load_run(campaign.folder(name)), campaign)
+            if hints:
+                return tuple(f"Scene {name}: {hint}" for hint in hints)
     return ()
 
 
-def half_width_notes(
+def _again(run: Run | Campaign, options: Sequence[str]) -> str:
+    """How to evaluate again with further options. Verdicts on grasps as they were read stay where
+    they are, so that it takes another folder."""
+    words = shlex.split(run.document.command)
+    if not options or words[:2] != ["burg-drake", "evaluate"]:
+        return " Evaluate them again in another folder."
+    command = shlex.join([*words, *options, "-o", f"{run.path}_corrected"])
+    return f" This command evaluates them again:\n{command}"
+
+
+def half_width_note(
     grasps: Mapping[str, GraspSet], station: Station, source: Scene | ObjectLibrary
-) -> tuple[str, ...]:
-    """A note if most widths are half of the distance of the contacts."""
+) -> str:
+    """A note if most widths are half of the distance of the contacts; "" if they are not."""
     from burg_drake.grasping.quality import grasp_contacts
 
     test, ratios = _FitTest(station, source), []
@@ -161,10 +212,11 @@ def half_width_notes(
         ratios += (part.width[known] / apart)[contacts.touching].tolist()
     half = sum(HALF_WIDTH_RATIOS[0] < ratio < HALF_WIDTH_RATIOS[1] for ratio in ratios)
     if half < max(MIN_FITTING, MIN_SHARE_COMBINED * len(ratios)):
-        return ()
+        return ""
     return (
-        f"widths of {half} of {len(ratios)} grasps that were looked at are half of the distance"
-        " between the contacts; if they are those of one finger, give --correction half_widths",
+        f"The widths of {half} of the {len(ratios)} grasps that were looked at are half of the"
+        " distance between the contacts. They are very likely those of one finger;"
+        f" --correction {HALF_WIDTHS} reads them that way."
     )
 
 
@@ -188,6 +240,7 @@ class _Search:
         if self._X_SM is None and self._scene is not None:
             grasps = _one_instance_each(grasps, self._scene)
         self.format = format_of_set(first)
+        self.correction = correction_of(first)
         self.total = sum(len(part) for part in grasps.values())
         rows = [(name, part, k) for name, part in grasps.items() for k in _promising(part)]
         chosen = np.unique(np.linspace(0, len(rows) - 1, min(MAX_GRASPS, len(rows))).astype(int))
@@ -240,6 +293,7 @@ class _Search:
         alone = alone.reshape(shape)
         return alone, None if clear is None else alone & clear.reshape(shape)
 
+    @cached_property
     def closing_share(self) -> float:
         """Share of the grasps, as they were read, at which the pads close on the object, whatever
         else the hand hits."""
@@ -287,12 +341,27 @@ class _Search:
         poses = {name: self._scene.X_SO(name) for name in set(names.tolist())}
         return np.stack([poses[name] for name in names.tolist()])
 
-    def least_share(self, mistake: Mistake) -> float:
-        """Share of the grasps that has to fit once a mistake is corrected for it to be named."""
-        if self.keeps_closing_line(mistake):
-            return MIN_SHARE_ABOUT
-        combined = mistake.step or bool(mistake.turn and mistake.forward)
-        return MIN_SHARE_COMBINED if combined else MIN_SHARE
+    def is_shown(self, mistake: Mistake, before: Fits, after: Fits) -> bool:
+        """Whether enough grasps fit once a mistake is corrected for it to be named.
+
+        Args:
+            mistake: it.
+            before, after: (N,) which grasps fit as they were read, and once it is corrected.
+        """
+        about, n = self.keeps_closing_line(mistake), int(after.sum())
+        if self.closing_share <= MAX_CLOSING or about:
+            combined = mistake.step or bool(mistake.turn and mistake.forward)
+            share = MIN_SHARE_COMBINED if combined else MIN_SHARE
+            least = max(MIN_FITTING, (MIN_SHARE_ABOUT if about else share) * self.count)
+        elif mistake.reads_otherwise:
+            least = max(MIN_FITTING_CLOSING, MIN_SHARE_ABOUT * self.count)
+        else:
+            return False
+        if n < least or n >= MIN_GAIN * before.sum():
+            return bool(n >= least)
+        gained, lost = int((after & ~before).sum()), int((before & ~after).sum())
+        enough = gained >= MIN_GAINED and lost <= MAX_LOST_SHARE * gained
+        return enough and mistake.reads_otherwise and n >= MIN_SHARE_ABOUT * self.count
 
     def likeness(self, mistake: Mistake) -> tuple[GraspFormat, ...]:
         """Other formats that measure grasps as those are once a mistake is corrected."""
@@ -399,11 +468,11 @@ def _decide(search: _Search, mistakes: Sequence[Mistake], fits: Fits) -> Mistake
         mistakes: K of them.
         fits: (K + 1, N) which grasps fit, as they were read and once each is corrected.
     """
-    before, *after = fits.sum(axis=1).tolist()
+    before = int(fits[0].sum())
     count = {
-        mistake: n
-        for mistake, n in zip(mistakes, after, strict=True)
-        if n >= max(MIN_FITTING, MIN_GAIN * before, search.least_share(mistake) * search.count)
+        mistake: int(after.sum())
+        for mistake, after in zip(mistakes, fits[1:], strict=True)
+        if search.is_shown(mistake, fits[0], after)
     }
     if not count:
         return None
@@ -434,6 +503,7 @@ def _decide(search: _Search, mistakes: Sequence[Mistake], fits: Fits) -> Mistake
             if m != chosen and not (m.moves_frame and chosen.moves_frame and m.turn == chosen.turn)
         )[:2],
         reach_mm=reach,
+        given=search.correction,
     )
 
 

@@ -12,6 +12,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -80,8 +81,13 @@ FILE_POSES: Mapping[str, tuple[Callable[[Array], Array], str]] = {
 """Corrections of the poses that a file has, by name: of poses (..., 4, 4) in the file's convention,
 and in words."""
 HALF_WIDTHS = "half_widths"
+CORRECTION = "correction"
+"""Key of a provenance."""
 CORRECTIONS = (*FILE_POSES, HALF_WIDTHS, "turn:AXISDEGREES", "forward:MM")
 """What `correction` may have."""
+LIKELY_GRASPS, LIKELY_SHARE = 8, 0.9
+"""A mistake is called likely if so many grasps were looked at, and so large a share of them fits
+once it is corrected."""
 _TURN = re.compile(r"turn:([xyz])([+-]?\d+(?:\.\d+)?)")
 _FORWARD = re.compile(r"forward:([+-]?\d+(?:\.\d+)?)")
 
@@ -159,9 +165,10 @@ def corrected(
         UnknownNameError: there is no such correction.
     """
     names = check_corrections(correction)
-    if not names:
-        return imported
     grasps = imported.grasps
+    provenance = _without_correction(grasps.provenance)
+    if not names:
+        return replace(imported, grasps=replace(grasps, provenance=provenance))
     X_MG = corrected_poses(grasps.X_OG, frames_of(grasps, gripper), names)
     factor = 2.0 if HALF_WIDTHS in names else 1.0
     found = GraspSet.create(
@@ -169,10 +176,28 @@ def corrected(
         object=grasps.object,
         width=grasps.width * factor,
         score=grasps.score,
-        provenance={**grasps.provenance, "correction": list(names)},
+        provenance={**provenance, CORRECTION: list(names)},
         columns=grasps.columns,
     )
     return replace(imported, grasps=found)
+
+
+def _without_correction(provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """A provenance without the correction with which the grasps of a file were once read from
+    another file, which the poses of this one have already."""
+    found = {key: value for key, value in provenance.items() if key != CORRECTION}
+    parts = found.get("parts")
+    if isinstance(parts, Mapping):
+        found["parts"] = {k: _without_correction(p) if p else p for k, p in parts.items()}
+    elif isinstance(parts, (list, tuple)):
+        found["parts"] = [_without_correction(part) for part in parts_of(found)]
+    return found
+
+
+def correction_of(grasps: GraspSet) -> tuple[str, ...]:
+    """The correction with which a set was read, as its provenance says."""
+    provenances = (grasps.provenance, *parts_of(grasps.provenance))
+    return next((tuple(p[CORRECTION]) for p in provenances if p.get(CORRECTION)), ())
 
 
 def frames_of(grasps: GraspSet, gripper: Gripper) -> Array:
@@ -222,6 +247,11 @@ class Mistake:
         """Whether it is about the grasp frame of a file: turns, and a distance."""
         kinds = ("turn:", "forward:")
         return bool(self.correction) and all(name.startswith(kinds) for name in self.correction)
+
+    @property
+    def reads_otherwise(self) -> bool:
+        """Whether it is one of a few ways to read rotations and poses, and no distance."""
+        return bool(self.correction) and not self.forward
 
 
 def usual_mistakes(format: GraspFormat, gripper: Gripper) -> list[Mistake]:
@@ -297,6 +327,7 @@ class MistakeFound:
         format: another format by which the same file can be read, which corrects it.
         alternatives: what else does as well, in words.
         reach_mm: least and largest distance along the approach that does as well [mm].
+        given: the correction with which the grasps were read.
     """
 
     mistake: Mistake
@@ -308,34 +339,53 @@ class MistakeFound:
     format: str = ""
     alternatives: tuple[str, ...] = ()
     reach_mm: tuple[float, float] | None = None
+    given: tuple[str, ...] = ()
+
+    @property
+    def is_likely(self) -> bool:
+        """Whether nearly all grasps fit once it is corrected, and nothing else does as well."""
+        enough = self.count >= LIKELY_GRASPS and self.after >= LIKELY_SHARE * self.count
+        return enough and not self.alternatives
 
     def text(self, format_option: str = "--grasps-format") -> str:
-        """What was found and what corrects it, in a sentence."""
-        of = f"of {self.count} grasps" + (
-            f" looked at, of {self.total}," if self.total > self.count else ""
-        )
-        fits = "clear and held by the pads"
-        words = self.mistake.words
+        """What was found, how sure that is, and which option corrects it, in sentences.
+
+        Args:
+            format_option: what the caller's option about the format of a file is called.
+        """
+        sentences = [self._found()]
         if self.reach_mm is not None and self.reach_mm[0] < self.reach_mm[1]:
             low, high = sorted(map(abs, self.reach_mm))
-            words += f" (anything from {low:g} to {high:g} mm does)"
-        text = f"{self.before} {of} are {fits} as they were read;"
-        text += f" {words} {self.after} of {self.count} are"
+            sentences.append(f"Any distance from {low:g} to {high:g} mm fits as well.")
         if self.likeness:
-            text += f", as files of {listing(self.likeness)} have them"
-        text += f"; {self.remedy(format_option)}"
+            sentences.append(f"Files of {listing(self.likeness)} have their grasps that way.")
         if self.alternatives:
-            text += f" (as many are {' or '.join(self.alternatives)})"
-        return text
+            sentences.append(f"As many fit {' or '.join(self.alternatives)}.")
+        return " ".join([*sentences, self._remedy(format_option)])
 
-    def remedy(self, format_option: str = "--grasps-format") -> str:
-        """What corrects it."""
+    def options(self, format_option: str = "--grasps-format") -> list[str]:
+        """Words of a command line that correct it; none if a file would have to be written."""
         mistake = self.mistake
         if mistake.camera is not None:
-            return "if that is the camera's pose, give it (--camera-pose)"
+            return []
         if mistake.frame is not None:
-            frame = "scene" if mistake.frame == "world" else mistake.frame
-            return f"if they are, give --grasps-frame {frame}"
+            return ["--grasps-frame", "scene" if mistake.frame == "world" else mistake.frame]
         if self.format:
-            return f"if they are meant so, give {format_option} {self.format}"
-        return f"if they are meant so, give --correction {','.join(mistake.correction)}"
+            return [format_option, self.format]
+        return ["--correction", ",".join((*self.given, *mistake.correction))]
+
+    def _found(self) -> str:
+        words = self.mistake.words
+        others = f" that were looked at, of {self.total}," if self.total > self.count else ""
+        return (
+            f"{self.before} of the {self.count} grasps{others} fit as they were read: the open hand"
+            f" is clear of the object, and its pads close on it. {words[0].upper()}{words[1:]},"
+            f" {self.after} of {self.count} fit."
+        )
+
+    def _remedy(self, format_option: str) -> str:
+        likely = "very likely" if self.is_likely else "perhaps"
+        if self.mistake.camera is not None:
+            return f"The camera's pose is {likely} wrong; give the right one with --camera-pose."
+        correction = " ".join(self.options(format_option))
+        return f"The file {likely} means them so; {correction} reads them that way."

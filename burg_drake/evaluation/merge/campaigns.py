@@ -70,6 +70,7 @@ def merge_campaigns(campaigns: Sequence[Campaign], staging: Path, folder: Path) 
         first.document,
         shard=common_shard(campaigns),
         stretches=all_sessions([campaign.document.stretches for campaign in campaigns]),
+        hints=next((c.document.hints for c in campaigns if c.document.hints), ()),
     )
     merged = Campaign(staging, document)
     (staging / SCENES_FOLDER).mkdir()

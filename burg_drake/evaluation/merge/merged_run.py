@@ -17,8 +17,8 @@ from burg_drake.evaluation.records import (
     JOURNAL_FILE,
     Shard,
     WorkSession,
-    differences,
-    identity,
+    grasp_differences,
+    run_differences,
     share,
 )
 from burg_drake.evaluation.store import (
@@ -67,6 +67,7 @@ def write_merged(
         first.document,
         shard=shard,
         stretches=all_sessions([run.document.stretches for run in runs]),
+        hints=next((run.document.hints for run in runs if run.document.hints), ()),
     )
     save_run(Run(staging, document))
     copy_documents(first, staging, folder)
@@ -82,9 +83,7 @@ def require_mergeable(first: Run, other: Run) -> None:
     a, b = first.document, other.document
     if a.hash == b.hash:
         return
-    found = differences(identity(a), identity(b))
-    if not found:
-        found = [f"grasps are {a.grasps.content[:12]} there, {b.grasps.content[:12]} here"]
+    found = run_differences(a, b) or grasp_differences(a.grasps, b.grasps)
     raise InvalidInputError(
         f"{first.path} and {other.path} are not the same run ({'; '.join(found)}); only shards and"
         " copies of one run can be merged"

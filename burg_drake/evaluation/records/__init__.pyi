@@ -10,6 +10,16 @@ from .folder_lock import (
     is_locked as is_locked,
     unchanged as unchanged,
 )
+from .identity import (
+    differences as differences,
+    grasp_differences as grasp_differences,
+    input_difference as input_difference,
+    request_differences as request_differences,
+    require_same_run as require_same_run,
+    run_differences as run_differences,
+    run_hash as run_hash,
+    setting_differences as setting_differences,
+)
 from .journal import (
     JOURNAL_FILE as JOURNAL_FILE,
     LONGEST_LINE as LONGEST_LINE,
@@ -55,15 +65,10 @@ from .run_document import (
     TableFormat as TableFormat,
     WorkSession as WorkSession,
     begun_now as begun_now,
-    differences as differences,
-    identity as identity,
     input_of as input_of,
     input_reference as input_reference,
     numbers as numbers,
     origin_of as origin_of,
-    request_identity as request_identity,
-    require_same_run as require_same_run,
-    run_hash as run_hash,
 )
 from .settings import EvaluationSettings as EvaluationSettings
 from .shard import (

@@ -8,15 +8,17 @@ from pathlib import Path
 from burg_drake.core import InvalidInputError, content_hash, listing
 from burg_drake.core.grasps import Mode
 from burg_drake.core.paths import require_name
+from burg_drake.evaluation.records.identity import (
+    request_differences,
+    request_identity,
+    require_same_shard,
+)
 from burg_drake.evaluation.records.run_document import (
     HASH_DIGITS,
     Grasps,
     Input,
     TableFormat,
     WorkSession,
-    differences,
-    request_identity,
-    require_same_shard,
 )
 from burg_drake.evaluation.records.shard import Shard, as_shard
 from burg_drake.station.document import Engine
@@ -65,6 +67,7 @@ class CampaignDocument:
         libraries: hash of all objects of each library, by folder.
         versions: of the software and the machine.
         stretches: sessions in which it was worked on.
+        hints: usual mistakes that given grasps show, see `RunDocument`.
     """
 
     version: int = 1
@@ -84,6 +87,7 @@ class CampaignDocument:
     libraries: dict[str, str] = field(default_factory=dict)
     versions: dict[str, str] = field(default_factory=dict)
     stretches: tuple[WorkSession, ...] = ()
+    hints: tuple[str, ...] = ()
 
     @property
     def mine(self) -> tuple[SceneEntry, ...]:
@@ -140,8 +144,7 @@ def scene_differences(there: CampaignDocument, here: CampaignDocument) -> list[s
 
 def campaign_differences(there: CampaignDocument, here: CampaignDocument) -> list[str]:
     """What two runs differ in that must be the same in one run, in words."""
-    found = differences(identity(there), identity(here))
-    return [f for f in found if not f.startswith("scenes is")] + scene_differences(there, here)
+    return request_differences(there, here) + scene_differences(there, here)
 
 
 def require_same_campaign(folder: Path, there: CampaignDocument, here: CampaignDocument) -> None:

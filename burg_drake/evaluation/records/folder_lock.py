@@ -14,9 +14,9 @@ from pathlib import Path
 from burg_drake.core import InvalidInputError
 from burg_drake.core.files import try_lock, without_locks
 
-TRIES = 5
-PAUSE = 0.02
-"""Between two tries [s]: who looks whether a folder is being written holds it for a moment."""
+LOCK_ATTEMPTS = 5
+LOCK_RETRY_INTERVAL = 0.02
+"""Seconds between attempts: who checks whether a folder is being written holds it for a moment."""
 
 
 def lock(file: int, path: Path) -> None:
@@ -26,10 +26,10 @@ def lock(file: int, path: Path) -> None:
         InvalidInputError: another process has it, or its file system has no locks.
     """
     try:
-        for k in range(TRIES):
+        for k in range(LOCK_ATTEMPTS):
             if try_lock(file):
                 return
-            time.sleep(PAUSE if k + 1 < TRIES else 0.0)
+            time.sleep(LOCK_RETRY_INTERVAL if k + 1 < LOCK_ATTEMPTS else 0.0)
     except OSError as error:
         os.close(file)
         raise without_locks(path.parent, error) from error

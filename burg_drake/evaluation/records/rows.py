@@ -19,13 +19,13 @@ AREA_STEP = 1e-6
 """Lengths [m], angles [rad] and areas [m2] count in whole steps: less tells no grasps apart."""
 CLEARANCE_STEP = 5e-4
 """Clearances count in steps of 0.5 mm [m]."""
-BEHIND = 1e6
-"""Steps of clearance that are more than any."""
+MAX_CLEARANCE_STEPS = 1e6
+"""More steps of clearance than any grasp has."""
 SLIP_SCALE = 0.005
 TILT_SCALE = 0.1
 PUSH_SCALE = 0.01
 """A slip of 5 mm, a tilt of 0.1 rad and a push of 10 mm weigh the same."""
-ALIKE = 0.7
+MIN_ID_SIMILARITY = 0.7
 """Similarity of ids from which one is suggested for another: those of two grasps of one object
 have 0.43 on average, an id and the first half of its digits more than 0.75."""
 
@@ -81,12 +81,12 @@ def best_rows(
 def _room(columns: Columns, rows: NDArray[np.int64]) -> Array:
     """Clearances of some rows in whole steps; those of contested ones are behind all others."""
     clearance = columns["clearance"][rows] if "clearance" in columns else np.zeros(len(rows))
-    steps = np.nan_to_num(np.floor(clearance / CLEARANCE_STEP + 1e-9), nan=-BEHIND)
+    steps = np.nan_to_num(np.floor(clearance / CLEARANCE_STEP + 1e-9), nan=-MAX_CLEARANCE_STEPS)
     if "confidence" not in columns or "judged_again" not in columns:  # of earlier releases
         return steps
     contested = columns["confidence"][rows] < CONTESTED
     contested &= columns["judged_again"][rows] == ""
-    return np.where(contested, steps - 2.0 * BEHIND, steps)
+    return np.where(contested, steps - 2.0 * MAX_CLEARANCE_STEPS, steps)
 
 
 def _clearest(
@@ -126,7 +126,7 @@ def rows_of(columns: Columns, id: str, where: str) -> list[int]:
 
 def unknown_grasp(id: str, ids: Sequence[str], where: str, hint: str = "") -> UnknownNameError:
     """The error about an id that nothing goes by; names those that are much like it, if any."""
-    close = difflib.get_close_matches(id, ids, n=3, cutoff=ALIKE)
+    close = difflib.get_close_matches(id, ids, n=3, cutoff=MIN_ID_SIMILARITY)
     known = f"did you mean {' or '.join(close)}?" if close else f"known: {listing(ids)}"
     hint = f" ({hint})" if hint else ""
     return UnknownNameError(f"{where} has no judged grasp {id!r}; {known}{hint}")

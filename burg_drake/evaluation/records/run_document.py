@@ -6,26 +6,16 @@ import math
 from dataclasses import dataclass, field, is_dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Literal
 
-from burg_drake.core import InvalidInputError, content_hash
 from burg_drake.core.grasps import Among, Mode
 from burg_drake.core.paths import data_root
-from burg_drake.evaluation.records.limit_numbers import (
-    APPROACH,
-    limits_text,
-    measure_text,
-    without_limits,
-)
-from burg_drake.evaluation.records.motion_numbers import motion_in, motion_text, without_motion
-from burg_drake.evaluation.records.origin import TrialOrigin, engine_label
+from burg_drake.evaluation.records.origin import TrialOrigin
 from burg_drake.scene.document import Scene
 from burg_drake.station.document import Engine, Station
 
 TableFormat = Literal["csv", "parquet"]
 
-SETTINGS = "settings of engine, trial and arm"
-"""A topic of `identity`."""
 HASH_DIGITS = 12
 """Digits of a hash that people get to see."""
 
@@ -75,6 +65,7 @@ class Grasps:
             grasps were sampled once.
         asked: with `until_balanced`, how many grasps were sampled so far for each instance of an
             object: ordinary and slippery ones.
+        correction: with which a file of given ones was read, see `FileReading`.
         count: how many there are.
         objects: how many there are by object; 0 where an object has none.
         content: hash of them all.
@@ -90,6 +81,7 @@ class Grasps:
     balanced_among: Among = "executed"
     max_per_object: int = 0
     asked: dict[str, tuple[int, int]] = field(default_factory=dict)
+    correction: tuple[str, ...] = ()
     count: int
     objects: dict[str, int]
     content: str
@@ -132,7 +124,8 @@ class RunDocument:
         table: format of the results file.
         versions: of the software and the machine.
         stretches: sessions in which it was worked on.
-        hints: usual mistakes that given grasps show, one sentence each.
+        hints: usual mistakes that given grasps show, in sentences; a further line of one is a
+            command that evaluates them again.
     """
 
     version: int = 1
@@ -160,81 +153,6 @@ def begun_now(workers: int, before: int) -> WorkSession:
     return WorkSession(started=started, workers=workers, before=before)
 
 
-class RunRequestFields(Protocol):
-    """What a call asks about each scene; documents of runs say it, see `RunDocument`."""
-
-    @property
-    def station(self) -> Input: ...
-    @property
-    def grasps(self) -> Grasps: ...
-    @property
-    def engine(self) -> Engine: ...
-    @property
-    def trial(self) -> dict[str, float]: ...
-    @property
-    def mode(self) -> Mode: ...
-    @property
-    def arm(self) -> dict[str, float]: ...
-    @property
-    def seed(self) -> int: ...
-    @property
-    def versions(self) -> dict[str, str]: ...
-
-
-def identity(document: RunDocument) -> dict[str, str]:
-    """What two calls must have in common to work on the same run, in words, by topic."""
-    return {
-        "scene": f"content {document.scene.content[:HASH_DIGITS]}",
-        **request_identity(document),
-    }
-
-
-def request_identity(document: RunRequestFields) -> dict[str, str]:
-    """The same of all scenes that it is asked about, in words, by topic."""
-    grasps, engine = document.grasps, document.engine
-    others = [without_limits(without_motion(values)) for values in (document.trial, document.arm)]
-    settings = content_hash(vars(engine), *others)[:HASH_DIGITS]
-    sampled = grasps.origin == "sampled"
-    angle = {"approach angle": f"{grasps.approach_angle_deg} degrees"} if sampled else {}
-    simulated = "simulated" if document.trial.get(APPROACH) else "not simulated"
-    return {
-        "station": f"content {document.station.content[:HASH_DIGITS]}",
-        "engine": engine_label(engine),
-        SETTINGS: settings,
-        "motion": motion_text(motion_in(document.trial)),
-        "limit in the hand": limits_text(document.trial),
-        "motion of others": measure_text(document.trial),
-        **({} if document.mode == "arm" else {"approach of the hand": simulated}),
-        "mode": document.mode,
-        "grasps": (
-            _sampled(grasps) if sampled else f"given, content {grasps.content[:HASH_DIGITS]}"
-        ),
-        **angle,
-        "seed": str(document.seed),
-        "burg_drake": document.versions.get("burg_drake", ""),
-        "drake": document.versions.get("drake", ""),
-        **{name: document.versions.get(name, "not recorded") for name in engine.packages},
-    }
-
-
-def _sampled(grasps: Grasps) -> str:
-    how = "sampled blind" if grasps.blind else "clear of the scene"
-    where = f", on {', '.join(grasps.only)}" if grasps.only else ""
-    balance = (
-        f", more until each object has {grasps.until_balanced} lifted and"
-        f" {grasps.until_balanced} failing ones (counted: {grasps.balanced_among}; at most"
-        f" {grasps.max_per_object} grasps)"
-        if grasps.until_balanced
-        else ""
-    )
-    return f"{grasps.per_object} an object, {how}{where}{balance}"
-
-
-def run_hash(document: RunDocument) -> str:
-    """Short hash of what decides about a run's results: `identity` and the candidates."""
-    return content_hash(identity(document), document.grasps.content)[:HASH_DIGITS]
-
-
 def origin_of(document: RunDocument) -> TrialOrigin:
     """What every row of the run's table tells of it."""
     return TrialOrigin(
@@ -249,43 +167,6 @@ def origin_of(document: RunDocument) -> TrialOrigin:
         seed=document.seed,
         run=document.hash,
     )
-
-
-def require_same_run(folder: Path, there: RunDocument, here: RunDocument) -> None:
-    """Refuses to go on with a run that is not the one asked for.
-
-    Raises:
-        InvalidInputError: names every difference.
-    """
-    found = differences(identity(there), identity(here))
-    if found:
-        raise InvalidInputError(
-            f"{folder} holds another run ({'; '.join(found)}); choose another folder, or delete it"
-        ).about("out")
-    require_same_shard(folder, there.shard, here.shard)
-
-
-def require_same_shard(folder: Path, there: str, here: str) -> None:
-    """Refuses to go on with another share of the same run.
-
-    Raises:
-        InvalidInputError: names both.
-    """
-    if there != here:
-        held = f"shard {there} of this run" if there else "all of this run"
-        asked = f"shard {here}" if here else "no shard"
-        raise InvalidInputError(
-            f"{folder} holds {held}, and {asked} is given; choose another folder; merge shards"
-            " with burg-drake merge"
-        ).about("out")
-
-
-def differences(there: dict[str, str], here: dict[str, str]) -> list[str]:
-    """Topics that two identities have in common and differ in, in words."""
-    topics = [k for k in there if k in here and there[k] != here[k]]
-    if "engine" in topics or "mode" in topics:  # settings differ too, which says nothing more
-        topics = [k for k in topics if k != SETTINGS]
-    return [f"{k} is {there[k]} there, {here[k]} here" for k in topics]
 
 
 def input_reference(path: Path, kind: str) -> str:

@@ -127,7 +127,7 @@ def _counter(members: Sequence[Text], counts: NDArray[np.int64]) -> Counter[Text
 
 
 def _notes(campaign: Campaign) -> tuple[str, ...]:
-    states, notes = campaign.states, []
+    states, notes = campaign.states, [*campaign.document.hints]
     if empty := [n for n in campaign.names if n in states and states[n].state == "empty"]:
         notes.append(f"no grasps to judge in {len(empty)} scenes: {listing(empty)}")
     if failed := list(campaign.failed):

@@ -8,7 +8,7 @@ import numpy as np
 
 from burg_drake.core import Array
 
-ROUNDING = 1e-9
+LENGTH_TOLERANCE = 1e-9
 """Lengths that differ by less are the same [m]."""
 
 
@@ -51,7 +51,7 @@ def short_lifts(lift_height: Array, whole: float) -> ShortLifts | None:
         None if no lift is short.
     """
     known = lift_height[np.isfinite(lift_height)]
-    short = known[known < whole - ROUNDING]
+    short = known[known < whole - LENGTH_TOLERANCE]
     if not len(short):
         return None
     return ShortLifts(len(known), len(short), whole, float(np.median(short)), float(short.min()))

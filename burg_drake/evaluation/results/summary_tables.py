@@ -29,6 +29,7 @@ class SummaryView:
     summary: Summary
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        from rich.segment import Segment
         from rich.text import Text
 
         matrix = _outcome_matrix(self.summary)
@@ -39,7 +40,12 @@ class SummaryView:
             yield _certainty_table(self.summary)
             yield ""
         if self.summary.notes:
-            yield Text("\n".join(f"note: {note}" for note in self.summary.notes) + "\n")
+            for note in self.summary.notes:
+                words, *commands = note.splitlines()
+                yield Text(f"note: {words}")
+                for command in commands:  # in one piece, so that it can be copied
+                    yield Segment(f"    {command}\n")
+            yield ""
         yield matrix if fits else _outcome_list(self.summary)
         yield ""
         for found in (self.summary.lifts, self.summary.pushes):

@@ -24,6 +24,7 @@ from burg_drake.core import (
 from burg_drake.core.files import remove_unfinished, writable_folder
 from burg_drake.core.grasps import Outcome, Verdict
 from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
+from burg_drake.evaluation.grasp_sets import campaign_hints
 from burg_drake.evaluation.records import (
     CampaignDocument,
     Ledger,
@@ -36,7 +37,12 @@ from burg_drake.evaluation.records import (
 )
 from burg_drake.evaluation.report import renew_report
 from burg_drake.evaluation.run.completeness import require_scenes_judged
-from burg_drake.evaluation.run.request import Request, command, given_content
+from burg_drake.evaluation.run.request import (
+    Request,
+    command,
+    given_content,
+    given_correction,
+)
 from burg_drake.evaluation.run.scene_judging import SceneJudging, is_finished
 from burg_drake.evaluation.run.scene_list import Scenes, read_scenes, require_used
 from burg_drake.evaluation.run.scene_processes import SceneProcesses
@@ -94,6 +100,9 @@ def evaluate_scenes(
             save_campaign(campaign)
         call = _Call(campaign, scenes, request, executor, reporter)
         judged = call.run()
+        if call.judged:
+            hints = campaign_hints(judged)
+            judged = save_campaign(replace(judged, document=replace(judged.document, hints=hints)))
         renew_report(judged)
         require_scenes_judged(judged)
         return judged
@@ -104,7 +113,11 @@ def _document(scenes: Scenes, request: Request) -> CampaignDocument:
     document = CampaignDocument(
         command=command(),
         station=input_of(request.station, "stations"),
-        grasps=replace(request.requested_of_all(), content=given_content(request.grasps)),
+        grasps=replace(
+            request.requested_of_all(),
+            content=given_content(request.grasps),
+            correction=given_correction(request.grasps),
+        ),
         engine=request.engine,
         trial=request.trial,
         mode=request.mode,

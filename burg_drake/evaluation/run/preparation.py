@@ -14,6 +14,7 @@ from burg_drake.evaluation.candidates import (
     Candidates,
     given_candidates,
 )
+from burg_drake.evaluation.grasp_sets import correction_of
 from burg_drake.evaluation.records import (
     RunDocument,
     TableFormat,
@@ -127,6 +128,7 @@ def _with_grasps(
         document,
         grasps=replace(
             document.grasps,
+            correction=correction_of(candidates.grasps),
             count=len(candidates),
             objects=dict(counts),
             content=candidates.content,

@@ -21,7 +21,7 @@ from burg_drake.core import (
 from burg_drake.core.grasps import GraspSet, Mode
 from burg_drake.core.paths import PACKAGE_URI, portable_reference
 from burg_drake.evaluation.candidates import INSTANCE, chosen_instances, on_chosen
-from burg_drake.evaluation.grasp_sets import by_names
+from burg_drake.evaluation.grasp_sets import by_names, correction_of
 from burg_drake.evaluation.records import (
     AS_MEASURED,
     EvaluationSettings,
@@ -42,7 +42,9 @@ if TYPE_CHECKING:
 
 ByInstance = Mapping[str, GraspSet]
 GraspsLike = GraspSet | ByInstance | Callable[[Scene], ByInstance]
-"""Grasps that a user has: a set, sets by instance, or a function that has those of a scene."""
+"""Grasps that a user has: a set, sets by instance, or a function that has those of a scene.
+Attributes `content` and `correction` of a function, if it has them, are a hash of all that its
+grasps come from, and the correction with which it reads them."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -254,13 +256,21 @@ def command() -> str:
 
 
 def given_content(grasps: GraspsLike | None) -> str:
-    """Hash of the grasps that are given for many scenes; empty of those that a function has, which
-    each scene's run has a hash of."""
+    """Hash of the grasps that are given for many scenes; empty of those of a function that does not
+    say it: each scene's run has a hash of its own."""
     if grasps is None or callable(grasps):
-        return ""
+        return str(getattr(grasps, "content", ""))
     sets = {"": grasps} if isinstance(grasps, GraspSet) else grasps
     parts = {
         name: [part.X_OG, part.width, part.object, part.columns.get(INSTANCE)]
         for name, part in sets.items()
     }
     return content_hash(parts)
+
+
+def given_correction(grasps: GraspsLike | None) -> tuple[str, ...]:
+    """The correction with which the grasps that are given for many scenes were read."""
+    if grasps is None or callable(grasps):
+        return tuple(getattr(grasps, "correction", ()))
+    sets = [grasps] if isinstance(grasps, GraspSet) else grasps.values()
+    return next((found for part in sets if (found := correction_of(part))), ())

@@ -28,9 +28,11 @@ from burg_drake.evaluation.records import (
     Input,
     Journal,
     differences,
+    input_difference,
     motion_in,
     motion_text,
     read_journal,
+    setting_differences,
     without_motion,
 )
 
@@ -150,7 +152,17 @@ class PlanFolder:
             )
 
     def _require_same(self, there: PlansDocument) -> None:
-        found = differences(_identity(there), _identity(self.document))
+        here = self.document
+        counts = f"grasps are {there.grasps} there, {here.grasps} here"
+        words = {
+            "scene": [input_difference("scene", there.scene, here.scene, behind="objects")],
+            "station": [input_difference("station", there.station, here.station)],
+            "grasps": [counts if there.grasps != here.grasps else "grasps are as many, but others"],
+            "settings of the arm": setting_differences(
+                _other_arm_settings(there), _other_arm_settings(here)
+            ),
+        }
+        found = differences(_identity(there), _identity(here), words)
         if found:
             raise InvalidInputError(
                 f"folder {self.path} has plans of something else ({'; '.join(found)}); choose"
@@ -182,15 +194,19 @@ def plans_document(
 
 def _identity(document: PlansDocument) -> dict[str, str]:
     """What two calls must have in common to work on the same plans, in words, by topic."""
-    arm = without_motion({k: v for k, v in document.arm.items() if k != "exact"})
     return {
         "scene": f"content {document.scene.content[:HASH_DIGITS]}",
         "station": f"content {document.station.content[:HASH_DIGITS]}",
         "grasps": f"{document.grasps}, content {document.content[:HASH_DIGITS]}",
         "check": "exact" if document.exact else "screening",
-        "settings of the arm": content_hash(arm)[:HASH_DIGITS],
+        "settings of the arm": content_hash(_other_arm_settings(document))[:HASH_DIGITS],
         "motion": motion_text(motion_in(document.arm)),
         "format": document.format,
         "burg_drake": document.versions.get("burg_drake", ""),
         "drake": document.versions.get("drake", ""),
     }
+
+
+def _other_arm_settings(document: PlansDocument) -> dict[str, float]:
+    """Settings of the arm that are no topics of their own."""
+    return without_motion({k: v for k, v in document.arm.items() if k != "exact"})

@@ -25,9 +25,13 @@ from burg_drake.experiment.statistics import (
 
 COVERED = 0.9
 """Share of the differences of a margin that are within `MarginDifference.within`."""
-SURE = 0.95
-"""A verdict with more confidence is among the surest."""
-CONFIDENCES = (f"below {CONTESTED:g}", f"{CONTESTED:g} to {SURE:g}", f"above {SURE:g}")
+SURE_CONFIDENCE = 0.95
+"""Confidence above which a verdict counts as sure."""
+CONFIDENCES = (
+    f"below {CONTESTED:g}",
+    f"{CONTESTED:g} to {SURE_CONFIDENCE:g}",
+    f"above {SURE_CONFIDENCE:g}",
+)
 """Groups of verdicts by their confidence, rising."""
 
 
@@ -203,7 +207,7 @@ def _by_confidence(held: VerdictPairs, seed: int) -> tuple[FactorGroup, ...]:
     if not known.any():
         return ()
     values = held.confidence[known]
-    group = (values >= CONTESTED).astype(np.intp) + (values > SURE)
+    group = (values >= CONTESTED).astype(np.intp) + (values > SURE_CONFIDENCE)
     names = {name: name for name in CONFIDENCES}
     return by_factor(held.take(known), Factor(CONFIDENCES, group), names, seed=seed)
 

@@ -19,8 +19,8 @@ HEIGHT_ERROR = 0.005
 """An object that stands as planned but for so much of its height was measured wrongly [m]."""
 TILT_ERROR = math.radians(5.0)
 """The same for its tilt; what is tilted more has fallen over."""
-APART = 0.005
-"""So far at most objects are moved that were measured within each other [m]."""
+MAX_SEPARATING_SHIFT = 0.005
+"""Largest distance by which objects that were measured within each other are moved apart [m]."""
 TRIES = 20
 OVER_THE_EDGE = 0.05
 """An object may stand over the board's edge by so much; the board is paper [m]."""
@@ -127,7 +127,7 @@ def _pushed_apart(
             half = _half_overlap(now, issue)
             shift[issue.instance] += half
             shift[issue.other] -= half
-        far = [name for name, p in shift.items() if np.linalg.norm(p) > APART]
+        far = [name for name, p in shift.items() if np.linalg.norm(p) > MAX_SEPARATING_SHIFT]
         if far:
             return MeasuredScene(None, tuple(notes), errors[0].message)
         now = displaced_scene(

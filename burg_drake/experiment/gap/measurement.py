@@ -242,6 +242,7 @@ def _begin_reach(
     """Writes the run of mode `reach` as far as the hand's trials tell, which is all of it."""
     grasps = Grasps(
         origin="given",
+        correction=hand.document.grasps.correction,
         count=hand.document.grasps.count,
         objects=hand.document.grasps.objects,
         content=hand.document.grasps.content,

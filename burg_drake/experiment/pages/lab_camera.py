@@ -33,7 +33,7 @@ from burg_drake.scene.document import Scene
 
 IDLE_AFTER = 5.0
 """The camera is not looked at when no browser has asked for a picture for so long [s]."""
-FRESH = 5.0
+PICTURE_TIMEOUT = 5.0
 """How long a check waits for a picture [s]."""
 OpenSource = Callable[[Scene], FrameSource]
 
@@ -145,7 +145,7 @@ class LabCamera:
             assert view is not None
             stale = view.live.request_pictures()
             picture = view.live.picture if not stale else None
-            picture = picture or view.live.next_picture(stale, FRESH)
+            picture = picture or view.live.next_picture(stale, PICTURE_TIMEOUT)
             if picture is None or not picture.located.estimate.valid:
                 raise InvalidInputError(
                     "a placement check needs a picture that shows where the board is"

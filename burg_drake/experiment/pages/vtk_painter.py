@@ -41,8 +41,8 @@ RENDERER = "trials"
 SUPERSAMPLING = 2
 """Pixels rendered for each of a picture, each way, against jagged edges."""
 RANGE = ClippingRange(0.02, 20.0)
-AWAY = RigidTransform([0.0, 0.0, -1e4])
-"""Where what is not in a picture is, beyond the camera's range."""
+HIDDEN_POSE = RigidTransform([0.0, 0.0, -1e4])
+"""Pose of bodies that a picture does not show, beyond the camera's range."""
 
 
 class VtkPainter:
@@ -119,6 +119,6 @@ class VtkPainter:
             counts[key] = counts.get(key, 0) + 1
             poses.set_value(self._frames[used[-1]], RigidTransform(one.X_SB))
         for name in self._frames.keys() - set(used):
-            poses.set_value(self._frames[name], AWAY)
+            poses.set_value(self._frames[name], HIDDEN_POSE)
         self._graph.get_source_pose_port(self._source).FixValue(self._context, poses)
         return used

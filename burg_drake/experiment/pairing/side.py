@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from burg_drake.core import InvalidInputError
-from burg_drake.evaluation.records import HASH_DIGITS, differences, engine_label, request_identity
+from burg_drake.evaluation.records import HASH_DIGITS, engine_label, request_differences
 from burg_drake.evaluation.store import (
     RUN_FILE,
     Campaign,
@@ -167,11 +167,8 @@ def side_of_trials(sheet: TrialSheet, path: Path) -> Side:
 
 def settings_apart(first: JudgedRuns, second: JudgedRuns) -> tuple[str, ...]:
     """In what the runs of two folders differ, in words."""
-    asked = [request_identity(judged.found.document) for judged in (first, second)]
-    return tuple(
-        text.replace(" there, ", " in the first, ").removesuffix(" here") + " in the second"
-        for text in differences(*asked)
-    )
+    sides = ("in the first", "in the second")
+    return tuple(request_differences(first.found.document, second.found.document, sides))
 
 
 def require_common_scene(first: JudgedRuns, second: JudgedRuns) -> None:

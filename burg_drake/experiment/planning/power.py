@@ -21,7 +21,7 @@ ALPHA, POWER = 0.05, 0.8
 """Significance level, and chance to find a difference that there is."""
 SHARES = (0.5, 0.8, 0.95)
 """Shares that intervals are told for; at the first one they are widest."""
-AGAINST = (0.0, 0.05, 0.1)
+REVERSED_SHARES = (0.0, 0.05, 0.1)
 """Shares of the trials where the method that is worse in all is right, and the better one not."""
 
 
@@ -141,7 +141,7 @@ def power_table(sheet: TrialSheet) -> TextTable:
 
 def difference_text(trials: int) -> str:
     """Which difference between two methods will show, in a sentence."""
-    found = {worse: smallest_difference(trials, worse) for worse in AGAINST}
+    found = {worse: smallest_difference(trials, worse) for worse in REVERSED_SHARES}
     if all(math.isnan(size) for size in found.values()):
         return (
             f"{trials} trials are too few for McNemar's exact test (5 %) to tell two methods apart"

@@ -32,7 +32,7 @@ from burg_drake.experiment.trials import Selection, Stratum, succeeded
 
 Chosen = list[tuple[EligibleGrasps, int, str]]
 """Grasps with the key of their stratum; a number is a place in the pool."""
-RARE = 0.1
+RARE_CLASS_SHARE = 0.1
 """Share of the trials below which there are almost none of a class."""
 
 
@@ -84,7 +84,7 @@ def _rare_class(chosen: Chosen, selection: Selection) -> list[str]:
     found = [Outcome(str(outcomes[pool.key][k])) for pool, k, _ in chosen]
     good = [succeeded(outcome, selection.success) for outcome in found]
     for name, count in (("failures", good.count(False)), ("successes", good.count(True))):
-        if good and count < RARE * len(good):
+        if good and count < RARE_CLASS_SHARE * len(good):
             return [
                 f"{count} of {len(good)} are {name} in simulation: almost nothing here measures"
                 f" how well {name} are predicted; evaluate with until_balanced=10 to get more"

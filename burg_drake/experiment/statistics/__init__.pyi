@@ -16,13 +16,6 @@ from .estimates import (
     Estimate as Estimate,
     share as share,
 )
-from .exact_tests import (
-    Paired as Paired,
-    excess_p_value as excess_p_value,
-    holm as holm,
-    paired as paired,
-    paired_counts as paired_counts,
-)
 from .margin_calibration import (
     PREDICTORS as PREDICTORS,
     PROBABILITY as PROBABILITY,
@@ -31,5 +24,10 @@ from .margin_calibration import (
     MarginCalibration as MarginCalibration,
     calibration as calibration,
     calibrations as calibrations,
+)
+from .paired_answers import (
+    Paired as Paired,
+    paired as paired,
+    paired_counts as paired_counts,
 )
 from .rank_statistics import MIN_OF_EACH_OUTCOME as MIN_OF_EACH_OUTCOME

@@ -11,7 +11,7 @@ from pathlib import Path
 from burg_drake.core import InvalidInputError
 from burg_drake.core.files import try_lock, without_locks
 
-WAIT = 30.0
+LOCK_TIMEOUT = 30.0
 """Time to wait for other writers, each of which takes some hundredths of a second [s]."""
 TURN = 0.01
 """Time between two attempts to get the lock [s]."""
@@ -41,7 +41,7 @@ def exclusive(sheet_path: Path) -> Iterator[None]:
 
 
 def _wait_for(file: int, sheet_path: Path) -> None:
-    until = time.monotonic() + WAIT
+    until = time.monotonic() + LOCK_TIMEOUT
     while True:
         try:
             if try_lock(file):
@@ -50,7 +50,7 @@ def _wait_for(file: int, sheet_path: Path) -> None:
             raise without_locks(sheet_path, error) from error
         if time.monotonic() > until:
             raise InvalidInputError(
-                f"{sheet_path} has been locked by another process for {WAIT:g} s; nothing"
+                f"{sheet_path} has been locked by another process for {LOCK_TIMEOUT:g} s; nothing"
                 " was recorded"
             )
         time.sleep(TURN)

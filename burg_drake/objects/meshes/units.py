@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from burg_drake.core import MeshError, UnknownNameError, nearest
@@ -47,26 +49,35 @@ def check_extent(extent: float, name: str, scale: float) -> None:
         scale: that it was scaled by.
 
     Raises:
-        MeshError: the size tells of a wrong unit; the message says which ones would do.
+        MeshError: the size tells of a wrong unit; it has those that would do.
     """
     if extent == 0.0:
         raise MeshError(f"{name}: all vertices are at one point")
     if not MIN_EXTENT <= extent <= MAX_EXTENT:
-        raise MeshError(
+        units = _fitting_units(extent / scale)
+        error = MeshError(
             f"{name}: largest extent is {length(extent)}, but lengths are in metres;"
-            f" {_hint(extent / scale)}"
+            f" {_hint(extent / scale, units)}"
         )
+        error.units = tuple(units)
+        raise error
 
 
-def _hint(extent: float) -> str:
-    """Which units would make something of a mesh with this largest extent in its own unit."""
-    fits: dict[str, float] = {}
+def _fitting_units(extent: float) -> dict[str, float]:
+    """Units with their scales that would make something usual of a mesh with this largest extent in
+    its own unit, or else something possible."""
     for low, high in (USUAL_EXTENT, (MIN_EXTENT, MAX_EXTENT)):
-        fits = fits or {u: s for u, s in UNITS.items() if low <= s * extent <= high}
-    if not fits:
+        if fits := {u: s for u, s in UNITS.items() if low <= s * extent <= high}:
+            return fits
+    return {}
+
+
+def _hint(extent: float, units: Mapping[str, float]) -> str:
+    """What to try with a mesh with this largest extent in its own unit."""
+    if not units:
         scale = 10.0 ** (-1.0 - np.ceil(np.log10(extent)))  # 10 to 100 mm
         return f"try scale={scale:g}"
     return "try " + " or ".join(
         f"unit {unit} (scale={scale:g} makes it {length(scale * extent)})"
-        for unit, scale in fits.items()
+        for unit, scale in units.items()
     )

@@ -16,7 +16,7 @@ from burg_drake.apps.cli import main
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.core.grasps import Mode, Verdict
 from burg_drake.core.grasps.outcome import Outcome, RealOutcome, Stage
-from burg_drake.evaluation.records.run_document import run_hash
+from burg_drake.evaluation.records.identity import run_hash
 from burg_drake.evaluation.replay import differences
 from burg_drake.evaluation.stages.judge import judge_grasp
 from burg_drake.evaluation.stages.station_judge import build_judge

@@ -13,7 +13,7 @@ from burg_drake.core.grasps import MOVED, TURNED, Outcome
 from burg_drake.evaluation.records import Columns
 from burg_drake.evaluation.report.elements import Html, element, folded, table
 
-NOTICEABLE = 1e-3
+MIN_DISPLACEMENT = 1e-3
 """Objects count as moved from this displacement on [m]."""
 
 
@@ -56,7 +56,7 @@ def disturbed_section(columns: Columns, disturbance: float) -> Html | None:
     """
     names = [name.removeprefix(MOVED) for name in columns if name.startswith(MOVED)]
     moved = {name: columns[MOVED + name] for name in names}
-    found = {name: int((far >= NOTICEABLE).sum()) for name, far in moved.items()}
+    found = {name: int((far >= MIN_DISPLACEMENT).sum()) for name, far in moved.items()}
     names = sorted((name for name in names if found[name]), key=lambda name: -found[name])
     if not names:
         return None
@@ -76,7 +76,7 @@ def disturbed_section(columns: Columns, disturbance: float) -> Html | None:
     rows = []
     for name in names:
         far = moved[name]
-        mask = far >= NOTICEABLE
+        mask = far >= MIN_DISPLACEMENT
         by, times = Counter(columns["instance"][mask].tolist()).most_common(1)[0]
         cells = [
             int(np.isfinite(far).sum()),
@@ -92,9 +92,10 @@ def disturbed_section(columns: Columns, disturbance: float) -> Html | None:
         rows.append(element("tr", element("th", name, scope="row"), *numbers, cause))
     return folded(
         "What was disturbed",
-        f"Objects that trials on other objects moved by {NOTICEABLE * 1e3:g} mm or more, whatever"
-        " the outcome: in how many of the executed trials, and how far at most in each, at the"
-        " point of the object that moved farthest. Toppled ones stood before and lie at the end.",
+        f"Objects that trials on other objects moved by {MIN_DISPLACEMENT * 1e3:g} mm or more,"
+        " whatever the outcome: in how many of the executed trials, and how far at most in each, at"
+        " the point of the object that moved farthest. Toppled ones stood before and lie at the"
+        " end.",
         table(head, rows, numbers=(1, 2, 3, 4, 5, 6, 7)),
     )
 

@@ -1,11 +1,8 @@
-"""Exact tests: whether two judges of the same trials differ (McNemar), and whether one group of
-trials errs more often than the others (Fisher), with Holm's correction for many groups."""
+"""Whether two answers about the same trials differ: McNemar's exact test."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from math import comb
 
 import numpy as np
 
@@ -74,32 +71,3 @@ def paired_counts(
         difference=difference,
         p_value=p_value,
     )
-
-
-def excess_p_value(errors: int, trials: int, other_errors: int, other_trials: int) -> float:
-    """One-sided p-value of Fisher's exact test that a group errs no more often than the others.
-
-    It is the mid-p (H. O. Lancaster, JASA 56, 1961): half the probability of what was seen counts,
-    as the exact one finds less than it may where counts are small.
-
-    Args:
-        errors, trials: of the group.
-        other_errors, other_trials: of all others.
-    """
-    total = errors + other_errors
-    ways = [
-        comb(trials, k) * comb(other_trials, total - k)
-        for k in range(errors, min(trials, total) + 1)
-    ]
-    return (ways[0] + 2 * sum(ways[1:])) / (2 * comb(trials + other_trials, total))
-
-
-def holm(p_values: Sequence[float]) -> list[float]:
-    """P-values corrected for their number (S. Holm, Scandinavian Journal of Statistics 6, 1979):
-    with those below 0.05 taken for real, the probability of any false one is at most 0.05."""
-    order = np.argsort(p_values, kind="stable")
-    factors = np.arange(len(p_values), 0, -1)
-    corrected = np.empty(len(p_values))
-    scaled = np.minimum(1.0, np.asarray(p_values)[order] * factors)
-    corrected[order] = np.maximum.accumulate(scaled)
-    return [float(p) for p in corrected]
