@@ -98,6 +98,9 @@ class Disturbance:
             root mean square [pixels].
         aspect: how much longer the print is along y than along x [-].
         size: by how much the markers are larger for their distances [-].
+        mean_square_aspect: of how much longer the print may be along y than along x, by
+            probability, whether told or not [-].
+        rest: (N,) what the most probable shifts leave of the offsets of all edges [pixels].
     """
 
     step: Array
@@ -108,6 +111,8 @@ class Disturbance:
     rows: float
     aspect: float
     size: float
+    mean_square_aspect: float
+    rest: Array
 
 
 class SheetModes:
@@ -123,8 +128,9 @@ class SheetModes:
         out_of_plane: (N, L) of heights, of unit variance.
     """
 
-    def __init__(self, center: Array, p_SE: Array) -> None:
-        """Takes the markers' middles (M, 3) and the edges' (N, 3) [m]."""
+    def __init__(self, p_SQ: Array, p_SE: Array) -> None:
+        """Takes the markers' corners (M, 4, 3) and the edges' middles (N, 3) [m]."""
+        center = p_SQ.mean(axis=1)
         n = len(center)
         self.middle = center[:, :2].mean(axis=0)
         x, y = (center[:, :2] - self.middle).T
@@ -134,18 +140,21 @@ class SheetModes:
         along_both = np.asarray(np.kron(alike, np.eye(2)), dtype=float)
         modes = _modes(along_both, moved.transpose(1, 0, 2).reshape(2 * n, 3))
         self.in_plane = np.tensordot(between, modes.reshape(n, 2, -1), axes=1)
-        alike, between = _alike(center, p_SE, HILL)
-        self.out_of_plane = between @ _modes(alike, np.stack([one, x, y], axis=-1))
+        # Not by the markers' middles alone: an edge that curls rises most beyond the last of them.
+        corners = p_SQ.reshape(-1, 3)
+        alike, between = _alike(corners, p_SE, HILL)
+        plane = np.column_stack([np.ones(len(corners)), corners[:, :2] - self.middle])
+        self.out_of_plane = between @ _modes(alike, plane)
 
 
-def _alike(center: Array, p_SE: Array, within: float) -> tuple[Array, Array]:
-    """(M, M) covariance of shifts of markers that are alike within a distance [m], and (N, M)
-    shifts of edges by those of the markers."""
+def _alike(points: Array, p_SE: Array, within: float) -> tuple[Array, Array]:
+    """(M, M) covariance of shifts of points (M, 3) that are alike within a distance [m], and
+    (N, M) shifts of edges by those of the points."""
     covariance, to_edges = (
-        np.exp(-((p[:, None] - center) ** 2).sum(axis=-1) / (2.0 * within**2))
-        for p in (center, p_SE)
+        np.exp(-((p[:, None] - points) ** 2).sum(axis=-1) / (2.0 * within**2))
+        for p in (points, p_SE)
     )
-    known = covariance + FAINT * np.eye(len(center))
+    known = covariance + FAINT * np.eye(len(points))
     return covariance, np.linalg.solve(known, to_edges.T).T
 
 
@@ -199,27 +208,26 @@ class DisturbanceFit:
         height: int,
     ) -> None:
         kept = information > 0.0
-        used, belongs = np.unique(marker[kept], return_inverse=True)
-        across = views.across[kept]
-        self._normal = across / np.sqrt((across**2).sum(axis=1, keepdims=True))
-        self._offset = offset[kept]
+        used, belongs = np.unique(marker, return_inverse=True)
+        self._kept, self._marker = kept, belongs
+        self._normal = views.across / np.sqrt((views.across**2).sum(axis=1, keepdims=True))
+        self._offset = offset
         # sums of edges by marker, weighted
         self._sums = np.zeros((len(used), len(belongs)))
-        self._sums[belongs, np.arange(len(belongs))] = information[kept]
-        self._sums /= self._spread_within_markers(belongs)
-        which = views.which[kept]
-        self._modes = modes.in_plane[which], modes.out_of_plane[which]
-        J = views.motion[kept]
-        row = views.at[kept, 1:] / height - 0.5
+        self._sums[belongs, np.arange(len(belongs))] = information
+        self._sums /= self._spread_within_markers(views, information)
+        self._modes = modes.in_plane[views.which], modes.out_of_plane[views.which]
+        J = views.motion
+        row = views.at[:, 1:] / height - 0.5
         x, y = modes.middle  # about which the sheet is longer: S is the frame that fits best
-        strength = np.sqrt((J**2).mean(axis=0)) + 1e-9
+        strength = np.sqrt((J[kept] ** 2).mean(axis=0)) + 1e-9
         # What the camera does from the first row to the last one moves each edge by [pixels].
         self._turning = J / strength / np.sqrt(6.0)
         parts = {
-            "pose": np.column_stack([J, views.bloom[kept]]),
+            "pose": np.column_stack([J, views.bloom]),
             "rows": row * self._turning,
-            "aspect": 0.5 * (views.print[kept, :1] + (J[:, 3:5] * [-x, y]).sum(axis=1)[:, None]),
-            "size": views.print[kept, 1:],
+            "aspect": 0.5 * (views.print[:, :1] + (J[:, 3:5] * [-x, y]).sum(axis=1)[:, None]),
+            "size": views.print[:, 1:],
             "in_plane": (J[:, None, 3:5] @ self._modes[0])[:, 0],
             "out_of_plane": J[:, 5:] * self._modes[1],
             "center": self._normal,
@@ -253,16 +261,15 @@ class DisturbanceFit:
         G = self._sums @ (self._normal[:, :, None] * self._normal[:, None]).reshape(-1, 4)
         return G.reshape(-1, 2, 2), self._sums @ (self._normal * self._offset[:, None])
 
-    def _spread_within_markers(self, belongs: NDArray[np.intp]) -> float:
+    def _spread_within_markers(self, views: EdgeViews, information: Array) -> float:
         """Variance of offsets within markers over that by the image's noise."""
-        G, g = self._by_marker()
-        G = G + 1e-6 * np.trace(G, axis1=1, axis2=2)[:, None, None] * np.eye(2)
-        shift = np.linalg.solve(G, g[..., None])[..., 0]
-        rest = self._offset - (self._normal * shift[belongs]).sum(axis=1)
-        freedom = len(belongs) - 2 * len(self._sums)
+        alike = np.column_stack([views.motion, views.bloom, views.print])
+        rest = rest_within_markers(self._normal, alike, self._offset, information, self._marker)
+        markers = len(np.unique(self._marker[self._kept]))
+        freedom = np.count_nonzero(self._kept) - 2 * markers - alike.shape[1]
         if freedom < FEWEST:
             return 1.0
-        return max(float((self._sums @ rest**2).sum()) / freedom, LEAST_SPREAD)
+        return max(float((information * rest**2).sum()) / freedom, LEAST_SPREAD)
 
     def _add_up(self) -> None:
         """Sums over all edges, and those by marker, of the columns and of what is seen."""
@@ -302,6 +309,15 @@ class DisturbanceFit:
         logarithm -= float(np.log(known).sum()) + RARE * rare
         return _Solution(logarithm, shifts, x, covariance, columns)
 
+    def _rest(self, solution: _Solution) -> Array:
+        """(N,) what a solution, and the shifts of single markers that it makes likely, leave of
+        the offsets of all edges."""
+        known = self._G + np.eye(2) / solution.shifts.alone**2
+        by_marker = self._shares[..., -1] - self._shares[..., solution.columns] @ solution.x
+        shift = np.linalg.solve(known, by_marker[..., None])[..., 0][self._marker]
+        rest = self._offset - self._J[:, solution.columns] @ solution.x
+        return np.asarray(rest - (self._normal * shift).sum(axis=1))
+
     def _disturbance(self, best: _Solution, solved: list[_Solution], center: float) -> Disturbance:
         """What the best solution says, its step and covariance those of all, by probability. The
         step takes the principal point as it is known, so that the pose fits the image with it."""
@@ -315,6 +331,7 @@ class DisturbanceFit:
         rows, aspect, size, in_plane, out_of_plane = (x[self._columns[kind]] for kind in KINDS)
         weight = np.exp((np.array([s.logarithm for s in solved]) - best.logarithm) / TEMPER)
         weight /= weight.sum()
+        aspects = [s.x[s.columns == self._columns["aspect"][0]].sum() for s in solved]
         steps = np.array([s.x[:6] for s in solved])
         step = weight @ steps
         apart = steps - step
@@ -327,12 +344,40 @@ class DisturbanceFit:
             step,
             covariance,
             best.shifts,
-            float(np.linalg.norm(self._modes[0] @ in_plane, axis=1).max()),
-            float(np.abs(self._modes[1] @ out_of_plane).max()),
-            float(np.sqrt(2.0 * ((self._turning @ rows) ** 2).mean())),
+            float(np.linalg.norm(self._modes[0][self._kept] @ in_plane, axis=1).max()),
+            float(np.abs(self._modes[1][self._kept] @ out_of_plane).max()),
+            float(np.sqrt(2.0 * ((self._turning[self._kept] @ rows) ** 2).mean())),
             float(aspect[0]),
             float(size[0]),
+            float(weight @ np.square(aspects)),
+            self._rest(best),
         )
+
+
+def rest_within_markers(
+    normal: Array, alike: Array, offset: Array, information: Array, marker: NDArray[np.intp]
+) -> Array:
+    """(N,) offsets of edges without what a shift of each marker explains, and changes that are
+    alike for all markers [pixels].
+
+    Args:
+        normal: (N, 2) directions of the offsets.
+        alike: (N, K) motion of edges by such changes.
+        offset: (N,) of edges [pixels].
+        information: (N,) inverse variance of each offset.
+        marker: (N,) that each belongs to.
+    """
+    seen = np.column_stack([alike, offset])
+    n = marker.max() + 1
+    G, g = np.zeros((n, 2, 2)), np.zeros((n, 2, seen.shape[1]))
+    weighted = information[:, None, None] * normal[:, :, None]
+    np.add.at(G, marker, weighted * normal[:, None])
+    np.add.at(g, marker, weighted * seen[:, None])
+    G += (1e-6 * np.trace(G, axis1=1, axis2=2)[:, None, None] + 1e-9) * np.eye(2)
+    seen = seen - np.einsum("ni,nik->nk", normal, np.linalg.solve(G, g)[marker])
+    root = np.sqrt(information)
+    factors = np.linalg.lstsq(seen[:, :-1] * root[:, None], seen[:, -1] * root, rcond=1e-9)[0]
+    return np.asarray(seen[:, -1] - seen[:, :-1] @ factors)
 
 
 def _logarithm(solution: _Solution) -> float:

@@ -15,7 +15,13 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from burg_drake.cameras.optics import Intrinsics
-from burg_drake.cameras.pose.disturbance import Disturbance, DisturbanceFit, SheetModes
+from burg_drake.cameras.pose.disturbance import (
+    Disturbance,
+    DisturbanceFit,
+    MarkerShifts,
+    SheetModes,
+    rest_within_markers,
+)
 from burg_drake.cameras.pose.edge_fit import EdgeFits, fit_edges
 from burg_drake.cameras.pose.edge_projection import (
     MARGIN,
@@ -156,7 +162,7 @@ class EdgeRefinement:
         self._edges = edges
         self._corners = p_SQ
         self._intrinsics = intrinsics
-        self._modes = SheetModes(p_SQ.mean(axis=1), edges.p_SE)
+        self._modes = SheetModes(p_SQ, edges.p_SE)
 
     def refine(
         self,
@@ -246,8 +252,8 @@ class EdgeRefinement:
         sd = np.sqrt(_offset_variance(fits, good) + MODEL_SD**2)
         weight = good.astype(float)
         for _ in range(REWEIGHTED):
-            apart = _marker_shifts(normal, fits.offset, weight / sd**2, marker, len(shift))
-            rest = (fits.offset - (normal * apart[marker]).sum(axis=1)) / sd
+            information = weight / sd**2
+            rest = rest_within_markers(normal, views.print, fits.offset, information, marker) / sd
             weight = good * _tukey_weight(rest, good)
         offset = fits.offset + (normal * shift[marker]).sum(axis=1)
         J = np.column_stack([views.motion, views.bloom])
@@ -277,22 +283,33 @@ class EdgeRefinement:
     def with_disturbance(self, light: NDArray[np.float32], last: EdgeRound) -> RefinedPose:
         """The pose of the last round if markers may be shifted."""
         found = self._disturbance(last)
-        moved = last.views.motion @ found.step
-        if np.sqrt(np.average(moved**2, weights=last.weight)) > LONG:
-            shift = self._shifts_by_marker(last, last.residual - moved)
-            there = replace(last, X_SC=perturbed_pose(last.X_SC, found.step))
-            last, _ = self._iterate_by_marker(light, there, last.views.which, shift, step=False)
+        if replace(found.shifts, size=0.0) != MarkerShifts():
+            # Weights by how edges fit the pose leave out those that shifts move most, so that
+            # shifts look smaller than they are.
+            last = self._fit_shifted(light, last, found)
+            found = self._disturbance(last)
+            good = _has_expected_profile(last.fits)
+            last = replace(last, weight=good * _tukey_weight(found.rest / last.sd, good))
             found = self._disturbance(last)
         X_SC = perturbed_pose(last.X_SC, found.step)
         covariance = found.covariance.copy()
         covariance[:3, :3] += self._shift_by_blur(last)
-        covariance[3:, 3:] += found.aspect**2 * self._unknown_size(X_SC[:3, 3])
+        covariance[3:, 3:] += found.mean_square_aspect * self._unknown_size(X_SC[:3, 3])
         changed = {
             "X_SC": X_SC,
             "covariance": covariance,
             "residual": last.residual - last.views.motion @ found.step,
         }
         return RefinedPose(**(vars(last) | changed), disturbance=found)
+
+    def _fit_shifted(
+        self, light: NDArray[np.float32], last: EdgeRound, found: Disturbance
+    ) -> EdgeRound:
+        """A round that looks for the edges where shifts put their markers."""
+        rest = last.residual - last.views.motion @ found.step
+        there = replace(last, X_SC=perturbed_pose(last.X_SC, found.step), residual=rest)
+        shift = self._shifts_by_marker(there, rest)
+        return self._iterate_by_marker(light, there, last.views.which, shift, step=False)[0]
 
     def _disturbance(self, last: EdgeRound) -> Disturbance:
         return DisturbanceFit(
