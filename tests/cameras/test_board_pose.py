@@ -344,6 +344,19 @@ def test_a_print_longer_along_one_axis_leaves_its_size_open(scale: tuple[float, 
     assert np.linalg.norm(off) > 1e-3
 
 
+def test_edges_that_a_longer_axis_moves_most_count_too() -> None:
+    """In noise they look like outliers of a pose that does not know of it: 1.004, 0.06 degrees."""
+    X_SC = view((0.29, 0.2), 0.7, 45.0, 80.0, 10.0)
+    look = ImageDegradation(blur=0.7, noise=2.0)
+    rng = np.random.default_rng(0)
+    image = board_image(Board(), CAMERA, X_SC, scale=(0.995, 1.0), look=look, rng=rng)
+    estimate = BoardPose(Board(), CAMERA).estimate(image)
+    assert estimate.valid and "1.005 times as long along y as along x" in estimate.reason
+    off = error(estimate.X_SC, X_SC)
+    assert np.rad2deg(np.linalg.norm(off[:3])) < 0.02
+    assert np.sqrt(off @ np.linalg.solve(estimate.covariance, off) / 6.0) < 1.3
+
+
 def test_what_intrinsics_are_known_to_is_in_the_covariance() -> None:
     X_SC = view((0.29, 0.2), 0.7, 20.0, 40.0, 10.0)
     image = board_image(Board(), CAMERA, X_SC)

@@ -121,6 +121,22 @@ def test_a_sheet_that_bulges() -> None:
     assert np.sqrt(np.mean([sds(f) ** 2 for f in found])) < 3.0
 
 
+def test_an_edge_that_curls() -> None:
+    """It rises most beyond the middles of the outermost markers."""
+
+    def height(p: np.ndarray) -> np.ndarray:
+        return 6e-3 * (1.0 - np.minimum(p[..., 0] / 0.15, 1.0)) ** 2
+
+    corners, p = CORNERS.reshape(-1, 3), places()
+    A = [np.column_stack([np.ones(len(q)), q[:, :2]]) for q in (corners, p)]
+    p[:, 2] = height(p) - A[1] @ np.linalg.lstsq(A[0], height(corners), rcond=None)[0]
+    seen = offsets(p, still())
+    found = [fitted(seen, np.random.default_rng(seed)) for seed in range(8)]
+    assert np.median([np.linalg.norm(off(f)[3:]) * 1e3 for f in found]) < 0.2 * without(seen)
+    # 1.2 with heights by the middles
+    assert np.sqrt(np.mean([sds(f) ** 2 for f in found])) < 0.9
+
+
 def test_rows_that_are_exposed_one_after_the_other() -> None:
     rng = np.random.default_rng(2)
     # 2 pixels from the first row to the last one, by a turn of the camera.

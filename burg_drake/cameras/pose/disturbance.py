@@ -32,7 +32,7 @@ SIZE = 0.01
 from that within [-]."""
 ASPECT = 0.01
 """Of a print's length along y for that along x [-]."""
-PAGE, HILL = 0.15, 0.16
+PAGE, HILL = 0.15, 0.14
 """Distances within which shifts along the sheet, and heights, are alike [m]: half a page of A4, and
 a hill of paper is wide."""
 MODES = 40
@@ -100,7 +100,7 @@ class Disturbance:
         size: by how much the markers are larger for their distances [-].
         mean_square_aspect: of how much longer the print may be along y than along x, by
             probability, whether told or not [-].
-        rest: (N,) what the most probable shifts leave of the offsets of all edges [pixels].
+        rest: (N,) offsets of all edges, less the patterns of the most probable shifts [pixels].
     """
 
     step: Array
@@ -309,15 +309,6 @@ class DisturbanceFit:
         logarithm -= float(np.log(known).sum()) + RARE * rare
         return _Solution(logarithm, shifts, x, covariance, columns)
 
-    def _rest(self, solution: _Solution) -> Array:
-        """(N,) what a solution, and the shifts of single markers that it makes likely, leave of
-        the offsets of all edges."""
-        known = self._G + np.eye(2) / solution.shifts.alone**2
-        by_marker = self._shares[..., -1] - self._shares[..., solution.columns] @ solution.x
-        shift = np.linalg.solve(known, by_marker[..., None])[..., 0][self._marker]
-        rest = self._offset - self._J[:, solution.columns] @ solution.x
-        return np.asarray(rest - (self._normal * shift).sum(axis=1))
-
     def _disturbance(self, best: _Solution, solved: list[_Solution], center: float) -> Disturbance:
         """What the best solution says, its step and covariance those of all, by probability. The
         step takes the principal point as it is known, so that the pose fits the image with it."""
@@ -350,7 +341,7 @@ class DisturbanceFit:
             float(aspect[0]),
             float(size[0]),
             float(weight @ np.square(aspects)),
-            self._rest(best),
+            self._offset - self._J[:, best.columns] @ best.x,
         )
 
 
