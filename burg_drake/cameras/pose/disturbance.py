@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from burg_drake.cameras.pose.edge_projection import EdgeViews
 from burg_drake.core import Array
 
-ALONE = 0.006, 0.02, 0.06, 0.2
+MARKER_SIGMAS_PX = 0.006, 0.02, 0.06, 0.2
 """Shifts of single markers, for whatever else is not as assumed; standard deviations that are tried
 [pixels]. In images without noise the first one is right."""
 IN_PLANE = 1.5e-4, 6e-4, 2e-3
@@ -32,7 +32,7 @@ SIZE = 0.01
 from that within [-]."""
 ASPECT = 0.01
 """Of a print's length along y for that along x [-]."""
-PAGE, HILL = 0.15, 0.14
+PAGE_CORRELATION_LENGTH, BULGE_CORRELATION_LENGTH = 0.15, 0.14
 """Distances within which shifts along the sheet, and heights, are alike [m]: half a page of A4, and
 a hill of paper is wide."""
 MODES = 40
@@ -50,14 +50,14 @@ FEWEST = 5
 """Edges more than markers' shifts from which on their spread is known."""
 LEAST_SPREAD = 1e-3
 """Of that over what noise makes; keeps probabilities finite."""
-RARE = 6.0
+LOG_PRIOR_PENALTY = 6.0
 """By how much each kind of shift lowers the logarithm of the probability before it is seen; the
 largest of its sizes lowers it twice as much."""
-TOLD = 8.0
+REPORT_THRESHOLD = 8.0
 """By how much the logarithm of the probability must exceed that without a kind of shift for it to
 be told; less may be chance, and only widens the covariance. Another kind that explains the same
 does not keep the better one from being told."""
-TEMPER = 4.0
+LIKELIHOOD_TEMPERATURE = 4.0
 """Logarithms of probabilities count by this part of them: patterns are not quite those of a real
 sheet."""
 
@@ -75,7 +75,7 @@ class MarkerShifts:
         size: of the markers for their distances [-].
     """
 
-    alone: float = ALONE[0]
+    alone: float = MARKER_SIGMAS_PX[0]
     in_plane: float = 0.0
     out_of_plane: float = 0.0
     rows: float = 0.0
@@ -136,13 +136,13 @@ class SheetModes:
         x, y = (center[:, :2] - self.middle).T
         one, zero = np.ones(n), np.zeros(n)
         moved = np.stack([[one, zero], [zero, one], [-y, x]], axis=-1)  # (2, n, 3)
-        alike, between = _alike(center, p_SE, PAGE)
+        alike, between = _alike(center, p_SE, PAGE_CORRELATION_LENGTH)
         along_both = np.asarray(np.kron(alike, np.eye(2)), dtype=float)
         modes = _modes(along_both, moved.transpose(1, 0, 2).reshape(2 * n, 3))
         self.in_plane = np.tensordot(between, modes.reshape(n, 2, -1), axes=1)
         # Not by the markers' middles alone: an edge that curls rises most beyond the last of them.
         corners = p_SQ.reshape(-1, 3)
-        alike, between = _alike(corners, p_SE, HILL)
+        alike, between = _alike(corners, p_SE, BULGE_CORRELATION_LENGTH)
         plane = np.column_stack([np.ones(len(corners)), corners[:, :2] - self.middle])
         self.out_of_plane = between @ _modes(alike, plane)
 
@@ -236,7 +236,7 @@ class DisturbanceFit:
         self._columns = {kind: np.arange(*ends[k : k + 2]) for k, kind in enumerate(parts)}
         self._J = np.column_stack(list(parts.values()))
         self._add_up()
-        self._equations = {alone: self._normal_equations(alone) for alone in ALONE}
+        self._equations = {alone: self._normal_equations(alone) for alone in MARKER_SIGMAS_PX}
 
     def fit(self, prior: Array, center: float = 0.0) -> Disturbance:
         """The most probable shifts, and the step of the pose with them.
@@ -245,7 +245,7 @@ class DisturbanceFit:
             prior: (7, 7) information about the step of pose and bloom that is known before.
             center: standard deviation of the camera's principal point along u and v [pixels].
         """
-        solved = {s: self._solve(s, prior) for s in map(MarkerShifts, ALONE)}
+        solved = {s: self._solve(s, prior) for s in map(MarkerShifts, MARKER_SIGMAS_PX)}
         best = max(solved.values(), key=_logarithm)
         for _ in range(len(KINDS)):
             others = [s for s in _with_another(best.shifts) if s not in solved]
@@ -306,7 +306,7 @@ class DisturbanceFit:
         x = covariance @ b
         logarithm += 0.5 * float(b @ x) - 0.5 * float(np.linalg.slogdet(A)[1])
         rare = sum(1 + (sds[k] == KINDS[k][-1] and len(KINDS[k]) > 1) for k in _kinds(shifts))
-        logarithm -= float(np.log(known).sum()) + RARE * rare
+        logarithm -= float(np.log(known).sum()) + LOG_PRIOR_PENALTY * rare
         return _Solution(logarithm, shifts, x, covariance, columns)
 
     def _disturbance(self, best: _Solution, solved: list[_Solution], center: float) -> Disturbance:
@@ -317,10 +317,12 @@ class DisturbanceFit:
         chosen = _kinds(best.shifts)
         for kind in KINDS:
             without = (s for s in solved if not _kinds(s.shifts) - (chosen - {kind}))
-            if best.logarithm - max(map(_logarithm, without)) < TOLD:
+            if best.logarithm - max(map(_logarithm, without)) < REPORT_THRESHOLD:
                 x[self._columns[kind]] = 0.0
         rows, aspect, size, in_plane, out_of_plane = (x[self._columns[kind]] for kind in KINDS)
-        weight = np.exp((np.array([s.logarithm for s in solved]) - best.logarithm) / TEMPER)
+        weight = np.exp(
+            (np.array([s.logarithm for s in solved]) - best.logarithm) / LIKELIHOOD_TEMPERATURE
+        )
         weight /= weight.sum()
         aspects = [s.x[s.columns == self._columns["aspect"][0]].sum() for s in solved]
         steps = np.array([s.x[:6] for s in solved])
@@ -381,7 +383,7 @@ def _kinds(shifts: MarkerShifts) -> set[str]:
 
 def _with_another(shifts: MarkerShifts) -> Iterator[MarkerShifts]:
     """Shifts that differ from some in one kind, and in those of single markers."""
-    for alone in {shifts.alone, ALONE[0]}:
+    for alone in {shifts.alone, MARKER_SIGMAS_PX[0]}:
         for kind, values in KINDS.items():
             for value in values:
                 yield replace(shifts, alone=alone, **{kind: value})

@@ -50,7 +50,7 @@ MOST_BLOOM = 4.0
 """White that is larger by more than that leaves no cells to read [pixels]."""
 STILL = 0.05
 """Edges that a round moves by less are where they belong, root mean square [pixels]."""
-MORE = 3
+MAX_FULL_ROUNDS = 3
 """Rounds with all edges, at most."""
 LONG = 0.3
 """A first step that moves an edge by more is followed by another of its kind: edges are fitted best
@@ -195,7 +195,7 @@ class EdgeRefinement:
             which = np.concatenate([found[:FIRST], unread[:LATER]])
             result = self._iterate(light, result.X_SC, which, result.spread)
             found = found if result is None else self._seen(result, found)
-        for _ in range(MORE):
+        for _ in range(MAX_FULL_ROUNDS):
             result = result and self._iterate(light, result.X_SC, found[:LAST], result.spread)
             if result is None or result.moved < STILL:
                 break
