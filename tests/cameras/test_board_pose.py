@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras.pose.edge_projection import perturbed_pose
 from burg_drake.cameras.pose.estimate import BoardEstimate
 from burg_drake.cameras.pose.estimator import BoardPose, estimate_board
-from burg_drake.cameras.pose.refinement import perturbed_pose
 from burg_drake.core.errors import InvalidInputError
 from burg_drake.scene.document.markers import Markers
 from burg_drake.scene.document.scene import Board

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from burg_drake.cameras.pose.disturbance import Disturbance, DisturbanceFit, SheetModes
-from burg_drake.cameras.pose.edge_projection import EdgeViews, view_edges
+from burg_drake.cameras.pose.edge_projection import EdgeViews, perturbed_pose, view_edges
 from burg_drake.cameras.pose.edges import marker_edges
 from burg_drake.cameras.pose.estimator import BoardPose
-from burg_drake.cameras.pose.refinement import perturbed_pose
 from burg_drake.scene.document.scene import Board
 from tests.cameras.board_views import CAMERA, error, view
 from tests.cameras.placement_views import INTRINSICS, looking

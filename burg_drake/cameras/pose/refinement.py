@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from burg_drake.cameras.optics import Intrinsics
 from burg_drake.cameras.pose.disturbance import (
@@ -22,12 +21,18 @@ from burg_drake.cameras.pose.disturbance import (
     SheetModes,
     rest_within_markers,
 )
-from burg_drake.cameras.pose.edge_fit import EdgeFits, fit_edges
+from burg_drake.cameras.pose.edge_fit import (
+    FARTHEST,
+    EdgeFits,
+    fit_edges,
+    has_expected_profile,
+    offset_variance,
+)
 from burg_drake.cameras.pose.edge_projection import (
     MARGIN,
-    NEAREST,
     EdgeViews,
-    motion_of_points,
+    perturbed_pose,
+    predicted_places,
     view_edges,
 )
 from burg_drake.cameras.pose.edges import MarkerEdges
@@ -69,12 +74,6 @@ EXPECTED_EDGES = 0.2
 SURE = 3
 """Read markers from which on a pose puts the others well; with fewer, most of a marker's edges must
 look as they should: covers have edges, too."""
-FAINTEST = 0.25
-"""Least contrast, as a share of the upper quartile of all."""
-UNLIKE = 0.15
-"""Most that a fit may leave, as a share of the contrast, besides the image's noise."""
-FARTHEST = 1.5
-"""Largest offset that a fit can be trusted with [pixels]."""
 MODEL_SD = 0.01
 """What an offset errs by in images without noise: cells and blur are not exactly as assumed
 [pixels]; the median in images with exact truth."""
@@ -246,10 +245,10 @@ class EdgeRefinement:
         shift = np.clip(shift, -MAX_SHIFT, MAX_SHIFT)
         looked_at = replace(views, at=views.at + shift[marker])
         fits = fit_edges(light, self._edges, looked_at, last.spread.blur)
-        good = _has_expected_profile(fits)
+        good = has_expected_profile(fits)
         if good.sum() < LEAST_EDGES:
             return last, shift
-        sd = np.sqrt(_offset_variance(fits, good) + MODEL_SD**2)
+        sd = np.sqrt(offset_variance(fits, good) + MODEL_SD**2)
         weight = good.astype(float)
         for _ in range(REWEIGHTED):
             information = weight / sd**2
@@ -273,12 +272,17 @@ class EdgeRefinement:
         return found, self._shifts_by_marker(found, found.residual)
 
     def _shifts_by_marker(self, found: EdgeRound, offset: Array) -> Array:
-        """(M, 2) shifts of markers by the offsets (N,) of their edges [pixels]."""
+        """(M, 2) shifts of markers by the offsets (N,) of their edges [pixels]; 0 for markers
+        without edges."""
         views = found.views
         normal = views.across / np.sqrt((views.across**2).sum(axis=1, keepdims=True))
         marker = self._edges.marker[views.which]
         information = found.weight / found.sd**2
-        return _marker_shifts(normal, offset, information, marker, len(self._corners))
+        G, g = np.zeros((len(self._corners), 2, 2)), np.zeros((len(self._corners), 2))
+        np.add.at(G, marker, information[:, None, None] * normal[:, :, None] * normal[:, None])
+        np.add.at(g, marker, (information * offset)[:, None] * normal)
+        G += np.eye(2) / FARTHEST**2
+        return np.asarray(np.linalg.solve(G, g[..., None])[..., 0])
 
     def with_disturbance(self, light: NDArray[np.float32], last: EdgeRound) -> RefinedPose:
         """The pose of the last round if markers may be shifted."""
@@ -288,7 +292,7 @@ class EdgeRefinement:
             # shifts look smaller than they are.
             last = self._fit_shifted(light, last, found)
             found = self._disturbance(last)
-            good = _has_expected_profile(last.fits)
+            good = has_expected_profile(last.fits)
             last = replace(last, weight=good * _tukey_weight(found.rest / last.sd, good))
             found = self._disturbance(last)
         X_SC = perturbed_pose(last.X_SC, found.step)
@@ -373,10 +377,10 @@ class EdgeRefinement:
         if len(views.which) < LEAST_EDGES:
             return None
         fits = fit_edges(light, self._edges, views, spread.blur)
-        good = _has_expected_profile(fits)
+        good = has_expected_profile(fits)
         if good.sum() < LEAST_EDGES:
             return None
-        sd = np.sqrt(_offset_variance(fits, good) + MODEL_SD**2)
+        sd = np.sqrt(offset_variance(fits, good) + MODEL_SD**2)
         J = np.column_stack([views.motion, views.bloom])
         step, weight = _robust_step(J, fits.offset, sd, good)
         residual = fits.offset - J @ step
@@ -418,13 +422,6 @@ def _bloom_prior() -> Array:
     return prior
 
 
-def _offset_variance(fits: EdgeFits, good: NDArray[np.bool_]) -> Array:
-    """(N,) variance of offsets by the image's noise [pixels^2]: light is noisy by its root."""
-    contrast = np.maximum(np.abs(fits.contrast), 4e-6)
-    noise = np.median(fits.noise[good] / np.sqrt(contrast[good]))
-    return np.asarray(noise**2 / (contrast * np.maximum(fits.information, 1e-6)))
-
-
 def _better_blur(blur: Array, views: EdgeViews, widening: Array, good: NDArray[np.bool_]) -> Array:
     """(2, 2) the blur with which edges fit better; of a change that no edge tells, none."""
     n = views.across[good]
@@ -441,55 +438,6 @@ def _better_blur(blur: Array, views: EdgeViews, widening: Array, good: NDArray[n
     better = blur + root @ (axes * np.clip(share, -0.3, 0.5)) @ axes.T @ root.T
     variance, axes = np.linalg.eigh(better)
     return np.asarray((axes * np.clip(variance, LEAST_BLUR, MOST_BLUR)) @ axes.T)
-
-
-def predicted_places(
-    p_SQ: Array, intrinsics: Intrinsics, X_SC: Array, covariance: Array
-) -> tuple[Array, Array]:
-    """Places (..., 2) in the image of points (..., 3) [pixels], and their variance (...) along the
-    larger axis [pixels^2]: infinite for points behind the camera."""
-    p_S = p_SQ.reshape(-1, 3)
-    ahead = (p_S - X_SC[:3, 3]) @ X_SC[:3, 2] > NEAREST
-    at, motion = motion_of_points(intrinsics, X_SC, p_S)
-    spread = motion @ covariance @ motion.transpose(0, 2, 1)
-    variance = np.where(ahead, np.linalg.eigvalsh(spread)[:, -1], np.inf)
-    return at.reshape(*p_SQ.shape[:-1], 2), variance.reshape(p_SQ.shape[:-1])
-
-
-def perturbed_pose(X_SC: Array, step: Array, p_SA: Array | None = None) -> Array:
-    """A pose after a small rotation and translation (6,), see `BoardEstimate.covariance`.
-
-    Args:
-        X_SC: (4, 4) pose.
-        step: (6,) rotation [rad] and translation [m].
-        p_SA: (3,) point about which the rotation turns the camera, shifted before; the camera
-            itself if None. To first order it makes no difference; a point in the middle of what is
-            seen makes longer steps hold.
-    """
-    R = Rotation.from_rotvec(step[:3]).as_matrix()
-    X = np.eye(4)
-    X[:3, :3] = R @ X_SC[:3, :3]
-    if p_SA is None:
-        X[:3, 3] = X_SC[:3, 3] + step[3:]
-    else:
-        arm = X_SC[:3, 3] - p_SA
-        X[:3, 3] = p_SA + R @ (arm + step[3:] - np.cross(step[:3], arm))
-    return X
-
-
-def _has_expected_profile(fits: EdgeFits) -> NDArray[np.bool_]:
-    """Edges with the right colors, enough contrast, and a profile that fits."""
-    right = fits.contrast > 0.0
-    if not right.any():
-        return right
-    usual = np.quantile(fits.contrast[right], 0.75)
-    noise = np.median(fits.noise[right])
-    return np.asarray(
-        (fits.contrast > FAINTEST * usual)
-        & (fits.noise < UNLIKE * fits.contrast + 2.0 * noise)
-        & (np.abs(fits.offset) < FARTHEST)
-        & (fits.contrast**2 * fits.information > 4.0 * fits.noise**2)
-    )
 
 
 def _robust_step(
@@ -510,18 +458,6 @@ def _tukey_weight(rest: Array, good: NDArray[np.bool_]) -> Array:
     """(N,) weights of residuals (N,) by the spread of the good ones."""
     scale = 1.4826 * np.median(np.abs(rest[good]))  # of normal residuals
     return np.asarray(np.maximum(1.0 - (rest / (TUKEY * scale)) ** 2, 0.0) ** 2)
-
-
-def _marker_shifts(
-    normal: Array, offset: Array, information: Array, marker: NDArray[np.intp], count: int
-) -> Array:
-    """(M, 2) shifts of markers by the offsets (N,) of their edges along normals (N, 2); 0 for
-    markers without edges."""
-    G, g = np.zeros((count, 2, 2)), np.zeros((count, 2))
-    np.add.at(G, marker, information[:, None, None] * normal[:, :, None] * normal[:, None])
-    np.add.at(g, marker, (information * offset)[:, None] * normal)
-    G += np.eye(2) / FARTHEST**2
-    return np.asarray(np.linalg.solve(G, g[..., None])[..., 0])
 
 
 def _weighted_step(J: Array, e: Array, weight: Array) -> Array:
