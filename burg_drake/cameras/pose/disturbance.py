@@ -269,7 +269,7 @@ class DisturbanceFit:
         freedom = np.count_nonzero(self._kept) - 2 * markers - alike.shape[1]
         if freedom < FEWEST:
             return 1.0
-        return max(float((information * rest**2).sum()) / freedom, LEAST_SPREAD)
+        return float(max((information * rest**2).sum() / freedom, LEAST_SPREAD))
 
     def _add_up(self) -> None:
         """Sums over all edges, and those by marker, of the columns and of what is seen."""
