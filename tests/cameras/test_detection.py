@@ -6,11 +6,10 @@ import cv2
 import numpy as np
 
 from burg_drake.cameras.pose.detection import MarkerDetector, other_markers
-from burg_drake.cameras.pose.edge_projection import view_edges
+from burg_drake.cameras.pose.edge_projection import perturbed_pose, view_edges
 from burg_drake.cameras.pose.edges import REACH, marker_edges
 from burg_drake.cameras.pose.estimator import grey_image
 from burg_drake.cameras.pose.quadrilaterals import read_cells
-from burg_drake.cameras.pose.refinement import perturbed_pose
 from burg_drake.scene.document.markers import Markers, marker_dictionary
 from burg_drake.scene.document.scene import Board
 from tests.cameras.board_views import SMALL, view

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from burg_drake.cameras.pose.disturbance import Disturbance, DisturbanceFit, SheetModes
-from burg_drake.cameras.pose.edge_projection import EdgeViews, view_edges
+from burg_drake.cameras.pose.edge_projection import EdgeViews, perturbed_pose, view_edges
 from burg_drake.cameras.pose.edges import marker_edges
 from burg_drake.cameras.pose.estimator import BoardPose
-from burg_drake.cameras.pose.refinement import perturbed_pose
 from burg_drake.scene.document.scene import Board
 from tests.cameras.board_views import CAMERA, error, view
 from tests.cameras.placement_views import INTRINSICS, looking
@@ -18,9 +17,10 @@ from tests.cameras.synthetic import ImageDegradation, board_image
 
 BOARD = Board()
 VIEW = view((0.29, 0.2), 0.75, 25.0, 40.0, 15.0)
-CENTER = BOARD.layout.p_SQ.mean(axis=1)
+CORNERS = BOARD.layout.p_SQ
+CENTER = CORNERS.mean(axis=1)
 EDGES = marker_edges(BOARD.layout)
-MODES = SheetModes(CENTER, EDGES.p_SE)
+MODES = SheetModes(CORNERS, EDGES.p_SE)
 NOISE = 0.05
 """Of an edge's place [pixels]."""
 PRIOR = np.diag([0.0] * 6 + [1.0])
@@ -120,6 +120,22 @@ def test_a_sheet_that_bulges() -> None:
     assert np.sqrt(np.mean([sds(f) ** 2 for f in found])) < 3.0
 
 
+def test_an_edge_that_curls() -> None:
+    """It rises most beyond the middles of the outermost markers."""
+
+    def height(p: np.ndarray) -> np.ndarray:
+        return 6e-3 * (1.0 - np.minimum(p[..., 0] / 0.15, 1.0)) ** 2
+
+    corners, p = CORNERS.reshape(-1, 3), places()
+    A = [np.column_stack([np.ones(len(q)), q[:, :2]]) for q in (corners, p)]
+    p[:, 2] = height(p) - A[1] @ np.linalg.lstsq(A[0], height(corners), rcond=None)[0]
+    seen = offsets(p, still())
+    found = [fitted(seen, np.random.default_rng(seed)) for seed in range(8)]
+    assert np.median([np.linalg.norm(off(f)[3:]) * 1e3 for f in found]) < 0.2 * without(seen)
+    # 1.2 with heights by the middles
+    assert np.sqrt(np.mean([sds(f) ** 2 for f in found])) < 0.9
+
+
 def test_rows_that_are_exposed_one_after_the_other() -> None:
     rng = np.random.default_rng(2)
     # 2 pixels from the first row to the last one, by a turn of the camera.
@@ -142,13 +158,15 @@ def test_a_print_that_is_longer_along_y() -> None:
 
 
 def test_patterns_neither_shift_nor_turn_the_sheet() -> None:
-    modes = SheetModes(CENTER, CENTER)
+    modes = SheetModes(CORNERS, CENTER)
     x, y = (CENTER[:, :2] - CENTER[:, :2].mean(axis=0)).T
     whole = [np.c_[np.ones(54), 0 * x], np.c_[0 * x, np.ones(54)], np.c_[-y, x]]
     for moved in whole:
         assert np.abs(np.einsum("mi,mik->k", moved, modes.in_plane)).max() < 0.02
-    for tilted in (np.ones(54), x, y):
-        assert np.abs(tilted @ modes.out_of_plane).max() < 0.02
+    corners = CORNERS.reshape(-1, 3)
+    modes = SheetModes(CORNERS, corners)
+    for tilted in (np.ones(216), *(corners[:, :2] - corners[:, :2].mean(axis=0)).T):
+        assert np.abs(tilted @ modes.out_of_plane).max() < 0.05
 
 
 def test_unclear_markers_of_a_far_camera_are_not_taken_for_shifted_ones() -> None:

@@ -15,24 +15,24 @@ from burg_drake.core import Array
 from burg_drake.core.documents import Pose, Vector3
 from burg_drake.scene.document import Scene
 
-ENOUGH = 0.2
+MIN_ABSENCE_VISIBILITY = 0.2
 """Share of the silhouette that must be seen for a verdict that something is not there."""
-WELL = 0.4
+MIN_MEASUREMENT_VISIBILITY = 0.4
 """Share that must be seen to be sure of a measurement."""
 AGREEMENT = 0.6
 """Share of the outline, or of the points before the board, that must fit."""
-CLEAR = 0.85
+MIN_INK_AGREEMENT = 0.85
 """Agreement at which an object as dark as ink, or as bright as paper, may stand on it."""
 SUPPORT = 0.45
 """Mean evidence in the silhouette from which on it is filled."""
-SPILL = 0.35
+MAX_SPILL_SHARE = 0.35
 """Share around the silhouette that may be something else: a shadow, a hand, a cable."""
-COLORFUL, UNLIKE = 0.6, 0.4
+MIN_MEDIAN_LIKENESS, MIN_LIKENESS_RATIO = 0.6, 0.4
 """Likeness that objects have in the middle where their meshes' colors are the real ones, and the
 share of it below which one of them is doubtful."""
-VAGUE = np.deg2rad(3.0)
+MAX_ANGLE_SD = np.deg2rad(3.0)
 """Standard deviation of the angle above which an angle is not worth much [rad]."""
-LOOSE = 0.003
+MAX_DISPLACEMENT_SD = 0.003
 """The same of the displacement [m]."""
 
 
@@ -84,7 +84,11 @@ def placement_of(
 
 def typical_likeness(located: Iterable[Located]) -> float:
     """Median likeness of the objects that were found; 0 of fewer than three."""
-    likeness = [f.likeness for f in located if f.alignment is not None and f.seen > WELL]
+    likeness = [
+        f.likeness
+        for f in located
+        if f.alignment is not None and f.seen > MIN_MEASUREMENT_VISIBILITY
+    ]
     return float(np.median(likeness)) if len(likeness) > 2 else 0.0
 
 
@@ -102,9 +106,9 @@ def unseen(scene: Scene, name: str, reason: str, seen: float = 0.0) -> Placement
 
 def _missing(found: Located) -> str:
     """Why an object is not seen; empty if it is."""
-    if found.in_image < ENOUGH:
+    if found.in_image < MIN_ABSENCE_VISIBILITY:
         return "it is out of view"
-    if found.seen < ENOUGH:
+    if found.seen < MIN_ABSENCE_VISIBILITY:
         return "other objects hide it"
     if found.alignment is None or found.support < SUPPORTED:
         return f"nothing like it was found within {1e3 * RANGE:.0f} mm of its target"
@@ -122,25 +126,29 @@ def _doubt(
             f"only {100 * alignment.agreement:.0f} % of its outline fit what is seen:"
             " is it another object, or in another pose?"
         )
-    if found.support < SUPPORT and alignment.agreement < CLEAR:
+    if found.support < SUPPORT and alignment.agreement < MIN_INK_AGREEMENT:
         return (
             "the board is seen where it should hide it: is it another object, or in another pose?"
         )
     if alignment.residual > rough:
         return "its outline does not quite fit: is it another object, or in another pose?"
-    if shape.colors is not None and found.likeness < UNLIKE * typical and typical > COLORFUL:
+    if (
+        shape.colors is not None
+        and found.likeness < MIN_LIKENESS_RATIO * typical
+        and typical > MIN_MEDIAN_LIKENESS
+    ):
         return "it does not have the colors of its mesh: is it another object?"
-    if found.spill > SPILL:
+    if found.spill > MAX_SPILL_SHARE:
         return "something stands out beside it: is it another object, or in another pose?"
     if alignment.ambiguous:
         return "another place fits almost as well"
     if alignment.turnable:
         turn = np.rad2deg(max(alignment.turnable, key=abs))
         return f"it fits as well when rotated by another {turn:+.0f} deg"
-    if found.seen < WELL:
+    if found.seen < MIN_MEASUREMENT_VISIBILITY:
         return f"only {100 * found.seen:.0f} % of it can be seen"
-    if deviation[:2].max() > LOOSE:
+    if deviation[:2].max() > MAX_DISPLACEMENT_SD:
         return f"its place is known to {1e3 * deviation[:2].max():.1f} mm only"
-    if not shape.symmetric and deviation[2] > VAGUE:
+    if not shape.symmetric and deviation[2] > MAX_ANGLE_SD:
         return f"its rotation is known to {np.rad2deg(deviation[2]):.0f} deg only"
     return ""

@@ -22,16 +22,16 @@ from burg_drake.cameras.placement.candidates import (
 from burg_drake.cameras.placement.localization import Located, best_alignment
 from burg_drake.core import Array
 
-FITS = 0.7
+MIN_AGREEMENT = 0.7
 """Agreement of what is seen of an object's outline from which on it may stand in a place."""
-SHOWN = 0.4
+MIN_OUTLINE_SHARE = 0.4
 """Share of its outline that is seen and agrees from which on it is said to stand in another's
 place: with less, an object behind another one fits many things."""
-FILLED = 0.6
+MIN_SILHOUETTE_EVIDENCE = 0.6
 """Mean evidence in its silhouette for that."""
-COLORED = 0.4
+MIN_COLOR_LIKENESS = 0.4
 """Likeness of its colors for that, where they are known."""
-CLEARER = 0.5
+MIN_SCORE_GAIN = 0.5
 """By how much better than the object that belongs there, and than in its own place, it has to fit:
 in the sum of agreement, evidence and likeness, which is 3 at most."""
 
@@ -70,8 +70,8 @@ def exchanged_objects(
             shape = at_place_of(shapes[name], shapes[place])
             found = _found(aligner, shape, sure, others)
             fit = _fit(aligner, shape, found, others)
-            clear = fit.total > max(own[place].total, own[name].total) + CLEARER
-            if found is not None and fit.good and fit.shown > SHOWN and clear:
+            clear = fit.total > max(own[place].total, own[name].total) + MIN_SCORE_GAIN
+            if found is not None and fit.good and fit.shown > MIN_OUTLINE_SHARE and clear:
                 rated.append((fit.total, place, name, (shape, found.q)))
     stands: dict[str, tuple[str, Placed]] = {}
     for _, place, name, placed in sorted(rated, key=lambda r: -r[0]):
@@ -118,10 +118,10 @@ def _fit(aligner: Aligner, shape: TargetShape, found: Alignment | None, others: 
         return _Fit()
     filled, _ = support_of(aligner.view, shape, found.q, aligner.evidence, others)
     alike = aligner.likeness(shape, found.q, others)
-    colored = alike > COLORED or not aligner.sees_colors or shape.colors is None
+    colored = alike > MIN_COLOR_LIKENESS or not aligner.sees_colors or shape.colors is None
     _, seen = aligner.view.seen(shape, found.q, others)
     return _Fit(
         float(np.clip(found.agreement, 0.0, 1.0)) + filled + alike,
-        found.agreement >= FITS and filled >= FILLED and colored,
+        found.agreement >= MIN_AGREEMENT and filled >= MIN_SILHOUETTE_EVIDENCE and colored,
         found.coverage * seen,
     )

@@ -5,9 +5,9 @@ from .detection import (
     other_markers as other_markers,
     side_lengths as side_lengths,
 )
+from .edge_projection import perturbed_pose as perturbed_pose
 from .estimate import BoardEstimate as BoardEstimate
 from .estimator import (
     BoardPose as BoardPose,
     grey_image as grey_image,
 )
-from .refinement import perturbed_pose as perturbed_pose

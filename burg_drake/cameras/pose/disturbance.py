@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from burg_drake.cameras.pose.edge_projection import EdgeViews
 from burg_drake.core import Array
 
-ALONE = 0.006, 0.02, 0.06, 0.2
+MARKER_SIGMAS_PX = 0.006, 0.02, 0.06, 0.2
 """Shifts of single markers, for whatever else is not as assumed; standard deviations that are tried
 [pixels]. In images without noise the first one is right."""
 IN_PLANE = 1.5e-4, 6e-4, 2e-3
@@ -32,7 +32,7 @@ SIZE = 0.01
 from that within [-]."""
 ASPECT = 0.01
 """Of a print's length along y for that along x [-]."""
-PAGE, HILL = 0.15, 0.16
+PAGE_CORRELATION_LENGTH, BULGE_CORRELATION_LENGTH = 0.15, 0.14
 """Distances within which shifts along the sheet, and heights, are alike [m]: half a page of A4, and
 a hill of paper is wide."""
 MODES = 40
@@ -50,14 +50,14 @@ FEWEST = 5
 """Edges more than markers' shifts from which on their spread is known."""
 LEAST_SPREAD = 1e-3
 """Of that over what noise makes; keeps probabilities finite."""
-RARE = 6.0
+LOG_PRIOR_PENALTY = 6.0
 """By how much each kind of shift lowers the logarithm of the probability before it is seen; the
 largest of its sizes lowers it twice as much."""
-TOLD = 8.0
+REPORT_THRESHOLD = 8.0
 """By how much the logarithm of the probability must exceed that without a kind of shift for it to
 be told; less may be chance, and only widens the covariance. Another kind that explains the same
 does not keep the better one from being told."""
-TEMPER = 4.0
+LIKELIHOOD_TEMPERATURE = 4.0
 """Logarithms of probabilities count by this part of them: patterns are not quite those of a real
 sheet."""
 
@@ -75,7 +75,7 @@ class MarkerShifts:
         size: of the markers for their distances [-].
     """
 
-    alone: float = ALONE[0]
+    alone: float = MARKER_SIGMAS_PX[0]
     in_plane: float = 0.0
     out_of_plane: float = 0.0
     rows: float = 0.0
@@ -98,6 +98,9 @@ class Disturbance:
             root mean square [pixels].
         aspect: how much longer the print is along y than along x [-].
         size: by how much the markers are larger for their distances [-].
+        mean_square_aspect: of how much longer the print may be along y than along x, by
+            probability, whether told or not [-].
+        rest: (N,) offsets of all edges, less the patterns of the most probable shifts [pixels].
     """
 
     step: Array
@@ -108,6 +111,8 @@ class Disturbance:
     rows: float
     aspect: float
     size: float
+    mean_square_aspect: float
+    rest: Array
 
 
 class SheetModes:
@@ -123,29 +128,33 @@ class SheetModes:
         out_of_plane: (N, L) of heights, of unit variance.
     """
 
-    def __init__(self, center: Array, p_SE: Array) -> None:
-        """Takes the markers' middles (M, 3) and the edges' (N, 3) [m]."""
+    def __init__(self, p_SQ: Array, p_SE: Array) -> None:
+        """Takes the markers' corners (M, 4, 3) and the edges' middles (N, 3) [m]."""
+        center = p_SQ.mean(axis=1)
         n = len(center)
         self.middle = center[:, :2].mean(axis=0)
         x, y = (center[:, :2] - self.middle).T
         one, zero = np.ones(n), np.zeros(n)
         moved = np.stack([[one, zero], [zero, one], [-y, x]], axis=-1)  # (2, n, 3)
-        alike, between = _alike(center, p_SE, PAGE)
+        alike, between = _alike(center, p_SE, PAGE_CORRELATION_LENGTH)
         along_both = np.asarray(np.kron(alike, np.eye(2)), dtype=float)
         modes = _modes(along_both, moved.transpose(1, 0, 2).reshape(2 * n, 3))
         self.in_plane = np.tensordot(between, modes.reshape(n, 2, -1), axes=1)
-        alike, between = _alike(center, p_SE, HILL)
-        self.out_of_plane = between @ _modes(alike, np.stack([one, x, y], axis=-1))
+        # Not by the markers' middles alone: an edge that curls rises most beyond the last of them.
+        corners = p_SQ.reshape(-1, 3)
+        alike, between = _alike(corners, p_SE, BULGE_CORRELATION_LENGTH)
+        plane = np.column_stack([np.ones(len(corners)), corners[:, :2] - self.middle])
+        self.out_of_plane = between @ _modes(alike, plane)
 
 
-def _alike(center: Array, p_SE: Array, within: float) -> tuple[Array, Array]:
-    """(M, M) covariance of shifts of markers that are alike within a distance [m], and (N, M)
-    shifts of edges by those of the markers."""
+def _alike(points: Array, p_SE: Array, within: float) -> tuple[Array, Array]:
+    """(M, M) covariance of shifts of points (M, 3) that are alike within a distance [m], and
+    (N, M) shifts of edges by those of the points."""
     covariance, to_edges = (
-        np.exp(-((p[:, None] - center) ** 2).sum(axis=-1) / (2.0 * within**2))
-        for p in (center, p_SE)
+        np.exp(-((p[:, None] - points) ** 2).sum(axis=-1) / (2.0 * within**2))
+        for p in (points, p_SE)
     )
-    known = covariance + FAINT * np.eye(len(center))
+    known = covariance + FAINT * np.eye(len(points))
     return covariance, np.linalg.solve(known, to_edges.T).T
 
 
@@ -199,27 +208,26 @@ class DisturbanceFit:
         height: int,
     ) -> None:
         kept = information > 0.0
-        used, belongs = np.unique(marker[kept], return_inverse=True)
-        across = views.across[kept]
-        self._normal = across / np.sqrt((across**2).sum(axis=1, keepdims=True))
-        self._offset = offset[kept]
+        used, belongs = np.unique(marker, return_inverse=True)
+        self._kept, self._marker = kept, belongs
+        self._normal = views.across / np.sqrt((views.across**2).sum(axis=1, keepdims=True))
+        self._offset = offset
         # sums of edges by marker, weighted
         self._sums = np.zeros((len(used), len(belongs)))
-        self._sums[belongs, np.arange(len(belongs))] = information[kept]
-        self._sums /= self._spread_within_markers(belongs)
-        which = views.which[kept]
-        self._modes = modes.in_plane[which], modes.out_of_plane[which]
-        J = views.motion[kept]
-        row = views.at[kept, 1:] / height - 0.5
+        self._sums[belongs, np.arange(len(belongs))] = information
+        self._sums /= self._spread_within_markers(views, information)
+        self._modes = modes.in_plane[views.which], modes.out_of_plane[views.which]
+        J = views.motion
+        row = views.at[:, 1:] / height - 0.5
         x, y = modes.middle  # about which the sheet is longer: S is the frame that fits best
-        strength = np.sqrt((J**2).mean(axis=0)) + 1e-9
+        strength = np.sqrt((J[kept] ** 2).mean(axis=0)) + 1e-9
         # What the camera does from the first row to the last one moves each edge by [pixels].
         self._turning = J / strength / np.sqrt(6.0)
         parts = {
-            "pose": np.column_stack([J, views.bloom[kept]]),
+            "pose": np.column_stack([J, views.bloom]),
             "rows": row * self._turning,
-            "aspect": 0.5 * (views.print[kept, :1] + (J[:, 3:5] * [-x, y]).sum(axis=1)[:, None]),
-            "size": views.print[kept, 1:],
+            "aspect": 0.5 * (views.print[:, :1] + (J[:, 3:5] * [-x, y]).sum(axis=1)[:, None]),
+            "size": views.print[:, 1:],
             "in_plane": (J[:, None, 3:5] @ self._modes[0])[:, 0],
             "out_of_plane": J[:, 5:] * self._modes[1],
             "center": self._normal,
@@ -228,7 +236,7 @@ class DisturbanceFit:
         self._columns = {kind: np.arange(*ends[k : k + 2]) for k, kind in enumerate(parts)}
         self._J = np.column_stack(list(parts.values()))
         self._add_up()
-        self._equations = {alone: self._normal_equations(alone) for alone in ALONE}
+        self._equations = {alone: self._normal_equations(alone) for alone in MARKER_SIGMAS_PX}
 
     def fit(self, prior: Array, center: float = 0.0) -> Disturbance:
         """The most probable shifts, and the step of the pose with them.
@@ -237,7 +245,7 @@ class DisturbanceFit:
             prior: (7, 7) information about the step of pose and bloom that is known before.
             center: standard deviation of the camera's principal point along u and v [pixels].
         """
-        solved = {s: self._solve(s, prior) for s in map(MarkerShifts, ALONE)}
+        solved = {s: self._solve(s, prior) for s in map(MarkerShifts, MARKER_SIGMAS_PX)}
         best = max(solved.values(), key=_logarithm)
         for _ in range(len(KINDS)):
             others = [s for s in _with_another(best.shifts) if s not in solved]
@@ -253,16 +261,15 @@ class DisturbanceFit:
         G = self._sums @ (self._normal[:, :, None] * self._normal[:, None]).reshape(-1, 4)
         return G.reshape(-1, 2, 2), self._sums @ (self._normal * self._offset[:, None])
 
-    def _spread_within_markers(self, belongs: NDArray[np.intp]) -> float:
+    def _spread_within_markers(self, views: EdgeViews, information: Array) -> float:
         """Variance of offsets within markers over that by the image's noise."""
-        G, g = self._by_marker()
-        G = G + 1e-6 * np.trace(G, axis1=1, axis2=2)[:, None, None] * np.eye(2)
-        shift = np.linalg.solve(G, g[..., None])[..., 0]
-        rest = self._offset - (self._normal * shift[belongs]).sum(axis=1)
-        freedom = len(belongs) - 2 * len(self._sums)
+        alike = np.column_stack([views.motion, views.bloom, views.print])
+        rest = rest_within_markers(self._normal, alike, self._offset, information, self._marker)
+        markers = len(np.unique(self._marker[self._kept]))
+        freedom = np.count_nonzero(self._kept) - 2 * markers - alike.shape[1]
         if freedom < FEWEST:
             return 1.0
-        return max(float((self._sums @ rest**2).sum()) / freedom, LEAST_SPREAD)
+        return float(max((information * rest**2).sum() / freedom, LEAST_SPREAD))
 
     def _add_up(self) -> None:
         """Sums over all edges, and those by marker, of the columns and of what is seen."""
@@ -299,7 +306,7 @@ class DisturbanceFit:
         x = covariance @ b
         logarithm += 0.5 * float(b @ x) - 0.5 * float(np.linalg.slogdet(A)[1])
         rare = sum(1 + (sds[k] == KINDS[k][-1] and len(KINDS[k]) > 1) for k in _kinds(shifts))
-        logarithm -= float(np.log(known).sum()) + RARE * rare
+        logarithm -= float(np.log(known).sum()) + LOG_PRIOR_PENALTY * rare
         return _Solution(logarithm, shifts, x, covariance, columns)
 
     def _disturbance(self, best: _Solution, solved: list[_Solution], center: float) -> Disturbance:
@@ -310,11 +317,14 @@ class DisturbanceFit:
         chosen = _kinds(best.shifts)
         for kind in KINDS:
             without = (s for s in solved if not _kinds(s.shifts) - (chosen - {kind}))
-            if best.logarithm - max(map(_logarithm, without)) < TOLD:
+            if best.logarithm - max(map(_logarithm, without)) < REPORT_THRESHOLD:
                 x[self._columns[kind]] = 0.0
         rows, aspect, size, in_plane, out_of_plane = (x[self._columns[kind]] for kind in KINDS)
-        weight = np.exp((np.array([s.logarithm for s in solved]) - best.logarithm) / TEMPER)
+        weight = np.exp(
+            (np.array([s.logarithm for s in solved]) - best.logarithm) / LIKELIHOOD_TEMPERATURE
+        )
         weight /= weight.sum()
+        aspects = [s.x[s.columns == self._columns["aspect"][0]].sum() for s in solved]
         steps = np.array([s.x[:6] for s in solved])
         step = weight @ steps
         apart = steps - step
@@ -327,12 +337,40 @@ class DisturbanceFit:
             step,
             covariance,
             best.shifts,
-            float(np.linalg.norm(self._modes[0] @ in_plane, axis=1).max()),
-            float(np.abs(self._modes[1] @ out_of_plane).max()),
-            float(np.sqrt(2.0 * ((self._turning @ rows) ** 2).mean())),
+            float(np.linalg.norm(self._modes[0][self._kept] @ in_plane, axis=1).max()),
+            float(np.abs(self._modes[1][self._kept] @ out_of_plane).max()),
+            float(np.sqrt(2.0 * ((self._turning[self._kept] @ rows) ** 2).mean())),
             float(aspect[0]),
             float(size[0]),
+            float(weight @ np.square(aspects)),
+            self._offset - self._J[:, best.columns] @ best.x,
         )
+
+
+def rest_within_markers(
+    normal: Array, alike: Array, offset: Array, information: Array, marker: NDArray[np.intp]
+) -> Array:
+    """(N,) offsets of edges without what a shift of each marker explains, and changes that are
+    alike for all markers [pixels].
+
+    Args:
+        normal: (N, 2) directions of the offsets.
+        alike: (N, K) motion of edges by such changes.
+        offset: (N,) of edges [pixels].
+        information: (N,) inverse variance of each offset.
+        marker: (N,) that each belongs to.
+    """
+    seen = np.column_stack([alike, offset])
+    n = marker.max() + 1
+    G, g = np.zeros((n, 2, 2)), np.zeros((n, 2, seen.shape[1]))
+    weighted = information[:, None, None] * normal[:, :, None]
+    np.add.at(G, marker, weighted * normal[:, None])
+    np.add.at(g, marker, weighted * seen[:, None])
+    G += (1e-6 * np.trace(G, axis1=1, axis2=2)[:, None, None] + 1e-9) * np.eye(2)
+    seen = seen - np.einsum("ni,nik->nk", normal, np.linalg.solve(G, g)[marker])
+    root = np.sqrt(information)
+    factors = np.linalg.lstsq(seen[:, :-1] * root[:, None], seen[:, -1] * root, rcond=1e-9)[0]
+    return np.asarray(seen[:, -1] - seen[:, :-1] @ factors)
 
 
 def _logarithm(solution: _Solution) -> float:
@@ -345,7 +383,7 @@ def _kinds(shifts: MarkerShifts) -> set[str]:
 
 def _with_another(shifts: MarkerShifts) -> Iterator[MarkerShifts]:
     """Shifts that differ from some in one kind, and in those of single markers."""
-    for alone in {shifts.alone, ALONE[0]}:
+    for alone in {shifts.alone, MARKER_SIGMAS_PX[0]}:
         for kind, values in KINDS.items():
             for value in values:
                 yield replace(shifts, alone=alone, **{kind: value})

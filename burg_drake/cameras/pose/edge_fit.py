@@ -28,6 +28,13 @@ WIDE_CELL = 2.2
 LEAST_CONTRAST = 4e-4
 """Below it an offset means nothing; keeps the division finite [linear light]."""
 
+FAINTEST = 0.25
+"""Least contrast, as a share of the upper quartile of all."""
+UNLIKE = 0.15
+"""Most that a fit may leave, as a share of the contrast, besides the image's noise."""
+FARTHEST = 1.5
+"""Largest offset that a fit can be trusted with [pixels]."""
+
 
 @dataclass(frozen=True, eq=False)
 class EdgeFits:
@@ -89,6 +96,28 @@ def fit_edges(
     slope = bell.sum(axis=-1) / sigma  # derivatives by the distance in pixels
     bend = np.einsum("nwk,nwk->nw", bell, z) / -(sigma**2)
     return _fit(light[rows, columns].astype(float), shape, slope, bend)
+
+
+def has_expected_profile(fits: EdgeFits) -> NDArray[np.bool_]:
+    """Edges with the right colors, enough contrast, and a profile that fits."""
+    right = fits.contrast > 0.0
+    if not right.any():
+        return right
+    usual = np.quantile(fits.contrast[right], 0.75)
+    noise = np.median(fits.noise[right])
+    return np.asarray(
+        (fits.contrast > FAINTEST * usual)
+        & (fits.noise < UNLIKE * fits.contrast + 2.0 * noise)
+        & (np.abs(fits.offset) < FARTHEST)
+        & (fits.contrast**2 * fits.information > 4.0 * fits.noise**2)
+    )
+
+
+def offset_variance(fits: EdgeFits, good: NDArray[np.bool_]) -> Array:
+    """(N,) variance of offsets by the image's noise [pixels^2]: light is noisy by its root."""
+    contrast = np.maximum(np.abs(fits.contrast), 4e-6)
+    noise = np.median(fits.noise[good] / np.sqrt(contrast[good]))
+    return np.asarray(noise**2 / (contrast * np.maximum(fits.information, 1e-6)))
 
 
 def _width(blur: Array, gradient: Array) -> NDArray[np.float32]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from burg_drake.cameras.optics import Intrinsics
 from burg_drake.cameras.pose.edges import REACH, MarkerEdges
@@ -101,6 +102,40 @@ def motion_of_points(intrinsics: Intrinsics, X_SC: Array, p_S: Array) -> tuple[A
     at, by_C = image_points(intrinsics, np.where(ahead, p_C, [0.0, 0.0, 1.0]))
     by_S = by_C @ X_SC[:3, :3].T
     return at, np.concatenate([cross(by_S, q_S[:, None]), -by_S], axis=2)
+
+
+def predicted_places(
+    p_SQ: Array, intrinsics: Intrinsics, X_SC: Array, covariance: Array
+) -> tuple[Array, Array]:
+    """Places (..., 2) in the image of points (..., 3) [pixels], and their variance (...) along the
+    larger axis [pixels^2]: infinite for points behind the camera."""
+    p_S = p_SQ.reshape(-1, 3)
+    ahead = (p_S - X_SC[:3, 3]) @ X_SC[:3, 2] > NEAREST
+    at, motion = motion_of_points(intrinsics, X_SC, p_S)
+    spread = motion @ covariance @ motion.transpose(0, 2, 1)
+    variance = np.where(ahead, np.linalg.eigvalsh(spread)[:, -1], np.inf)
+    return at.reshape(*p_SQ.shape[:-1], 2), variance.reshape(p_SQ.shape[:-1])
+
+
+def perturbed_pose(X_SC: Array, step: Array, p_SA: Array | None = None) -> Array:
+    """A pose after a small rotation and translation (6,), see `BoardEstimate.covariance`.
+
+    Args:
+        X_SC: (4, 4) pose.
+        step: (6,) rotation [rad] and translation [m].
+        p_SA: (3,) point about which the rotation turns the camera, shifted before; the camera
+            itself if None. To first order it makes no difference; a point in the middle of what is
+            seen makes longer steps hold.
+    """
+    R = Rotation.from_rotvec(step[:3]).as_matrix()
+    X = np.eye(4)
+    X[:3, :3] = R @ X_SC[:3, :3]
+    if p_SA is None:
+        X[:3, 3] = X_SC[:3, 3] + step[3:]
+    else:
+        arm = X_SC[:3, 3] - p_SA
+        X[:3, 3] = p_SA + R @ (arm + step[3:] - np.cross(step[:3], arm))
+    return X
 
 
 def image_points(intrinsics: Intrinsics, p_CQ: Array) -> tuple[Array, Array]:

@@ -12,16 +12,27 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from burg_drake.cameras.optics import Intrinsics
-from burg_drake.cameras.pose.disturbance import Disturbance, DisturbanceFit, SheetModes
-from burg_drake.cameras.pose.edge_fit import EdgeFits, fit_edges
+from burg_drake.cameras.pose.disturbance import (
+    Disturbance,
+    DisturbanceFit,
+    MarkerShifts,
+    SheetModes,
+    rest_within_markers,
+)
+from burg_drake.cameras.pose.edge_fit import (
+    FARTHEST,
+    EdgeFits,
+    fit_edges,
+    has_expected_profile,
+    offset_variance,
+)
 from burg_drake.cameras.pose.edge_projection import (
     MARGIN,
-    NEAREST,
     EdgeViews,
-    motion_of_points,
+    perturbed_pose,
+    predicted_places,
     view_edges,
 )
 from burg_drake.cameras.pose.edges import MarkerEdges
@@ -44,7 +55,7 @@ MOST_BLOOM = 4.0
 """White that is larger by more than that leaves no cells to read [pixels]."""
 STILL = 0.05
 """Edges that a round moves by less are where they belong, root mean square [pixels]."""
-MORE = 3
+MAX_FULL_ROUNDS = 3
 """Rounds with all edges, at most."""
 LONG = 0.3
 """A first step that moves an edge by more is followed by another of its kind: edges are fitted best
@@ -63,12 +74,6 @@ EXPECTED_EDGES = 0.2
 SURE = 3
 """Read markers from which on a pose puts the others well; with fewer, most of a marker's edges must
 look as they should: covers have edges, too."""
-FAINTEST = 0.25
-"""Least contrast, as a share of the upper quartile of all."""
-UNLIKE = 0.15
-"""Most that a fit may leave, as a share of the contrast, besides the image's noise."""
-FARTHEST = 1.5
-"""Largest offset that a fit can be trusted with [pixels]."""
 MODEL_SD = 0.01
 """What an offset errs by in images without noise: cells and blur are not exactly as assumed
 [pixels]; the median in images with exact truth."""
@@ -156,7 +161,7 @@ class EdgeRefinement:
         self._edges = edges
         self._corners = p_SQ
         self._intrinsics = intrinsics
-        self._modes = SheetModes(p_SQ.mean(axis=1), edges.p_SE)
+        self._modes = SheetModes(p_SQ, edges.p_SE)
 
     def refine(
         self,
@@ -189,7 +194,7 @@ class EdgeRefinement:
             which = np.concatenate([found[:FIRST], unread[:LATER]])
             result = self._iterate(light, result.X_SC, which, result.spread)
             found = found if result is None else self._seen(result, found)
-        for _ in range(MORE):
+        for _ in range(MAX_FULL_ROUNDS):
             result = result and self._iterate(light, result.X_SC, found[:LAST], result.spread)
             if result is None or result.moved < STILL:
                 break
@@ -240,14 +245,14 @@ class EdgeRefinement:
         shift = np.clip(shift, -MAX_SHIFT, MAX_SHIFT)
         looked_at = replace(views, at=views.at + shift[marker])
         fits = fit_edges(light, self._edges, looked_at, last.spread.blur)
-        good = _has_expected_profile(fits)
+        good = has_expected_profile(fits)
         if good.sum() < LEAST_EDGES:
             return last, shift
-        sd = np.sqrt(_offset_variance(fits, good) + MODEL_SD**2)
+        sd = np.sqrt(offset_variance(fits, good) + MODEL_SD**2)
         weight = good.astype(float)
         for _ in range(REWEIGHTED):
-            apart = _marker_shifts(normal, fits.offset, weight / sd**2, marker, len(shift))
-            rest = (fits.offset - (normal * apart[marker]).sum(axis=1)) / sd
+            information = weight / sd**2
+            rest = rest_within_markers(normal, views.print, fits.offset, information, marker) / sd
             weight = good * _tukey_weight(rest, good)
         offset = fits.offset + (normal * shift[marker]).sum(axis=1)
         J = np.column_stack([views.motion, views.bloom])
@@ -267,32 +272,48 @@ class EdgeRefinement:
         return found, self._shifts_by_marker(found, found.residual)
 
     def _shifts_by_marker(self, found: EdgeRound, offset: Array) -> Array:
-        """(M, 2) shifts of markers by the offsets (N,) of their edges [pixels]."""
+        """(M, 2) shifts of markers by the offsets (N,) of their edges [pixels]; 0 for markers
+        without edges."""
         views = found.views
         normal = views.across / np.sqrt((views.across**2).sum(axis=1, keepdims=True))
         marker = self._edges.marker[views.which]
         information = found.weight / found.sd**2
-        return _marker_shifts(normal, offset, information, marker, len(self._corners))
+        G, g = np.zeros((len(self._corners), 2, 2)), np.zeros((len(self._corners), 2))
+        np.add.at(G, marker, information[:, None, None] * normal[:, :, None] * normal[:, None])
+        np.add.at(g, marker, (information * offset)[:, None] * normal)
+        G += np.eye(2) / FARTHEST**2
+        return np.asarray(np.linalg.solve(G, g[..., None])[..., 0])
 
     def with_disturbance(self, light: NDArray[np.float32], last: EdgeRound) -> RefinedPose:
         """The pose of the last round if markers may be shifted."""
         found = self._disturbance(last)
-        moved = last.views.motion @ found.step
-        if np.sqrt(np.average(moved**2, weights=last.weight)) > LONG:
-            shift = self._shifts_by_marker(last, last.residual - moved)
-            there = replace(last, X_SC=perturbed_pose(last.X_SC, found.step))
-            last, _ = self._iterate_by_marker(light, there, last.views.which, shift, step=False)
+        if replace(found.shifts, size=0.0) != MarkerShifts():
+            # Weights by how edges fit the pose leave out those that shifts move most, so that
+            # shifts look smaller than they are.
+            last = self._fit_shifted(light, last, found)
+            found = self._disturbance(last)
+            good = has_expected_profile(last.fits)
+            last = replace(last, weight=good * _tukey_weight(found.rest / last.sd, good))
             found = self._disturbance(last)
         X_SC = perturbed_pose(last.X_SC, found.step)
         covariance = found.covariance.copy()
         covariance[:3, :3] += self._shift_by_blur(last)
-        covariance[3:, 3:] += found.aspect**2 * self._unknown_size(X_SC[:3, 3])
+        covariance[3:, 3:] += found.mean_square_aspect * self._unknown_size(X_SC[:3, 3])
         changed = {
             "X_SC": X_SC,
             "covariance": covariance,
             "residual": last.residual - last.views.motion @ found.step,
         }
         return RefinedPose(**(vars(last) | changed), disturbance=found)
+
+    def _fit_shifted(
+        self, light: NDArray[np.float32], last: EdgeRound, found: Disturbance
+    ) -> EdgeRound:
+        """A round that looks for the edges where shifts put their markers."""
+        rest = last.residual - last.views.motion @ found.step
+        there = replace(last, X_SC=perturbed_pose(last.X_SC, found.step), residual=rest)
+        shift = self._shifts_by_marker(there, rest)
+        return self._iterate_by_marker(light, there, last.views.which, shift, step=False)[0]
 
     def _disturbance(self, last: EdgeRound) -> Disturbance:
         return DisturbanceFit(
@@ -356,10 +377,10 @@ class EdgeRefinement:
         if len(views.which) < LEAST_EDGES:
             return None
         fits = fit_edges(light, self._edges, views, spread.blur)
-        good = _has_expected_profile(fits)
+        good = has_expected_profile(fits)
         if good.sum() < LEAST_EDGES:
             return None
-        sd = np.sqrt(_offset_variance(fits, good) + MODEL_SD**2)
+        sd = np.sqrt(offset_variance(fits, good) + MODEL_SD**2)
         J = np.column_stack([views.motion, views.bloom])
         step, weight = _robust_step(J, fits.offset, sd, good)
         residual = fits.offset - J @ step
@@ -401,13 +422,6 @@ def _bloom_prior() -> Array:
     return prior
 
 
-def _offset_variance(fits: EdgeFits, good: NDArray[np.bool_]) -> Array:
-    """(N,) variance of offsets by the image's noise [pixels^2]: light is noisy by its root."""
-    contrast = np.maximum(np.abs(fits.contrast), 4e-6)
-    noise = np.median(fits.noise[good] / np.sqrt(contrast[good]))
-    return np.asarray(noise**2 / (contrast * np.maximum(fits.information, 1e-6)))
-
-
 def _better_blur(blur: Array, views: EdgeViews, widening: Array, good: NDArray[np.bool_]) -> Array:
     """(2, 2) the blur with which edges fit better; of a change that no edge tells, none."""
     n = views.across[good]
@@ -424,55 +438,6 @@ def _better_blur(blur: Array, views: EdgeViews, widening: Array, good: NDArray[n
     better = blur + root @ (axes * np.clip(share, -0.3, 0.5)) @ axes.T @ root.T
     variance, axes = np.linalg.eigh(better)
     return np.asarray((axes * np.clip(variance, LEAST_BLUR, MOST_BLUR)) @ axes.T)
-
-
-def predicted_places(
-    p_SQ: Array, intrinsics: Intrinsics, X_SC: Array, covariance: Array
-) -> tuple[Array, Array]:
-    """Places (..., 2) in the image of points (..., 3) [pixels], and their variance (...) along the
-    larger axis [pixels^2]: infinite for points behind the camera."""
-    p_S = p_SQ.reshape(-1, 3)
-    ahead = (p_S - X_SC[:3, 3]) @ X_SC[:3, 2] > NEAREST
-    at, motion = motion_of_points(intrinsics, X_SC, p_S)
-    spread = motion @ covariance @ motion.transpose(0, 2, 1)
-    variance = np.where(ahead, np.linalg.eigvalsh(spread)[:, -1], np.inf)
-    return at.reshape(*p_SQ.shape[:-1], 2), variance.reshape(p_SQ.shape[:-1])
-
-
-def perturbed_pose(X_SC: Array, step: Array, p_SA: Array | None = None) -> Array:
-    """A pose after a small rotation and translation (6,), see `BoardEstimate.covariance`.
-
-    Args:
-        X_SC: (4, 4) pose.
-        step: (6,) rotation [rad] and translation [m].
-        p_SA: (3,) point about which the rotation turns the camera, shifted before; the camera
-            itself if None. To first order it makes no difference; a point in the middle of what is
-            seen makes longer steps hold.
-    """
-    R = Rotation.from_rotvec(step[:3]).as_matrix()
-    X = np.eye(4)
-    X[:3, :3] = R @ X_SC[:3, :3]
-    if p_SA is None:
-        X[:3, 3] = X_SC[:3, 3] + step[3:]
-    else:
-        arm = X_SC[:3, 3] - p_SA
-        X[:3, 3] = p_SA + R @ (arm + step[3:] - np.cross(step[:3], arm))
-    return X
-
-
-def _has_expected_profile(fits: EdgeFits) -> NDArray[np.bool_]:
-    """Edges with the right colors, enough contrast, and a profile that fits."""
-    right = fits.contrast > 0.0
-    if not right.any():
-        return right
-    usual = np.quantile(fits.contrast[right], 0.75)
-    noise = np.median(fits.noise[right])
-    return np.asarray(
-        (fits.contrast > FAINTEST * usual)
-        & (fits.noise < UNLIKE * fits.contrast + 2.0 * noise)
-        & (np.abs(fits.offset) < FARTHEST)
-        & (fits.contrast**2 * fits.information > 4.0 * fits.noise**2)
-    )
 
 
 def _robust_step(
@@ -493,18 +458,6 @@ def _tukey_weight(rest: Array, good: NDArray[np.bool_]) -> Array:
     """(N,) weights of residuals (N,) by the spread of the good ones."""
     scale = 1.4826 * np.median(np.abs(rest[good]))  # of normal residuals
     return np.asarray(np.maximum(1.0 - (rest / (TUKEY * scale)) ** 2, 0.0) ** 2)
-
-
-def _marker_shifts(
-    normal: Array, offset: Array, information: Array, marker: NDArray[np.intp], count: int
-) -> Array:
-    """(M, 2) shifts of markers by the offsets (N,) of their edges along normals (N, 2); 0 for
-    markers without edges."""
-    G, g = np.zeros((count, 2, 2)), np.zeros((count, 2))
-    np.add.at(G, marker, information[:, None, None] * normal[:, :, None] * normal[:, None])
-    np.add.at(g, marker, (information * offset)[:, None] * normal)
-    G += np.eye(2) / FARTHEST**2
-    return np.asarray(np.linalg.solve(G, g[..., None])[..., 0])
 
 
 def _weighted_step(J: Array, e: Array, weight: Array) -> Array:
