@@ -13,6 +13,8 @@ from typing import Any
 
 import pytest
 
+from tests.hang_guard import HANG_GUARD
+
 viser = pytest.importorskip("viser", reason="pages need viser: pip install 'burg-drake[ui]'")
 sync_api = pytest.importorskip("playwright.sync_api", reason="driven by playwright")
 
@@ -24,10 +26,8 @@ ARGUMENTS = (
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 )
-BROWSER_TIMEOUT = 180.0
-"""For one thing that a browser is to do or to show [s], of which the slowest takes 3 s of processor
-time. Pages use some all the time, by which `until` could not tell that one hangs."""
-BROWSER_TIMEOUT_MS = 1000.0 * BROWSER_TIMEOUT
+BROWSER_TIMEOUT_MS = 1000.0 * HANG_GUARD
+"""For one thing that a browser is to do or to show; the slowest takes 3 s on an idle machine."""
 SIZE = {"width": 1280, "height": 800}
 LAST_WORDS = 3000
 """Characters of a page's text in the report of a test that failed."""

@@ -8,7 +8,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,11 +27,10 @@ from burg_drake.station.document.station_document import load_station
 from burg_drake.ui.pointing.pointer import PageCamera
 from burg_drake.ui.server.door import ServedPage, serve
 from burg_drake.ui.setup_page import SetupPage
-from tests import hang_guard
-from tests.ui.conftest import BROWSER_TIMEOUT, open_page
+from tests.hang_guard import until
+from tests.ui.conftest import open_page
 
 ONE_TRY = 0.7
-until = partial(hang_guard.until, seconds=BROWSER_TIMEOUT)
 UNDER_POINTER = """([x, y]) => {
   const element = document.elementFromPoint(x, y);
   return element?.closest(".mantine-Notifications-root") ? "MESSAGE" : element?.tagName;
