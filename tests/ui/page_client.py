@@ -17,7 +17,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
 from burg_drake.ui.server.door import ServedPage
-from tests.hang_guard import HANG_GUARD
+from tests.hang_guard import HANG_GUARD, until
 
 POSING = ("SetSceneNodeVisibilityMessage", "SetPositionMessage", "SetOrientationMessage")
 CAMERA_FIELDS = {
@@ -86,11 +86,13 @@ class PageClient:
         self._controls: dict[str, dict[str, Any]] = {}
         self._commands: dict[tuple[str, str | None], str] = {}
         self._complete = threading.Event()
+        before = set(door.server.get_clients())
         self._connection = coming_in(door)
         self._thread = threading.Thread(target=self._listen, daemon=True)
         self._thread.start()
         self.report_camera()
         assert self._complete.wait(HANG_GUARD)
+        until(lambda: set(door.server.get_clients()) - before, "the server knows the page")
 
     def __enter__(self) -> PageClient:
         return self

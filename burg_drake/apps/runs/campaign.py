@@ -17,7 +17,7 @@ from burg_drake.apps.runs.second_opinion import (
     settled_line,
 )
 from burg_drake.apps.runs.settings import requested_settings
-from burg_drake.core import InvalidInputError, content_hash, listing
+from burg_drake.core import InvalidInputError, listing
 
 if TYPE_CHECKING:
     from burg_drake.core.grasps import GraspSet
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from burg_drake.scene.document import Scene
     from burg_drake.station.document import Station
 
-SHOWN = 20
-"""So many scenes have a row of their own."""
+MAX_SCENE_ROWS = 20
+"""Scenes that have a row of their own in the table."""
 
 
 def evaluate_many(
@@ -122,9 +122,9 @@ def _scene_table(summary: Summary) -> Any:
     def share(group: Any) -> float:
         return group.lifted / group.executed if group.executed else -1.0
 
-    groups = sorted(summary.scenes, key=share)[:SHOWN]
+    groups = sorted(summary.scenes, key=share)[:MAX_SCENE_ROWS]
     more = len(summary.scenes) - len(groups)
-    title = f"Scenes, the {SHOWN} with the least success" if more else "Scenes"
+    title = f"Scenes, the {MAX_SCENE_ROWS} with the least success" if more else "Scenes"
     table = TextTable(title).names("scene")
     table.numbers(*summary.steps, "success")
     for group in groups:
@@ -140,6 +140,7 @@ def _scene_table(summary: Summary) -> Any:
 def _given(arguments: argparse.Namespace, station: Station) -> GraspsLike | None:
     """The grasps of the file: those in the frames of their objects as a set for all scenes."""
     from burg_drake.apps.options import FRAMES, gripper_for
+    from burg_drake.core import content_hash
     from burg_drake.evaluation.grasp_sets import read_input
     from burg_drake.formats.common import read_poses, with_objects_renamed
 

@@ -13,10 +13,10 @@ from burg_drake.apps.options import add_verb
 if TYPE_CHECKING:
     from burg_drake.evaluation.results import Status
 
-LOOK = 1.0
+POLL_INTERVAL = 1.0
 """Between two looks [s]."""
-SHOWN = 8
-"""So many scenes are named."""
+MAX_SCENES_NAMED = 8
+"""Scenes under way that are named."""
 
 
 def add_to(verbs: Any) -> None:
@@ -50,7 +50,7 @@ def run_status(arguments: argparse.Namespace) -> int:
         return 1 if status.failed else 0
     shown = status
     while not status.complete:
-        time.sleep(LOOK)
+        time.sleep(POLL_INTERVAL)
         status = watch.look()
         if (status.judged, status.done, status.working) != (
             shown.judged,
@@ -92,15 +92,17 @@ def status_lines(status: Status) -> list[str]:
     lines = [head, f"outcomes  {', '.join(found) or '-'}"]
     if status.kind == "campaign":
         now = status.under_way
-        more = f", now {', '.join(now[:SHOWN])}" if now else ""
-        more += f" and {len(now) - SHOWN} others" if len(now) > SHOWN else ""
+        more = f", now {', '.join(now[:MAX_SCENES_NAMED])}" if now else ""
+        more += f" and {len(now) - MAX_SCENES_NAMED} others" if len(now) > MAX_SCENES_NAMED else ""
         lines.append(f"scenes    {status.done:,} of {status.scenes:,} done{more}")
     lines.append(f"process   {_process(status)}")
     if status.shard:
         lines.append(f"shard     {status.shard}")
     if status.failed:
         lines.append(f"failed    {listing(list(status.failed))}")
-        lines += [f"  {name}: {why}" for name, why in list(status.failed.items())[:SHOWN]]
+        lines += [
+            f"  {name}: {why}" for name, why in list(status.failed.items())[:MAX_SCENES_NAMED]
+        ]
     return lines
 
 

@@ -99,7 +99,7 @@ def _certainty_table(summary: Summary) -> TextTable:
         table.row(group.name, *map(format_count, [*numbers, *([group.settled] * settled)]))
     table.caption = (
         "contested: the simulation is not sure whether the object was held (confidence below"
-        f" {CONTESTED:g}); --rejudge contested asks another engine"
+        f" {CONTESTED:g}); another engine can settle it"
     )
     if settled:
         table.caption += "\nsettled: judged again by another engine, lifted or failed"
