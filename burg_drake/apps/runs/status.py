@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from burg_drake.evaluation.results import Status
 
 POLL_INTERVAL = 1.0
-"""Between two looks [s]."""
+"""Between two reads of a run's state [s]."""
 MAX_SCENES_NAMED = 8
 """Scenes under way that are named."""
 
