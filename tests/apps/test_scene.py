@@ -77,8 +77,8 @@ def test_built_in_scenes_are_sound(name: str, capsys: Capture) -> None:
     assert main(["scene", "validate", name]) == 0
     path = resolve(name, "scenes")
     assert capsys.readouterr().out == (
-        f"{path}: nothing is wrong with the {len(load_scene(name).instances)} objects on station"
-        " panda_tabletop: all stand, within the board, and none overlaps another\n"
+        f"{path}: no mistakes on station panda_tabletop: {len(load_scene(name).instances)} objects,"
+        " all standing within the board, none overlapping another\n"
     )
 
 

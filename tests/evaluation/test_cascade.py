@@ -282,7 +282,7 @@ def test_another_run_is_not_mixed_in(
     assert whole.complete
     grasps = {"bar": GraspSet.create(np.eye(4), object="bar")}
     with pytest.raises(
-        InvalidInputError, match="5 an object, sampled blind there, 1 given ones here"
+        InvalidInputError, match="5 an object, sampled blind there, 1 given here"
     ) as error:
         evaluate(scene, station, run, grasps=grasps, progress=False)
     assert "approach angle" not in str(error.value)  # it goes with the sampling

@@ -215,7 +215,7 @@ def test_what_makes_another_run_is_told_without_hashes(run: Run) -> None:
         "correction is none there, turn:z90,inverse here"
     )
     assert told(grasps=replace(given, content="1", count=4)) == (
-        "grasps are 5 given ones there, 4 given ones here"
+        "grasps are 5 given there, 4 given here"
     )
     assert told(grasps=replace(given, content="1")) == "the given grasps are others"
 

@@ -146,9 +146,13 @@ def run_validate(arguments: argparse.Namespace) -> int:
     for issue in issues:
         print(f"{'error' if issue.is_error else 'warning'}: {issue.message}")
     if not issues:
+        count = len(scene.instances)
+        objects = f"{count} object{'' if count == 1 else 's'}"
         print(
-            f"{scene.path}: nothing is wrong with the {len(scene.instances)} objects on station"
-            f" {station.name}: all stand, within the board, and none overlaps another"
+            f"{scene.path}: no mistakes on station {station.name}: {objects}, all standing within"
+            " the board, none overlapping another"
+            if count
+            else f"{scene.path}: no mistakes, but it has no objects"
         )
     return 1 if any(issue.is_error for issue in issues) else 0
 

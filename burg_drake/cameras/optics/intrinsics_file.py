@@ -216,7 +216,7 @@ def _numbers(data: Tree, keys: tuple[str, ...], name: str) -> list[float]:
             return [float(item) for item in value]
     except (TypeError, ValueError):
         pass
-    raise DocumentError(f"{name}: {key or keys[0]} is not a list of numbers")
+    raise DocumentError(f"{name}: {key or keys[0]} is not a list of finite numbers")
 
 
 def _of_opencv(data: Tree, name: str) -> Intrinsics:

@@ -7,6 +7,8 @@ import contextlib
 import shlex
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -192,10 +194,28 @@ def _again(run: Run | Campaign, options: Sequence[str]) -> str:
     """How to evaluate again with further options. Verdicts on grasps as they were read stay where
     they are, so that it takes another folder."""
     words = shlex.split(run.document.command)
-    if not options or words[:2] != ["burg-drake", "evaluate"]:
+    if not options or words[:2] != ["burg-drake", "evaluate"] or not _has_grasp_file(words):
         return " Evaluate them again in another folder."
-    command = shlex.join([*words, *options, "-o", f"{run.path}_corrected"])
+    kept = _without(words, "-o", "--output", "--shard")
+    command = shlex.join([*kept, *options, "-o", f"{run.path}_corrected"])
     return f" This command evaluates them again:\n{command}"
+
+
+def _has_grasp_file(words: Sequence[str]) -> bool:
+    """Whether the grasps of a command can be read again, which those of a pipe cannot."""
+    files = [value for word, value in pairwise(words) if word == "--grasps"]
+    files += [word.partition("=")[2] for word in words if word.startswith("--grasps=")]
+    return any(Path(file).is_file() and not file.startswith("/dev/") for file in files)
+
+
+def _without(words: Sequence[str], *options: str) -> list[str]:
+    """The words of a command but for some of its options that have one value each."""
+    before = ["", *words]
+    return [
+        word
+        for word, previous in zip(words, before, strict=False)
+        if word not in options and previous not in options and word.partition("=")[0] not in options
+    ]
 
 
 def half_width_note(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -49,6 +50,12 @@ class SceneEntry:
 
     def __post_init__(self) -> None:
         require_name(self.name, "name")
+
+    def chosen(self, only: Collection[str]) -> dict[str, str]:
+        """Objects by name of the free instances whose own name or whose object's is among `only`;
+        of all if that is empty."""
+        pairs = self.instances.items()
+        return {name: o for name, o in pairs if not only or name in only or o in only}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -73,7 +73,9 @@ def request_identity(document: RunRequestFields) -> dict[str, str]:
         **({} if document.mode == "arm" else {"approach of the hand": simulated}),
         "mode": document.mode,
         "grasps": (
-            _sampled(grasps) if sampled else f"given, content {grasps.content[:HASH_DIGITS]}"
+            _sampled(grasps)
+            if sampled
+            else f"given, content {grasps.content[:HASH_DIGITS]}{_where(grasps)}"
         ),
         **angle,
         "seed": str(document.seed),
@@ -85,7 +87,6 @@ def request_identity(document: RunRequestFields) -> dict[str, str]:
 
 def _sampled(grasps: Grasps) -> str:
     how = "sampled blind" if grasps.blind else "clear of the scene"
-    where = f", on {', '.join(grasps.only)}" if grasps.only else ""
     balance = (
         f", more until each object has {grasps.until_balanced} lifted and"
         f" {grasps.until_balanced} failing ones (counted: {grasps.balanced_among}; at most"
@@ -93,7 +94,11 @@ def _sampled(grasps: Grasps) -> str:
         if grasps.until_balanced
         else ""
     )
-    return f"{grasps.per_object} an object, {how}{where}{balance}"
+    return f"{grasps.per_object} an object, {how}{_where(grasps)}{balance}"
+
+
+def _where(grasps: Grasps) -> str:
+    return f", on {', '.join(grasps.only)}" if grasps.only else ""
 
 
 def run_hash(document: RunDocument) -> str:
@@ -208,7 +213,8 @@ def grasp_differences(there: Grasps, here: Grasps, sides: Sequence[str] = HERE) 
 def _described(grasps: Grasps) -> str:
     if grasps.origin == "sampled":
         return _sampled(grasps)
-    return f"{grasps.count} given ones" if grasps.count else "given ones"
+    count = f"{grasps.count} given" if grasps.count else "given"
+    return count + _where(grasps)
 
 
 def _settings(document: RunRequestFields) -> dict[str, object]:

@@ -51,7 +51,8 @@ def summarize_campaign(campaign: Campaign) -> Summary:
     if sampled:
         grasps, seconds = sum(s.grasps for s in sampled), sum(s.sampling for s in sampled)
         costs.insert(0, StageCost("sampling", grasps, seconds, math.nan))
-    known = dict.fromkeys(o for entry in document.mine for o in entry.instances.values())
+    only = document.grasps.only
+    known = dict.fromkeys(o for entry in document.mine for o in entry.chosen(only).values())
     return Summary(
         objects=tuple(replace(by_object.get(name, none), name=name) for name in known),
         total=_groups(rows, np.zeros_like(rows.run), ["all"])[0],

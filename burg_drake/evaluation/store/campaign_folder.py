@@ -153,8 +153,7 @@ class Campaign:
         found = {}
         for entry in document.mine:
             state = self.states.get(entry.name)
-            chosen = [n for n, o in entry.instances.items() if not only or n in only or o in only]
-            asked = range((document.grasps.per_object or 0) * len(chosen))
+            asked = range((document.grasps.per_object or 0) * len(entry.chosen(only)))
             mine = share(asked, shard)
             found[entry.name] = len(mine) if state is None or state.why else state.mine
         return found

@@ -19,7 +19,8 @@ from burg_drake.experiment.pairing import Factor, VerdictPairs
 from burg_drake.experiment.statistics import Flags
 
 SIGNIFICANCE_LEVEL = 0.05
-"""Maximum probability of naming any group if none stands out."""
+"""Probability of naming any group if none stands out, about: mid-p values give no strict bound.
+`benchmarks/compare.py` measures it."""
 GroupKind = Literal["object", "verdict", "body in the way"]
 
 
@@ -135,7 +136,8 @@ def excess_p_value(errors: int, trials: int, other_errors: int, other_trials: in
 
 def holm(p_values: Sequence[float]) -> list[float]:
     """P-values corrected for their number (S. Holm, Scandinavian Journal of Statistics 6, 1979):
-    with those below 0.05 taken for real, the probability of any false one is at most 0.05."""
+    with those below a level taken for real, the probability of any false one is at most that level,
+    as far as it is for each p-value alone."""
     order = np.argsort(p_values, kind="stable")
     factors = np.arange(len(p_values), 0, -1)
     corrected = np.empty(len(p_values))

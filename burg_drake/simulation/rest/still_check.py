@@ -37,8 +37,8 @@ def stillness(
 ) -> Mapping[str, Displacement]:
     """Simulates a scene as it stands, without the robot, and tells how far each object moves.
 
-    The world is that of `build_station_diagram` with this engine, in which trials are executed and
-    which users simulate.
+    The world is that of `build_station_diagram` with this engine, and resists rolling, which
+    trials do not.
 
     An object that touches nothing but the table may sink straight into it, as far as the table
     yields to what stands on it: that is no movement. `settle_scene` lifts such objects onto the

@@ -83,6 +83,7 @@ class _GivenView:
         aspect: width over height that it was made for.
         position, target: (3,) of the camera, and what it looks at, in S [m].
         arrived: the page has reported it; reports from before may come later than it was given.
+        sendings_left: how often it may still be sent; a page that cannot have it keeps its own.
     """
 
     back: Array
@@ -91,6 +92,7 @@ class _GivenView:
     position: Array
     target: Array
     arrived: bool = False
+    sendings_left: int = 20
 
     def is_seen_by(self, camera: Any) -> bool:
         """Whether a camera of viser has this view."""
@@ -159,7 +161,9 @@ class PageViews:
             self._given[client.client_id] = given
         if given.is_seen_by(camera):
             given.arrived = True
-        elif not given.arrived or _same(camera.position, self._server.initial_camera.position):
+        elif given.sendings_left and (
+            not given.arrived or _same(camera.position, self._server.initial_camera.position)
+        ):
             self._send(client, given)  # it is not there yet, or the page has put its first over it
         else:
             del self._given[client.client_id]
@@ -185,6 +189,7 @@ class PageViews:
         self._send(client, given)
 
     def _send(self, client: viser.ClientHandle, given: _GivenView) -> None:
+        given.sendings_left -= 1
         camera = client.camera
         with client.atomic():
             camera.up_direction = np.array([0.0, 0.0, 1.0])
