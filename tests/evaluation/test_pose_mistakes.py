@@ -105,6 +105,17 @@ def test_a_planted_mistake_is_named_and_undone(
     assert np.logical_or(*same).all()
 
 
+def test_what_the_grasps_of_one_object_show(right: GraspSet, six: Scene, panda: Station) -> None:
+    """Those of the banana are right, and as many."""
+    others = sample_grasps(six, panda, 12, only=["banana"])
+    both = {**of_mug(right.X_OG @ pose((0, 0, 90))), "banana": others}
+    found = find_mistake(both, panda, six)
+    assert found is not None and found.only == "mug"
+    assert found.options() == ["--correction", "turn:z90", "--only", "mug"]
+    assert " of the 12 grasps of mug fit as they were read: " in found.text()
+    assert find_mistake({**of_mug(right.X_OG), "banana": others}, panda, six) is None
+
+
 def test_transposed_rotations_that_change_few_grasps(six: Scene, panda: Station) -> None:
     """A grasp from straight above is turned by 180 degrees, and its transposed rotation is the
     same: most grasps fit either way, and those that do not tell the mistake."""

@@ -6,6 +6,7 @@ from __future__ import annotations
 import contextlib
 import shlex
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -108,7 +109,8 @@ def find_mistake(
         source: where the objects stand, or else where they are.
 
     Returns:
-        The mistake that makes most grasps fit, where few fit as they are; None if that is none.
+        The mistake that makes most grasps fit, where few fit as they are; where all grasps together
+        show none, that of the first object whose own grasps show one. None if there is none.
     """
     held = {name: part for name, part in grasps.items() if len(part)}
     if not held:
@@ -117,7 +119,16 @@ def find_mistake(
 
     station = as_station(station)
     source = source if isinstance(source, ObjectLibrary) else as_scene(source)
-    search = _Search(held, station, source, station_gripper(station))
+    gripper = station_gripper(station)
+    if found := _mistake_of_all(_Search(held, station, source, gripper)):
+        return found
+    for name, part in held.items() if len(held) > 1 else ():
+        if found := _mistake_of_all(_Search({name: part}, station, source, gripper)):
+            return replace(found, only=name)
+    return None
+
+
+def _mistake_of_all(search: _Search) -> MistakeFound | None:
     mistakes = search.mistakes()
     alone, in_scene = search.fits(mistakes)
     found = _decide(search, mistakes, alone)
@@ -196,7 +207,8 @@ def _again(run: Run | Campaign, options: Sequence[str]) -> str:
     words = shlex.split(run.document.command)
     if not options or words[:2] != ["burg-drake", "evaluate"] or not _has_grasp_file(words):
         return " Evaluate them again in another folder."
-    kept = _without(words, "-o", "--output", "--shard")
+    only = ["--only"] if "--only" in options else []
+    kept = _without(words, "-o", "--output", "--shard", *only)
     command = shlex.join([*kept, *options, "-o", f"{run.path}_corrected"])
     return f" This command evaluates them again:\n{command}"
 

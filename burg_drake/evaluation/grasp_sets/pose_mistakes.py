@@ -328,6 +328,7 @@ class MistakeFound:
         alternatives: what else does as well, in words.
         reach_mm: least and largest distance along the approach that does as well [mm].
         given: the correction with which the grasps were read.
+        only: the instance or object whose grasps alone show it; empty if all of them do.
     """
 
     mistake: Mistake
@@ -340,6 +341,7 @@ class MistakeFound:
     alternatives: tuple[str, ...] = ()
     reach_mm: tuple[float, float] | None = None
     given: tuple[str, ...] = ()
+    only: str = ""
 
     @property
     def is_likely(self) -> bool:
@@ -366,21 +368,23 @@ class MistakeFound:
     def options(self, format_option: str = "--grasps-format") -> list[str]:
         """Words of a command line that correct it; none if a file would have to be written."""
         mistake = self.mistake
+        only = ["--only", self.only] if self.only else []
         if mistake.camera is not None:
             return []
         if mistake.frame is not None:
-            return ["--grasps-frame", "scene" if mistake.frame == "world" else mistake.frame]
+            return ["--grasps-frame", "scene" if mistake.frame == "world" else mistake.frame, *only]
         if self.format:
-            return [format_option, self.format]
-        return ["--correction", ",".join((*self.given, *mistake.correction))]
+            return [format_option, self.format, *only]
+        return ["--correction", ",".join((*self.given, *mistake.correction)), *only]
 
     def _found(self) -> str:
         words = self.mistake.words
         others = f" that were looked at, of {self.total}," if self.total > self.count else ""
+        grasps = f"grasps of {self.only}" if self.only else "grasps"
         return (
-            f"{self.before} of the {self.count} grasps{others} fit as they were read: the open hand"
-            f" is clear of the object, and its pads close on it. {words[0].upper()}{words[1:]},"
-            f" {self.after} of {self.count} fit."
+            f"{self.before} of the {self.count} {grasps}{others} fit as they were read: the open"
+            " hand is clear of the object, and its pads close on it."
+            f" {words[0].upper()}{words[1:]}, {self.after} of {self.count} fit."
         )
 
     def _remedy(self, format_option: str) -> str:
