@@ -373,7 +373,7 @@ def test_what_intrinsics_are_known_to_is_in_the_covariance() -> None:
 
 
 def test_a_curled_strip_that_lies_a_pixel_beside_its_place_counts() -> None:
-    """All edges of its markers dropped out as outliers: 0.7 mm, 0.06 degrees, 2.2 standard deviations."""
+    """All edges of its markers dropped out as outliers: 0.7 mm off, 2.2 standard deviations."""
     X_SC = view((0.33, 0.19), 0.67, 34.0, 22.0, -80.0)
 
     def rise(p: np.ndarray) -> np.ndarray:
