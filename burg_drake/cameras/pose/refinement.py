@@ -91,6 +91,9 @@ UNUSED = 0.05
 beside its place."""
 ROUNDS_BY_MARKER = 2
 """Of that."""
+MIN_SHIFT = 1.0
+"""Of the corners of a marker most edges of which drop out, from which on it is beside its place:
+half of the edges that are shifted so far do not look as they should any more [pixels]."""
 MAX_SHIFT = MARGIN / 2.0
 """Of a marker beside its place, up to which its edges are looked for there: seven pixels across
 an edge stay within the image [pixels]."""
@@ -209,13 +212,12 @@ class EdgeRefinement:
         return result
 
     def _beside(self, result: EdgeRound, shift: Array) -> int:
-        """Markers of which most edges are not where the pose puts them, and the corners that were
-        read farther from there than edges are looked for: edges of small or half hidden markers are
-        unclear without being elsewhere."""
+        """Markers of which most edges are not where the pose puts them, nor the corners that were
+        read: edges of small or half hidden markers are unclear without being elsewhere."""
         marker, n = self._edges.marker[result.views.which], len(self._corners)
         used = np.bincount(marker, weights=result.weight > 0.0, minlength=n)
         unused = used < 0.5 * np.bincount(marker, minlength=n)
-        return int((unused & (np.linalg.norm(shift, axis=1) > FARTHEST)).sum())
+        return int((unused & (np.linalg.norm(shift, axis=1) > MIN_SHIFT)).sum())
 
     def _iterate_by_marker(
         self,
@@ -293,8 +295,12 @@ class EdgeRefinement:
             last = self._fit_shifted(light, last, found)
             found = self._disturbance(last)
             good = has_expected_profile(last.fits)
-            last = replace(last, weight=good * _tukey_weight(found.rest / last.sd, good))
-            found = self._disturbance(last)
+            for _ in range(REWEIGHTED):
+                rest = found.rest
+                last = replace(last, weight=good * _tukey_weight(rest / last.sd, good))
+                found = self._disturbance(last)
+                if np.average((found.rest - rest) ** 2, weights=last.weight) < STILL**2:
+                    break
         X_SC = perturbed_pose(last.X_SC, found.step)
         covariance = found.covariance.copy()
         covariance[:3, :3] += self._shift_by_blur(last)
