@@ -151,10 +151,10 @@ def check_pose(X_AB: ArrayLike, name: str) -> Array:
     off = np.where(np.isnan(off), np.inf, off)
     worst = f"{off.max(initial=0.0):.2g}"
     refuse(
-        (off > POSE_TOLERANCE) | mirrored,
-        f"is not a rigid transform: its rotation part is off by {worst} from orthonormal or is a"
-        " mirror image",
+        off > POSE_TOLERANCE,
+        f"is not a rigid transform: its rotation part is off by {worst} from orthonormal",
     )
+    refuse(mirrored, "is not a rigid transform: its rotation part is a mirror image")
     last = np.abs(X[..., 3, :] - (0.0, 0.0, 0.0, 1.0)).max(axis=-1)
     refuse(last > POSE_TOLERANCE, "has a last row other than 0 0 0 1")
     return X

@@ -129,12 +129,19 @@ def test_an_unsound_scene_is_shown_with_a_warning(scene_file: Path, capsys: Capt
     assert not re.search(r"<(script|img|link)[^>]*(src|href)=", text)
 
 
-def test_hovering_is_only_a_warning(scene_file: Path, capsys: Capture) -> None:
+def test_hovering_is_only_a_warning(
+    scene_file: Path, capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also of `evaluate`, which looks at a scene once and then reads of it in the cache."""
+    monkeypatch.setenv("BURG_DRAKE_CACHE", str(tmp_path / "cache"))
     edit_scene(scene_file, ("[0.12, 0.11, 0.0]", "[0.12, 0.11, 0.05]"))
     assert main(["scene", "validate", str(scene_file)]) == 0
-    assert capsys.readouterr().out == (
-        "warning: 'mug' hovers 50.0 mm above the board; it will fall when simulated\n"
-    )
+    warning = "warning: 'mug' hovers 50.0 mm above the board; it will fall when simulated\n"
+    assert capsys.readouterr().out == warning
+    for name in ("computed", "cached"):
+        words = ["evaluate", str(scene_file), "--mode", "hand", "--blind", "-n", "1"]
+        assert main([*words, "-o", str(tmp_path / name), "--quiet"]) == 0
+        assert f"burg-drake: {warning}" in capsys.readouterr().err
 
 
 def test_a_path_of_a_checkout_names_the_built_in_scene(capsys: Capture, tmp_path: Path) -> None:

@@ -150,10 +150,11 @@ def _evaluate_one(arguments: argparse.Namespace, reference: str) -> int:
     given = None if arguments.grasps is None else read_given(arguments, scene, station)
     for note in given.notes if given else ():
         print(f"note: {note}")
+    warnings = require_valid_scene(scene, station)
     if mode != "hand":
-        require_valid_scene(scene, station)
-        for warning in require_usable_arm(scene, station):
-            print(f"burg-drake: warning: {warning}", file=sys.stderr)
+        warnings += require_usable_arm(scene, station)
+    for warning in warnings:
+        print(f"burg-drake: warning: {warning}", file=sys.stderr)
     folder = arguments.output or f"{DEFAULT_OUTPUT}/{scene.name}"
     settings = requested_settings(arguments, mode, motion)
     settings = replace(settings, engine=first_engine(arguments, folder, mode))

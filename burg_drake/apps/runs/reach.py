@@ -124,13 +124,13 @@ def run_reach(arguments: argparse.Namespace) -> int:
     _require_sound(arguments)
     output = _output(arguments)
     scene, station = load_scene(arguments.scene), load_station(arguments.station)
-    require_valid_scene(scene, station)
+    warnings = require_valid_scene(scene, station)
     motion = chosen_motion(arguments, station)
     grasps = _grasps(arguments, scene, station)
     hints = mistake_notes(grasps, station, scene) if arguments.grasps is not None else ()
     if isinstance(output, Output):
         output.require_fits([name for part in grasps.values() for name in part.object.tolist()])
-    for warning in require_usable_arm(scene, station):
+    for warning in (*warnings, *require_usable_arm(scene, station)):
         print(f"burg-drake: warning: {warning}", file=sys.stderr)
     judged = reach(
         scene,
