@@ -38,11 +38,9 @@ def run_check(arguments: argparse.Namespace) -> int:
         where = f"{issue.object}: " if issue.object else ""
         print(f"{'error' if issue.is_error else 'warning'}: {where}{issue.kind}: {issue.message}")
     errors = sum(issue.is_error for issue in issues)
-    count = len(library.objects)
-    print(
-        f"{library.root}: {count} object{'' if count == 1 else 's'}, {errors} errors,"
-        f" {len(issues) - errors} warnings"
-    )
+    counts = {"object": len(library.objects), "error": errors, "warning": len(issues) - errors}
+    words = [f"{n} {what}{'' if n == 1 else 's'}" for what, n in counts.items()]
+    print(f"{library.root}: {', '.join(words)}")
     return 1 if errors else 0
 
 

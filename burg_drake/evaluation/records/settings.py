@@ -73,8 +73,8 @@ class EvaluationSettings:
     )
     until_balanced: int | None = setting(
         None,
-        "go on sampling until each object has N grasps that are lifted and N that are not, so that"
-        " trials on the robot can be balanced; of one scene",
+        "after the first grasps, go on sampling until each object has N that are lifted and N that"
+        " are not, so that trials on the robot can be balanced; of one scene",
         low=1,
     )
     balanced_among: Among = setting(

@@ -206,8 +206,8 @@ def lifted_and_failed(run: Run) -> dict[str, tuple[int, int]]:
 
 
 def _unbalanced(run: Run) -> list[str]:
-    """A sentence for each object with fewer lifted or failing grasps than asked for, once all
-    grasps are judged."""
+    """Once all grasps are judged, a sentence for each object with fewer lifted or failing grasps than
+    asked for, or that there is none."""
     grasps = run.document.grasps
     if not grasps.until_balanced or not run.complete:
         return []
@@ -226,4 +226,5 @@ def _unbalanced(run: Run) -> list[str]:
                 f" {grasps.objects[name]:,} grasps (max_grasps_per_object is"
                 f" {grasps.max_per_object:,})"
             )
-    return notes
+    asked = grasps.until_balanced
+    return notes or [f"every object has {asked} lifted and {asked} failing grasps, as asked for"]
