@@ -295,12 +295,8 @@ class EdgeRefinement:
             last = self._fit_shifted(light, last, found)
             found = self._disturbance(last)
             good = has_expected_profile(last.fits)
-            for _ in range(REWEIGHTED):
-                rest = found.rest
-                last = replace(last, weight=good * _tukey_weight(rest / last.sd, good))
-                found = self._disturbance(last)
-                if np.average((found.rest - rest) ** 2, weights=last.weight) < STILL**2:
-                    break
+            last = replace(last, weight=good * _tukey_weight(found.rest / last.sd, good))
+            found = self._disturbance(last)
         X_SC = perturbed_pose(last.X_SC, found.step)
         covariance = found.covariance.copy()
         covariance[:3, :3] += self._shift_by_blur(last)
