@@ -415,6 +415,11 @@ def _middle(session: ComposeSession, name: str) -> np.ndarray:
     return X_SO[:3, :3] @ np.add(entry.lower, entry.upper) / 2.0 + X_SO[:3, 3]
 
 
+def test_the_library_of_the_scene_is_the_one_that_is_chosen(client: PageClient) -> None:
+    assert client.options("Load", "Library") == ["clutter", "household"]
+    assert client.value("Load", "Library") == "household"
+
+
 def test_a_scene_that_cannot_be_opened_leaves_the_open_one(
     session: ComposeSession, client: PageClient, tmp_path: Path
 ) -> None:

@@ -26,7 +26,7 @@ class FilePanel:
 
     def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
         self._actions = actions
-        self._shown_name = ""
+        self._shown_name = self._shown_library = ""
         icon = viser.Icon
         with gui.add_folder("Save"):
             self._name: Any = gui.add_text("Name", "", hint="Of the file")
@@ -71,6 +71,9 @@ class FilePanel:
         libraries = self._actions.session.libraries()
         if libraries != self._library.options:
             self._library.options = libraries
+        library = view.document.library
+        if library != self._shown_library and library in libraries:
+            self._shown_library = self._library.value = library
 
     def save(self, client: Client) -> None:
         """Writes the scene to the file of the name that stands in the field."""
