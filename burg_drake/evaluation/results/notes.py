@@ -206,8 +206,8 @@ def lifted_and_failed(run: Run) -> dict[str, tuple[int, int]]:
 
 
 def _unbalanced(run: Run) -> list[str]:
-    """Once all grasps are judged, a sentence for each object with fewer lifted or failing grasps than
-    asked for, or that there is none."""
+    """Once all grasps are judged, a sentence for each object with fewer lifted or failing grasps
+    than asked for, or that there is none."""
     grasps = run.document.grasps
     if not grasps.until_balanced or not run.complete:
         return []
