@@ -16,6 +16,7 @@ from burg_drake.apps.cli import main
 from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.cameras.optics.intrinsics_file import save_intrinsics
 from burg_drake.cameras.placement.document import load_placement
+from burg_drake.cameras.sources.image_file import write_image
 from burg_drake.core.frames import make_pose
 from burg_drake.experiment.trials.book import TrialBook
 from burg_drake.experiment.trials.sheet import RealTrial, load_trials
@@ -152,10 +153,13 @@ def test_next_is_what_is_open_when_it_is_recorded(
     photo = sheet.parent / "any.png"
     photo.write_bytes(b"any")
     assert trials("record", sheet, "next", "--outcome", "slipped", "--photo", photo) == 2
+    assert "any.png is not an image that can be read" in capsys.readouterr().err
+    write_image(photo, np.zeros((4, 6, 3), np.uint8))
+    assert trials("record", sheet, "next", "--outcome", "slipped", "--photo", photo) == 2
     told = capsys.readouterr().err
     assert "trial 3 was changed meanwhile; nothing was recorded, but the photo is kept" in told
     assert trial(sheet, 3).photo == "" and trial(sheet, 4).outcome is None
-    assert (sheet.parent / "photos" / "003.png").read_bytes() == b"any"
+    assert (sheet.parent / "photos" / "003.png").read_bytes() == photo.read_bytes()
 
 
 def test_an_old_buffer_is_seen_and_mended(sheet: Path, capsys: Capture) -> None:

@@ -14,10 +14,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 from hypothesis import example, given, settings, strategies as st
 
+from burg_drake.cameras.sources.image_file import write_image
 from burg_drake.core.documents.schema import Pose, dump_document, parse_document, plain_data
 from burg_drake.core.documents.yaml_nodes import parse_nodes
 from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownNameError
@@ -110,7 +112,7 @@ def test_all_links_to_a_file_share_its_lock_and_journal(tmp_path: Path) -> None:
     assert len(TrialBook(path).missing_values()) == 24
     assert len(TrialBook(link).restore()) == 24 and TrialBook(path).missing_values() == []
     photo = tmp_path / "p.png"
-    photo.write_bytes(b"a photo")
+    write_image(photo, np.zeros((4, 6, 3), np.uint8))
     assert keep_evidence(link, 3, photo=photo) == "photos/003.png"
     assert (path.parent / "photos" / "003.png").exists()
 

@@ -116,8 +116,12 @@ def keep_evidence(
     Raises:
         InvalidInputError: the photo cannot be read, or nothing be written.
     """
+    from burg_drake.cameras.sources import decode_image
+
     folder = Path(os.path.realpath(sheet_path)).parent
     content = None if photo is None else read_bytes(photo, IMAGE_SIZE)
+    if content is not None and decode_image(content) is None:
+        raise InvalidInputError(f"{photo} is not an image that can be read; PNG and JPEG are")
     copy = ""
     with exclusive(Path(sheet_path)):  # no other one takes the same name
         stem = _free_stem(folder, number)

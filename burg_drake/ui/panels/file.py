@@ -34,7 +34,7 @@ class FilePanel:
         with gui.add_folder("Load"):
             self._scene = gui.add_dropdown("Scene", (NO_SCENES,))
             actions.clicked_by(quiet_button(gui, "Load scene", icon=icon.FOLDER_OPEN), self._load)
-            self._library = gui.add_dropdown("Library", actions.session.libraries())
+            self._library: Any = gui.add_dropdown("Library", actions.session.libraries())
             actions.clicked_by(
                 quiet_button(
                     gui, "New scene", width=6, icon=icon.FILE_PLUS, hint="With this library"
