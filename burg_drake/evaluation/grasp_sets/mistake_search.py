@@ -110,7 +110,8 @@ def find_mistake(
 
     Returns:
         The mistake that makes most grasps fit, where few fit as they are; where all grasps together
-        show none, that of the first object whose own grasps show one. None if there is none.
+        show none, that of the first object whose own grasps very likely have one. None if there is
+        none.
     """
     held = {name: part for name, part in grasps.items() if len(part)}
     if not held:
@@ -123,7 +124,8 @@ def find_mistake(
     if found := _mistake_of_all(_Search(held, station, source, gripper)):
         return found
     for name, part in held.items() if len(held) > 1 else ():
-        if found := _mistake_of_all(_Search({name: part}, station, source, gripper)):
+        found = _mistake_of_all(_Search({name: part}, station, source, gripper))
+        if found and found.is_likely:  # with many objects, one of them would show one by chance
             return replace(found, only=name)
     return None
 
