@@ -164,7 +164,7 @@ def test_a_run_over_scenes_tells_the_mistake_of_its_file_once(
     assert line.endswith(f"--correction turn:z90 -o {tmp_path / 'all_corrected'}")
     assert line.count(" -o ") == 1
     assert typed([*words, "--only", "box"], monkeypatch) == 2
-    assert "grasps are given there, given, on box here" in capsys.readouterr().err
+    assert "grasps are given there, given for box alone here" in capsys.readouterr().err
 
 
 def test_another_file_of_grasps_of_scenes_is_not_taken_for_the_first(tmp_path: Path) -> None:

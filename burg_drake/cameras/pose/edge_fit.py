@@ -28,11 +28,11 @@ WIDE_CELL = 2.2
 LEAST_CONTRAST = 4e-4
 """Below it an offset means nothing; keeps the division finite [linear light]."""
 
-FAINTEST = 0.25
+MIN_CONTRAST_SHARE = 0.25
 """Least contrast, as a share of the upper quartile of all."""
-UNLIKE = 0.15
+MAX_RESIDUAL_SHARE = 0.15
 """Most that a fit may leave, as a share of the contrast, besides the image's noise."""
-FARTHEST = 1.5
+MAX_EDGE_OFFSET = 1.5
 """Largest offset that a fit can be trusted with [pixels]."""
 
 
@@ -106,9 +106,9 @@ def has_expected_profile(fits: EdgeFits) -> NDArray[np.bool_]:
     usual = np.quantile(fits.contrast[right], 0.75)
     noise = np.median(fits.noise[right])
     return np.asarray(
-        (fits.contrast > FAINTEST * usual)
-        & (fits.noise < UNLIKE * fits.contrast + 2.0 * noise)
-        & (np.abs(fits.offset) < FARTHEST)
+        (fits.contrast > MIN_CONTRAST_SHARE * usual)
+        & (fits.noise < MAX_RESIDUAL_SHARE * fits.contrast + 2.0 * noise)
+        & (np.abs(fits.offset) < MAX_EDGE_OFFSET)
         & (fits.contrast**2 * fits.information > 4.0 * fits.noise**2)
     )
 

@@ -22,7 +22,7 @@ from burg_drake.cameras.pose.disturbance import (
     rest_within_markers,
 )
 from burg_drake.cameras.pose.edge_fit import (
-    FARTHEST,
+    MAX_EDGE_OFFSET,
     EdgeFits,
     fit_edges,
     has_expected_profile,
@@ -283,7 +283,7 @@ class EdgeRefinement:
         G, g = np.zeros((len(self._corners), 2, 2)), np.zeros((len(self._corners), 2))
         np.add.at(G, marker, information[:, None, None] * normal[:, :, None] * normal[:, None])
         np.add.at(g, marker, (information * offset)[:, None] * normal)
-        G += np.eye(2) / FARTHEST**2
+        G += np.eye(2) / MAX_EDGE_OFFSET**2
         return np.asarray(np.linalg.solve(G, g[..., None])[..., 0])
 
     def with_disturbance(self, light: NDArray[np.float32], last: EdgeRound) -> RefinedPose:

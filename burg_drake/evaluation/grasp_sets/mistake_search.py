@@ -20,6 +20,7 @@ from burg_drake.core.grasps import GraspSet, Outcome
 from burg_drake.evaluation.candidates import Owners, held_instances
 from burg_drake.evaluation.grasp_sets.pose_mistakes import (
     HALF_WIDTHS,
+    LIKELY_GRASPS,
     Mistake,
     MistakeFound,
     corrected_poses,
@@ -123,7 +124,8 @@ def find_mistake(
     gripper = station_gripper(station)
     if found := _mistake_of_all(_Search(held, station, source, gripper)):
         return found
-    for name, part in held.items() if len(held) > 1 else ():
+    many = {name: part for name, part in held.items() if len(part) >= LIKELY_GRASPS}
+    for name, part in many.items() if len(held) > 1 else ():
         found = _mistake_of_all(_Search({name: part}, station, source, gripper))
         if found and found.is_likely:  # with many objects, one of them would show one by chance
             return replace(found, only=name)

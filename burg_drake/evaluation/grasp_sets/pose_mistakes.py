@@ -33,7 +33,7 @@ from burg_drake.formats.common import GraspFormat, Gripper, ImportedGrasps, Pose
 
 OFFSETS_MM = np.arange(-120.0, 121.0, 5.0)
 """Distances along the approach that are tried besides those of known frames [mm]."""
-NAMES = {
+AXIS_WORDS = {
     "z": "the approach",
     "x": "the closing direction",
     "y": "the axis across approach and closing direction",
@@ -81,9 +81,9 @@ FILE_POSES: Mapping[str, tuple[Callable[[Array], Array], str]] = {
 """Corrections of the poses that a file has, by name: of poses (..., 4, 4) in the file's convention,
 and in words."""
 HALF_WIDTHS = "half_widths"
-CORRECTION = "correction"
+CORRECTION_KEY = "correction"
 """Key of a provenance."""
-CORRECTIONS = (*FILE_POSES, HALF_WIDTHS, "turn:AXISDEGREES", "forward:MM")
+CORRECTION_FORMS = (*FILE_POSES, HALF_WIDTHS, "turn:AXISDEGREES", "forward:MM")
 """What `correction` may have."""
 LIKELY_GRASPS, LIKELY_SHARE = 8, 0.9
 """A mistake is called likely if so many grasps were looked at, and so large a share of them fits
@@ -159,7 +159,7 @@ def corrected(
     Args:
         imported: what was read.
         gripper: the hand that it was read for.
-        correction: names of `CORRECTIONS`; `half_widths` doubles widths.
+        correction: names of `CORRECTION_FORMS`; `half_widths` doubles widths.
 
     Raises:
         UnknownNameError: there is no such correction.
@@ -176,7 +176,7 @@ def corrected(
         object=grasps.object,
         width=grasps.width * factor,
         score=grasps.score,
-        provenance={**provenance, CORRECTION: list(names)},
+        provenance={**provenance, CORRECTION_KEY: list(names)},
         columns=grasps.columns,
     )
     return replace(imported, grasps=found)
@@ -185,7 +185,7 @@ def corrected(
 def _without_correction(provenance: Mapping[str, Any]) -> dict[str, Any]:
     """A provenance without the correction with which the grasps of a file were once read from
     another file, which the poses of this one have already."""
-    found = {key: value for key, value in provenance.items() if key != CORRECTION}
+    found = {key: value for key, value in provenance.items() if key != CORRECTION_KEY}
     parts = found.get("parts")
     if isinstance(parts, Mapping):
         found["parts"] = {k: _without_correction(p) if p else p for k, p in parts.items()}
@@ -197,7 +197,7 @@ def _without_correction(provenance: Mapping[str, Any]) -> dict[str, Any]:
 def correction_of(grasps: GraspSet) -> tuple[str, ...]:
     """The correction with which a set was read, as its provenance says."""
     provenances = (grasps.provenance, *parts_of(grasps.provenance))
-    return next((tuple(p[CORRECTION]) for p in provenances if p.get(CORRECTION)), ())
+    return next((tuple(p[CORRECTION_KEY]) for p in provenances if p.get(CORRECTION_KEY)), ())
 
 
 def frames_of(grasps: GraspSet, gripper: Gripper) -> Array:
@@ -303,7 +303,7 @@ def _origins(gripper: Gripper) -> list[float]:
 def _frame_mistake(turn: tuple[str, ...], forward: float) -> Mistake:
     """A mistake about the grasp frame of a file."""
     words = [
-        f"turned by {float(m[2]):g} degrees about {NAMES[m[1]]}"
+        f"turned by {float(m[2]):g} degrees about {AXIS_WORDS[m[1]]}"
         for name in turn
         if (m := _TURN.fullmatch(name))
     ]

@@ -6,13 +6,13 @@ from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from burg_drake.core import InvalidInputError, content_hash, listing
+from burg_drake.core import content_hash, listing
 from burg_drake.core.grasps import Mode
 from burg_drake.core.paths import require_name
 from burg_drake.evaluation.records.identity import (
     request_differences,
     request_identity,
-    require_same_shard,
+    require_no_differences,
 )
 from burg_drake.evaluation.records.run_document import (
     HASH_DIGITS,
@@ -160,9 +160,4 @@ def require_same_campaign(folder: Path, there: CampaignDocument, here: CampaignD
     Raises:
         InvalidInputError: names every difference.
     """
-    found = campaign_differences(there, here)
-    if found:
-        raise InvalidInputError(
-            f"{folder} holds another run ({'; '.join(found)}); choose another folder, or delete it"
-        ).about("out")
-    require_same_shard(folder, there.shard, here.shard)
+    require_no_differences(folder, campaign_differences(there, here), there.shard, here.shard)

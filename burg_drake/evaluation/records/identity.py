@@ -20,9 +20,9 @@ from burg_drake.evaluation.records.origin import engine_label
 from burg_drake.evaluation.records.run_document import HASH_DIGITS, Grasps, Input, RunDocument
 from burg_drake.station.document import Engine
 
-SETTINGS = "settings of engine, trial and arm"
+SETTINGS_TOPIC = "settings of engine, trial and arm"
 """A topic of `identity`."""
-HERE = ("there", "here")
+THERE_AND_HERE = ("there", "here")
 """Names of the two sides of a comparison: a folder, and what is asked for now."""
 
 
@@ -66,7 +66,7 @@ def request_identity(document: RunRequestFields) -> dict[str, str]:
     return {
         "station": f"content {document.station.content[:HASH_DIGITS]}",
         "engine": engine_label(engine),
-        SETTINGS: settings,
+        SETTINGS_TOPIC: settings,
         "motion": motion_text(motion_in(document.trial)),
         "limit in the hand": limits_text(document.trial),
         "motion of others": measure_text(document.trial),
@@ -113,13 +113,13 @@ def run_differences(there: RunDocument, here: RunDocument) -> list[str]:
         identity(here),
         {
             "scene": [_scene_difference(there, here)],
-            **_words(there, here, HERE),
+            **_words(there, here, THERE_AND_HERE),
         },
     )
 
 
 def request_differences(
-    there: RunRequestFields, here: RunRequestFields, sides: Sequence[str] = HERE
+    there: RunRequestFields, here: RunRequestFields, sides: Sequence[str] = THERE_AND_HERE
 ) -> list[str]:
     """The same of what is asked, whatever the scene.
 
@@ -135,7 +135,7 @@ def differences(
     there: Mapping[str, str],
     here: Mapping[str, str],
     words: Mapping[str, Sequence[str]],
-    sides: Sequence[str] = HERE,
+    sides: Sequence[str] = THERE_AND_HERE,
 ) -> list[str]:
     """Topics that two identities have in common and differ in, in words.
 
@@ -146,7 +146,7 @@ def differences(
     """
     topics = [k for k in there if k in here and there[k] != here[k]]
     if "engine" in topics or "mode" in topics:  # settings differ too, which says nothing more
-        topics = [k for k in topics if k != SETTINGS]
+        topics = [k for k in topics if k != SETTINGS_TOPIC]
     found: list[str] = []
     for topic in topics:
         found += words.get(topic) or [_difference(topic, there[topic], here[topic], sides)]
@@ -154,7 +154,11 @@ def differences(
 
 
 def input_difference(
-    topic: str, there: Input, here: Input, sides: Sequence[str] = HERE, behind: str = "models"
+    topic: str,
+    there: Input,
+    here: Input,
+    sides: Sequence[str] = THERE_AND_HERE,
+    behind: str = "models",
 ) -> str:
     """How two documents with different contents differ, in words.
 
@@ -170,7 +174,7 @@ def input_difference(
 
 
 def setting_differences(
-    there: Mapping[str, object], here: Mapping[str, object], sides: Sequence[str] = HERE
+    there: Mapping[str, object], here: Mapping[str, object], sides: Sequence[str] = THERE_AND_HERE
 ) -> list[str]:
     """Settings that differ by name, with both values."""
     names = [k for k in {**there, **here} if there.get(k) != here.get(k)]
@@ -184,7 +188,7 @@ def _words(
     """Differences by topic, of topics whose texts in `request_identity` have hashes."""
     return {
         "station": [input_difference("station", there.station, here.station, sides)],
-        SETTINGS: setting_differences(_settings(there), _settings(here), sides),
+        SETTINGS_TOPIC: setting_differences(_settings(there), _settings(here), sides),
         "grasps": grasp_differences(there.grasps, here.grasps, sides),
     }
 
@@ -197,7 +201,9 @@ def _scene_difference(there: RunDocument, here: RunDocument) -> str:
     return input_difference("scene", there.scene, here.scene, behind="objects")
 
 
-def grasp_differences(there: Grasps, here: Grasps, sides: Sequence[str] = HERE) -> list[str]:
+def grasp_differences(
+    there: Grasps, here: Grasps, sides: Sequence[str] = THERE_AND_HERE
+) -> list[str]:
     """How the grasps of two runs differ, in words."""
     found = []
     if there.correction != here.correction:
@@ -214,7 +220,7 @@ def _described(grasps: Grasps) -> str:
     if grasps.origin == "sampled":
         return _sampled(grasps)
     count = f"{grasps.count} given" if grasps.count else "given"
-    return count + _where(grasps)
+    return f"{count} for {listing(grasps.only)} alone" if grasps.only else count
 
 
 def _settings(document: RunRequestFields) -> dict[str, object]:
@@ -236,20 +242,25 @@ def require_same_run(folder: Path, there: RunDocument, here: RunDocument) -> Non
     Raises:
         InvalidInputError: names every difference.
     """
-    found = run_differences(there, here)
-    if found:
-        raise InvalidInputError(
-            f"{folder} holds another run ({'; '.join(found)}); choose another folder, or delete it"
-        ).about("out")
-    require_same_shard(folder, there.shard, here.shard)
+    require_no_differences(folder, run_differences(there, here), there.shard, here.shard)
 
 
-def require_same_shard(folder: Path, there: str, here: str) -> None:
-    """Refuses to go on with another share of the same run.
+def require_no_differences(folder: Path, differences: Sequence[str], there: str, here: str) -> None:
+    """Refuses to go on with another run, or with another shard of the same one.
+
+    Args:
+        folder: holds the run.
+        differences: how the runs differ, in words.
+        there, here: shards of the run in the folder and of the one asked for.
 
     Raises:
-        InvalidInputError: names both.
+        InvalidInputError: names every difference, or both shards.
     """
+    if differences:
+        raise InvalidInputError(
+            f"{folder} holds another run ({'; '.join(differences)}); choose another folder, or"
+            " delete it"
+        ).about("out")
     if there != here:
         held = f"shard {there} of this run" if there else "all of this run"
         asked = f"shard {here}" if here else "no shard"

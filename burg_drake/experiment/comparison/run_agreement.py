@@ -27,7 +27,7 @@ COVERED = 0.9
 """Share of the differences of a margin that are within `MarginDifference.within`."""
 SURE_CONFIDENCE = 0.95
 """Confidence above which a verdict counts as sure."""
-CONFIDENCES = (
+CONFIDENCE_GROUPS = (
     f"below {CONTESTED:g}",
     f"{CONTESTED:g} to {SURE_CONFIDENCE:g}",
     f"above {SURE_CONFIDENCE:g}",
@@ -93,7 +93,7 @@ class RunAgreement:
         apart: the same of the grasps that are not alike.
         parted: the grasps that are not alike, by name.
         confidence: as `objects`, by the confidence of the first run's verdicts, of those that have
-            one; see `CONFIDENCES`.
+            one; see `CONFIDENCE_GROUPS`.
         margins: share of alike grasps in quantile bins of the first run's margins, of grasps of
             which both runs measured it; `successes` are the alike ones.
         differences: of the margins, where both executed.
@@ -208,8 +208,8 @@ def _by_confidence(held: VerdictPairs, seed: int) -> tuple[FactorGroup, ...]:
         return ()
     values = held.confidence[known]
     group = (values >= CONTESTED).astype(np.intp) + (values > SURE_CONFIDENCE)
-    names = {name: name for name in CONFIDENCES}
-    return by_factor(held.take(known), Factor(CONFIDENCES, group), names, seed=seed)
+    names = {name: name for name in CONFIDENCE_GROUPS}
+    return by_factor(held.take(known), Factor(CONFIDENCE_GROUPS, group), names, seed=seed)
 
 
 def _by_stage(first: Factor, second: Factor) -> dict[str, dict[str, int]]:

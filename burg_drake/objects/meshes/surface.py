@@ -104,7 +104,7 @@ class SurfaceMesh:
     wall: float | None = None
 
 
-GLTF = (".glb", ".gltf")
+GLTF_SUFFIXES = (".glb", ".gltf")
 
 
 def load_mesh(
@@ -132,7 +132,7 @@ def load_mesh(
         raw = mesh.copy()
     else:
         raw = _read_zup(Path(mesh))
-        if Path(mesh).suffix.lower() in GLTF:
+        if Path(mesh).suffix.lower() in GLTF_SUFFIXES:
             sentences.append("turned from glTF's y-up to z-up")
     _check_numbers(raw, name)
     if (alpha := make_opaque(raw)) is not None:
@@ -188,7 +188,7 @@ def read_piece(file: Path, scale: float) -> trimesh.Trimesh:
 def _read_zup(file: Path) -> trimesh.Trimesh:
     """A mesh file with z up, as which glTF is read turned."""
     mesh = read_mesh(file)
-    if file.suffix.lower() in GLTF:
+    if file.suffix.lower() in GLTF_SUFFIXES:
         mesh.apply_transform(make_pose(R_ZUP_YUP))
     return mesh
 

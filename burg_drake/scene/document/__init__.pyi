@@ -27,7 +27,7 @@ from .scene import (
     save_scene as save_scene,
 )
 from .validation import (
-    BOARD as BOARD,
+    BOARD_NAME as BOARD_NAME,
     GROUND_TOLERANCE as GROUND_TOLERANCE,
     HOVER_TOLERANCE as HOVER_TOLERANCE,
     IN_BOUNDS_TOLERANCE as IN_BOUNDS_TOLERANCE,

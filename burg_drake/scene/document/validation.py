@@ -47,7 +47,7 @@ pieces reach beyond the surface."""
 MILLIMETRES_SUSPECTED = 5.0
 """A coordinate on a table of this size [m] or more was probably meant in millimetres."""
 
-BOARD = "board"
+BOARD_NAME = "board"
 """What an object hovers over where no other object is below it."""
 
 IssueKind = Literal[
@@ -250,13 +250,13 @@ def _hovering_issue(name: str, extent: Extent, others: Mapping[str, Extent]) -> 
     height = min(float(extent.low[2]), extent.support)
     if height <= HOVER_TOLERANCE:
         return None
-    below = BOARD
+    below = BOARD_NAME
     for other, box in others.items():
         if (box.low[:2] >= extent.high[:2]).any() or (extent.low[:2] >= box.high[:2]).any():
             continue
         if box.low[2] < extent.low[2] and extent.low[2] - box.high[2] < height:
             height, below = float(extent.low[2] - box.high[2]), other
-    if below != BOARD and height < SUPPORT_TOLERANCE:
+    if below != BOARD_NAME and height < SUPPORT_TOLERANCE:
         return None
     return hovering_issue(name, height, below)
 
@@ -267,9 +267,9 @@ def hovering_issue(name: str, height: float, below: str) -> SceneIssue:
     Args:
         name: of the instance.
         height: how far it falls [m].
-        below: name of what it falls on; `BOARD`, or empty if nothing is below it.
+        below: name of what it falls on; `BOARD_NAME`, or empty if nothing is below it.
     """
-    where = "the board" if below == BOARD else repr(below)
+    where = "the board" if below == BOARD_NAME else repr(below)
     hovers = f"hovers {length_text(height)} above {where}" if below else "has nothing below it"
     return SceneIssue(
         instance=name,

@@ -18,7 +18,7 @@ from pydrake.math import RigidTransform
 from burg_drake.core import Array, InvalidInputError, check_pose, transform_points
 from burg_drake.objects.library import ObjectLibrary
 from burg_drake.scene.document import (
-    BOARD,
+    BOARD_NAME,
     GROUND_TOLERANCE,
     HOVER_TOLERANCE,
     SINK_TOLERANCE,
@@ -50,7 +50,7 @@ GRAVITY = 9.81
 """[m/s^2]."""
 DEEPEST = 0.006
 """A tip may be so deep in the table [m], if the table bears it there."""
-DOWN = np.array([0.0, 0.0, -1.0])
+DOWN_DIRECTION = np.array([0.0, 0.0, -1.0])
 """In the world."""
 PUSH_ERROR = 1.05
 """What lies still was pushed up by its weight; the table's force is known to 2 %."""
@@ -273,9 +273,9 @@ class SceneCheck:
         height = min(placed.surface, placed.support)
         if height <= HOVER_TOLERANCE:
             return None
-        fall, below = self._travel.first_contact([name], DOWN, np.inf)
+        fall, below = self._travel.first_contact([name], DOWN_DIRECTION, np.inf)
         if below in ("table", ""):
-            fall, below = height, BOARD if below else ""
+            fall, below = height, BOARD_NAME if below else ""
         elif fall <= HOVER_TOLERANCE + sum(self._gap_to_surface(n) for n in (name, below)):
             return None
         return hovering_issue(name, fall, below)
