@@ -90,7 +90,8 @@ pip_install() {
 }
 if [ -n "${LOWEST:-}" ]; then  # pip takes the newest versions alone
   pip_install uv
-  "$venv/bin/python" -m uv pip install -q --python "$venv/bin/python" --resolution lowest-direct \
+  "$venv/bin/python" -m uv pip install -q --system-certs --python "$venv/bin/python" \
+    --resolution lowest-direct \
     -e '.[dask,dev,frame,jobqueue,mujoco,parquet,ui,usd]'
 else
   pip_install -e '.[dev,ui]'
