@@ -92,8 +92,8 @@ beside its place."""
 ROUNDS_BY_MARKER = 2
 """Of that."""
 MIN_SHIFT = 1.0
-"""Of the corners of a marker most edges of which drop out, from which on it is beside its place:
-half of the edges that are shifted so far do not look as they should any more [pixels]."""
+"""A marker of which most edges drop out is beside its place if its corners were read farther from
+there [pixels]. Of edges that are shifted so far, half no longer have the expected profile."""
 MAX_SHIFT = MARGIN / 2.0
 """Of a marker beside its place, up to which its edges are looked for there: seven pixels across
 an edge stay within the image [pixels]."""
