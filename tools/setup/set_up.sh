@@ -89,8 +89,11 @@ pip_install() {
   "$venv/bin/python" -m pip install ${quiet[@]+"${quiet[@]}"} --disable-pip-version-check "$@"
 }
 if [ -n "${LOWEST:-}" ]; then  # pip takes the newest versions alone
-  "$venv/bin/python" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' ||
-    fail "the oldest versions are for Python 3.11 alone; name one: make test-lowest PYTHON=/path/to/python3.11"
+  if ! "$venv/bin/python" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))'; then
+    rm -rf "$venv"
+    fail "the oldest versions are for Python 3.11 alone; name one:" \
+      "make test-lowest PYTHON=/path/to/python3.11"
+  fi
   pip_install uv
   "$venv/bin/python" -m uv pip install -q --system-certs --python "$venv/bin/python" \
     --resolution lowest-direct -e '.[dask,dev,frame,jobqueue,mujoco,parquet,ui,usd]'
