@@ -6,6 +6,10 @@ A comment of a page right before a block (`<!-- ... -->`) says what is special a
 - `run first` and lines of Python: what a reader has at hand, and the blocks take for granted;
 - `file NAME`: the block is written to that file, for those after it;
 - `run`: of commands; they are run, and not only parsed.
+
+A comment anywhere on a page that begins with a line `in tests` replaces text of the page by what
+runs faster, one replacement a line: `printed => replacement`. The printed text has to occur exactly
+once outside the comment.
 """
 
 from __future__ import annotations
@@ -21,7 +25,8 @@ from types import MappingProxyType
 from markdown_it import MarkdownIt
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("**/[!_]*.md"))]
+REPLACEMENTS = re.compile(r"<!-- in tests\n(.*?)-->", re.DOTALL)
 AS_PRINTED: Mapping[str, str] = MappingProxyType({})
 
 
@@ -67,6 +72,9 @@ def blocks(page: Path, changes: Mapping[str, str] = AS_PRINTED) -> Iterator[Bloc
         changes: what is printed, each once, and what is taken in its place.
     """
     text = page.read_text("utf-8")
+    lines = [line for comment in REPLACEMENTS.findall(text) for line in comment.splitlines()]
+    text = REPLACEMENTS.sub(lambda found: "\n" * found[0].count("\n"), text)
+    changes = {**changes, **dict(line.split(" => ", 1) for line in lines)}
     for printed, small in changes.items():
         assert text.count(printed) == 1, printed
         text = text.replace(printed, small)

@@ -14,7 +14,7 @@ from burg_drake.apps.cli import main
 from burg_drake.evaluation.workers import LocalExecutor
 from burg_drake.system_libraries import missing_render_libraries
 from tests.evaluation.inline_executor import Inline
-from tests.pages import PAGES, blocks
+from tests.pages import PAGES, ROOT, blocks
 
 SMALL = """\
 version: 1
@@ -68,7 +68,7 @@ RUN = [page for page in PAGES if any(block.runs for block in blocks(page))]
 
 
 @pytest.mark.usefixtures("judged_here")
-@pytest.mark.parametrize("page", RUN, ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", RUN, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_blocks_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if "camera" in page.read_text("utf-8") and missing_render_libraries():
         pytest.skip("the renderer's system libraries are missing")

@@ -47,7 +47,9 @@ BLOCKS = {page: list(blocks(page)) for page in PAGES}
 
 
 def ids(value: Any) -> str:
-    return value.stem if isinstance(value, Path) else f"{value.page.stem}:{value.line}"
+    page = value if isinstance(value, Path) else value.page
+    name = page.relative_to(ROOT).with_suffix("").as_posix()
+    return name if page is value else f"{name}:{value.line}"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=ids)
