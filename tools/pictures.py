@@ -3,9 +3,9 @@
 `station` renders those of stations and the built-in objects by Drake, `board` what a camera over
 the board sees, with the overlay, `overlay` the latter after a placement check. `pages` takes those
 of grasps by outcome and by a column, of a replay, of frames and of a reachability map from the
-pages that the commands write with --html, by a Chromium that runs without a display; `ports` what
-the example of the ports shows in Meshcat; `sampled` renders a scene of each layout; `setup` takes
-those of the setup page. The others are screenshots by hand.
+pages that the commands write with --html, by a Chromium that runs without a display; `report` that
+of a run; `ports` what the example of the ports shows in Meshcat; `sampled` renders a scene of each
+layout; `setup` takes those of the setup page. The others are screenshots by hand.
 """
 
 from __future__ import annotations
@@ -152,6 +152,14 @@ def pages() -> None:
         photograph(page, "reachability.png", (1200, 760))
 
 
+def report() -> None:
+    """Writes the picture of a report: that of the demo with few grasps."""
+    with tempfile.TemporaryDirectory() as run:
+        evaluate = "evaluate tabletop_six --station panda_tabletop --grasps-per-object 10 --quiet"
+        burg_drake([*evaluate.split(), "-o", run])
+        photograph(Path(run) / "report.html", "report.png", (985, 1010))
+
+
 def ports() -> None:
     """Runs the example of the ports, and looks at the end of its plan."""
     meshcat = runpy.run_path(str(IMAGES.parents[1] / "examples" / "10_ports.py"))["meshcat"]
@@ -256,7 +264,7 @@ def main() -> None:
     """Makes the kinds of pictures that are named, or all."""
     kinds = {
         **{"station": station, "board": board, "overlay": overlay},
-        **{"pages": pages, "ports": ports, "sampled": sampled, "setup": setup},
+        **{"pages": pages, "report": report, "ports": ports, "sampled": sampled, "setup": setup},
     }
     for name in sys.argv[1:] or kinds:
         if name not in kinds:
