@@ -13,30 +13,11 @@ from typing import ClassVar, Literal
 
 from burg_drake.cameras.optics import SENSORS
 from burg_drake.core import FieldError, UnknownNameError, nearest
-from burg_drake.core.documents import load_document, require_ranges
+from burg_drake.core.documents import Ranges, load_document, require_ranges
 
 SecondView = Literal["none", "same", "wide"]
 """What the second imager or the projector sees: it is of no interest; as much as the first one to
 each side; all that the first one sees, if nothing is in between."""
-
-RANGES = {
-    "baseline": (-1.0, 1.0),
-    "axial_base": (0.0, 1.0),
-    "axial_square": (0.0, 1.0),
-    "axial_center": (-10.0, 10.0),
-    "axial_angle": (0.0, 1.0),
-    "disparity_sigma": (0.0, 10.0),
-    "disparity_step": (0.0, 10.0),
-    "lateral_base": (0.0, 10.0),
-    "lateral_angle": (0.0, 10.0),
-    "flying": (0.0, 1.0),
-    "grazing_from_deg": (0.0, 90.0),
-    "grazing_to_deg": (0.0, 90.0),
-    "dark_below": (0.0, 255.0),
-    "dark_probability": (0.0, 1.0),
-    "hole_size": (0.0, 20.0),
-    "depth_step": (0.0, 1.0),
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,6 +48,25 @@ class DepthNoise:
 
     WRITTEN_WHOLE: ClassVar[bool] = True
 
+    RANGES: ClassVar[Ranges] = {
+        "baseline": (-1.0, 1.0),
+        "axial_base": (0.0, 1.0),
+        "axial_square": (0.0, 1.0),
+        "axial_center": (-10.0, 10.0),
+        "axial_angle": (0.0, 1.0),
+        "disparity_sigma": (0.0, 10.0),
+        "disparity_step": (0.0, 10.0),
+        "lateral_base": (0.0, 10.0),
+        "lateral_angle": (0.0, 10.0),
+        "flying": (0.0, 1.0),
+        "grazing_from_deg": (0.0, 90.0),
+        "grazing_to_deg": (0.0, 90.0),
+        "dark_below": (0.0, 255.0),
+        "dark_probability": (0.0, 1.0),
+        "hole_size": (0.0, 20.0),
+        "depth_step": (0.0, 1.0),
+    }
+
     version: int = 1
     baseline: float = 0.0
     second_view: SecondView = "none"
@@ -87,7 +87,7 @@ class DepthNoise:
     depth_step: float = 0.0
 
     def __post_init__(self) -> None:
-        require_ranges(self, RANGES)
+        require_ranges(self)
         if self.grazing_to_deg < self.grazing_from_deg:
             raise FieldError(
                 f"grazing_to_deg is {self.grazing_to_deg:g}; it must be at least grazing_from_deg,"

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, get_args
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 
 from burg_drake.cameras.optics.fisheye import COEFFICIENTS, fisheye_lens
 from burg_drake.cameras.optics.known_parts import PARTS
 from burg_drake.core import Array, FieldError, InvalidInputError, nearest
+from burg_drake.core.documents import Ranges, require_ranges
 from burg_drake.station.document import (
     FOCAL_RANGE,
     HALF_PIXEL as HALF_PIXEL,
@@ -24,8 +25,6 @@ from burg_drake.station.document import (
 
 DISTORTION_SIZES = (0, 4, 5, 8, 12, 14)
 """Numbers of coefficients that OpenCV's model of a lens may have."""
-INTRINSICS_RANGES = {"focal": FOCAL_RANGE, "center": (-1e6, 1e6), "distortion": (-1e12, 1e12)}
-"""Allowed values, far beyond those of any camera; projections overflow with larger ones."""
 LensModel = Literal["perspective", "fisheye"]
 
 
@@ -50,6 +49,13 @@ class Intrinsics:
             `upper right corner`, `left edge`, `middle`, `right edge`, `lower left corner`, `lower
             edge`, `lower right corner`.
     """
+
+    RANGES: ClassVar[Ranges] = {
+        "focal": FOCAL_RANGE,
+        "center": (-1e6, 1e6),
+        "distortion": (-1e12, 1e12),
+    }
+    """Far beyond any camera; projections overflow with larger values."""
 
     version: int = 1
     camera: str = ""
@@ -76,10 +82,7 @@ class Intrinsics:
         if min(self.width, self.height, *self.focal) <= 0:
             raise InvalidInputError("width, height and focal of a camera must be positive")
         require_image_size(self.width, self.height)
-        for name, (low, high) in INTRINSICS_RANGES.items():
-            for value in getattr(self, name):
-                if not low <= value <= high:
-                    raise FieldError(f"{name} has {value:g}; it must be {low:g} to {high:g}", name)
+        require_ranges(self)
         if self.model not in get_args(LensModel):
             known = nearest(str(self.model), get_args(LensModel))
             raise FieldError(f"model {self.model!r} does not exist; {known}", "model")

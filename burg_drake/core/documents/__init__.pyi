@@ -9,8 +9,10 @@ from .plain_yaml import (
     parse_plain_yaml as parse_plain_yaml,
 )
 from .ranges import (
+    Ranges as Ranges,
     require_finite as require_finite,
     require_ranges as require_ranges,
+    require_rising as require_rising,
 )
 from .reader import Reader as Reader
 from .schema import (

@@ -5,33 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal, get_args
 
-from burg_drake.core import FieldError
-from burg_drake.core.documents import require_ranges
+from burg_drake.core.documents import Ranges, require_ranges, require_rising
 
 Pattern = Literal["wood", "cloth", "stone", "plain"]
 PATTERNS: tuple[Pattern, ...] = get_args(Pattern)
 
 MOST_LIGHTS = 4
 MOST_DISTRACTORS = 50
-RANGES = {
-    "shadows": (0.0, 1.0),
-    "room": (0.0, 1.0),
-    "room_light": (0.0, 1.0),
-    "board": (0.0, 1.0),
-    "white_balance": (0.0, 0.5),
-    "color_gain": (0.0, 0.9),
-}
-PAIRS = {
-    "lights": (1, MOST_LIGHTS),
-    "light_elevation_deg": (5.0, 90.0),
-    "temperature": (1000.0, 20_000.0),
-    "exposure": (-5.0, 5.0),
-    "gamma": (0.2, 5.0),
-    "blur": (0.0, 20.0),
-    "electrons": (50.0, 1e6),
-    "distractors": (0, MOST_DISTRACTORS),
-}
-"""The same of ranges that values are drawn from."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,6 +49,23 @@ class AppearanceSettings:
 
     WRITTEN_WHOLE: ClassVar[bool] = True
 
+    RANGES: ClassVar[Ranges] = {
+        "shadows": (0.0, 1.0),
+        "room": (0.0, 1.0),
+        "room_light": (0.0, 1.0),
+        "board": (0.0, 1.0),
+        "white_balance": (0.0, 0.5),
+        "color_gain": (0.0, 0.9),
+        "lights": (1, MOST_LIGHTS),
+        "light_elevation_deg": (5.0, 90.0),
+        "temperature": (1000.0, 20_000.0),
+        "exposure": (-5.0, 5.0),
+        "gamma": (0.2, 5.0),
+        "blur": (0.0, 20.0),
+        "electrons": (50.0, 1e6),
+        "distractors": (0, MOST_DISTRACTORS),
+    }
+
     lights: tuple[int, int] | None = (1, 3)
     light_elevation_deg: tuple[float, float] = (35.0, 85.0)
     temperature: tuple[float, float] | None = (3200.0, 7500.0)
@@ -88,12 +85,7 @@ class AppearanceSettings:
     distractors_on_board: bool = False
 
     def __post_init__(self) -> None:
-        require_ranges(self, RANGES)
-        for name, (least, most) in PAIRS.items():
-            pair = getattr(self, name)
-            if pair is not None and not least <= pair[0] <= pair[1] <= most:
-                raise FieldError(
-                    f"{name} is {pair[0]:g} to {pair[1]:g}; it must rise, within {least:g} to"
-                    f" {most:g}",
-                    name,
-                )
+        require_ranges(self)
+        for name in self.RANGES:
+            if isinstance(pair := getattr(self, name), tuple):
+                require_rising(pair, name)

@@ -10,18 +10,12 @@ from typing import Any, ClassVar
 from burg_drake.cameras.noise import depth_noise
 from burg_drake.cameras.optics import sensor
 from burg_drake.core import LARGEST_SEED, FieldError, InvalidInputError, nearest, setting
-from burg_drake.core.documents import parse_document, plain_data, require_ranges
+from burg_drake.core.documents import Ranges, parse_document, plain_data, require_ranges
 from burg_drake.dataset.appearance import AppearanceSettings
 from burg_drake.dataset.blender import RENDERERS, RendererName
 from burg_drake.dataset.views import ViewpointSettings
 from burg_drake.scene.document import SceneRecipe
 from burg_drake.station.document import MAX_SIDE
-
-RANGES = {
-    "seed": (0, LARGEST_SEED),
-    "views": (1, 1000),
-    "grasps_per_object": (0, 100_000),
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,6 +46,12 @@ class DatasetRecipe:
 
     WRITTEN_WHOLE: ClassVar[bool] = True
 
+    RANGES: ClassVar[Ranges] = {
+        "seed": (0, LARGEST_SEED),
+        "views": (1, 1000),
+        "grasps_per_object": (0, 100_000),
+    }
+
     version: int = 1
     seed: int = setting(0, high=LARGEST_SEED)
     views: int = setting(20, "views of each scene", metavar="K", low=1)
@@ -76,7 +76,7 @@ class DatasetRecipe:
     given: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        require_ranges(self, RANGES)
+        require_ranges(self)
         if self.sensor:
             self._require_size()
             depth_noise(self.sensor)

@@ -6,27 +6,13 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from burg_drake.core import FieldError
-from burg_drake.core.documents import Pose, require_ranges
+from burg_drake.core.documents import Pose, Ranges, require_ranges, require_rising
 
 SPHERE, WRIST = "sphere", "wrist"
 """Cameras that no station has: around the scene, and on the hand."""
 FARTHEST = 100.0
 """Of a camera from what it looks at [m]."""
 
-RANGES = {
-    "aim": (0.0, FARTHEST),
-    "position_jitter": (0.0, FARTHEST),
-    "angle_jitter_deg": (0.0, 180.0),
-    "in_view": (0.0, 1.0),
-    "draws": (1, 100_000),
-}
-PAIRS = {
-    "distance": (1e-3, FARTHEST),
-    "elevation_deg": (-90.0, 90.0),
-    "azimuth_deg": (-360.0, 360.0),
-    "roll_deg": (-360.0, 360.0),
-}
-"""The same of ranges that views are drawn from."""
 
 Range = tuple[float, float]
 
@@ -58,6 +44,18 @@ class ViewpointSettings:
 
     WRITTEN_WHOLE: ClassVar[bool] = True
 
+    RANGES: ClassVar[Ranges] = {
+        "aim": (0.0, FARTHEST),
+        "position_jitter": (0.0, FARTHEST),
+        "angle_jitter_deg": (0.0, 180.0),
+        "in_view": (0.0, 1.0),
+        "draws": (1, 100_000),
+        "distance": (1e-3, FARTHEST),
+        "elevation_deg": (-90.0, 90.0),
+        "azimuth_deg": (-360.0, 360.0),
+        "roll_deg": (-360.0, 360.0),
+    }
+
     cameras: tuple[str, ...] = (SPHERE,)
     distance: Range = (0.5, 1.0)
     elevation_deg: Range = (25.0, 75.0)
@@ -77,11 +75,7 @@ class ViewpointSettings:
                 " station",
                 "cameras",
             )
-        require_ranges(self, RANGES)
-        for name, (least, most) in PAIRS.items():
-            low, high = getattr(self, name)
-            if not least <= low <= high <= most:
-                raise FieldError(
-                    f"{name} is {low:g} to {high:g}; it must rise, within {least:g} to {most:g}",
-                    name,
-                )
+        require_ranges(self)
+        for name in self.RANGES:
+            if isinstance(pair := getattr(self, name), tuple):
+                require_rising(pair, name)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal, get_args
 
 from burg_drake.core import Array, InvalidInputError
-from burg_drake.core.documents import Pose, Vector3, require_ranges
+from burg_drake.core.documents import Pose, Ranges, Vector3, require_ranges
 
 DEFAULT_FRICTION = 0.24
 """Friction coefficient where none is given, as in BURG-Toolkit (Rudorfer et al., 2022)."""
@@ -74,18 +74,6 @@ class MassProperties:
             raise InvalidInputError(f"mass is {self.mass:g} kg; a free object needs a mass above 0")
 
 
-DECOMPOSITION_RANGES = {
-    "threshold": (0.01, 1.0),
-    "join": (0.0, 10.0),
-    "max_vertices": (4, 4096),
-    "tolerance": (0.0, 0.1),
-    "min_thickness": (0.0, 0.1),
-    "timeout": (1e-3, 86400.0),
-    "seed": (0, 2**31 - 1),
-}
-"""Values that make sense; CoACD itself takes thresholds of 0.01 to 1."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class Decomposition:
     """Parameters of the convex decomposition.
@@ -103,6 +91,17 @@ class Decomposition:
 
     WRITTEN_WHOLE: ClassVar[bool] = True
 
+    RANGES: ClassVar[Ranges] = {
+        "threshold": (0.01, 1.0),
+        "join": (0.0, 10.0),
+        "max_vertices": (4, 4096),
+        "tolerance": (0.0, 0.1),
+        "min_thickness": (0.0, 0.1),
+        "timeout": (1e-3, 86400.0),
+        "seed": (0, 2**31 - 1),
+    }
+    """Values that make sense; CoACD itself takes thresholds of 0.01 to 1."""
+
     threshold: float = 0.05
     join: float = 0.01
     max_vertices: int = 64
@@ -112,7 +111,7 @@ class Decomposition:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        require_ranges(self, DECOMPOSITION_RANGES)
+        require_ranges(self)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,20 +6,12 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, get_args
 
 from burg_drake.core import LARGEST_SEED, content_hash, setting
-from burg_drake.core.documents import dump_document, require_ranges
+from burg_drake.core.documents import Ranges, dump_document, require_ranges
 from burg_drake.scene.document.board import Board
 from burg_drake.scene.document.layout import TRIES, LayoutName, PoseChoice
 
 ATTEMPTS = 100
 """Whole scenes that are drawn until one is accepted."""
-
-RANGES = {
-    "count": (1, 1000),
-    "seed": (0, LARGEST_SEED),
-    "tries": (1, 1_000_000),
-    "attempts": (1, 100_000),
-    "clear_grasps": (0, 1_000_000),
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,6 +40,14 @@ class SceneRecipe:
     """
 
     WRITTEN_WHOLE: ClassVar[bool] = True
+
+    RANGES: ClassVar[Ranges] = {
+        "count": (1, 1000),
+        "seed": (0, LARGEST_SEED),
+        "tries": (1, 1_000_000),
+        "attempts": (1, 100_000),
+        "clear_grasps": (0, 1_000_000),
+    }
 
     library: str
     count: int = 6
@@ -80,7 +80,7 @@ class SceneRecipe:
     )
 
     def __post_init__(self) -> None:
-        require_ranges(self, RANGES)
+        require_ranges(self)
 
     @property
     def content(self) -> str:

@@ -6,10 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from burg_drake.core import InvalidInputError, UnknownNameError, nearest, quoted
-from burg_drake.core.documents import require_ranges
-
-RANGES = {"time_step": (1e-4, 0.02), "stiction_tolerance": (1e-9, 1.0)}
-"""With longer steps contact is wrong; shorter ones, a tenth of the reference's, take hours."""
+from burg_drake.core.documents import Ranges, require_ranges
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +35,9 @@ class Engine:
 
     WRITTEN_WHOLE: ClassVar[bool] = True
 
+    RANGES: ClassVar[Ranges] = {"time_step": (1e-4, 0.02), "stiction_tolerance": (1e-9, 1.0)}
+    """With longer steps contact is wrong; shorter ones, a tenth of the reference's, take hours."""
+
     name: str
     time_step: float
     simulator: Literal["drake", "mujoco"] = "drake"
@@ -48,7 +48,7 @@ class Engine:
     whole_trial: bool = False
 
     def __post_init__(self) -> None:
-        require_ranges(self, RANGES, f"engine {quoted(self.name)}")
+        require_ranges(self, f"engine {quoted(self.name)}")
 
     @property
     def creeps(self) -> bool:
