@@ -23,12 +23,12 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, ClassVar, Literal, cast
 
 import yaml
 
 from burg_drake.core import InvalidInputError
-from burg_drake.core.documents import Reader, Vector3, load_nodes
+from burg_drake.core.documents import Ranges, Reader, Vector3, load_nodes
 from burg_drake.core.paths import require_name
 from burg_drake.core.terminal import Rgba
 from burg_drake.objects.library import ContactKind, Decomposition, Inertia
@@ -45,6 +45,8 @@ class Cutting:
     Attributes:
         threshold, join, max_vertices, tolerance, min_thickness, timeout, seed: as there.
     """
+
+    RANGES: ClassVar[Ranges] = Decomposition.RANGES
 
     threshold: float | None = None
     join: float | None = None

@@ -10,6 +10,7 @@ import dataclasses
 import enum
 import inspect
 import json
+import math
 import re
 import types
 import typing
@@ -144,7 +145,7 @@ def _optional(schema: dict[str, Any]) -> dict[str, Any]:
 def _bound(schema: dict[str, Any], low: float, high: float) -> None:
     """Adds a range to the schema of a number, or to that of the numbers of a list."""
     schema = schema.get("items", schema)
-    schema |= {"minimum": low, "maximum": high}
+    schema |= {name: x for name, x in (("minimum", low), ("maximum", high)) if math.isfinite(x)}
 
 
 def _summary(kind: type) -> str:
