@@ -41,8 +41,8 @@ BUILT_IN = [
     for pattern in ("scenes/*.yaml", "stations/*.yaml", "models/hands/*.yaml", "models/*/*.yaml")
     for path in sorted(data_root().glob(pattern))
 ]
-NOT_YAML = {"Appearance", "Comparison", "Record", "Nearest", "PrecisionRecall"} | {
-    *("SetComparison", "SetSummary"),
+NOT_YAML = {"Appearance", "Comparison", "Record", "Nearest", "PrecisionRecall", "Matches"} | {
+    *("TopPrecision", "SetComparison", "SetSummary"),
 }
 """Classes with a version that are written as JSON, or within another document."""
 MUTATIONS = 12
@@ -52,8 +52,8 @@ ONLY_THE_READER_REFUSES = {
     r"|needs a baseline|margin names|is less than|more than lift_height|minimum is at most"
     r"|entries; expected|coefficients|depth images|both fingers|closed and open|simulated$",
     "a range that has to rise": r"must rise|at least grazing",
-    "more than 0, or of many numbers": r"above 0|> 0|positive|below 0|or more|at least|must be 0, or"
-    r"|to 1000$|one a joint|each must be",
+    "more than 0, or of many numbers": r"above 0|> 0|positive|below 0|or more|at least|each must be"
+    r"|must be 0, or|one a joint",
     "directions and rotations": r"has length|has no length",
     "letters of names and dates": r"cannot be used in paths|is not a name|write it as in",
     "names of what is elsewhere": r"does not exist|neither the table|there is no|is of object"
@@ -81,7 +81,7 @@ for kind, pattern in {
     "null": r"~|null|Null|NULL|",
     "bool": r"true|True|TRUE|false|False|FALSE",
     "int": r"[-+]?[0-9]+",
-    "float": r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN)",
+    "float": r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\.inf|\.nan",
 }.items():
     Yaml12.add_implicit_resolver(f"tag:yaml.org,2002:{kind}", re.compile(f"^({pattern})$"), None)
 
@@ -153,7 +153,9 @@ def test_every_key_is_explained(kind: str) -> None:
     schema = json_schema(kind)
     mappings = {kind: schema} | schema.get("definitions", {})
     assert [name for name, mapping in mappings.items() if not mapping["description"]] == []
-    keys = {f"{name}.{k}": v for name, one in mappings.items() for k, v in one["properties"].items()}
+    keys = {
+        f"{name}.{k}": v for name, one in mappings.items() for k, v in one["properties"].items()
+    }
     assert [key for key, value in keys.items() if not value.get("description")] == []
 
 
@@ -190,7 +192,9 @@ def mutated(data: Any, random: Random) -> Any:
     for node, key in places:  # grows meanwhile
         inner = node[key]
         if isinstance(inner, dict | list):
-            places += [(inner, k) for k in (inner if isinstance(inner, dict) else range(len(inner)))]
+            places += [
+                (inner, k) for k in (inner if isinstance(inner, dict) else range(len(inner)))
+            ]
     node, key = random.choice(places)
     change = random.choice(("remove", "add", "type", "type", "range", "range"))
     put = None
@@ -201,7 +205,9 @@ def mutated(data: Any, random: Random) -> Any:
     elif change == "range" and isinstance(node[key], int | float):
         node[key] = put = random.choice((-1, -1e6, 0, 1e7, 0.5, 1e40))
     else:
-        node[key] = put = random.choice((None, True, 7, 0.5, "a text", "7", [], [1, 2], {}, {"a": 1}))
+        node[key] = put = random.choice(
+            (None, True, 7, 0.5, "a text", "7", [], [1, 2], {}, {"a": 1})
+        )
     return data, put
 
 

@@ -30,24 +30,25 @@ LensModel = Literal["perspective", "fisheye"]
 
 @dataclass(frozen=True, kw_only=True)
 class Intrinsics:
-    """Schema of an intrinsics file.
+    """Intrinsics of a camera, as in OpenCV (pixel centres at integers).
 
     Attributes:
-        camera: what camera they are of.
-        width, height: image size [pixels].
-        focal: fx, fy [pixels].
-        center: principal point cx, cy [pixels], pixel centres at integers.
-        model: of the lens. `perspective` is a pinhole with distortion, for up to about 120 degrees;
-            `fisheye` has a focal length of image a radian off the axis, for up to about 170.
-        distortion: of a perspective lens OpenCV's k1, k2, p1, p2[, k3[, k4, k5, k6[, s1, s2, s3,
-            s4[, tx, ty]]]], none for a pinhole camera; of a fisheye k1, k2, k3, k4 of
-            `cv2.fisheye`.
-        residual: root mean square reprojection error of the calibration [pixels], if known.
-        known_to: how far this camera and the true one show the same apart, at most, in 19 of 20
-            cases [pixels], as the calibration promises.
-        except_at: parts of the image where it does not, of `upper left corner`, `upper edge`,
-            `upper right corner`, `left edge`, `middle`, `right edge`, `lower left corner`, `lower
-            edge`, `lower right corner`.
+        camera: name of the camera, for people.
+        width: width of the image [pixels].
+        height: height of the image [pixels].
+        focal: focal lengths fx and fy [pixels].
+        center: principal point cx and cy [pixels].
+        model: model of the lens. `perspective`: a pinhole with distortion, for angles of view of up
+            to about 120 degrees. `fisheye`: for up to about 170 degrees.
+        distortion: distortion coefficients in OpenCV's order: k1, k2, p1, p2[, k3[, k4, k5, k6[,
+            s1, s2, s3, s4[, tx, ty]]]] of a perspective lens, k1, k2, k3, k4 of a fisheye; none for
+            a pinhole.
+        residual: root mean square reprojection error of the calibration [pixels].
+        known_to: largest error of these intrinsics anywhere in the image, in 19 of 20 cases
+            [pixels].
+        except_at: parts of the image where the error may be larger than `known_to`: `upper left
+            corner`, `upper edge`, `upper right corner`, `left edge`, `middle`, `right edge`, `lower
+            left corner`, `lower edge` or `lower right corner`.
     """
 
     RANGES: ClassVar[Ranges] = {

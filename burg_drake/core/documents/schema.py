@@ -41,12 +41,12 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Pose:
-    """A rigid transform as people write it.
+    """A position and an orientation. Without keys it is the identity.
 
     Attributes:
-        translation: position [m].
-        rpy_deg: roll, pitch, yaw about the fixed x, y, z axes [degrees].
-        quaternion_wxyz: the rotation as quaternion, in place of `rpy_deg`.
+        translation: position x, y, z [m].
+        rpy_deg: roll, pitch and yaw about the fixed x, y and z axes [degrees].
+        quaternion_wxyz: rotation as a unit quaternion w, x, y, z, in place of `rpy_deg`.
     """
 
     translation: Vector3 = (0.0, 0.0, 0.0)

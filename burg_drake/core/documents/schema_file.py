@@ -32,6 +32,7 @@ _PLAIN: dict[Any, Any] = {
     str: ["string", "number", "boolean"],  # `operator: 7` is a text for the reader as well
     Any: None,
 }
+_WORD = re.compile(r"^[a-z]{3,}\b")
 _SECTION = re.compile(r"^[A-Z]\w+:$", re.MULTILINE)
 _ENTRY = re.compile(r"^(\w[\w, ]*): (.*(?:\n .*)*)", re.MULTILINE)
 
@@ -149,15 +150,16 @@ def _bound(schema: dict[str, Any], low: float, high: float) -> None:
 
 
 def _summary(kind: type) -> str:
-    """What a dataclass is: the docstring before its sections."""
-    return " ".join(_SECTION.split(inspect.getdoc(kind) or "")[0].split())
+    """What a dataclass is: the first paragraph of its docstring."""
+    return " ".join((inspect.getdoc(kind) or "").partition("\n\n")[0].split())
 
 
 def _meanings(kind: type) -> dict[str, str]:
     """What fields of a dataclass mean, by its docstring and those of its bases."""
-    found = {"version": "of this kind of document"}
+    found = {"version": "Version of this kind of document."}
     for base in reversed(kind.__mro__):
         text = inspect.cleandoc(base.__doc__ or "").partition("Attributes:\n")[2]
         for names, meaning in _ENTRY.findall(inspect.cleandoc(_SECTION.split(text)[0])):
-            found |= dict.fromkeys(re.split(r",\s*", names), " ".join(meaning.split()))
+            sentence = _WORD.sub(lambda word: word[0].capitalize(), " ".join(meaning.split()))
+            found |= dict.fromkeys(re.split(r",\s*", names), sentence)
     return found

@@ -33,19 +33,19 @@ def _length(default: float | None, field: str, help: str, name: str = "") -> Any
 
 @dataclass(frozen=True, kw_only=True)
 class GraspMotion:
-    """Straight ways of the hand, without turning: from the pregrasp along the approach to the
-    grasp; then, with the object, back along the approach, and from there along the lift.
+    """Straight segments of the hand: from the pregrasp to the grasp, back by the retreat, and up by
+    the lift.
 
     The defaults are those of Rudorfer et al., "BURG-Toolkit" (2022). MoveIt calls `least_lift` the
     minimum and `lift_height` the desired distance of the post-grasp retreat.
 
     Attributes:
-        standoff: from pregrasp to grasp [m].
-        retreat: path back along the approach with the object, before the lift [m].
+        standoff: distance from pregrasp to grasp [m].
+        retreat: distance back along the approach with the object, before the lift [m].
         lift_height: length of the lift [m].
-        least_lift: what has to be free of it [m]: the hand rises as high as there is room, but no
-            less than this; None if the whole lift has to be free.
-        lift_direction: of the lift in the world; of any length above 0.
+        least_lift: length of the lift that has to be free of obstacles [m]; the hand rises as far
+            as there is room. If left out, all of `lift_height` has to be free.
+        lift_direction: direction of the lift in the world, of any length.
     """
 
     RANGES: ClassVar[Ranges] = LENGTHS
