@@ -38,7 +38,7 @@ SCHEMAS = {
     "tls: {": ClusterDocument,
     "jobqueue:": ClusterDocument,
 }
-"""By words of a document in YAML, what it is, where neither a first line nor a comment (`<!-- scene -->`) does."""
+"""By words of a document in YAML, what it is, unless its first line or a comment says so."""
 PARTS = {
     SceneDocument: "version: 1\nname: part\nlibrary: household\n",
     StationDocument: "version: 1\nname: part\n",

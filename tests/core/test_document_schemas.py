@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import ast
 import copy
+import dataclasses
+import importlib
 import json
 import re
 from functools import cache
@@ -183,6 +185,18 @@ def test_all_schemas_are_written(tmp_path: Path) -> None:
     for file in files:
         schema = json.loads(file.read_text("utf-8"))
         assert schema["$id"] == f"{ADDRESS}{file.name}"
+
+
+def test_the_page_has_all_keys_and_its_links_lead_somewhere(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.syspath_prepend(Path(__file__).parents[2] / "docs")
+    text = importlib.import_module("_schemas").document_tables()
+    for kind in DOCUMENT_KINDS:
+        _, _, section = text.partition(f"(document-{kind})=\n## {kind}\n")
+        rows = re.findall(r"^\| `(\w+)` \| .+ \|$", section.partition("\n(")[0], re.MULTILINE)
+        assert rows == [f.name for f in dataclasses.fields(document_class(kind))]
+    assert set(re.findall(r"\(#([\w-]+)\)", text)) <= set(re.findall(r"^\((.*)\)=$", text, re.M))
 
 
 def mutated(data: Any, random: Random) -> Any:
