@@ -116,9 +116,9 @@ def _value(kind: Any, parts: dict[str, Any]) -> dict[str, Any]:
     if origin in (list, tuple):
         if len({*arguments} - {...}) != 1:
             raise TypeError(f"type {kind} has no schema yet")
-        schema = {"type": "array", "items": _value(arguments[0], parts)}
+        schema: dict[str, Any] = {"type": "array", "items": _value(arguments[0], parts)}
         if origin is tuple and ... not in arguments:
-            schema |= {"minItems": len(arguments), "maxItems": len(arguments)}
+            schema["minItems"] = schema["maxItems"] = len(arguments)
         return schema
     if origin in (dict, Mapping):
         return {"type": "object", "additionalProperties": _value(arguments[1], parts)}

@@ -7,15 +7,18 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import ClassVar
 
 from burg_drake.core import FieldError, InvalidInputError, UnknownNameError, content_hash, nearest
 from burg_drake.core.documents import (
     Pose,
+    Ranges,
     Vector3,
     dump_document,
     load_document,
     plain_data,
     require_finite,
+    require_ranges,
 )
 from burg_drake.core.paths import (
     NO_PACKAGES,
@@ -132,6 +135,13 @@ class Camera:
             smoother edges.
     """
 
+    RANGES: ClassVar[Ranges] = {
+        "width": (1, MAX_SIDE),
+        "height": (1, MAX_SIDE),
+        "focal": FOCAL_RANGE,
+        "samples": (1, MAX_SAMPLES),
+    }
+
     X_WC: Pose
     width: int = 640
     height: int = 480
@@ -141,20 +151,9 @@ class Camera:
     samples: int = 1
 
     def __post_init__(self) -> None:
-        if min(self.width, self.height, *self.focal) <= 0:
-            raise InvalidInputError("camera width, height and focal must be positive")
-        low, high = FOCAL_RANGE
-        if not all(low <= value <= high for value in self.focal):
-            raise FieldError(
-                f"focal {list(self.focal)} of a camera must be {low:g} to {high:g} pixels", "focal"
-            )
-        require_image_size(self.width, self.height)
+        require_ranges(self, "a camera")
         if not 0.0 < self.depth_range[0] < self.depth_range[1]:
             raise InvalidInputError("camera depth_range must rise from above 0 [m]")
-        if not 1 <= self.samples <= MAX_SAMPLES:
-            raise FieldError(
-                f"samples {self.samples} of a camera must be 1 to {MAX_SAMPLES}", "samples"
-            )
 
     @property
     def principal_point(self) -> tuple[float, float]:
