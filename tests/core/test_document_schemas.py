@@ -87,6 +87,8 @@ for kind, pattern in {
 }.items():
     Yaml12.add_implicit_resolver(f"tag:yaml.org,2002:{kind}", re.compile(f"^({pattern})$"), None)
 
+Yaml12.add_constructor("tag:yaml.org,2002:int", lambda _, node: int(node.value))  # 010 is ten
+
 
 def as_editors_read(text: str) -> Any:
     return json.loads(json.dumps(yaml.load(text, Loader=Yaml12)))  # keys are texts
