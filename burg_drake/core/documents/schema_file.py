@@ -156,7 +156,7 @@ def _summary(kind: type) -> str:
 
 def _meanings(kind: type) -> dict[str, str]:
     """What fields of a dataclass mean, by its docstring and those of its bases."""
-    found = {"version": "Version of this kind of document."}
+    found = {"version": "Version of the file format."}
     for base in reversed(kind.__mro__):
         text = inspect.cleandoc(base.__doc__ or "").partition("Attributes:\n")[2]
         for names, meaning in _ENTRY.findall(inspect.cleandoc(_SECTION.split(text)[0])):
