@@ -34,13 +34,13 @@ class DepthNoise:
         axial_square: growth of the standard deviation of depth with the squared distance from
             `axial_center` [1/m].
         axial_center: depth at which the standard deviation of depth is smallest [m].
-        axial_angle: growth of the standard deviation of depth on surfaces seen at an angle [m^1.5];
-            see `axial_sigma`.
+        axial_angle: growth d of the standard deviation of depth at angles of incidence t above 60
+            degrees [m^1.5]: d / sqrt(z) (t / (pi/2 - t))^2 is added.
         disparity_sigma: standard deviation of the disparity [pixels].
         disparity_step: step in which disparity is measured [pixels].
         lateral_base: standard deviation of the position of edges in the image [pixels].
-        lateral_angle: growth of that standard deviation on surfaces seen at an angle [pixels]; see
-            `lateral_sigma`.
+        lateral_angle: growth b of that standard deviation with the angle of incidence t [pixels]:
+            b t / (pi/2 - t) is added.
         flying: share of the pixels at edges whose depth lies between near and far, 0 to 1.
         grazing_from_deg: angle of incidence from which surfaces have holes [degrees]; 90 for none.
         grazing_to_deg: angle of incidence from which surfaces have no depth at all [degrees].
