@@ -3,6 +3,7 @@ from . import (
     cameras as cameras,
     compose as compose,
     dataset as dataset,
+    documents as documents,
     errors as errors,
     frames as frames,
     grasps as grasps,

@@ -5,6 +5,7 @@ A comment of a page right before a block (`<!-- ... -->`) says what is special a
 - `not run: REASON`: of Python; it is compiled, and what it takes from burg_drake is looked up;
 - `run first` and lines of Python: what a reader has at hand, and the blocks take for granted;
 - `file NAME`: the block is written to that file, for those after it;
+- `scene`, `station` or another kind of document (`burg-drake schema`): of YAML; what it is;
 - `run`: of commands; they are run, and not only parsed.
 
 A comment anywhere on a page that begins with a line `in tests` replaces text of the page by what

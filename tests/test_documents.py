@@ -17,6 +17,7 @@ import pytest
 
 from burg_drake.apps.cli import build_parser
 from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.core.documents.kinds import DOCUMENT_KINDS, document_class
 from burg_drake.core.documents.schema import parse_document
 from burg_drake.evaluation.cluster.document import ClusterDocument
 from burg_drake.experiment.trials.sheet import TrialSheet
@@ -37,7 +38,7 @@ SCHEMAS = {
     "tls: {": ClusterDocument,
     "jobqueue:": ClusterDocument,
 }
-"""By words of a document in YAML, what it is."""
+"""By words of a document in YAML, what it is, unless its first line or a comment says so."""
 PARTS = {
     SceneDocument: "version: 1\nname: part\nlibrary: household\n",
     StationDocument: "version: 1\nname: part\n",
@@ -138,8 +139,15 @@ DOCUMENTS = [b for page in PAGES for b in BLOCKS[page] if b.language == "yaml"]
 
 @pytest.mark.parametrize("block", DOCUMENTS, ids=ids)
 def test_yaml_fits_its_schema(block: Block) -> None:
-    (schema,) = [schema for words, schema in SCHEMAS.items() if words in block.code]
     code = block.code
+    if line := re.match(r"# (?:yaml-language-server: )?\$schema[=:] ?\S*?/?(\w+)\.json\n", code):
+        schema, code = document_class(line[1]), code[line.end() :]
+        if not code:  # the line alone
+            return
+    elif block.remark in DOCUMENT_KINDS:
+        schema = document_class(block.remark)
+    else:
+        (schema,) = [schema for words, schema in SCHEMAS.items() if words in code]
     if not code.startswith("version: "):
         code = PARTS[schema] + code
     parse_document(code, schema, block.page.name)

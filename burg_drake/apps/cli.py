@@ -18,7 +18,19 @@ from collections.abc import Sequence
 from functools import cache
 
 from burg_drake import __version__
-from burg_drake.apps import ar, camera, dataset, grasps, hand, library, ros, scene, station, trials
+from burg_drake.apps import (
+    ar,
+    camera,
+    dataset,
+    grasps,
+    hand,
+    library,
+    ros,
+    scene,
+    schema,
+    station,
+    trials,
+)
 from burg_drake.apps.comparison import compare, gap
 from burg_drake.apps.dataset import render
 from burg_drake.apps.grasps import frames
@@ -69,6 +81,7 @@ VERBS = (
     hand,
     frames,
     ros,
+    schema,
 )
 
 

@@ -20,16 +20,16 @@ RECORD_FILE = "export.yaml"
 
 @dataclass(frozen=True, kw_only=True)
 class ExportRecord:
-    """Schema of `export.yaml`.
+    """An exported scene (`export.yaml`).
 
     Attributes:
-        format: what the folder holds.
+        format: format of the export.
         scene: name of the scene.
         scene_content: hash of the scene and its objects.
-        station: name of the station; empty if there is none.
-        main: the file to open.
+        station: name of the station; empty without one.
+        main: file to open.
         software: name and version of the program that wrote it.
-        files: all others, relative to the folder.
+        files: all other files, relative to the folder.
     """
 
     version: int = 1

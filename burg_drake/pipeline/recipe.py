@@ -23,12 +23,12 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, ClassVar, Literal, cast
 
 import yaml
 
 from burg_drake.core import InvalidInputError
-from burg_drake.core.documents import Reader, Vector3, load_nodes
+from burg_drake.core.documents import Ranges, Reader, Vector3, load_nodes
 from burg_drake.core.paths import require_name
 from burg_drake.core.terminal import Rgba
 from burg_drake.objects.library import ContactKind, Decomposition, Inertia
@@ -40,11 +40,20 @@ Unit = Literal["mm", "cm", "m", "in"]
 
 @dataclass(frozen=True, kw_only=True)
 class Cutting:
-    """Parameters of the convex decomposition that differ from the pipeline's; see `Decomposition`.
+    """Parameters of the convex decomposition; each has its default if left out.
 
     Attributes:
-        threshold, join, max_vertices, tolerance, min_thickness, timeout, seed: as there.
+        threshold: concavity at which CoACD stops cutting, for an object scaled to unit size.
+        join: volume that joining two pieces may add, as a share of the volume of all pieces.
+        max_vertices: largest number of vertices of a piece.
+        tolerance: distance within which a piece follows its full convex hull, if `max_vertices`
+            allows it [m].
+        min_thickness: thinner pieces are dropped [m].
+        timeout: CPU time for CoACD [s].
+        seed: seed of CoACD's search.
     """
+
+    RANGES: ClassVar[Ranges] = Decomposition.RANGES
 
     threshold: float | None = None
     join: float | None = None
@@ -64,18 +73,19 @@ class Cutting:
 
 @dataclass(frozen=True, kw_only=True)
 class Defaults:
-    """What holds for every object that does not say otherwise.
+    """Values for all objects that have none of their own.
 
     Attributes:
-        unit: of the mesh.
-        scale: factor from the mesh's unit to metres, in place of `unit`.
-        density: of the material, for objects without a mass [kg/m^3].
-        friction: coefficient.
-        wall_thickness: of a hollow object, or of an open surface [m].
-        openings: what becomes of an open surface: `wall` or `close`.
-        contact: what of the object touches others in simulation.
+        unit: unit of the mesh file.
+        scale: factor from the mesh file's unit to metres, in place of `unit`.
+        density: density of the material, for objects without `mass` [kg/m^3].
+        friction: friction coefficient between the object and the gripper's pads.
+        wall_thickness: thickness of the wall of a hollow object, or of an open surface [m].
+        openings: what to do with a surface that is not closed: make it a wall, or close it.
+        contact: what touches other things in simulation: the surface, convex pieces, or a
+            primitive.
         decomposition: parameters of the convex decomposition.
-        rgba: colour and opacity, 0 to 1 each; all other colours are opaque.
+        rgba: colour in place of the mesh file's: red, green, blue and opacity, 0 to 1 each.
     """
 
     unit: Unit | None = None
@@ -101,16 +111,17 @@ class Defaults:
 
 @dataclass(frozen=True, kw_only=True)
 class RecipeObject(Defaults):
-    """One object.
+    """One object of the library.
 
     Attributes:
-        mesh: mesh file, relative to the document.
-        pieces: mesh files of convex pieces in the mesh's own frame and unit, relative to the
-            document; made by decomposition if empty.
-        mass: [kg].
-        center_of_mass: `p_OOcm` [m], in place of the centroid.
-        inertia: Ixx, Iyy, Izz, Ixy, Ixz, Iyz about the centre of mass in the axes of O [kg m^2].
-        description: for people.
+        mesh: mesh file, relative to this file.
+        pieces: files of convex pieces, in the frame and unit of the mesh, relative to this file;
+            made by convex decomposition if empty.
+        mass: mass [kg].
+        center_of_mass: centre of mass in the object's frame [m], in place of the computed one.
+        inertia: Ixx, Iyy, Izz, Ixy, Ixz, Iyz about the centre of mass, in the axes of the object's
+            frame [kg m^2], in place of the computed ones.
+        description: text for people.
     """
 
     mesh: str
@@ -135,12 +146,12 @@ class RecipeObject(Defaults):
 
 @dataclass(frozen=True, kw_only=True)
 class RecipeDocument:
-    """Schema of `objects.yaml`.
+    """What to build an object library of, and what the meshes do not tell (`objects.yaml`).
 
     Attributes:
-        name: of the library; None for that of its folder.
-        defaults: for all objects.
-        objects: by object name.
+        name: name of the library; that of its folder if left out.
+        defaults: values for all objects that have none of their own.
+        objects: the objects by name. Names have a-z, 0-9 and `_`.
     """
 
     version: int = 1

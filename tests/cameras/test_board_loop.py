@@ -278,7 +278,7 @@ def test_bad_input(scene: Scene, station: Station, loop: BoardLoop, context: Con
         loop.place_object(context, "mgu", np.eye(4))
     with pytest.raises(UnknownNameError, match="has no camera 'bord'; did you mean 'board'"):
         build_board_loop(scene, station, "bord")
-    with pytest.raises(InvalidInputError, match="samples 0 of a camera must be 1 to 8"):
+    with pytest.raises(InvalidInputError, match="samples of a camera is 0; it must be 1 to 8"):
         build_board_loop(scene, station, LoopCamera(samples=0))
     with pytest.raises(InvalidInputError, match="period 0 of a camera must be above 0"):
         LoopCamera(period=0.0)

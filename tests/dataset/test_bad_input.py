@@ -206,7 +206,7 @@ def test_a_data_set_of_another_version(
     ):
         assert main(["dataset", *arguments]) == 2
         assert capsys.readouterr().err == (
-            f"burg-drake: error: {document}:2: version: 2 cannot be read; this release reads"
+            f"burg-drake: error: {document}:3: version: 2 cannot be read; this release reads"
             " version 1\n"
         )
 

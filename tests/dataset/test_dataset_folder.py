@@ -237,7 +237,7 @@ def test_folders_of_other_things_are_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("version: 1", "version: 2", ":2: version: 2 cannot be read; this release reads version 1"),
+        ("version: 1", "version: 2", ":3: version: 2 cannot be read; this release reads version 1"),
         ("name: drawn", "nam: drawn", "unknown key 'nam'; did you mean 'name'?"),
         ("count: 3", "count: 3\n    count: 4", "recipe.views: key 'count' is given twice"),
         ("recipe:", "recipe: 4\nrecipe:", "key 'recipe' is given twice"),

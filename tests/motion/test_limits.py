@@ -90,7 +90,7 @@ def test_a_station_file_states_limits(tmp_path: Path) -> None:
     path.write_text(text.replace("  home:", "  jerk: [1, 2, 3, 4, 5, 6, 7]\n  home:"))
     assert limits(load_station(path)).jerk.tolist() == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]
     path.write_text(text.replace("  home:", "  jerk: [1, 2, 3, 4, 5, 6, 0]\n  home:"))
-    with pytest.raises(DocumentError, match=r"slow\.yaml:10: arm.* jerk limits must be 0.001"):
+    with pytest.raises(DocumentError, match=r"slow\.yaml:11: arm.* jerk limits must be 0.001"):
         load_station(path)
 
 

@@ -174,11 +174,11 @@ def test_document_that_does_not_fit_its_model(panda: Hand, wrong: str) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("force: 30.0", "force: -30", "14: force is -30 N; it has to be above 0"),
-        ("[0.0, 0.11]", "[0.11, 0.0]", "13: opening [0.11, 0.0] must rise from 0 or above [m]"),
-        ("wsg_right_joint", "wsg_left_joint", "20: both fingers name the joint 'wsg_left_joint'"),
-        ("wsg_right_finger", "wsg_left_finger", "20: both fingers name the body 'wsg_left_finger'"),
-        ("open: 0.055", "open: 0.0", "19: finger 'wsg_left_finger': closed and open are both 0 m"),
+        ("force: 30.0", "force: -30", "15: force is -30 N; it has to be above 0"),
+        ("[0.0, 0.11]", "[0.11, 0.0]", "14: opening [0.11, 0.0] must rise from 0 or above [m]"),
+        ("wsg_right_joint", "wsg_left_joint", "21: both fingers name the joint 'wsg_left_joint'"),
+        ("wsg_right_finger", "wsg_left_finger", "21: both fingers name the body 'wsg_left_finger'"),
+        ("open: 0.055", "open: 0.0", "20: finger 'wsg_left_finger': closed and open are both 0 m"),
         ("/wsg_50.sdf", "/wsg.sdf", " model: package://burg_drake/models/wsg/wsg.sdf does not"),
         (
             "{translation: [0.0, 0.0, 0.1455]}",

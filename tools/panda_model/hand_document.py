@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from burg_drake.core.documents.kinds import SCHEMA_FOLDER
 from tools.panda_model.figures import (
     FINGER_EFFORT,
     FINGER_SPEED,
@@ -19,7 +20,8 @@ def hand_yaml() -> str:
         f"closed: 0.0, open: {FINGER_TRAVEL}}}\n"
         for index, side in ((1, "left"), (2, "right"))
     )
-    return f"""# Written by tools/panda_model (python -m tools.panda_model).
+    return f"""# yaml-language-server: $schema={SCHEMA_FOLDER}/hand.json
+# Written by tools/panda_model (python -m tools.panda_model).
 version: 1
 name: panda_hand
 description: Franka Hand, the parallel gripper of the Panda arm

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from burg_drake.core.documents.kinds import SCHEMA_FOLDER
 from tools.robot_model.shapes import PAD
 from tools.wsg_model.figures import (
     CLOSING_SPEED,
@@ -22,7 +23,8 @@ def hand_yaml() -> str:
             FINGER_LINKS, FINGER_JOINTS, (FINGER_TRAVEL, -FINGER_TRAVEL), strict=True
         )
     )
-    return f"""# Written by tools/wsg_model (python -m tools.wsg_model).
+    return f"""# yaml-language-server: $schema={SCHEMA_FOLDER}/hand.json
+# Written by tools/wsg_model (python -m tools.wsg_model).
 version: 1
 name: wsg_50
 description: Parallel gripper like the Schunk (Weiss Robotics) WSG 50-110 with flat rubber pads

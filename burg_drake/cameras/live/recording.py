@@ -38,21 +38,19 @@ LONGEST_PAUSE = 2.0
 
 @dataclass(frozen=True, kw_only=True)
 class RecordingDocument:
-    """Schema of the document of a recording.
+    """A recorded video of the live overlay.
 
     Attributes:
-        scene: that was overlaid.
-        source: what gave the pictures.
-        started: date and time, ISO 8601 with time zone.
-        video: file name of the video.
-        plain: file name of the video without overlay, if there is one.
-        poses: file name of the table: `frame` of the video, `time` of the picture [s], the camera's
-            pose X_SC where it is valid (metres, quaternion), reprojection error [pixels], number
-            of markers, and why there is no pose. Each is the pose of that picture alone, also
-            where the overlay was drawn at the mean of several (`ViewSettings.steady`).
-        frames_per_second: of the video.
-        intrinsics: of the camera.
-        versions: of the software.
+        scene: the scene that was overlaid.
+        source: camera or file that gave the pictures.
+        started: date and time of the start, ISO 8601 with time zone.
+        video: file of the video.
+        plain: file of the video without overlay, if there is one.
+        poses: table of the camera's pose in each picture alone (CSV): time [s], pose (metres,
+            quaternion), reprojection error [pixels], number of markers, and why there is no pose.
+        frames_per_second: frame rate of the video [1/s].
+        intrinsics: intrinsics of the camera.
+        versions: versions of the software.
     """
 
     version: int = 1

@@ -30,15 +30,16 @@ DOCUMENT, INTRINSICS = "snapshot.yaml", "intrinsics.yaml"
 
 @dataclass(frozen=True, kw_only=True)
 class SeenBoard:
-    """What a picture said about the camera's place; a `BoardEstimate` as a document.
+    """Where the board was seen.
 
     Attributes:
-        X_SC: camera's optical frame in the scene frame; None where no pose was found.
-        reason: why none was found, or what is doubtful; empty if all is well.
-        reprojection_error: root mean square over the markers' corners [pixels].
-        covariance: six rows, see `BoardEstimate.covariance`.
-        markers: ids of those that were used.
-        scale: size of the printed board against the document's, where it was measured.
+        X_SC: pose of the camera's optical frame in the scene frame; left out if it was not found.
+        reason: why there is no pose, or what is doubtful; empty if all is well.
+        reprojection_error: root mean square reprojection error of the markers' corners [pixels].
+        covariance: covariance of the camera's pose, six rows: rotation [rad], then position [m], in
+            the scene frame; empty if unknown.
+        markers: ids of the markers that were used.
+        scale: size of the printed board divided by that in the scene file, if it was measured.
     """
 
     X_SC: Pose | None = None
@@ -51,20 +52,20 @@ class SeenBoard:
 
 @dataclass(frozen=True, kw_only=True)
 class SnapshotDocument:
-    """Schema of `snapshot.yaml`.
+    """A snapshot of the live overlay (`snapshot.yaml`).
 
     Attributes:
-        scene: that was overlaid.
-        library: its object library.
-        source: what gave the picture, as the source calls it.
-        taken: when the snapshot was made, ISO 8601 with time zone.
-        time: of the picture since the source was opened [s].
-        intrinsics: of the camera.
-        board: where the board was seen, by this picture alone.
-        X_SC_drawn: pose that the overlay was drawn at, where it is not that of `board` but the mean
-            of several pictures (`ViewSettings.steady`).
-        placement: how far the objects stand from their places, if that was measured.
-        versions: of the software.
+        scene: the scene that was overlaid.
+        library: object library of the scene.
+        source: camera or file that gave the picture.
+        taken: date and time of the snapshot, ISO 8601 with time zone.
+        time: time of the picture since the source was opened [s].
+        intrinsics: intrinsics of the camera.
+        board: where the board was seen in this picture.
+        X_SC_drawn: camera pose that the overlay was drawn with, if it is the mean of several
+            pictures.
+        placement: where the objects stand, if that was measured.
+        versions: versions of the software.
     """
 
     version: int = 1

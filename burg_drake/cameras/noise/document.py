@@ -13,59 +13,67 @@ from typing import ClassVar, Literal
 
 from burg_drake.cameras.optics import SENSORS
 from burg_drake.core import FieldError, UnknownNameError, nearest
-from burg_drake.core.documents import load_document, require_ranges
+from burg_drake.core.documents import Ranges, load_document, require_ranges
 
 SecondView = Literal["none", "same", "wide"]
 """What the second imager or the projector sees: it is of no interest; as much as the first one to
 each side; all that the first one sees, if nothing is in between."""
 
-RANGES = {
-    "baseline": (-1.0, 1.0),
-    "axial_base": (0.0, 1.0),
-    "axial_square": (0.0, 1.0),
-    "axial_center": (-10.0, 10.0),
-    "axial_angle": (0.0, 1.0),
-    "disparity_sigma": (0.0, 10.0),
-    "disparity_step": (0.0, 10.0),
-    "lateral_base": (0.0, 10.0),
-    "lateral_angle": (0.0, 10.0),
-    "flying": (0.0, 1.0),
-    "grazing_from_deg": (0.0, 90.0),
-    "grazing_to_deg": (0.0, 90.0),
-    "dark_below": (0.0, 255.0),
-    "dark_probability": (0.0, 1.0),
-    "hole_size": (0.0, 20.0),
-    "depth_step": (0.0, 1.0),
-}
-
 
 @dataclass(frozen=True, kw_only=True)
 class DepthNoise:
-    """Schema of a noise file: all effects; those whose figure is 0 do not happen.
+    """Noise of a depth camera. An effect whose figure is 0 does not occur.
 
     Attributes:
         baseline: x of the second imager, or of the projector, in the camera's frame [m].
-        second_view: what is seen from there; what is not, is not measured.
-        axial_base, axial_square, axial_center: standard deviation of depth z is
-            `axial_base + axial_square (z - axial_center)^2` [m, 1/m, m].
-        axial_angle: its growth on surfaces that are seen from aside [m^1.5], see `axial_sigma`.
-        disparity_sigma: standard deviation of the disparity [pixels of the image].
-        disparity_step: disparity is measured in steps of this [pixels of the image].
-        lateral_base, lateral_angle: standard deviation of where edges are, and its growth on
-            surfaces that are seen from aside [pixels], see `lateral_sigma`.
-        flying: share of the pixels at edges that lie anywhere between near and far.
-        grazing_from_deg, grazing_to_deg: between these angles of incidence the probability of a
-            hole grows from 0 to 1 [degrees]; no holes for that reason if the first is 90.
-        dark_below: luma from which down a surface is dark, of 255.
-        dark_probability: probability of a hole in a black surface; it falls to 0 at `dark_below`.
-        hole_size: radius of patches in which holes come, 1 or more [pixels]; each for itself if 0.
-        depth_step: depth is written in steps of this [m].
+        second_view: what the second imager or the projector sees. Surfaces that it does not see
+            have no depth. `same`: as much to each side as the camera. `wide`: all that the camera
+            sees, unless something is in between. `none`: all.
+        axial_base: standard deviation of depth at the depth `axial_center` [m]. At the depth z it
+            is `axial_base + axial_square (z - axial_center)^2`.
+        axial_square: growth of the standard deviation of depth with the squared distance from
+            `axial_center` [1/m].
+        axial_center: depth at which the standard deviation of depth is smallest [m].
+        axial_angle: growth d of the standard deviation of depth at angles of incidence t above 60
+            degrees [m^1.5]: d / sqrt(z) (t / (pi/2 - t))^2 is added.
+        disparity_sigma: standard deviation of the disparity [pixels].
+        disparity_step: step in which disparity is measured [pixels].
+        lateral_base: standard deviation of the position of edges in the image [pixels].
+        lateral_angle: growth b of that standard deviation with the angle of incidence t [pixels]:
+            b t / (pi/2 - t) is added.
+        flying: share of the pixels at edges whose depth lies between near and far, 0 to 1.
+        grazing_from_deg: angle of incidence from which surfaces have holes [degrees]; 90 for none.
+        grazing_to_deg: angle of incidence from which surfaces have no depth at all [degrees].
+        dark_below: brightness below which a surface counts as dark, of 255.
+        dark_probability: probability of a hole in a black surface, 0 to 1; it falls to 0 at
+            `dark_below`.
+        hole_size: radius of holes, 1 or more [pixels]; 0 for single pixels.
+        depth_step: step in which depth is written [m].
 
     Raises:
         FieldError: a figure is out of its range, or needs another one that is not there.
     """
 
     WRITTEN_WHOLE: ClassVar[bool] = True
+
+    RANGES: ClassVar[Ranges] = {
+        "baseline": (-1.0, 1.0),
+        "axial_base": (0.0, 1.0),
+        "axial_square": (0.0, 1.0),
+        "axial_center": (-10.0, 10.0),
+        "axial_angle": (0.0, 1.0),
+        "disparity_sigma": (0.0, 10.0),
+        "disparity_step": (0.0, 10.0),
+        "lateral_base": (0.0, 10.0),
+        "lateral_angle": (0.0, 10.0),
+        "flying": (0.0, 1.0),
+        "grazing_from_deg": (0.0, 90.0),
+        "grazing_to_deg": (0.0, 90.0),
+        "dark_below": (0.0, 255.0),
+        "dark_probability": (0.0, 1.0),
+        "hole_size": (0.0, 20.0),
+        "depth_step": (0.0, 1.0),
+    }
 
     version: int = 1
     baseline: float = 0.0
@@ -87,7 +95,7 @@ class DepthNoise:
     depth_step: float = 0.0
 
     def __post_init__(self) -> None:
-        require_ranges(self, RANGES)
+        require_ranges(self)
         if self.grazing_to_deg < self.grazing_from_deg:
             raise FieldError(
                 f"grazing_to_deg is {self.grazing_to_deg:g}; it must be at least grazing_from_deg,"

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, get_args
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 
 from burg_drake.cameras.optics.fisheye import COEFFICIENTS, fisheye_lens
 from burg_drake.cameras.optics.known_parts import PARTS
 from burg_drake.core import Array, FieldError, InvalidInputError, nearest
+from burg_drake.core.documents import Ranges, require_ranges
 from burg_drake.station.document import (
     FOCAL_RANGE,
     HALF_PIXEL as HALF_PIXEL,
@@ -24,32 +25,38 @@ from burg_drake.station.document import (
 
 DISTORTION_SIZES = (0, 4, 5, 8, 12, 14)
 """Numbers of coefficients that OpenCV's model of a lens may have."""
-INTRINSICS_RANGES = {"focal": FOCAL_RANGE, "center": (-1e6, 1e6), "distortion": (-1e12, 1e12)}
-"""Allowed values, far beyond those of any camera; projections overflow with larger ones."""
 LensModel = Literal["perspective", "fisheye"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Intrinsics:
-    """Schema of an intrinsics file.
+    """Intrinsics of a camera, as in OpenCV (pixel centres at integers).
 
     Attributes:
-        camera: what camera they are of.
-        width, height: image size [pixels].
-        focal: fx, fy [pixels].
-        center: principal point cx, cy [pixels], pixel centres at integers.
-        model: of the lens. `perspective` is a pinhole with distortion, for up to about 120 degrees;
-            `fisheye` has a focal length of image a radian off the axis, for up to about 170.
-        distortion: of a perspective lens OpenCV's k1, k2, p1, p2[, k3[, k4, k5, k6[, s1, s2, s3,
-            s4[, tx, ty]]]], none for a pinhole camera; of a fisheye k1, k2, k3, k4 of
-            `cv2.fisheye`.
-        residual: root mean square reprojection error of the calibration [pixels], if known.
-        known_to: how far this camera and the true one show the same apart, at most, in 19 of 20
-            cases [pixels], as the calibration promises.
-        except_at: parts of the image where it does not, of `upper left corner`, `upper edge`,
-            `upper right corner`, `left edge`, `middle`, `right edge`, `lower left corner`, `lower
-            edge`, `lower right corner`.
+        camera: name of the camera, for people.
+        width: width of the image [pixels].
+        height: height of the image [pixels].
+        focal: focal lengths fx and fy [pixels].
+        center: principal point cx and cy [pixels].
+        model: model of the lens. `perspective`: a pinhole with distortion, for angles of view of up
+            to about 120 degrees. `fisheye`: for up to about 170 degrees.
+        distortion: distortion coefficients in OpenCV's order: k1, k2, p1, p2[, k3[, k4, k5, k6[,
+            s1, s2, s3, s4[, tx, ty]]]] of a perspective lens, k1, k2, k3, k4 of a fisheye; none for
+            a pinhole.
+        residual: root mean square reprojection error of the calibration [pixels].
+        known_to: largest error of these intrinsics anywhere in the image, in 19 of 20 cases
+            [pixels].
+        except_at: parts of the image where the error may be larger than `known_to`: `upper left
+            corner`, `upper edge`, `upper right corner`, `left edge`, `middle`, `right edge`, `lower
+            left corner`, `lower edge` or `lower right corner`.
     """
+
+    RANGES: ClassVar[Ranges] = {
+        "focal": FOCAL_RANGE,
+        "center": (-1e6, 1e6),
+        "distortion": (-1e12, 1e12),
+    }
+    """Far beyond any camera; projections overflow with larger values."""
 
     version: int = 1
     camera: str = ""
@@ -76,10 +83,7 @@ class Intrinsics:
         if min(self.width, self.height, *self.focal) <= 0:
             raise InvalidInputError("width, height and focal of a camera must be positive")
         require_image_size(self.width, self.height)
-        for name, (low, high) in INTRINSICS_RANGES.items():
-            for value in getattr(self, name):
-                if not low <= value <= high:
-                    raise FieldError(f"{name} has {value:g}; it must be {low:g} to {high:g}", name)
+        require_ranges(self)
         if self.model not in get_args(LensModel):
             known = nearest(str(self.model), get_args(LensModel))
             raise FieldError(f"model {self.model!r} does not exist; {known}", "model")

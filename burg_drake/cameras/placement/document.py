@@ -27,13 +27,12 @@ PACKAGES = {"opencv": "opencv-python-headless", "numpy": "numpy", "scipy": "scip
 
 @dataclass(frozen=True, kw_only=True)
 class CheckedScene:
-    """The scene whose targets the objects were compared with.
+    """The scene that was compared or overlaid.
 
     Attributes:
-        name: its name.
-        path: where its document was; in a file, from the file's folder, or the bare name of a scene
-            that comes with the package.
-        content: hash of placement and objects, `Scene.content`.
+        name: name of the scene.
+        path: file of the scene, relative to this file, or the name of a built-in one.
+        content: hash of placement and objects.
     """
 
     name: str
@@ -43,11 +42,11 @@ class CheckedScene:
 
 @dataclass(frozen=True, kw_only=True)
 class CheckedImage:
-    """An image that went into the check.
+    """An image that was used.
 
     Attributes:
-        file: its name; empty for one in memory.
-        content: SHA-256 of the file's bytes; of the pixels for an image in memory.
+        file: name of the image file; empty for an image from memory.
+        content: SHA-256 of the file, or of the pixels of an image from memory.
     """
 
     file: str = ""
@@ -59,10 +58,12 @@ class CameraPlace:
     """Where the camera was.
 
     Attributes:
-        X_SC: optical frame in the scene frame.
-        reprojection_error: of the markers' corners [pixels]; None where it was not measured.
-        covariance: 36 entries, row by row, as in `BoardEstimate.covariance`; empty if unknown.
-        markers: number of markers used.
+        X_SC: pose of the optical frame in the scene frame.
+        reprojection_error: root mean square reprojection error of the markers' corners [pixels];
+            left out if it was not measured.
+        covariance: covariance of the camera's pose, 6 x 6 row by row: rotation [rad], then position
+            [m], in the scene frame; empty if unknown.
+        markers: number of markers that were used.
     """
 
     X_SC: Pose
@@ -73,30 +74,25 @@ class CameraPlace:
 
 @dataclass(frozen=True, kw_only=True)
 class Placement:
-    """One object: where it is, against where it should be.
-
-    The displacement is that of the reference point, a point of the object: the middle of its
-    outline seen from above, or the axis of an object that looks the same however it is turned about
-    the vertical. The mesh's origin may lie far away from the object, and would then move by its
-    turn.
+    """Where one object is, compared with where it should be. The displacement is that of a
+    reference point on the object: the middle of its outline from above, or its axis of symmetry.
 
     Attributes:
-        object: name in the library.
-        status: `measured`; `uncertain` (numbers are given where there are any, `reason` says what
-            is doubtful); `not_seen` (hidden, out of view, or not there; without numbers).
-        reason: one line; empty if measured.
-        target: X_SO of the scene document.
-        measured: X_SO as it stands; about the vertical the target's own turn where `angle` is None.
-        reference: p_OR, the reference point in the object frame [m].
-        displacement: x and y of the reference point in S, measured less target [m].
-        displacement_sd: standard deviations of both [m], the camera's error included.
-        angle: turn about the z axis of S from target to measured [rad], in (-pi, pi]; None where
-            the object's symmetry hides it.
-        angle_sd: its standard deviation [rad].
-        seen: share of the object's silhouette (by colour) or visible surface (by depth) that is in
-            view and not hidden by other objects, in [0, 1].
-        residual: root mean square of what the fit left: pixels between outline and image, or metres
-            between surface and depth.
+        object: name of the object in the library.
+        status: whether the object was `measured`, measured with doubt (`uncertain`), or `not_seen`.
+        reason: what is doubtful, in one line; empty if measured.
+        target: planned pose of the object in the scene frame.
+        measured: measured pose of the object in the scene frame.
+        reference: reference point in the object's frame [m].
+        displacement: x and y of the measured minus the planned reference point, in the scene frame
+            [m].
+        displacement_sd: standard deviations of `displacement` [m].
+        angle: measured minus planned turn about the vertical [rad], -pi to pi; left out if the
+            object's symmetry hides it.
+        angle_sd: standard deviation of `angle` [rad].
+        seen: share of the object that is in view and not hidden by others, 0 to 1.
+        residual: root mean square residual of the fit: between outline and image [pixels], or
+            between surface and depth [m].
     """
 
     object: str
@@ -115,11 +111,11 @@ class Placement:
 
 @dataclass(frozen=True, kw_only=True)
 class ExtraObject:
-    """Something that stands on the board and is no object of the scene.
+    """A thing on the board that is not in the scene.
 
     Attributes:
-        position: x and y in S of about the middle of where it stands [m].
-        width: how wide it looks, across the view [m].
+        position: x and y of its middle in the scene frame, roughly [m].
+        width: width across the view [m].
     """
 
     position: tuple[float, float]
@@ -128,21 +124,21 @@ class ExtraObject:
 
 @dataclass(frozen=True, kw_only=True)
 class PlacementCheck:
-    """Schema of a placement file.
+    """A placement check: where the objects of a real scene stand, compared with the scene file.
 
     Attributes:
-        scene: whose targets.
+        scene: the scene with the planned poses.
         taken: date and time of the check, ISO 8601 with time zone.
-        method: `silhouette` from colour, `depth` from distances.
+        method: how it was measured: `silhouette` from colour, `depth` from distances.
         image: the photo.
-        more_images: further photos of the same, if several were combined.
-        depth: the depth image, where one was used.
-        intrinsics: of the camera.
-        camera: where it was; None if no board was found, and then nothing was measured.
+        more_images: further photos of the same scene, if several were combined.
+        depth: the depth image, if one was used.
+        intrinsics: intrinsics of the camera.
+        camera: where the camera was; left out if the board was not found.
         reason: why nothing was measured; empty otherwise.
-        instances: by name, in the scene's order, those of the background as well.
-        extra: what stands on the board and is no object of the scene, the largest first.
-        versions: of the software.
+        instances: the objects by instance, in the scene's order, with those of the background.
+        extra: things on the board that are not in the scene, the largest first.
+        versions: versions of the software.
     """
 
     version: int = 1

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from burg_drake.core import BurgError, InvalidInputError
-from burg_drake.core.documents import dump_document
+from burg_drake.core.documents import document_text
 from burg_drake.core.files import atomic_write
 from burg_drake.core.paths import builtin_names, portable_reference, require_name
 from burg_drake.objects.library import ObjectLibrary, load_library
@@ -81,7 +81,7 @@ def write_scene(
             f"{path} {what}; overwrite it, save under another name, or load it to see what it holds"
         )
     written = replace(document, library=library_reference(document, library, path.parent))
-    text = dump_document(written)
+    text = document_text(written)
     atomic_write(path, text)
     return written, hashlib.sha256(text.encode()).hexdigest()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterable, Mapping
+from typing import ClassVar, Protocol
 
 from burg_drake.core.errors import FieldError
 
@@ -12,21 +13,42 @@ Ranges = Mapping[str, tuple[float, float]]
 """Smallest and largest value by name of the field."""
 
 
-def require_ranges(settings: object, ranges: Ranges, what: str = "") -> None:
-    """Refuses values outside of their range.
+class WithRanges(Protocol):
+    """A dataclass that says which values its fields may have; schemas say it, too."""
+
+    RANGES: ClassVar[Ranges]
+
+
+def require_ranges(settings: WithRanges, what: str = "") -> None:
+    """Refuses values outside of their range. None passes; in a tuple, each value has to be inside.
 
     Args:
         settings: dataclass with the fields.
-        ranges: of its fields.
         what: the settings are of, for messages; nothing where the field's name says enough.
 
     Raises:
         FieldError: a value is outside, or not a number.
     """
     of = f" of {what}" if what else ""
-    for name, (low, high) in ranges.items():
-        if not low <= (value := getattr(settings, name)) <= high:
-            raise FieldError(f"{name}{of} is {value:g}; it must be {low:g} to {high:g}", name)
+    for name, (low, high) in settings.RANGES.items():
+        given = getattr(settings, name)
+        several = isinstance(given, tuple)
+        for value in given if several else (given,):
+            if value is not None and not low <= value <= high:
+                verb = "has" if several else "is"
+                raise FieldError(
+                    f"{name}{of} {verb} {value:g}; it must be {low:g} to {high:g}", name
+                )
+
+
+def require_rising(pair: tuple[float, float], name: str) -> None:
+    """Refuses a range that falls.
+
+    Raises:
+        FieldError: the first value is above the second.
+    """
+    if pair[0] > pair[1]:
+        raise FieldError(f"{name} is {pair[0]:g} to {pair[1]:g}; it must rise", name)
 
 
 def require_finite(document: object) -> None:

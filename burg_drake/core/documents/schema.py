@@ -21,6 +21,7 @@ import yaml
 from numpy.typing import ArrayLike
 
 from burg_drake.core.arrays import Array
+from burg_drake.core.documents.kinds import schema_line
 from burg_drake.core.documents.reader import Reader
 from burg_drake.core.documents.vectors import Quaternion, Vector3
 from burg_drake.core.documents.yaml_nodes import parse_nodes
@@ -40,12 +41,12 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Pose:
-    """A rigid transform as people write it.
+    """A position and an orientation. Without keys it is the identity.
 
     Attributes:
-        translation: position [m].
-        rpy_deg: roll, pitch, yaw about the fixed x, y, z axes [degrees].
-        quaternion_wxyz: the rotation as quaternion, in place of `rpy_deg`.
+        translation: position x, y, z [m].
+        rpy_deg: roll, pitch and yaw about the fixed x, y and z axes [degrees].
+        quaternion_wxyz: rotation as a unit quaternion w, x, y, z, in place of `rpy_deg`.
     """
 
     translation: Vector3 = (0.0, 0.0, 0.0)
@@ -124,19 +125,28 @@ def read_document(node: yaml.Node, schema: type[T], name: str) -> T:
 def save_document(document: Any, path: str | Path, header: str = "") -> None:
     """Writes a document dataclass as YAML, whole or not at all.
 
+    Args:
+        document, header: see `document_text`.
+        path: file to write.
+    """
+    atomic_write(path, document_text(document, header))
+
+
+def document_text(document: Any, header: str = "") -> str:
+    """The text of a file: the line by which editors find the schema, a header, the document.
+
     Fields that have their default are left out; see `plain_data`.
 
     Args:
         document: instance of a document dataclass.
-        path: file to write.
-        header: comment for the first lines.
+        header: comment below the first line.
     """
     comment = "".join(f"# {line}\n" for line in header.splitlines())
-    atomic_write(path, comment + dump_document(document))
+    return schema_line(document) + comment + dump_document(document)
 
 
 def dump_document(document: Any) -> str:
-    """The YAML text that `save_document` writes."""
+    """A document as YAML without comments, of which hashes are made."""
     return yaml.dump(
         plain_data(document), Dumper=_Dumper, sort_keys=False, width=100, allow_unicode=True
     )

@@ -5,22 +5,22 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from burg_drake.core import LARGEST_SEED, FieldError, InvalidInputError
-from burg_drake.core.documents import Pose, Vector3, parse_document, plain_data, require_ranges
+from burg_drake.core.documents import (
+    Pose,
+    Ranges,
+    Vector3,
+    parse_document,
+    plain_data,
+    require_ranges,
+)
 from burg_drake.dataset.appearance.settings import Pattern
 
 WHITE: Vector3 = (1.0, 1.0, 1.0)
 MAX_GAIN = 1e4
 """Maximum irradiance, gain or component of a colour; with 1 a white surface is white."""
-CAMERA_RANGES = {
-    "exposure": (-20.0, 20.0),
-    "gamma": (0.05, 20.0),
-    "blur": (0.0, 100.0),
-    "electrons": (1.0, 1e12),
-}
-"""Allowed values of a camera, far beyond those that looks are sampled from."""
 
 
 def _require_gains(values: Vector3, name: str) -> None:
@@ -45,6 +45,8 @@ class DirectedLight:
         shadows: whether it casts them with Drake's renderer; with Blender those of the world do.
     """
 
+    RANGES: ClassVar[Ranges] = {"irradiance": (0.0, MAX_GAIN)}
+
     direction: Vector3
     frame: Literal["world", "camera"] = "world"
     irradiance: float
@@ -58,7 +60,7 @@ class DirectedLight:
                 "a light needs a direction and a color; given:"
                 f" {list(self.direction)}, {list(self.color)}"
             )
-        require_ranges(self, {"irradiance": (0.0, MAX_GAIN)})
+        require_ranges(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,6 +91,14 @@ class Photometry:
         electrons: that a white pixel collects; no noise if None.
     """
 
+    RANGES: ClassVar[Ranges] = {
+        "exposure": (-20.0, 20.0),
+        "gamma": (0.05, 20.0),
+        "blur": (0.0, 100.0),
+        "electrons": (1.0, 1e12),
+    }
+    """Allowed values of a camera, far beyond those that looks are sampled from."""
+
     exposure: float = 0.0
     white_balance: Vector3 = WHITE
     gamma: float = 1.0
@@ -96,12 +106,7 @@ class Photometry:
     electrons: float | None = None
 
     def __post_init__(self) -> None:
-        known = {
-            name: bounds
-            for name, bounds in CAMERA_RANGES.items()
-            if getattr(self, name) is not None
-        }
-        require_ranges(self, known)
+        require_ranges(self)
         _require_gains(self.white_balance, "white_balance")
 
 
@@ -135,6 +140,8 @@ class Appearance:
         distractors: on the table.
     """
 
+    RANGES: ClassVar[Ranges] = {"room_light": (0.0, MAX_GAIN)}
+
     version: int = 1
     lights: tuple[DirectedLight, ...] = ()
     room: int | None = None
@@ -148,7 +155,7 @@ class Appearance:
 
     def __post_init__(self) -> None:
         _require_seed(self.room, "room")
-        require_ranges(self, {"room_light": (0.0, MAX_GAIN)})
+        require_ranges(self)
         if self.room_light and self.room is None:
             raise FieldError(
                 f"room_light is {self.room_light:g}; it is 0 without a room", "room_light"

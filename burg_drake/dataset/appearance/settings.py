@@ -5,69 +5,62 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal, get_args
 
-from burg_drake.core import FieldError
-from burg_drake.core.documents import require_ranges
+from burg_drake.core.documents import Ranges, require_ranges, require_rising
 
 Pattern = Literal["wood", "cloth", "stone", "plain"]
 PATTERNS: tuple[Pattern, ...] = get_args(Pattern)
 
 MOST_LIGHTS = 4
 MOST_DISTRACTORS = 50
-RANGES = {
-    "shadows": (0.0, 1.0),
-    "room": (0.0, 1.0),
-    "room_light": (0.0, 1.0),
-    "board": (0.0, 1.0),
-    "white_balance": (0.0, 0.5),
-    "color_gain": (0.0, 0.9),
-}
-PAIRS = {
-    "lights": (1, MOST_LIGHTS),
-    "light_elevation_deg": (5.0, 90.0),
-    "temperature": (1000.0, 20_000.0),
-    "exposure": (-5.0, 5.0),
-    "gamma": (0.2, 5.0),
-    "blur": (0.0, 20.0),
-    "electrons": (50.0, 1e6),
-    "distractors": (0, MOST_DISTRACTORS),
-}
-"""The same of ranges that values are drawn from."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class AppearanceSettings:
-    """Ranges and choices that the looks of scenes are drawn from; each can be switched off.
+    """Ranges from which the looks of scenes are drawn. Pairs are the smallest and the largest
+    value.
 
     Attributes:
-        lights: how many there are, besides a weak one that goes with the camera, without which
-            sides that face no light would be black; the usual lights if None.
-        light_elevation_deg: of the first light above the table; the others come from anywhere
-            above.
-        temperature: of the lights' colours [K]; all are white if None.
-        shadows: probability that the first light casts shadows, which doubles the time of
-            rendering.
-        room: probability that a room is seen behind the table, and not an even grey.
-        room_light: probability that the room, if there is one, lights the scene from all around,
-            by its picture; that takes about a second a scene without a graphics card.
-        table: patterns of the table, each with equal probability; its own colour if empty.
-        board: probability that the printed board lies on the table, and not only what stands on it.
-        exposure: of the image [stops]; 0 if None.
-        white_balance: gains of red and blue differ from 1 by this, at most.
-        gamma: exponent that is left in the image; 1 if None.
-        blur: standard deviation [pixels]; none if None.
-        electrons: that a white pixel collects, by which its noise follows; no noise if None.
-        color_gain: channels of each object's colour differ from the library's by this share, at
-            most.
-        distractors: how many things that belong to no label stand on the table beside the objects;
-            fewer if there is no room for more.
-        distractor_library: that they are from: a built-in name, or a folder.
-        distractors_on_board: they may stand on the board, too.
+        lights: number of lights, besides a weak one at the camera; the usual lights if null.
+        light_elevation_deg: elevation of the first light above the table [degrees]; the others come
+            from anywhere above.
+        temperature: colour temperature of the lights [K]; white if null.
+        shadows: probability that the first light casts shadows, which doubles the rendering time.
+        room: probability that a room is seen behind the table instead of an even grey.
+        room_light: probability that the room, if there is one, lights the scene from all around.
+        table: patterns of the table, each with the same probability; its own colour if empty.
+        board: probability that the printed board is seen.
+        exposure: exposure of the image [stops]; 0 if null.
+        white_balance: largest deviation of the gains of red and blue from 1.
+        gamma: exponent of the image; 1 if null.
+        blur: standard deviation of blur [pixels]; none if null.
+        electrons: electrons that a white pixel collects; fewer give more noise, null gives none.
+        color_gain: largest change of the channels of each object's colour, as a share.
+        distractors: number of other things on the table, without labels; fewer if there is no room.
+        distractor_library: object library of these things: a folder, or the name of a built-in one.
+        distractors_on_board: whether these things may stand on the board.
 
     Raises:
         FieldError: a value is out of its range, or a range falls.
     """
 
     WRITTEN_WHOLE: ClassVar[bool] = True
+
+    RANGES: ClassVar[Ranges] = {
+        "shadows": (0.0, 1.0),
+        "room": (0.0, 1.0),
+        "room_light": (0.0, 1.0),
+        "board": (0.0, 1.0),
+        "white_balance": (0.0, 0.5),
+        "color_gain": (0.0, 0.9),
+        "lights": (1, MOST_LIGHTS),
+        "light_elevation_deg": (5.0, 90.0),
+        "temperature": (1000.0, 20_000.0),
+        "exposure": (-5.0, 5.0),
+        "gamma": (0.2, 5.0),
+        "blur": (0.0, 20.0),
+        "electrons": (50.0, 1e6),
+        "distractors": (0, MOST_DISTRACTORS),
+    }
 
     lights: tuple[int, int] | None = (1, 3)
     light_elevation_deg: tuple[float, float] = (35.0, 85.0)
@@ -88,12 +81,7 @@ class AppearanceSettings:
     distractors_on_board: bool = False
 
     def __post_init__(self) -> None:
-        require_ranges(self, RANGES)
-        for name, (least, most) in PAIRS.items():
-            pair = getattr(self, name)
-            if pair is not None and not least <= pair[0] <= pair[1] <= most:
-                raise FieldError(
-                    f"{name} is {pair[0]:g} to {pair[1]:g}; it must rise, within {least:g} to"
-                    f" {most:g}",
-                    name,
-                )
+        require_ranges(self)
+        for name in self.RANGES:
+            if isinstance(pair := getattr(self, name), tuple):
+                require_rising(pair, name)

@@ -10,47 +10,45 @@ from typing import Any, ClassVar
 from burg_drake.cameras.noise import depth_noise
 from burg_drake.cameras.optics import sensor
 from burg_drake.core import LARGEST_SEED, FieldError, InvalidInputError, nearest, setting
-from burg_drake.core.documents import parse_document, plain_data, require_ranges
+from burg_drake.core.documents import Ranges, parse_document, plain_data, require_ranges
 from burg_drake.dataset.appearance import AppearanceSettings
 from burg_drake.dataset.blender import RENDERERS, RendererName
 from burg_drake.dataset.views import ViewpointSettings
 from burg_drake.scene.document import SceneRecipe
 from burg_drake.station.document import MAX_SIDE
 
-RANGES = {
-    "seed": (0, LARGEST_SEED),
-    "views": (1, 1000),
-    "grasps_per_object": (0, 100_000),
-}
-
 
 @dataclass(frozen=True, kw_only=True)
 class DatasetRecipe:
-    """How samples are made of scenes. The sample of a scene's number and a view's follows from it,
-    from the scene and from the station; it is the same alone and on any worker.
+    """How a data set is made from scenes. Each sample follows from the numbers of its scene and
+    view; it is the same on any number of workers.
 
     Attributes:
-        seed: all views and looks of another seed are others.
-        views: of each scene.
-        viewpoints: where they are drawn from.
-        sensor: depth camera that all views are taken with, see `cameras.sensor`: its intrinsics,
-            its range, and its noise as `sensor_depth`; cameras of the station, or like them,
-            without noise, if empty.
-        size: width and height of the sensor's images [pixels]; its usual ones if None.
-        looks: how the looks of scenes vary, drawn once a scene; as simulated cameras always see
-            them if None.
-        colors: whether there are images of colours, which need a renderer. All other images are
-            the same without them, but for `sensor_depth`, whose noise is drawn anew and has no
-            holes at dark surfaces.
-        renderer: of colours: `drake`, or `blender`, see `dataset.blender`; all else is the same.
-        normals: whether there are images of normals.
-        grasps_per_object: grasps that are sampled on each object and screened by the open hand.
-        run: folder of a run whose grasps and outcomes are taken; none if empty.
-        sampled: how scenes are sampled; None for given ones.
-        given: content of each given scene, in their order.
+        seed: seed of all random choices; another one gives other views and looks.
+        views: number of views of each scene.
+        viewpoints: how views are drawn.
+        sensor: depth camera that takes all views, with its intrinsics, depth range and noise;
+            cameras of the station, without noise, if empty.
+        size: width and height of the sensor's images [pixels]; its usual ones if left out.
+        looks: how lights, colours and surroundings vary from scene to scene; always the same if
+            null.
+        colors: whether to write colour images, which need a renderer.
+        renderer: renderer of colour images.
+        normals: whether to write images of surface normals.
+        grasps_per_object: number of grasps sampled on each object and checked for collisions of the
+            open hand.
+        run: folder of a run whose grasps and outcomes to use; none if empty.
+        sampled: how scenes are sampled; null for scenes that are given.
+        given: hashes of the given scenes, in their order.
     """
 
     WRITTEN_WHOLE: ClassVar[bool] = True
+
+    RANGES: ClassVar[Ranges] = {
+        "seed": (0, LARGEST_SEED),
+        "views": (1, 1000),
+        "grasps_per_object": (0, 100_000),
+    }
 
     version: int = 1
     seed: int = setting(0, high=LARGEST_SEED)
@@ -76,7 +74,7 @@ class DatasetRecipe:
     given: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        require_ranges(self, RANGES)
+        require_ranges(self)
         if self.sensor:
             self._require_size()
             depth_noise(self.sensor)

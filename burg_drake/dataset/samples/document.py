@@ -24,17 +24,20 @@ SHOWN_DIFFERENCES = 6
 
 @dataclass(frozen=True, kw_only=True)
 class DatasetDocument:
-    """Schema of `dataset.yaml`.
+    """What a data set holds and how it was made (`dataset.yaml`).
 
     Attributes:
-        name: of the data set.
-        objects: names in the order of their ids, which count from 1.
-        library: folder of the object library, relative to the data set, or a built-in name.
-        station: its file, relative to the data set, or a built-in name; empty without one.
-        library_content, station_content: hashes of what is in them.
-        distractors_content: the same of the library that distractors are from; empty without one.
-        versions: of the software that made it.
-        recipe: of who generated it, as plain data; None if nobody did.
+        name: name of the data set.
+        objects: names of the objects in the order of their ids, which count from 1.
+        library: object library: its folder, relative to the data set, or the name of a built-in
+            one.
+        station: station: its file, relative to the data set, or the name of a built-in one; empty
+            without one.
+        library_content: hash of the library.
+        station_content: hash of the station.
+        distractors_content: hash of the library of distractors; empty without one.
+        versions: versions of the software.
+        recipe: how the samples were generated, as in a data set recipe; left out if they were not.
     """
 
     version: int = 1

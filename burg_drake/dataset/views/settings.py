@@ -6,57 +6,57 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from burg_drake.core import FieldError
-from burg_drake.core.documents import Pose, require_ranges
+from burg_drake.core.documents import Pose, Ranges, require_ranges, require_rising
 
 SPHERE, WRIST = "sphere", "wrist"
 """Cameras that no station has: around the scene, and on the hand."""
 FARTHEST = 100.0
 """Of a camera from what it looks at [m]."""
 
-RANGES = {
-    "aim": (0.0, FARTHEST),
-    "position_jitter": (0.0, FARTHEST),
-    "angle_jitter_deg": (0.0, 180.0),
-    "in_view": (0.0, 1.0),
-    "draws": (1, 100_000),
-}
-PAIRS = {
-    "distance": (1e-3, FARTHEST),
-    "elevation_deg": (-90.0, 90.0),
-    "azimuth_deg": (-360.0, 360.0),
-    "roll_deg": (-360.0, 360.0),
-}
-"""The same of ranges that views are drawn from."""
 
 Range = tuple[float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ViewpointSettings:
-    """How views of a scene are drawn. A view looks at a point near the scene's middle, the mean of
-    its objects' centres.
+    """How views of a scene are drawn. A view looks at a point near the mean of the objects'
+    centres.
 
     Attributes:
-        cameras: what takes them, each with equal probability: `sphere`, `wrist`, or cameras of the
-            station by name.
-        distance: of the sphere's and the wrist's camera from the point that it looks at [m].
-        elevation_deg: of the camera above the board, seen from there; uniform on the sphere.
-        azimuth_deg: of the camera, from the board's x axis, counter-clockwise seen from above.
-        aim: the point that is looked at is so far from the scene's middle, at most [m].
-        roll_deg: about the optical axis; at 0 the image's rows are level.
-        position_jitter: the station's cameras are so far from their places, at most [m] ...
-        angle_jitter_deg: ... and turned by that, at most, about a random axis.
-        X_HC: the wrist's camera in the hand's frame; if None it is beside the hand, a little behind
-            the fingertips, and looks along the fingers.
-        in_view: share of the scene's objects whose centres a view shows, at least, with neither the
-            table nor an obstacle before them; one of them in any case.
-        draws: of a view, until it is given up.
+        cameras: cameras, each with the same probability: `sphere` (around the scene), `wrist` (on
+            the hand), or names of cameras of the station.
+        distance: smallest and largest distance of the camera from the point it looks at [m].
+        elevation_deg: smallest and largest angle of the camera above the board [degrees].
+        azimuth_deg: smallest and largest angle of the camera about the vertical, from the board's x
+            axis, counter-clockwise from above [degrees].
+        aim: largest distance of the point looked at from the scene's middle [m].
+        roll_deg: smallest and largest angle about the optical axis [degrees]; at 0 rows of the
+            image are level.
+        position_jitter: largest distance of the station's cameras from their places [m].
+        angle_jitter_deg: largest turn of the station's cameras about a random axis [degrees].
+        X_HC: pose of the wrist camera in the hand's frame; beside the hand, looking along the
+            fingers, if null.
+        in_view: smallest share of the objects whose centres a view has to show, 0 to 1. One is
+            always shown.
+        draws: number of drafts of a view until it is given up.
 
     Raises:
         FieldError: a value is out of its range, a range falls, or there is no camera.
     """
 
     WRITTEN_WHOLE: ClassVar[bool] = True
+
+    RANGES: ClassVar[Ranges] = {
+        "aim": (0.0, FARTHEST),
+        "position_jitter": (0.0, FARTHEST),
+        "angle_jitter_deg": (0.0, 180.0),
+        "in_view": (0.0, 1.0),
+        "draws": (1, 100_000),
+        "distance": (1e-3, FARTHEST),
+        "elevation_deg": (-90.0, 90.0),
+        "azimuth_deg": (-360.0, 360.0),
+        "roll_deg": (-360.0, 360.0),
+    }
 
     cameras: tuple[str, ...] = (SPHERE,)
     distance: Range = (0.5, 1.0)
@@ -77,11 +77,7 @@ class ViewpointSettings:
                 " station",
                 "cameras",
             )
-        require_ranges(self, RANGES)
-        for name, (least, most) in PAIRS.items():
-            low, high = getattr(self, name)
-            if not least <= low <= high <= most:
-                raise FieldError(
-                    f"{name} is {low:g} to {high:g}; it must rise, within {least:g} to {most:g}",
-                    name,
-                )
+        require_ranges(self)
+        for name in self.RANGES:
+            if isinstance(pair := getattr(self, name), tuple):
+                require_rising(pair, name)

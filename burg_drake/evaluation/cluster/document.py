@@ -23,11 +23,12 @@ HOW_TLS = (
 
 @dataclass(frozen=True, kw_only=True)
 class TlsFiles:
-    """Files in PEM form, relative to the document.
+    """Certificates (PEM files, relative to this file).
 
     Attributes:
-        ca: certificate of who has signed those of all machines.
-        cert, key: certificate and private key of this one.
+        ca: certificate of the authority that signed those of all machines.
+        cert: certificate of this machine.
+        key: private key of this machine.
     """
 
     ca: str
@@ -37,10 +38,11 @@ class TlsFiles:
 
 @dataclass(frozen=True, kw_only=True)
 class Adapt:
-    """Between so many jobs of the batch system run, as there is work.
+    """Smallest and largest number of jobs. Jobs start and end with the amount of work.
 
     Attributes:
-        minimum, maximum: numbers of jobs.
+        minimum: smallest number of jobs.
+        maximum: largest number of jobs.
     """
 
     minimum: int = 0
@@ -56,18 +58,23 @@ class Adapt:
 
 @dataclass(frozen=True, kw_only=True)
 class JobQueue:
-    """How a batch system starts workers, by dask-jobqueue.
+    """How a batch system starts workers (by dask-jobqueue).
 
     Attributes:
-        kind: the batch system.
-        workers: workers in a job, each with one thread, one child and one processor.
-        memory: of a job, such as `16GB`.
-        walltime, queue, account, interface, local_directory, python, log_directory: as
-            dask-jobqueue has them; its own default if empty.
-        directives: more lines for the head of the job's script, without `#SBATCH` or `#PBS`.
-        prologue: commands before the workers start, such as those that activate an environment.
-        shared_directory: that all machines see, for certificates of passing use, if there are no
-            `tls` files.
+        kind: kind of batch system.
+        workers: number of workers in a job, each with one processor.
+        memory: memory of a job, such as `16GB`.
+        walltime: time limit of a job, such as `04:00:00`; dask-jobqueue's default if empty.
+        queue: queue or partition; the default one if empty.
+        account: account or project; the default one if empty.
+        interface: network interface between the machines, such as `ib0`; the default one if empty.
+        local_directory: folder on the workers' machines for temporary files.
+        python: Python to start workers with; this one if empty.
+        log_directory: folder for the jobs' output.
+        directives: further lines for the head of the job script, without `#SBATCH` or `#PBS`.
+        prologue: commands before the workers start, such as to activate an environment.
+        shared_directory: folder that all machines see, for temporary certificates if there is no
+            `tls`.
     """
 
     kind: Literal["slurm", "pbs", "sge", "lsf", "htcondor", "oar", "moab"]
@@ -91,14 +98,15 @@ class JobQueue:
 
 @dataclass(frozen=True, kw_only=True)
 class ClusterDocument:
-    """Schema of a cluster file.
+    """A cluster of machines for `--cluster`: either a running Dask scheduler, or a batch system
+    that starts workers.
 
     Attributes:
-        address: of a scheduler that runs, such as `tls://head:8786`.
-        tls: files that prove who is who.
-        jobqueue: a batch system that starts workers.
-        scale: number of its jobs.
-        adapt: their number as there is work, in place of `scale`.
+        address: address of a running scheduler, such as `tls://head:8786`.
+        tls: certificates for an encrypted connection.
+        jobqueue: batch system that starts the workers.
+        scale: number of jobs.
+        adapt: smallest and largest number of jobs, in place of `scale`.
     """
 
     version: int = 1

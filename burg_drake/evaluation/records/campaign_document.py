@@ -33,12 +33,12 @@ class SceneEntry:
     """A scene of the run.
 
     Attributes:
-        name: in this run, of its folder; the scene's own, unless another has the same.
-        path: where it was, or the name of a built-in one.
-        content: hash of all that matters in it and behind it.
-        file: hash of the scene file's bytes; empty for a scene that was no file.
-        library: folder of its library, a key of `libraries`.
-        instances: objects of the free instances by name.
+        name: name of the scene's folder in this run.
+        path: file of the scene, or the name of a built-in one.
+        content: hash of its content, with its objects.
+        file: SHA-256 of the scene file; empty for a scene from memory.
+        library: folder of its object library; a key of `libraries`.
+        instances: objects of the free instances, by instance.
     """
 
     name: str
@@ -60,21 +60,27 @@ class SceneEntry:
 
 @dataclass(frozen=True, kw_only=True)
 class CampaignDocument:
-    """Schema of campaign.yaml.
+    """A run of `burg-drake evaluate` or `reach` over many scenes (`campaign.yaml`).
 
     Attributes:
-        hash: of what decides about results, `campaign_hash`.
-        command: the command line, or the Python script, that began the run.
-        station, engine, trial, mode, arm, seed, grasps: what is asked about each scene, as in
-            `RunDocument`; each run has its own number of grasps.
-        shard: which share of the work is done here, as `K/N`; all if empty.
-        table: format of the tables of results.
-        joints: of the arm that is asked; 0 without one.
-        scenes: all of them, also in a shard.
-        libraries: hash of all objects of each library, by folder.
-        versions: of the software and the machine.
-        stretches: sessions in which it was worked on.
-        hints: usual mistakes that given grasps show, see `RunDocument`.
+        hash: hash of all that decides about the results.
+        command: command line, or Python script, that began the run.
+        station: the station.
+        grasps: the grasps of each scene.
+        engine: physics engine and its settings.
+        trial: settings of the trials, in SI units.
+        mode: `hand`: the hand alone executes the grasps. `reach`: the same, of grasps that the arm
+            can execute. `arm`: the whole arm executes them.
+        arm: settings of the search for arm motions, in SI units; empty in mode `hand`.
+        seed: seed of the grasp sampling.
+        shard: share of the work done here, as `K/N`; empty for all.
+        table: format of the results tables.
+        joints: number of the arm's joints; 0 without an arm.
+        scenes: all scenes of the run, in every shard.
+        libraries: hash of each object library, by folder.
+        versions: versions of the software and the machine.
+        stretches: the calls that worked on the run, in order.
+        hints: usual mistakes that the given grasps show, each with a command that corrects it.
     """
 
     version: int = 1

@@ -22,12 +22,12 @@ HASH_DIGITS = 12
 
 @dataclass(frozen=True, kw_only=True)
 class Input:
-    """A document that went into the run; a copy lies in the run's folder.
+    """A scene or station that was used.
 
     Attributes:
-        name: its name.
-        path: where it was, or the name of a built-in one.
-        content: hash of all that matters in it and behind it (objects, robot models).
+        name: name of the scene or station.
+        path: its file, or the name of a built-in one.
+        content: hash of its content, with objects and robot models.
     """
 
     name: str
@@ -37,12 +37,12 @@ class Input:
 
 @dataclass(frozen=True, kw_only=True)
 class Library:
-    """The object library; it is not copied.
+    """The object library of a run. It is not copied.
 
     Attributes:
-        name: its name.
-        path: its folder, absolute, or as package://.
-        objects: build hash of each object in the scene.
+        name: name of the library.
+        path: its folder, absolute, or as `package://`.
+        objects: build hash of each object of the scene.
     """
 
     name: str
@@ -52,23 +52,26 @@ class Library:
 
 @dataclass(frozen=True, kw_only=True)
 class Grasps:
-    """The candidates; they are in grasps.npz.
+    """The grasps of a run; they are in `grasps.npz`.
 
     Attributes:
-        origin: sampled here, or given by the user.
-        per_object: how many were asked for, if sampled.
-        approach_angle_deg: largest angle between their approach and straight down, if sampled.
-        blind: whether they were sampled without regard to the hand, as they were in runs that do
-            not say.
-        only: instances that grasps were sampled or judged on; all if empty.
-        until_balanced, balanced_among, max_per_object: as `EvaluationSettings` has them; 0 where
-            grasps were sampled once.
-        asked: with `until_balanced`, how many grasps were sampled so far for each instance of an
-            object: ordinary and slippery ones.
-        correction: with which a file of given ones was read, see `FileReading`.
-        count: how many there are.
-        objects: how many there are by object; 0 where an object has none.
-        content: hash of them all.
+        origin: whether the grasps were sampled or given.
+        per_object: number of sampled grasps wanted per object.
+        approach_angle_deg: largest angle between approach and straight down of sampled grasps
+            [degrees].
+        blind: whether grasps were sampled without regard to the hand's size.
+        only: instances or objects that were evaluated; all if empty.
+        until_balanced: number of successes and failures per object at which sampling stops; 0 to
+            sample once.
+        balanced_among: grasps that count for `until_balanced`: all, those with the hand `clear`,
+            those the arm can reach (`reachable`), or those tried in simulation (`executed`).
+        max_per_object: largest number of grasps per object with `until_balanced`; 0 without it.
+        asked: with `until_balanced`, the numbers of ordinary and of slippery grasps sampled per
+            object so far.
+        correction: corrections that given grasps were read with.
+        count: number of grasps.
+        objects: number of grasps of each object.
+        content: hash of all grasps.
         cpu: CPU time of the sampling [s].
     """
 
@@ -90,14 +93,14 @@ class Grasps:
 
 @dataclass(frozen=True, kw_only=True)
 class WorkSession:
-    """One call that worked on the run; there are several if it was interrupted.
+    """One call that worked on the run.
 
     Attributes:
         started: date and time, ISO 8601 with time zone.
         workers: number of worker processes.
-        before: grasps that had a verdict when it began; unknown in runs of earlier versions.
-        judged: grasps judged in it; unknown if it was killed.
-        seconds: wall time it took; unknown if it was killed.
+        before: number of grasps that were finished before.
+        judged: number of grasps finished by this call; left out if it was killed.
+        seconds: duration [s]; left out if it was killed.
     """
 
     started: str
@@ -109,23 +112,26 @@ class WorkSession:
 
 @dataclass(frozen=True, kw_only=True)
 class RunDocument:
-    """Schema of run.yaml.
+    """A run of `burg-drake evaluate` or `reach` over one scene (`run.yaml`).
 
     Attributes:
-        hash: `run_hash`, once the candidates are known; column `run` of the results file.
-        command: the command line, or the Python script, that began the run.
-        scene, station, library, grasps: what was judged.
-        engine: how trials were stepped.
-        trial: settings of the trial's phases, and how its results were measured.
-        mode: what was asked about each grasp.
-        arm: settings of the search for the arm's motions; none in mode `hand`.
-        seed: of the sampling.
-        shard: which share of the grasps is judged here, as `K/N`; all of them if empty.
-        table: format of the results file.
-        versions: of the software and the machine.
-        stretches: sessions in which it was worked on.
-        hints: usual mistakes that given grasps show, in sentences; a further line of one is a
-            command that evaluates them again.
+        hash: hash of all that decides about the results; column `run` of the table.
+        command: command line, or Python script, that began the run.
+        scene: the scene.
+        station: the station.
+        library: the object library.
+        grasps: the grasps.
+        engine: physics engine and its settings.
+        trial: settings of the trials, in SI units.
+        mode: `hand`: the hand alone executes the grasps. `reach`: the same, of grasps that the arm
+            can execute. `arm`: the whole arm executes them.
+        arm: settings of the search for arm motions, in SI units; empty in mode `hand`.
+        seed: seed of the grasp sampling.
+        shard: share of the grasps evaluated here, as `K/N`; empty for all.
+        table: format of the results table.
+        versions: versions of the software and the machine.
+        stretches: the calls that worked on the run, in order.
+        hints: usual mistakes that the given grasps show, each with a command that corrects it.
     """
 
     version: int = 1

@@ -63,16 +63,17 @@ class PlanOutput:
 
 @dataclass(frozen=True, kw_only=True)
 class PlansDocument:
-    """Schema of plans.yaml.
+    """A folder of arm motions, one for each grasp (`plans.yaml`).
 
     Attributes:
-        scene, station: what the plans are for.
-        grasps: how many were asked about.
-        content: hash of these.
-        arm: settings of the search for motions.
-        exact: whether Drake's checker has seen each motion.
-        format: of the plans.
-        versions: of the software and the machine.
+        scene: the scene.
+        station: the station.
+        grasps: number of grasps.
+        content: hash of the grasps.
+        arm: settings of the search for arm motions, in SI units.
+        exact: whether Drake's collision checker confirmed each motion.
+        format: format of the motions.
+        versions: versions of the software and the machine.
     """
 
     version: int = 1

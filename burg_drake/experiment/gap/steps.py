@@ -14,18 +14,20 @@ StepName = Literal["hand", "reach", "arm", "placed"]
 
 @dataclass(frozen=True, kw_only=True)
 class GapDocument:
-    """Schema of gap.yaml.
+    """A measurement of the gap between simulation and robot, step by step (`gap.yaml`).
 
     Attributes:
-        source: hash of the run whose grasps are judged; empty if they were sampled.
-        scene, station: content hashes.
-        last: the last mode.
-        place_mm, turn_deg: standard deviations of the objects' places [mm, degrees].
-        seed: of the places.
+        source: hash of the run whose grasps are evaluated; empty if they were sampled.
+        scene: hash of the scene.
+        station: hash of the station.
+        last: mode of the last step.
+        place_mm: standard deviation of the objects' positions [mm].
+        turn_deg: standard deviation of the objects' turns about the vertical [degrees].
+        seed: seed of the displacements.
         samples: number of displaced scenes.
-        redrawn: how many places were drawn again, by scene.
-        kept: objects that stay as planned in a scene, as no other place was found.
-        versions: of the software.
+        redrawn: how often places were drawn again, for each displaced scene.
+        kept: objects that stay as planned because no other place was found, by displaced scene.
+        versions: versions of the software.
     """
 
     version: int = 1

@@ -30,11 +30,13 @@ class SourceRun:
     """A run whose grasps are tried.
 
     Attributes:
-        path: its folder, from the folder of the sheet, or absolute.
-        hash: `run_hash`; column `run` of its table.
-        scene, station: what was judged, with content hashes.
-        mode: what was asked about each grasp.
-        engine: label of the engine.
+        path: folder of the run, relative to this file, or absolute.
+        hash: hash of the run; column `run` of its results.
+        scene: scene of the run.
+        station: station of the run.
+        mode: `hand`: the hand alone executed the grasps. `reach`: the same, of grasps that the arm
+            can execute. `arm`: the whole arm executed them.
+        engine: name of the physics engine.
     """
 
     path: str
@@ -47,18 +49,20 @@ class SourceRun:
 
 @dataclass(frozen=True, kw_only=True)
 class Selection:
-    """How the grasps were chosen.
+    """How grasps were chosen.
 
     Attributes:
-        per_object: how many of each object of a run were wanted.
-        balance: by what the grasps of an object were divided into strata.
-        margin: name of the margin, with `margin`.
-        bins: number of strata of a margin or a probability.
-        success: what counts as success, here and in comparisons.
-        seed: of choice and order.
-        among: what was chosen from.
-        scenes: so many scenes were drawn from those of the runs; 0 for all.
-        blocks: how many blocks the trials of a scene were divided into.
+        per_object: number of grasps wanted of each object of a run.
+        balance: quantity whose values were to be equally frequent among the chosen grasps.
+        margin: name of the margin, if `balance` is `margin`.
+        bins: number of groups that the margin or the probability was divided into.
+        success: which outcomes count as success. `lifted`: only lifted. `held`: also grasps that
+            held the object but turned it, or moved another one.
+        seed: seed of choice and order.
+        among: grasps that were chosen from: all, those with the hand `clear`, those the arm can
+            reach (`reachable`), or those tried in simulation (`executed`).
+        scenes: number of scenes drawn from those of the runs; 0 for all.
+        blocks: number of blocks that the trials of a scene were divided into.
     """
 
     WRITTEN_WHOLE: ClassVar[bool] = True
@@ -85,15 +89,15 @@ class Selection:
 
 @dataclass(frozen=True, kw_only=True)
 class Stratum:
-    """Grasps of one object of one run that are alike in what was balanced.
+    """A group of similar grasps of one object of one run.
 
     Attributes:
-        run: key of the run.
-        object: name in the library.
-        label: what they have in common, such as `success` or `slipped`.
-        population: how many there were to choose from.
-        selected: how many were chosen; each stands for `population / selected` grasps.
-        wanted: how many were asked for; more than `selected` where there were too few.
+        run: name of the run in `runs`.
+        object: name of the object in the library.
+        label: what the grasps have in common, such as `success` or `slipped`.
+        population: number of grasps in the group.
+        selected: number of grasps that were chosen. Each stands for `population / selected` grasps.
+        wanted: number of grasps that were wanted; larger than `selected` if there were too few.
     """
 
     run: str
@@ -113,15 +117,16 @@ class Stratum:
 
 @dataclass(frozen=True, kw_only=True)
 class ObjectPlace:
-    """Where an object stood before a trial; see `cameras.placement.document.Placement`.
+    """Where an object stood before a trial.
 
     Attributes:
-        status: `measured`, `uncertain` or `not_seen`.
-        offset_mm: x and y of its reference point in S, measured less target [mm].
-        offset_sd_mm: standard deviations of both [mm].
-        turn_deg: about the z axis of S [degrees]; None where its symmetry hides it.
-        turn_sd_deg: its standard deviation [degrees].
-        X_SO: its pose as it stood.
+        status: whether the object was `measured`, measured with doubt (`uncertain`), or `not_seen`.
+        offset_mm: x and y of the measured minus the planned position, in the scene frame [mm].
+        offset_sd_mm: standard deviations of `offset_mm` [mm].
+        turn_deg: measured minus planned turn about the vertical [degrees]; left out if the object's
+            symmetry hides it.
+        turn_sd_deg: standard deviation of `turn_deg` [degrees].
+        X_SO: measured pose of the object in the scene frame.
     """
 
     status: Literal["measured", "uncertain", "not_seen"]
@@ -156,20 +161,21 @@ class RealTrial:
     """One trial.
 
     Attributes:
-        number: from 1 on, in the order in which they are carried out.
-        block: trials of a block are on the same scene, one after the other.
-        run: key of the run in `TrialSheet.runs`.
+        number: number of the trial, from 1, in the order in which they are carried out.
+        block: number of the block; trials of a block are on the same scene, one after the other.
+        run: name of the run in `runs`.
         grasp: id of the grasp in the run.
         content: short hash of the grasp's pose, width and instance.
         instance: name of the target in the scene.
-        object: its name in the library.
-        simulated: what the run found.
-        stratum: key in `TrialSheet.strata`.
-        outcome: how it ended on the robot; None if it is still to be carried out.
-        time: when, ISO 8601 with time zone.
-        operator, note: who, and what was noticed.
-        photo: file of the picture taken before, from the folder of the sheet.
-        placement: where the objects stood before, by instance.
+        object: name of the target in the library.
+        simulated: outcome in the run.
+        stratum: name of the group in `strata`.
+        outcome: outcome on the robot; left out until the trial is carried out.
+        time: date and time of the trial, ISO 8601 with time zone.
+        operator: who carried it out.
+        note: what was noticed.
+        photo: photo taken before the trial, relative to this file.
+        placement: where the objects stood before the trial, by instance.
         robot: what the robot reported.
     """
 
@@ -202,16 +208,16 @@ class RealTrial:
 
 @dataclass(frozen=True, kw_only=True)
 class TrialSheet:
-    """Schema of a trials file.
+    """Trials on a robot: which grasps, in which order, and how each ended (`trials.yaml`).
 
     Attributes:
-        created: date and time, ISO 8601 with time zone.
-        runs: the runs whose grasps are tried, by key.
+        created: date and time of the plan, ISO 8601 with time zone.
+        runs: runs whose grasps are tried, by a name of your choice.
         selection: how the grasps were chosen.
-        strata: what was chosen from, by key.
-        trials: in order.
-        notes: what people should know of the choice, such as where there were too few grasps.
-        versions: of the software that chose.
+        strata: groups of similar grasps that were chosen from, by name.
+        trials: the trials, in order.
+        notes: what to know about the choice, such as groups with too few grasps.
+        versions: versions of the software that chose.
     """
 
     version: int = 1

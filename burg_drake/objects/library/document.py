@@ -39,7 +39,13 @@ PACKAGE_FILE = "package.xml"
 
 @dataclass(frozen=True, kw_only=True)
 class LibraryDocument:
-    """Schema of `library.yaml`."""
+    """An object library (`library.yaml`), written by `burg-drake library build`.
+
+    Attributes:
+        name: name of the library.
+        description: text for people.
+        objects: the objects by name.
+    """
 
     version: int = 1
     name: str

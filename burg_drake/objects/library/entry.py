@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal, get_args
 
 from burg_drake.core import Array, InvalidInputError
-from burg_drake.core.documents import Pose, Vector3, require_ranges
+from burg_drake.core.documents import Pose, Ranges, Vector3, require_ranges
 
 DEFAULT_FRICTION = 0.24
 """Friction coefficient where none is given, as in BURG-Toolkit (Rudorfer et al., 2022)."""
@@ -27,15 +27,15 @@ PRIMITIVE_SIZES = {"box": 3, "cylinder": 2, "sphere": 1}
 
 @dataclass(frozen=True, kw_only=True)
 class StablePose:
-    """A way to rest on a horizontal plane.
+    """A pose in which an object can stand on a plane.
 
     Attributes:
-        probability: share of drops from random orientations that end here, in [0, 1].
-        X_SO: object in a frame whose xy plane is the support; the centre of mass is above the
-            frame's origin.
-        residual: angle by which the simulated object ended up tilted from this pose, at most, when
-            it was dropped on it with disturbances; up to its symmetry [rad]. None: not simulated.
-        rolls: whether it can roll on from here and still be in the same pose, as a lying can.
+        probability: share of drops from random orientations that end in this pose, 0 to 1.
+        X_SO: pose of the object in a frame whose xy plane is the support, with the origin below the
+            centre of mass.
+        residual: largest angle by which the object came to rest tilted from this pose in simulation
+            [rad], up to its symmetry; left out if it was not simulated.
+        rolls: whether the object can roll and stay in this pose, as a lying can.
     """
 
     probability: float
@@ -46,19 +46,17 @@ class StablePose:
 
 @dataclass(frozen=True, kw_only=True)
 class MassProperties:
-    """Mass properties, expressed in the object frame O.
+    """Mass, centre of mass and inertia of an object, in its frame O.
 
     Attributes:
-        mass: [kg].
-        source: `given` by the user, or computed from volume and `density`; `fixed` is furniture
-            that nobody gave a mass, which can only be background of a scene.
-        volume: volume of the material that the mass properties were computed with [m^3]: of the
-            wall alone where the object is hollow.
-        center_of_mass: `p_OOcm` [m].
-        inertia: moments and products about the centre of mass in the axes of O:
-            Ixx, Iyy, Izz, Ixy, Ixz, Iyz [kg m^2].
-        wall_thickness: of a hollow object [m]; None if it is solid.
-        overridden: which of the others were given by the user, and not computed.
+        mass: mass [kg].
+        source: where the mass is from: `given`, or computed with a `density`. `fixed` is for
+            objects without a mass, which can only be background.
+        volume: volume of the material [m^3]; of the wall alone if the object is hollow.
+        center_of_mass: centre of mass in O [m].
+        inertia: Ixx, Iyy, Izz, Ixy, Ixz, Iyz about the centre of mass, in the axes of O [kg m^2].
+        wall_thickness: thickness of the wall of a hollow object [m]; left out for a solid one.
+        overridden: values that were given and not computed.
     """
 
     mass: float
@@ -74,34 +72,33 @@ class MassProperties:
             raise InvalidInputError(f"mass is {self.mass:g} kg; a free object needs a mass above 0")
 
 
-DECOMPOSITION_RANGES = {
-    "threshold": (0.01, 1.0),
-    "join": (0.0, 10.0),
-    "max_vertices": (4, 4096),
-    "tolerance": (0.0, 0.1),
-    "min_thickness": (0.0, 0.1),
-    "timeout": (1e-3, 86400.0),
-    "seed": (0, 2**31 - 1),
-}
-"""Values that make sense; CoACD itself takes thresholds of 0.01 to 1."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class Decomposition:
     """Parameters of the convex decomposition.
 
     Attributes:
-        threshold: CoACD's concavity at which cutting stops, relative to a unit-sized object.
-        join: volume that joining pieces may add, as a share of the pieces' volume.
-        max_vertices: most vertices of a piece.
-        tolerance: pieces stay within this distance of the full hull where `max_vertices`
-            allows [m].
+        threshold: concavity at which CoACD stops cutting, for an object scaled to unit size.
+        join: volume that joining two pieces may add, as a share of the volume of all pieces.
+        max_vertices: largest number of vertices of a piece.
+        tolerance: distance within which a piece follows its full convex hull, if `max_vertices`
+            allows it [m].
         min_thickness: thinner pieces are dropped [m].
-        timeout: CPU time allowed for CoACD [s].
-        seed: of CoACD's search.
+        timeout: CPU time for CoACD [s].
+        seed: seed of CoACD's search.
     """
 
     WRITTEN_WHOLE: ClassVar[bool] = True
+
+    RANGES: ClassVar[Ranges] = {
+        "threshold": (0.01, 1.0),
+        "join": (0.0, 10.0),
+        "max_vertices": (4, 4096),
+        "tolerance": (0.0, 0.1),
+        "min_thickness": (0.0, 0.1),
+        "timeout": (1e-3, 86400.0),
+        "seed": (0, 2**31 - 1),
+    }
+    """Values that make sense; CoACD itself takes thresholds of 0.01 to 1."""
 
     threshold: float = 0.05
     join: float = 0.01
@@ -112,17 +109,17 @@ class Decomposition:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        require_ranges(self, DECOMPOSITION_RANGES)
+        require_ranges(self)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fit:
-    """How well a shape stands for an object's surface.
+    """Fit of convex pieces, a primitive or another mesh to an object's surface.
 
     Attributes:
-        volume_ratio: volume of the shape, overlaps of its parts counted once, over the volume
-            inside the surface.
-        hausdorff: largest distance from a point of one surface to the other, either way [m].
+        volume_ratio: volume of the shape divided by the volume inside the surface. Overlaps of
+            pieces count once.
+        hausdorff: largest distance from a point of one of the two surfaces to the other [m].
     """
 
     volume_ratio: float
@@ -134,10 +131,10 @@ class Primitive:
     """A primitive that stands for an object.
 
     Attributes:
-        shape: `box`, `cylinder` (axis z) or `sphere`, with its centre at the origin of P.
-        size: extents along x, y, z of a box; radius and length of a cylinder; radius of a
-            sphere [m].
-        X_OP: primitive in the object frame.
+        shape: shape of the primitive: a box, a cylinder along z, or a sphere.
+        size: lengths along x, y and z of a box; radius and length of a cylinder; radius of a sphere
+            [m].
+        X_OP: pose of the primitive's centre in the object frame.
     """
 
     shape: Literal["box", "cylinder", "sphere"]
@@ -156,19 +153,20 @@ class Primitive:
 
 @dataclass(frozen=True, kw_only=True)
 class ContactGeometry:
-    """What of an object touches others in simulation.
+    """What touches other things in simulation.
 
     Attributes:
-        kind: `surface` (gripper pads meet the surface in `mesh`, rigid, all else the convex
-            pieces), `pieces` (convex pieces, rigid), `compliant_pieces` (the same with a pressure
-            field), `mesh` (the surface in `mesh`, rigid, for all) or `primitive`.
-        fit: how well it stands for the surface; None for pieces, see `ObjectEntry.fit`.
-        mesh: the mesh of kinds `surface` and `mesh` (.obj, relative to the library's folder).
-        primitive: that of kind `primitive`.
-        excess: how far the surface of kind `surface` stands out of the union of the convex pieces,
-            at most [m]. Fingers that are clear of the pieces by more do not touch the surface.
-        reason: why pads meet the pieces, where neither a primitive nor the object's own surface
-            can stand for it; else empty.
+        kind: what touches other things. `surface`: gripper pads meet the surface, all else the
+            convex pieces. `pieces`: rigid convex pieces. `compliant_pieces`: convex pieces that
+            yield. `mesh`: the surface, for all. `primitive`: a box, cylinder or sphere.
+        fit: fit of this geometry to the object's surface; left out for pieces, whose fit is beside
+            `pieces`.
+        mesh: mesh of the kinds `surface` and `mesh` (.obj).
+        primitive: the primitive of the kind `primitive`.
+        excess: largest distance by which the surface stands out of the convex pieces, with the kind
+            `surface` [m]. Fingers that are farther from the pieces do not touch the surface.
+        reason: why pads meet the convex pieces, if neither a primitive nor the surface can be used;
+            else empty.
     """
 
     kind: ContactKind = "pieces"
@@ -181,14 +179,14 @@ class ContactGeometry:
 
 @dataclass(frozen=True, kw_only=True)
 class Source:
-    """Where an object came from.
+    """Where an object is from.
 
     Attributes:
-        file: name of the mesh file it was built from; empty for a mesh in memory.
-        path: where that file was, relative to the library's folder.
-        sha256: hash of that file's bytes, or of the mesh's arrays.
+        file: name of the mesh file; empty for a mesh made in memory.
+        path: path of the mesh file, relative to the library's folder.
+        sha256: SHA-256 of the mesh file, or of the mesh's arrays.
         scale: factor from the file's unit to metres.
-        repairs: what was changed in the mesh, one sentence each.
+        repairs: repairs of the mesh, one sentence each.
     """
 
     file: str
@@ -200,29 +198,28 @@ class Source:
 
 @dataclass(frozen=True, kw_only=True)
 class ObjectEntry:
-    """One object of a library; paths are relative to the library's folder.
+    """One object of a library. Paths are relative to the library's folder.
 
     Attributes:
-        description: for people.
+        description: text for people.
         mesh: mesh to look at, in metres, in the object frame O (.obj).
-        surface: surface that the object was built from (.obj), where that is not the one to look
-            at: of a textured mesh that became a wall, for example; else empty.
-        sdf: the Drake model; one link `body` whose frame is O.
+        surface: surface that the object was built from (.obj), if that is not `mesh`: that of a
+            textured mesh made into a wall, for example.
+        sdf: model for Drake (SDFormat), with one link `body` whose frame is O.
         pieces: convex pieces (.obj).
-        decomposition: how the pieces were cut; None for pieces that came with the object.
-        fit: how well the pieces stand for the surface; None where it was not measured.
-        contact: what of the object touches others in simulation.
-        friction: coefficient. In a trial, that between the object and the gripper's pads, as they
-            take the target's. Against the table and other objects Drake combines the coefficients
-            a and b of the two to 2ab / (a + b).
-        lower, upper: corners of the axis-aligned bounding box in O [m].
-        mass_properties: mass, centre of mass, inertia.
-        stable_poses: most probable first.
-        source: the mesh file and its repairs.
-        build: hash of everything that was given (the mesh with its textures, mass, density,
-            friction, scale, pieces, colour, name, parameters of the decomposition), of the
-            pipeline's version and defaults, and of CoACD's version unless pieces were given;
-            not of the files that came out.
+        decomposition: how the pieces were cut; left out for pieces that were given.
+        fit: fit of the convex pieces to the surface; left out if it was not measured.
+        contact: what touches other things in simulation.
+        friction: friction coefficient. Between object and gripper pads it holds as it is. Between
+            two objects, or object and table, with coefficients a and b, Drake takes 2ab / (a + b).
+        lower: lower corner of the bounding box along the axes of O [m].
+        upper: upper corner of the bounding box along the axes of O [m].
+        mass_properties: mass, centre of mass and inertia.
+        stable_poses: poses in which the object can stand, the most probable first.
+        source: mesh file that the object was built from, and its repairs.
+        build: hash of all that was given to build the object: mesh and textures, mass, density,
+            friction, scale, pieces, colour, name and parameters of the decomposition. It includes
+            the versions of the pipeline and, unless pieces were given, of CoACD.
     """
 
     description: str = ""

@@ -15,11 +15,11 @@ LARGEST = 100.0
 
 @dataclass(frozen=True, kw_only=True)
 class Board:
-    """The printed board; the scene frame S has its origin in the board's corner.
+    """The printed board. The origin of the scene frame S is its lower left corner.
 
     Attributes:
-        size: extents along x and y [m]; A2 landscape by default.
-        markers: ArUco markers printed on it.
+        size: lengths along x and y [m]; A2 landscape if left out.
+        markers: ArUco markers printed on the board.
     """
 
     size: tuple[float, float] = (0.594, 0.420)

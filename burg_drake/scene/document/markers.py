@@ -25,10 +25,10 @@ class Markers:
     """A grid of ArUco markers in the middle of the board, numbered row by row from the upper left.
 
     Attributes:
-        dictionary: OpenCV's name of the dictionary, without `DICT_`.
-        side: length of a marker's side, black border included [m].
+        dictionary: name of the dictionary in OpenCV, without `DICT_`.
+        side: length of a marker's side, with its black border [m].
         spacing: width of the gap between markers [m].
-        count: columns and rows; as many as fit if None.
+        count: number of columns and rows; as many as fit if left out.
         first_id: id of the marker in the upper left corner.
     """
 

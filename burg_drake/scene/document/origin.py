@@ -12,13 +12,13 @@ DECIDING_VERSIONS = ("burg_drake", "drake", "numpy", "scipy")
 
 @dataclass(frozen=True, kw_only=True)
 class SamplingProvenance:
-    """What scenes are made with, besides their numbers.
+    """What all scenes of a folder were sampled with (`recipe.yaml`).
 
     Attributes:
-        recipe: how they are drawn.
+        recipe: how scenes are drawn.
         library_content: hash of the library's objects.
         station_content: hash of the station.
-        versions: of the software and the machine.
+        versions: versions of the software and the machine.
     """
 
     version: int = 1
@@ -50,11 +50,11 @@ class SamplingProvenance:
 
 @dataclass(frozen=True, kw_only=True)
 class SceneOrigin(SamplingProvenance):
-    """How one scene was made.
+    """How one scene was sampled.
 
     Attributes:
-        number: of the scene.
-        attempt: that was accepted, from 1.
+        number: number of the scene in its folder.
+        attempt: number of the accepted draft, from 1.
     """
 
     number: int

@@ -6,48 +6,53 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, get_args
 
 from burg_drake.core import LARGEST_SEED, content_hash, setting
-from burg_drake.core.documents import dump_document, require_ranges
+from burg_drake.core.documents import Ranges, dump_document, require_ranges
 from burg_drake.scene.document.board import Board
 from burg_drake.scene.document.layout import TRIES, LayoutName, PoseChoice
 
 ATTEMPTS = 100
 """Whole scenes that are drawn until one is accepted."""
 
-RANGES = {
-    "count": (1, 1000),
-    "seed": (0, LARGEST_SEED),
-    "tries": (1, 1_000_000),
-    "attempts": (1, 100_000),
-    "clear_grasps": (0, 1_000_000),
-}
-
 
 @dataclass(frozen=True, kw_only=True)
 class SceneRecipe:
-    """How scenes are drawn. All of its values are written, as defaults may change one day.
+    """How scenes are drawn. Files have all of its values, because defaults may change between
+    versions.
 
     Attributes:
-        library: folder of the object library, relative to the recipe's file; or a built-in name.
-        count: objects in a scene.
+        library: object library: its folder, relative to this file, or the name of a built-in one.
+        count: number of objects in a scene.
         only: names of the objects to draw from; all that can stand if empty.
-        repeat: an object may be there several times.
-        board: that they stand on.
-        layout: how they stand to one another.
-        poses: how stable poses are drawn.
-        tries: random places that are tried for an object.
-        fewer: a scene in which not all have found a place is accepted, too.
-        seed: all scenes of another seed are others.
-        station: file of the station, relative to the recipe's file; or a built-in name. Its boxes
-            are in the way, on its table scenes are settled, and its arm and cameras are asked.
-        settle: let objects come to rest in simulation.
-        attempts: whole scenes that are drawn until one is accepted.
-        within_reach: every object is within the reach of the station's arm.
-        clear_grasps: so many grasps of every object are clear of all others, at least.
-        visible_from: this camera of the station, if given, sees half of every object's silhouette,
-            at least.
+        repeat: whether an object may be in a scene several times.
+        board: the board on which the objects stand.
+        layout: `random`: anywhere. `wide`: with room for fingers in between. `close`, `touching`:
+            beside one another, a few millimetres apart or in contact. `packed`: as dense as
+            possible. `heap`: dropped on a spot.
+        poses: which stable pose an object gets: by probability, each as often (`uniform`), or as
+            its mesh stands (`as_scanned`).
+        tries: number of random places tried for each object.
+        fewer: whether a scene is accepted in which some objects found no place.
+        seed: seed of all random choices; another one gives other scenes.
+        station: station: its file, relative to this file, or the name of a built-in one. Its boxes
+            are obstacles, objects come to rest on its table, and `within_reach` and `visible_from`
+            are about its arm and cameras.
+        settle: whether objects come to rest in simulation.
+        attempts: number of drafts of a scene until the attempt is given up.
+        within_reach: whether the arm has to be able to grasp every object.
+        clear_grasps: number of grasps that have to be free of collisions for every object.
+        visible_from: name of a camera of the station that has to see at least half of every object;
+            none if empty.
     """
 
     WRITTEN_WHOLE: ClassVar[bool] = True
+
+    RANGES: ClassVar[Ranges] = {
+        "count": (1, 1000),
+        "seed": (0, LARGEST_SEED),
+        "tries": (1, 1_000_000),
+        "attempts": (1, 100_000),
+        "clear_grasps": (0, 1_000_000),
+    }
 
     library: str
     count: int = 6
@@ -80,7 +85,7 @@ class SceneRecipe:
     )
 
     def __post_init__(self) -> None:
-        require_ranges(self, RANGES)
+        require_ranges(self)
 
     @property
     def content(self) -> str:

@@ -30,12 +30,13 @@ from burg_drake.scene.document.origin import SceneOrigin
 
 @dataclass(frozen=True, kw_only=True)
 class Instance:
-    """A placed object.
+    """An object placed in the scene.
 
     Attributes:
-        name: unique in the scene; the object's name if empty. Letters, digits, `_`, `-` and `.`.
-        object: name in the library.
-        X_SO: pose of the object frame in the scene frame.
+        name: name of this instance, unique in the scene; the object's name if left out. Letters,
+            digits, `_`, `-` and `.`.
+        object: name of the object in the library.
+        X_SO: pose of the object's frame in the scene frame.
     """
 
     name: str = ""
@@ -48,15 +49,17 @@ class Instance:
 
 @dataclass(frozen=True, kw_only=True)
 class SceneDocument:
-    """Schema of a scene file.
+    """A scene: objects of a library on a printed board.
 
     Attributes:
-        name: the scene's name.
-        library: folder of the object library, relative to the scene file; or a built-in name.
-        board: the printed board.
-        instances: free objects.
-        background: fixed objects.
-        origin: what made it, if it was sampled.
+        name: name of the scene. Letters, digits, `_`, `-` and `.`.
+        description: text for people.
+        library: object library: its folder, relative to the scene file, or the name of a built-in
+            one such as `household`.
+        board: the printed board, whose lower left corner is the origin of the scene.
+        instances: objects that are free to move, and to be grasped.
+        background: objects that are fixed where they are.
+        origin: how the scene was sampled; leave it out in scenes made by hand.
     """
 
     version: int = 1

@@ -4,28 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
-from burg_drake.core.documents import require_ranges
+from burg_drake.core.documents import Ranges, require_ranges
 from burg_drake.station.document import GraspMotion
 
 LONGEST = 30.0
 """Of a phase [s]: 60 times what the phases take by default."""
 
-RANGES = {
-    "lift_time": (1e-2, LONGEST),
-    "hold_time": (0.0, LONGEST),
-    "creep_speed": (0.0, 10.0),
-    "creep_distance": (0.0, 10.0),
-    "steady_time": (0.0, LONGEST),
-    "poll": (1e-4, 1.0),
-    "settled_speed": (0.0, 10.0),
-    "settled_time": (0.0, LONGEST),
-    "close_timeout": (0.0, LONGEST),
-    "disturbance": (0.0, 10.0),
-    "tilt_limit": (0.0, math.pi),
-    "slip_limit": (0.0, math.inf),
-}
-"""Values with which a trial ends, within minutes at the shortest steps, and is a trial."""
 USUAL_LIFT = 0.30
 """Length that `lift_time` is about [m]: that of the usual lift."""
 
@@ -55,6 +41,22 @@ class TrialSettings:
         approach: whether the hand alone begins at the pregrasp, and not at the grasp.
     """
 
+    RANGES: ClassVar[Ranges] = {
+        "lift_time": (1e-2, LONGEST),
+        "hold_time": (0.0, LONGEST),
+        "creep_speed": (0.0, 10.0),
+        "creep_distance": (0.0, 10.0),
+        "steady_time": (0.0, LONGEST),
+        "poll": (1e-4, 1.0),
+        "settled_speed": (0.0, 10.0),
+        "settled_time": (0.0, LONGEST),
+        "close_timeout": (0.0, LONGEST),
+        "disturbance": (0.0, 10.0),
+        "tilt_limit": (0.0, math.pi),
+        "slip_limit": (0.0, math.inf),
+    }
+    """Values with which a trial ends, within minutes at the shortest steps, and is a trial."""
+
     motion: GraspMotion | None = None
     lift_time: float = 1.25
     hold_time: float = 0.5
@@ -71,7 +73,7 @@ class TrialSettings:
     approach: bool = False
 
     def __post_init__(self) -> None:
-        require_ranges(self, RANGES, "a trial")
+        require_ranges(self, "a trial")
 
     @property
     def acceleration(self) -> float:

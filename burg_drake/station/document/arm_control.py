@@ -23,7 +23,7 @@ GAINS = (1e-3, 1e6)
 
 @dataclass(frozen=True, kw_only=True)
 class ArmControl:
-    """Schema of `arm.control`.
+    """How the joints of an arm follow their commands in simulation.
 
     With `impedance` every joint has a spring and a damper of its own, which Drake's solver computes
     as part of a step. Gravity does not pull the robot then: a real one compensates its own weight.
@@ -32,11 +32,14 @@ class ArmControl:
     hand holds. Either way no joint gets more than its effort limit.
 
     Attributes:
-        kind: which of the two.
-        kp: position gains, one number or one a joint: [Nm/rad] with `impedance`, [1/s^2] with
-            `inverse_dynamics`.
-        kd: velocity gains, likewise: [Nm s/rad] or [1/s]. If not given, a twentieth of `kp` with
-            `impedance`, critical damping with `inverse_dynamics`.
+        kind: `impedance`: a spring and a damper for each joint; gravity does not pull the robot.
+            `inverse_dynamics`: torques from a model of arm and hand, which knows nothing of what
+            the hand holds.
+        kp: position gains, one for all joints or one for each: [Nm/rad] with `impedance`, [1/s^2]
+            with `inverse_dynamics`.
+        kd: velocity gains, one for all joints or one for each: [Nm s/rad] with `impedance`, [1/s]
+            with `inverse_dynamics`. If left out, `kp` times 0.05 s with `impedance`, critical
+            damping with `inverse_dynamics`.
     """
 
     kind: Literal["impedance", "inverse_dynamics"] = "impedance"

@@ -6,37 +6,36 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from burg_drake.core import InvalidInputError, UnknownNameError, nearest, quoted
-from burg_drake.core.documents import require_ranges
-
-RANGES = {"time_step": (1e-4, 0.02), "stiction_tolerance": (1e-9, 1.0)}
-"""With longer steps contact is wrong; shorter ones, a tenth of the reference's, take hours."""
+from burg_drake.core.documents import Ranges, require_ranges
 
 
 @dataclass(frozen=True, kw_only=True)
 class Engine:
-    """What steps trials, and how.
+    """How trials are simulated.
+
+    With `lagged` what slides over the table is braked 2 % too hard at 2 ms and 10 % at 5 ms. `sap`
+    is wrong on marginal grasps. Drake's own stiction tolerance of 1e-4 m/s lets a box that hangs 20
+    mm off its centre tilt by 0.9 degrees in a trial at 1 ms, 1e-5 by 0.2, at about the same cost.
 
     Attributes:
         name: name of the preset.
-        simulator: Drake, or MuJoCo with the hand alone. To MuJoCo the settings of Drake's solver
-            (`contact_approximation`, `contact_model`, `stiction_tolerance`, `contact_surface`) mean
-            nothing; its own are those that its pads and servos are laid out for.
-        time_step: discrete step [s].
-        contact_approximation: Drake's approximation of the contact problem. With `lagged`
-            the pads hold up to Coulomb's limit, within a few per cent, at every step from 1 to 10
-            ms; `sap` is wrong on marginal grasps. What slides over the table is braked 2 % too
-            hard at 2 ms and 10 % at 5 ms.
-        contact_model: hydroelastic where geometry allows it, else point contact.
-        stiction_tolerance: speed at which friction that sticks creeps at most [m/s]. Drake's own
-            1e-4 lets a box that hangs 20 mm off its centre tilt by 0.9 degrees in a trial at 1 ms,
-            1e-5 by 0.2, at about the same cost.
-        contact_surface: polygons are faster than triangles and as accurate here.
-        whole_trial: simulate every trial to its end. Otherwise it ends as soon as its outcome is
-            decided: the target is held without moving, touched by nothing but the hand, and there
-            is nothing in the hand's way up.
+        simulator: physics engine. The settings below are Drake's, except `time_step` and
+            `whole_trial`.
+        time_step: time step [s].
+        contact_approximation: Drake's approximation of contact. `lagged` has correct friction
+            limits within a few per cent at steps of 1 to 10 ms; `sap` does not.
+        contact_model: contact of surfaces (hydroelastic) where the geometry allows it, or of points
+            only.
+        contact_surface: polygons are faster than triangles, and as accurate.
+        stiction_tolerance: largest speed at which bodies creep that friction holds [m/s].
+        whole_trial: whether every trial is simulated to its end. Otherwise it ends as soon as its
+            outcome is decided.
     """
 
     WRITTEN_WHOLE: ClassVar[bool] = True
+
+    RANGES: ClassVar[Ranges] = {"time_step": (1e-4, 0.02), "stiction_tolerance": (1e-9, 1.0)}
+    """With longer steps contact is wrong; shorter ones, a tenth of the reference's, take hours."""
 
     name: str
     time_step: float
@@ -48,7 +47,7 @@ class Engine:
     whole_trial: bool = False
 
     def __post_init__(self) -> None:
-        require_ranges(self, RANGES, f"engine {quoted(self.name)}")
+        require_ranges(self, f"engine {quoted(self.name)}")
 
     @property
     def creeps(self) -> bool:

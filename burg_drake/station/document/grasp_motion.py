@@ -5,15 +5,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from burg_drake.core import THOUSANDTHS, FieldError, setting
-from burg_drake.core.documents import Vector3, require_ranges
+from burg_drake.core.documents import Ranges, Vector3, require_ranges
 
 if TYPE_CHECKING:
     from burg_drake.core import Array
 
-RANGES = {
+LENGTHS = {
     "standoff": (0.0, 1.0),
     "retreat": (0.0, 1.0),
     "lift_height": (0.0, 2.0),
@@ -27,26 +27,28 @@ tell a grasp that holds from one that does not."""
 
 def _length(default: float | None, field: str, help: str, name: str = "") -> Any:
     """The declaration of a length in its range."""
-    low, high = (1000.0 * bound for bound in RANGES[field])
+    low, high = (1000.0 * bound for bound in LENGTHS[field])
     return setting(default, help, name=name, unit=THOUSANDTHS, low=low, high=high, noun="a length")
 
 
 @dataclass(frozen=True, kw_only=True)
 class GraspMotion:
-    """Straight ways of the hand, without turning: from the pregrasp along the approach to the
-    grasp; then, with the object, back along the approach, and from there along the lift.
+    """Straight segments of the hand: from the pregrasp to the grasp, back by the retreat, and up by
+    the lift.
 
     The defaults are those of Rudorfer et al., "BURG-Toolkit" (2022). MoveIt calls `least_lift` the
     minimum and `lift_height` the desired distance of the post-grasp retreat.
 
     Attributes:
-        standoff: from pregrasp to grasp [m].
-        retreat: path back along the approach with the object, before the lift [m].
+        standoff: distance from pregrasp to grasp [m].
+        retreat: distance back along the approach with the object, before the lift [m].
         lift_height: length of the lift [m].
-        least_lift: what has to be free of it [m]: the hand rises as high as there is room, but no
-            less than this; None if the whole lift has to be free.
-        lift_direction: of the lift in the world; of any length above 0.
+        least_lift: length of the lift that has to be free of obstacles [m]; the hand rises as far
+            as there is room. If left out, all of `lift_height` has to be free.
+        lift_direction: direction of the lift in the world, of any length.
     """
+
+    RANGES: ClassVar[Ranges] = LENGTHS
 
     standoff: float = _length(
         0.10,
@@ -77,8 +79,7 @@ class GraspMotion:
     def __post_init__(self) -> None:
         x, y, z = (float(part) for part in self.lift_direction)  # arrays are no part of documents
         object.__setattr__(self, "lift_direction", (x, y, z))
-        ranges = {k: v for k, v in RANGES.items() if getattr(self, k) is not None}
-        require_ranges(self, ranges)
+        require_ranges(self)
         if self.least_lift is not None and self.least_lift > self.lift_height:
             raise FieldError(
                 f"least_lift is {self.least_lift:g} m, more than lift_height, {self.lift_height:g}"

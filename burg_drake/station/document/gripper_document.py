@@ -18,14 +18,15 @@ LONGEST_CLOSING = 60.0
 
 @dataclass(frozen=True, kw_only=True)
 class Finger:
-    """One finger of a parallel hand.
+    """A finger of a parallel hand.
 
     Attributes:
         body: link of the finger in the hand's model.
-        joint: prismatic joint that moves it. For hands whose fingers turn see docs/hands.md.
-        pad: name of the collision geometry that touches the object; compliant, as objects are not.
-        closed: joint position with the pads at the smallest distance [m].
-        open: joint position with the pads at the largest distance [m].
+        joint: prismatic joint that moves the finger. For hands whose fingers turn see
+            https://burg-drake.github.io/burg_drake/reference/hands.html.
+        pad: name of the collision geometry that touches objects.
+        closed: joint position at the smallest distance of the pads [m].
+        open: joint position at the largest distance of the pads [m].
     """
 
     body: str
@@ -37,21 +38,22 @@ class Finger:
 
 @dataclass(frozen=True, kw_only=True)
 class Hand:
-    """Schema of a hand document in `models/hands`.
+    """A parallel hand.
 
     Attributes:
-        name: the hand's name.
-        description: for people.
-        source: where the figures come from.
-        model: reference to the hand's model file.
+        name: name of the hand. Letters, digits, `_`, `-` and `.`.
+        description: text for people.
+        source: where the figures are from.
+        model: model of the hand (URDF or SDF): `package://` address, or path relative to this file.
         body: link that the arm carries; its frame is H.
-        X_HG: grasp frame in H (midway between the pads; +z approach, +x closing).
+        X_HG: pose of the grasp frame in H: midway between the pads, +z along the approach, +x along
+            the closing direction.
         opening: smallest and largest distance between the pads [m].
         force: force of each finger on the object while gripping [N].
         closing_speed: speed of each finger while closing [m/s].
-        coupled: one drive moves both fingers, each in proportion to its way from open to closed;
-            where the model does not say so by itself (`mimic`), it is made so.
-        fingers: the two fingers; the first one is on the side of +x of G.
+        coupled: whether one drive moves both fingers, each in proportion to its way from open to
+            closed.
+        fingers: the two fingers; the first is on the +x side of G.
     """
 
     version: int = 1

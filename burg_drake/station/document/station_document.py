@@ -7,15 +7,18 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import ClassVar
 
 from burg_drake.core import FieldError, InvalidInputError, UnknownNameError, content_hash, nearest
 from burg_drake.core.documents import (
     Pose,
+    Ranges,
     Vector3,
     dump_document,
     load_document,
     plain_data,
     require_finite,
+    require_ranges,
 )
 from burg_drake.core.paths import (
     NO_PACKAGES,
@@ -61,20 +64,22 @@ def require_image_size(width: int, height: int) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Arm:
-    """An arm on its base.
+    """An arm and its base.
 
     Attributes:
-        model: reference to the arm's model file.
-        base: link that is welded to the world; its frame is A.
-        flange: frame that carries the hand.
-        X_FH: hand body in the flange frame.
-        X_WA: arm base in the world.
+        model: model of the arm (URDF or SDF): `package://` address, or path relative to the
+            station's file.
+        base: link that is fixed in the world; its frame is A.
+        flange: link or frame that carries the hand; its frame is F.
+        X_FH: pose of the hand's body in the flange frame.
+        X_WA: pose of the arm's base in the world.
         home: joint positions of the home posture [rad].
-        velocity, acceleration, jerk: limits of each joint [rad/s, rad/s^2, rad/s^3], in place of
-            those that `motion.ik.limits` finds in the model or knows of the Panda.
-        stands_in: `table` and fixed boxes that the base's own collision shapes may be in, as a
-            base plate is in the table that it is let into; links that move still collide with them.
-        control: how it follows its command.
+        velocity: velocity limit of each joint [rad/s], in place of the model's.
+        acceleration: acceleration limit of each joint [rad/s^2], in place of the usual one.
+        jerk: jerk limit of each joint [rad/s^3], in place of the usual one.
+        stands_in: names of boxes, or `table`, that the arm's base may overlap, such as a table with
+            the base let into it. Moving links still collide with them.
+        control: how the joints follow their commands in simulation.
     """
 
     model: str = "package://burg_drake/models/panda/panda_arm.sdf"
@@ -97,12 +102,12 @@ class Arm:
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """A box whose top face lies in the plane z = 0 of the world.
+    """The table: a box whose top face is at z = 0 of the world.
 
     Attributes:
         center: x and y of the box's centre in the world [m].
-        size: extents along x, y, z [m].
-        friction: Coulomb coefficient of its surface.
+        size: lengths along x, y and z [m].
+        friction: friction coefficient of its surface.
     """
 
     center: tuple[float, float] = (0.0, 0.0)
@@ -116,16 +121,26 @@ class Table:
 
 @dataclass(frozen=True, kw_only=True)
 class Camera:
-    """A camera fixed in the world, with OpenCV's pinhole intrinsics (pixel centres at integers).
+    """A camera fixed in the world, with pinhole intrinsics as in OpenCV (pixel centres at
+    integers).
 
     Attributes:
-        X_WC: optical frame in the world: z forward, x right, y down.
-        width, height: image size [pixels].
-        focal: fx, fy [pixels].
-        center: cx, cy [pixels]; the image centre if not given.
-        depth_range: nearest and farthest depth [m].
-        samples: a pixel of its simulated colour image is the mean of this many rays along x and y.
+        X_WC: pose of the optical frame in the world: z forward, x right, y down.
+        width: width of the image [pixels].
+        height: height of the image [pixels].
+        focal: focal lengths fx and fy [pixels].
+        center: principal point cx and cy [pixels]; the middle of the image if left out.
+        depth_range: smallest and largest depth that it measures [m].
+        samples: rays per pixel along x and along y in simulated colour images; more of them make
+            smoother edges.
     """
+
+    RANGES: ClassVar[Ranges] = {
+        "width": (1, MAX_SIDE),
+        "height": (1, MAX_SIDE),
+        "focal": FOCAL_RANGE,
+        "samples": (1, MAX_SAMPLES),
+    }
 
     X_WC: Pose
     width: int = 640
@@ -136,20 +151,9 @@ class Camera:
     samples: int = 1
 
     def __post_init__(self) -> None:
-        if min(self.width, self.height, *self.focal) <= 0:
-            raise InvalidInputError("camera width, height and focal must be positive")
-        low, high = FOCAL_RANGE
-        if not all(low <= value <= high for value in self.focal):
-            raise FieldError(
-                f"focal {list(self.focal)} of a camera must be {low:g} to {high:g} pixels", "focal"
-            )
-        require_image_size(self.width, self.height)
+        require_ranges(self, "a camera")
         if not 0.0 < self.depth_range[0] < self.depth_range[1]:
             raise InvalidInputError("camera depth_range must rise from above 0 [m]")
-        if not 1 <= self.samples <= MAX_SAMPLES:
-            raise FieldError(
-                f"samples {self.samples} of a camera must be 1 to {MAX_SAMPLES}", "samples"
-            )
 
     @property
     def principal_point(self) -> tuple[float, float]:
@@ -159,11 +163,11 @@ class Camera:
 
 @dataclass(frozen=True, kw_only=True)
 class Obstacle:
-    """A fixed box of the station.
+    """A fixed box.
 
     Attributes:
         X_WB: pose of the box's centre in the world.
-        size: extents [m].
+        size: lengths along x, y and z [m].
     """
 
     X_WB: Pose
@@ -176,19 +180,20 @@ class Obstacle:
 
 @dataclass(frozen=True, kw_only=True)
 class StationDocument:
-    """Schema of a station file.
+    """A station: hand, arm, table, cameras and obstacles around a board.
 
     Attributes:
-        name: the station's name.
-        hand: hand document (built-in name or path).
-        arm: the arm; a station may do without.
-        X_WS: where the board lies: scene frame in the world.
-        table: the table top under the board.
-        cameras: by name.
+        name: name of the station. Letters, digits, `_`, `-` and `.`.
+        description: text for people.
+        hand: hand: name of a built-in one, or its file, relative to this file.
+        arm: the arm. Without one the hand moves freely.
+        X_WS: pose of the scene frame in the world: where the board lies.
+        table: the table under the board.
+        cameras: fixed cameras by name.
         background: fixed boxes by name.
-        motion: how the hand goes to a grasp and away from it, where nothing else is asked for.
-        packages: folders of packages, by name, that models name in `package://NAME/...`, where
-            `core.paths.packages` does not find them by itself.
+        motion: how the hand approaches a grasp and lifts, unless the command says otherwise.
+        packages: folders of ROS packages by name, for `package://NAME/...` in models. Only packages
+            that are not found otherwise need an entry.
     """
 
     version: int = 1
