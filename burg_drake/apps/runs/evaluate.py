@@ -71,12 +71,13 @@ def add_to(verbs: Any) -> None:
         "burg-drake evaluate tabletop_six -o runs/first --rejudge contested --engine reference",
         "",
         "The same command continues where an interrupted one stopped.",
-        options=_add_options,
+        options=add_options_to,
     )
     parser.set_defaults(after_interrupt="; run the same command to continue")
 
 
-def _add_options(parser: Parser) -> None:
+def add_options_to(parser: Parser) -> None:
+    """Adds what the verb takes."""
     from burg_drake.evaluation.records import EvaluationSettings
 
     parser.add_argument(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.options import add_only, add_verb, add_view, positive_int
+from burg_drake.apps.options import Parser, add_only, add_verb, add_view, positive_int
 from burg_drake.core import InvalidInputError
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ class ReplaySource:
 
 def add_to(verbs: Any) -> None:
     """Adds the verb."""
-    parser = add_verb(
+    add_verb(
         verbs,
         "replay",
         run_replay,
@@ -41,7 +41,12 @@ def add_to(verbs: Any) -> None:
         "burg-drake replay one_row.csv --scene runs/first/scene.yaml",
         "",
         "A row and its header are enough, wherever they were copied to.",
+        options=add_options_to,
     )
+
+
+def add_options_to(parser: Parser) -> None:
+    """Adds what the verb takes."""
     parser.add_argument(
         "results",
         metavar="RESULTS",
