@@ -29,7 +29,7 @@ from burg_drake.system_libraries import (
     missing_useful_libraries,
 )
 
-State = Literal["ok", "missing", "broken", "low"]
+Finding = Literal["ok", "missing", "broken", "low"]
 
 OLDEST_PYTHON = (3, 11)
 MIN_MEMORY = 2.0  # GiB; a worker takes 0.3 to 0.5
@@ -50,7 +50,7 @@ class Check:
     """
 
     feature: str
-    state: State
+    state: Finding
     found: str = ""
     remedy: str = ""
     required: bool = False
@@ -118,24 +118,20 @@ def _drake() -> Check:
         return Check(
             feature, "broken", f"lacks {', '.join(missing)}", _libraries(missing), required=True
         )
+    install = pip_install()
     if error := import_error("pydrake.common"):
-        state: State = "broken" if found else "missing"
-        return Check(
-            feature, state, error if found else "", f"{pip_install()} drake", required=True
-        )
+        state: Finding = "broken" if found else "missing"
+        return Check(feature, state, error if found else "", f"{install} drake", required=True)
     return Check(feature, "ok", f"drake {found or 'of unknown version'}", required=True)
 
 
 def _packages() -> Check:
     feature = "packages it always needs"
+    install = pip_install()
     if unmet := unmet_requirements():
-        return Check(
-            feature, "missing", ", ".join(unmet), f"{pip_install()} --upgrade burg-drake", True
-        )
+        return Check(feature, "missing", ", ".join(unmet), f"{install} --upgrade burg-drake", True)
     if error := import_error("cv2, coacd, embreex, manifold3d, h5py"):
-        return Check(
-            feature, "broken", error, f"{pip_install()} --force-reinstall burg-drake", True
-        )
+        return Check(feature, "broken", error, f"{install} --force-reinstall burg-drake", True)
     return Check(
         feature, "ok", f"numpy {version('numpy')}, scipy {version('scipy')}, ...", "", True
     )
@@ -193,7 +189,7 @@ def _allocator() -> Check:
     feature = "faster memory (mimalloc)"
     if sys.platform != "linux":
         return Check(feature, "ok", "not used on this system")
-    from burg_drake.core.workers.allocator import PRELOAD, worker_preload
+    from burg_drake.core.workers import PRELOAD, worker_preload
 
     if missing_useful_libraries():
         return Check(feature, "missing", ATOMIC, _libraries([ATOMIC]))
@@ -239,7 +235,7 @@ def _blender(installed: list[str]) -> Check:
 
 
 def _ros() -> Check:
-    from burg_drake.ros.distribution import CLIENTS, ROS_1_HINT, ROS_2_HINT, SYSTEM_PACKAGES
+    from burg_drake.ros import CLIENTS, ROS_1_HINT, ROS_2_HINT, SYSTEM_PACKAGES
 
     feature = "ROS node (burg-drake ros)"
     for number, client in sorted(CLIENTS.items(), reverse=True):
