@@ -25,8 +25,8 @@ class HelpFormatter(argparse.RawDescriptionHelpFormatter):
     of verbs and examples, as they are."""
 
     def __init__(self, prog: str, **options: Any) -> None:
-        width = min(shutil.get_terminal_size().columns, MAX_HELP_WIDTH) - 2
-        super().__init__(prog, **{"max_help_position": 26, "width": width} | options)
+        self.line_width = min(shutil.get_terminal_size().columns, MAX_HELP_WIDTH) - 2
+        super().__init__(prog, **{"max_help_position": 26, "width": self.line_width} | options)
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         paragraphs = [
@@ -56,6 +56,7 @@ class Parser(argparse.ArgumentParser):
         options.setdefault("allow_abbrev", False)
         self._waiting: Callable[[Parser], None] | None = None
         super().__init__(**options, add_help=False)
+        self._positionals.title = "arguments"
         self.add_argument("-h", "--help", action="help", help=argparse.SUPPRESS)
 
     def wait_with(self, options: Callable[[Parser], None] | None) -> None:
@@ -96,7 +97,7 @@ class Parser(argparse.ArgumentParser):
         words, more = [self.prog.replace("%", "%%")], ""
         for action in self._actions:
             if isinstance(action, argparse._SubParsersAction):
-                words.append("VERB ...")
+                return f"{words[0]} VERB ..."
             elif not action.option_strings:
                 words.append(formatter.value_text(action))
             elif action in either:
@@ -105,7 +106,10 @@ class Parser(argparse.ArgumentParser):
                 words.append(f"{action.option_strings[0]} {formatter.value_text(action)}")
             elif action.help is not argparse.SUPPRESS:
                 more = "[options]"
-        return " ".join([*words, more]).strip()
+        words.append(more)
+        indent = " " * len(f"usage: {self.prog} ")
+        usage = " ".join(filter(None, words))
+        return textwrap.fill(usage, formatter.line_width - len("usage: "), subsequent_indent=indent)
 
     def parse_known_args(self, *arguments: Any, **named: Any) -> Any:
         """Refuses what it does not know, for its verbs, too, which else leave that to the parser
@@ -203,7 +207,7 @@ class VerbGroup:
         """Adds a verb, as `argparse` does, with a line for the list."""
         if self._list is None:
             self.heading("verbs")
-        line = f"{name:<{VERB_WIDTH}} {help}"
+        line = f"{name:<{VERB_WIDTH}}  {help}"
         self._list.description = "\n".join(filter(None, [self._list.description, line]))
         parser: Parser = self._action.add_parser(name, help=help, **options)
         return parser
@@ -218,7 +222,7 @@ def add_scene(parser: Parser) -> None:
     parser.add_argument(
         "scene",
         metavar="SCENE",
-        help=f"scene file, or name of a built-in one: {scene_names()}",
+        help=f"scene file, or built-in: {scene_names()}",
     )
 
 
@@ -231,7 +235,7 @@ def scene_names() -> str:
 
 def add_measured_board(
     parser: Any,
-    help: str = "what the printed board's rulers of 100 mm measure, along x and along y",
+    help: str = "length of the printed 100 mm rulers along x and y (default: 100)",
 ) -> None:
     """The option --measured-mm, of verbs that look at a board that was printed already, or print.
 
@@ -281,30 +285,36 @@ def add_only(parser: Parser, what: str) -> None:
         metavar="A,B",
         type=names,
         action="extend",
-        help=f"{what} of these objects, or instances of a scene, alone",
+        help=f"{what} of these objects or instances",
     )
 
 
 def add_renaming(parser: Parser) -> None:
     """The option --rename; evaluate, which is not about a file alone, calls it --grasps-object."""
-    parser.add_argument(
-        "--rename",
-        "--grasps-object",
-        metavar="[THEIRS=]OURS",
-        type=renaming,
-        action="append",
-        default=[],
-        help="rename an object of the file; OURS alone renames all",
-    )
+    for option, help in (
+        ("--rename", "rename an object of the file, or with OURS alone all"),
+        ("--grasps-object", argparse.SUPPRESS),
+    ):
+        parser.add_argument(
+            option,
+            dest="rename",
+            metavar="[THEIRS=]OURS",
+            type=renaming,
+            action="append",
+            default=[],
+            help=help,
+        )
 
 
 def add_quiet(parser: Parser) -> None:
     """The option --quiet of verbs that take long."""
-    parser.add_argument("--quiet", action="store_true", help="no progress")
+    parser.add_argument("--quiet", action="store_true", help="do not show progress")
 
 
 def add_workers(
-    parser: Any, help: str = "processes (default: one a processor)", default: int | None = None
+    parser: Any,
+    help: str = "worker processes (default: one for each core)",
+    default: int | None = None,
 ) -> None:
     """The option --workers of verbs that share their work out.
 

@@ -14,7 +14,7 @@ def add_to(verbs: Any) -> None:
         verbs,
         "report",
         run_report,
-        "print what a run found so far, and write its report again",
+        "print what a run found so far; write its report again",
         "burg-drake report runs/first",
         "burg-drake report runs/many",
         "burg-drake report runs/many/scenes/kitchen_3",
@@ -22,7 +22,7 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "run_folder",
         metavar="RUN",
-        help="folder of a run, of one scene or of many, or RUN/scenes/NAME for one of these",
+        help="folder of a run, or RUN/scenes/NAME for one scene of many",
     )
 
 
