@@ -81,7 +81,7 @@ def _add_options(parser: Parser) -> None:
     parser.add_argument("-o", "--output", metavar="GAP", required=True, help="folder to write")
     add_station(
         parser,
-        f"with a scene: station file or built-in name (default: {DEFAULT_STATION})",
+        f"with a scene: station (default: {DEFAULT_STATION})",
         default=None,
     )
     parser.add_argument(

@@ -62,7 +62,7 @@ def _add_options(parser: Parser) -> None:
         "-o",
         "--output",
         metavar="OUT",
-        help="grasp file to write, or folder for a file per object (default: only print)",
+        help="grasp file to write, or folder (default: only print)",
     )
     add_format(parser)
     add_source(parser)

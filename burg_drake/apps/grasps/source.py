@@ -69,10 +69,10 @@ def add_source(parser: Parser) -> None:
     which.add_argument(
         "--scene",
         metavar="SCENE",
-        help="scene that the grasps belong to (default: what the file names)",
+        help="scene of the grasps (default: what the file names)",
     )
     which.add_argument(
-        "--library", metavar="LIB", help="library of the objects (default: what the file names)"
+        "--library", metavar="LIB", help="library of the grasps (default: what the file names)"
     )
 
 

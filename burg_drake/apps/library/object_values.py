@@ -102,7 +102,7 @@ def named_values(arguments: argparse.Namespace, names: set[str]) -> NamedValues:
         DocumentError: the file of masses cannot be used.
     """
     masses = {} if arguments.masses is None else _read_masses(Path(arguments.masses), names)
-    masses.update(_by_name(arguments.mass, names, "mass in kg"))
+    masses.update(_by_name(arguments.mass, names, "mass"))
     frictions = _by_name([f for f in arguments.friction if f[0]], names, "friction")
     common = next((mu for name, mu in reversed(arguments.friction) if not name), None)
     return NamedValues(masses, frictions, common)

@@ -260,7 +260,7 @@ def print_scale(arguments: argparse.Namespace) -> tuple[float, float]:
 
 def add_station(
     parser: Any,
-    help: str = "station file or built-in name (default: %(default)s)",
+    help: str = "station: file or name (default: %(default)s)",
     default: str | None = DEFAULT_STATION,
 ) -> None:
     """The option --station.

@@ -32,7 +32,7 @@ def add_given(parser: Parser, which: Any) -> None:
         "--grasps",
         metavar="FILE|RUN",
         type=input_file,
-        help="evaluate the grasps of this file or run instead of sampling",
+        help="grasps of this file or run, instead of sampling",
     )
     group = parser.add_argument_group(
         "with --grasps",
@@ -48,7 +48,7 @@ def add_given(parser: Parser, which: Any) -> None:
         action="append",
         type=renaming,
         default=[],
-        help="object or instance that the grasps are for; once for each name in the file",
+        help="object or instance of the grasps; once for each name in the file",
     )
     group.add_argument(
         "--grasps-frame",

@@ -37,7 +37,7 @@ def add_reading(parser: Any, *, in_full: bool = False) -> None:
     parser.add_argument(
         "--gripper-link",
         metavar="NAME",
-        help="link of the hand in isaac_grasp files (default: that of its model)",
+        help="hand's link in isaac_grasp files (default: its own)",
     )
     parser.add_argument(
         "--correction",

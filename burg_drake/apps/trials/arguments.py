@@ -41,7 +41,7 @@ def add_show_simulated(parser: Parser, more: str = "") -> None:
     parser.add_argument(
         "--show-simulated",
         action="store_true",
-        help=f"show the simulated outcomes{more}; hidden by default to keep operators blind",
+        help=f"show the simulated outcomes{more}; hidden to keep operators blind",
     )
 
 

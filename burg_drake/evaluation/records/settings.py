@@ -95,7 +95,7 @@ class EvaluationSettings:
     )
     blind: bool = setting(
         False,
-        "sample by contacts alone, also where the hand collides",
+        "also sample grasps where the hand collides",
     )
     only: Iterable[str] | None = None
     mode: Mode | None = setting(
@@ -107,13 +107,13 @@ class EvaluationSettings:
     )
     engine: Engine | str = setting(
         DEFAULT_ENGINE,
-        "physics preset: reference (most accurate), standard, screening (fast), or mujoco for a"
-        " second opinion (needs burg-drake[mujoco])",
+        "physics: reference (most accurate), standard, screening (fast), or mujoco for a second"
+        " opinion (needs burg-drake[mujoco])",
         choices=tuple(ENGINES),
     )
     tilt_limit_deg: float = setting(
         DEFAULT_TILT_LIMIT_DEG,
-        "an object that turned more than this in the hand counts as lifted_turned (180: no limit)",
+        "objects that turned more in the hand are lifted_turned (180: no limit)",
         name="tilt_limit",
         metavar="DEG",
         above=0,
@@ -122,7 +122,7 @@ class EvaluationSettings:
     )
     slip_limit_mm: float = setting(
         DEFAULT_SLIP_LIMIT_MM,
-        "the same for an object that slid (inf: no limit)",
+        "likewise for objects that slid (inf: no limit)",
         metavar="MM",
         above=0,
         infinite=True,
