@@ -7,7 +7,7 @@ import os
 import platform
 import shutil
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,6 +32,9 @@ from burg_drake.system_libraries import (
 Finding = Literal["ok", "missing", "broken", "low"]
 
 OLDEST_PYTHON = (3, 11)
+DRAKE_MODULES = "pydrake.common"
+ALWAYS_NEEDED_MODULES = "numpy, cv2, coacd, embreex, manifold3d, h5py"
+"""Those that are compiled; the others hardly break."""
 MIN_MEMORY = 2.0  # GiB; a worker takes 0.3 to 0.5
 MIN_DISK = 1.0  # GiB
 RECIPE_FOR_LIBRARIES = "install with the package manager of this system"
@@ -84,6 +87,7 @@ EXTRAS = (
     Extra("parquet", "tables in Parquet", "pyarrow", "pyarrow.lib"),
     Extra("frame", "results in pandas", "pandas", "pandas"),
     Extra("dask", "clusters over Dask", "distributed", "msgpack"),
+    Extra("jobqueue", "batch systems (SLURM, PBS)", "dask-jobqueue", "cryptography"),
     Extra("usd", "export to USD", "usd-core", "pxr.Usd"),
 )
 BLENDER = Extra("blender", "photorealistic images (Blender)", "bpy", "bpy")
@@ -93,14 +97,15 @@ BLENDER_PYTHONS = ((3, 11), (3, 13))
 
 
 def all_checks() -> list[Check]:
-    """Everything, in the order in which it is shown. Imports are tried side by side."""
-    installed = [extra.name for extra in EXTRAS if version(extra.package)]
-    parts: list[Callable[[], Check]] = [_python, _drake, _packages, _cores_and_memory, _disk]
-    parts += [_cache, _renderer, _allocator]
-    parts += [lambda extra=extra: _extra(extra, installed) for extra in EXTRAS]  # type: ignore[misc]
-    parts += [lambda: _blender(installed), _ros, _cameras, _browser, _gpu]
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(lambda look: look(), parts))
+    """Everything, in the order in which it is shown."""
+    installed = [extra for extra in EXTRAS if version(extra.package)]
+    tried = [DRAKE_MODULES, ALWAYS_NEEDED_MODULES, *(extra.modules for extra in installed)]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:  # of processes; answers are kept
+        list(pool.map(import_error, tried))
+    names = [extra.name for extra in installed]
+    checks = [_python(), _drake(), _packages(), _cores_and_memory(), _disk(), _cache()]
+    checks += [_renderer(), _allocator(), *(_extra(extra, names) for extra in EXTRAS)]
+    return [*checks, _blender(names), _ros(), _cameras(), _browser(), _gpu()]
 
 
 def _python() -> Check:
@@ -119,7 +124,7 @@ def _drake() -> Check:
             feature, "broken", f"lacks {', '.join(missing)}", _libraries(missing), required=True
         )
     install = pip_install()
-    if error := import_error("pydrake.common"):
+    if error := import_error(DRAKE_MODULES):
         state: Finding = "broken" if found else "missing"
         return Check(feature, state, error if found else "", f"{install} drake", required=True)
     return Check(feature, "ok", f"drake {found or 'of unknown version'}", required=True)
@@ -130,7 +135,7 @@ def _packages() -> Check:
     install = pip_install()
     if unmet := unmet_requirements():
         return Check(feature, "missing", ", ".join(unmet), f"{install} --upgrade burg-drake", True)
-    if error := import_error("cv2, coacd, embreex, manifold3d, h5py"):
+    if error := import_error(ALWAYS_NEEDED_MODULES):
         return Check(feature, "broken", error, f"{install} --force-reinstall burg-drake", True)
     return Check(
         feature, "ok", f"numpy {version('numpy')}, scipy {version('scipy')}, ...", "", True

@@ -6,6 +6,7 @@ it, so each is tried in a process of its own.
 
 from __future__ import annotations
 
+import functools
 import importlib.metadata
 import importlib.util
 import re
@@ -25,6 +26,7 @@ def version(package: str) -> str | None:
         return None
 
 
+@functools.cache
 def import_error(modules: str) -> str | None:
     """Why modules cannot be imported, in one line; None if they can.
 

@@ -27,7 +27,7 @@ FILES = {
     "results.csv": "the table: one row for each grasp",
 }
 """What the demo leaves for people, by the names of files in the run's folder."""
-NEXT_STEPS = "https://burg-drake.github.io/burg_drake/start.html"
+NEXT_STEPS = "https://burg-drake.github.io/burg_drake/tutorials/own_object.html"
 
 
 def add_to(verbs: Any) -> None:
@@ -80,7 +80,7 @@ def run_demo(arguments: argparse.Namespace) -> int:
     width = max(len(str(path)) for path in paths)
     for path, what in paths.items():
         print(f"  {path!s:<{width}}  {what}")
-    print(f"\nNext, your own objects: {NEXT_STEPS}")
+    print(f"\nNext, grasps on your own object: {NEXT_STEPS}")
     for path in paths:
         if arguments.open and path.suffix == ".html":
             webbrowser.open(path.resolve().as_uri())
