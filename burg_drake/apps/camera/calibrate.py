@@ -110,7 +110,8 @@ def run_calibrate(arguments: argparse.Namespace) -> int:
         print(f"report  {arguments.report}")
     if useless and not arguments.keep:
         print(
-            "burg-drake: the views do not determine the camera well enough; no file without --keep",
+            "burg-drake: no file was written: the views do not determine the camera well enough;"
+            " take more, or give --keep",
             file=sys.stderr,
         )
     else:

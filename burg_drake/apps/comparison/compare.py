@@ -167,7 +167,7 @@ def _others(first: str, paths: list[str]) -> tuple[str, str | None]:
         )
     if len(paths) == 2 and kinds != [False, True]:
         raise InvalidInputError(
-            f"of {shown(paths[0])} and {shown(paths[1])} the last one has to be a trials file"
-            " (.yaml), and it alone"
+            f"{shown(paths[0])} and {shown(paths[1])} are of the same kind; give another run, then"
+            " a trials file (.yaml)"
         )
     return paths[0], paths[1] if len(paths) == 2 else None

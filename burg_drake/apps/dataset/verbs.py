@@ -139,7 +139,7 @@ def run_generate(arguments: argparse.Namespace) -> int:
         recipe = _replaced(recipe, sampled=sampled)
     elif arguments.objects is not None:
         raise InvalidInputError(
-            f"-n {arguments.objects}: how many objects stand in given scenes is in their documents"
+            f"-n {arguments.objects} is for sampled scenes; leave it out, or give --sample"
         )
     else:
         scenes = _given_scenes(arguments.scenes)

@@ -19,7 +19,7 @@ def add_to(verbs: Any) -> None:
         run_doctor,
         "show what is installed, what is missing, and how to get it",
         "burg-drake doctor",
-        "burg-drake doctor --json > doctor.json",
+        "burg-drake doctor --json",
         "",
         "It changes nothing and does not use the network. Exit code 1 if `evaluate` cannot run.",
     )

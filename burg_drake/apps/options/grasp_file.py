@@ -130,7 +130,9 @@ def station_for(arguments: argparse.Namespace, path: str) -> Station:
         return load_station(arguments.station)
     reference = station_reference(path)
     if reference is not None and not is_resolved(reference, "stations"):
-        raise UnknownNameError(f"{path} names a station: {reference} is not there; give --station")
+        raise UnknownNameError(
+            f"{path} names a station that is not there: {reference}; give --station"
+        )
     try:
         return load_station(reference or DEFAULT_STATION)
     except UnknownNameError as error:
@@ -161,5 +163,5 @@ def _gripper_of_file(path: str | None) -> Gripper:
         return named_gripper(reference)
     except BurgError as error:
         raise UnknownNameError(
-            f"{path} has grasps for a hand that cannot be used; name one (--hand): {error}"
+            f"the hand that {path} names cannot be used; give another (--hand): {error}"
         ) from error

@@ -41,6 +41,9 @@ def run_report(arguments: argparse.Namespace) -> int:
     write_report(run)
     print_summary(run)
     if not run.complete:
-        print(f"{len(run.verdicts)} of {len(run.mine)} grasps are judged; evaluate continues")
+        print(
+            f"{len(run.verdicts)} of {len(run.mine)} grasps are judged; the same"
+            " `evaluate` command continues"
+        )
     print(f"report  {run.report_path}")
     return 0

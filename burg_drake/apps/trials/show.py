@@ -108,7 +108,7 @@ def _print_lacking(path: str, lacking: Sequence[MissingValues]) -> None:
             print(f"trial {found.number}: {', '.join(found.edited)} edited by hand since recorded")
     if any(found.values for found in lacking):
         print(
-            f"burg-drake: `burg-drake trials restore {path}` enters it again; with --keep the file"
-            " counts as right",
+            f"burg-drake: `burg-drake trials restore {path}` brings it back; with --keep the file"
+            " stays as it is",
             file=sys.stderr,
         )
