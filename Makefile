@@ -4,7 +4,6 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.set-up
 N ?= 100
-DEMO := runs/demo$(if $(filter-out 100,$(N)),_$(N))
 # Of all packages that pyproject.toml names, something that they are needed for, but for mypy, which is slow.
 LOWEST_TESTS := tests/core/test_hdf5.py tests/core/test_lazy.py tests/core/test_progress.py \
 	tests/dataset/test_coco.py tests/dataset/test_shards.py tests/dataset/test_webdataset.py \
@@ -32,11 +31,7 @@ $(STAMP): pyproject.toml tools/setup/set_up.sh
 	@touch $@
 
 demo: $(STAMP)  ## evaluate grasps on the built-in scene, replay the best one
-	$(BIN)/burg-drake evaluate tabletop_six --station panda_tabletop --grasps-per-object $(N) -o $(DEMO)
-	$(BIN)/burg-drake replay $(DEMO) --best --html $(DEMO)/replay.html
-	@echo
-	@echo "Files to open:"
-	@find $(DEMO) -maxdepth 1 -type f \( -name '*.html' -o -name '*.csv' -o -name '*.parquet' -o -name '*.md' \) | sort | sed 's/^/  /'
+	$(BIN)/burg-drake demo -n $(N)
 
 test: $(STAMP)  ## build the wheel, install it, test the installed wheel (ARGS=... go to pytest)
 	@tools/setup/test_wheel.sh $(VENV) -m "not thorough" $(ARGS)

@@ -51,7 +51,8 @@ ROOMS = {
     "experiment": "trials planning statistics pairing comparison gap pages",
     "compose": "document commands storage background editing",
     "ui": "server widgets view pointing panels",
-    "apps": "terminal options web library scene camera ar grasps runs comparison trials dataset",
+    "apps": "terminal options doctor web library scene camera ar grasps runs comparison trials"
+    " dataset",
 }
 """Rooms, each with its sub-rooms. A room or sub-room imports those before it and itself."""
 WITHIN = {"evaluation.report": "elements sections"}

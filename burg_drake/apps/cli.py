@@ -21,7 +21,9 @@ from burg_drake import __version__
 from burg_drake.apps import (
     ar,
     camera,
+    completion,
     dataset,
+    doctor,
     grasps,
     hand,
     library,
@@ -34,8 +36,8 @@ from burg_drake.apps import (
 from burg_drake.apps.comparison import compare, gap
 from burg_drake.apps.dataset import render
 from burg_drake.apps.grasps import frames
-from burg_drake.apps.options import Parser, examples, with_given_names
-from burg_drake.apps.runs import evaluate, merge, reach, replay, report, robustness, status
+from burg_drake.apps.options import Parser, VerbGroup, examples, with_given_names
+from burg_drake.apps.runs import demo, evaluate, merge, reach, replay, report, robustness, status
 from burg_drake.apps.scene import printout, setup
 from burg_drake.apps.terminal import terminated_as_interrupted
 from burg_drake.core import BurgError, shown
@@ -57,32 +59,16 @@ OPTIONS_OF = {
 LONGEST_WORD = 300
 """Of a message, paths included; what is longer was not written by people."""
 
-VERBS = (
-    library,
-    scene,
-    setup,
-    printout,
-    ar,
-    camera,
-    grasps,
-    reach,
-    evaluate,
-    status,
-    merge,
-    robustness,
-    gap,
-    replay,
-    report,
-    trials,
-    compare,
-    render,
-    dataset,
-    station,
-    hand,
-    frames,
-    ros,
-    schema,
-)
+VERBS = {
+    "start": (demo, doctor, completion),
+    "objects and scenes": (library, scene, setup),
+    "grasps": (grasps, frames),
+    "evaluate": (reach, evaluate, status, report, replay, robustness, merge),
+    "real robot": (printout, camera, ar, ros, trials, compare, gap),
+    "training data": (render, dataset),
+    "robot cells, files": (station, hand, schema),
+}
+"""By what people want to do, each in the order of use."""
 
 
 @cache
@@ -90,19 +76,26 @@ def build_parser() -> Parser:
     """The parser of the whole command, of which a process needs one."""
     parser = Parser(
         prog="burg-drake",
-        description="Reproducible robot-grasping scenes and grasp evaluation on Drake.",
+        description="Find out which grasps a robot can execute: in simulation, on a printed board,"
+        " on your robot.",
         epilog=examples(
-            "burg-drake scene show tabletop_six",
-            "burg-drake evaluate tabletop_six --grasps-per-object 100 -o runs/first",
-            "burg-drake replay runs/first --best",
+            "burg-drake demo",
             "burg-drake library build scans/*.obj -o my_library",
-        )
-        + f"\n\nSet {DEBUG_VARIABLE}=1 to see where an error came from.",
+            "burg-drake setup my_library",
+            "burg-drake evaluate my_scene.yaml -o runs/first",
+            "",
+            "burg-drake VERB --help tells what a verb does. Set"
+            f" {DEBUG_VARIABLE}=1 to see where an error came from.",
+        ),
     )
-    parser.add_argument("--version", action="version", version=f"burg-drake {__version__}")
-    verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
-    for module in VERBS:
-        module.add_to(verbs)
+    parser.add_argument(
+        "--version", action="version", version=f"burg-drake {__version__}", help="print the version"
+    )
+    verbs = VerbGroup(parser)
+    for title, modules in VERBS.items():
+        verbs.heading(title)
+        for module in modules:
+            module.add_to(verbs)
     return parser
 
 
@@ -113,6 +106,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         argv: arguments without the program's name; those of the process if None.
     """
     if argv is None:
+        completion.complete_if_asked(build_parser)
         _print_any_name()
     # pyarrow's own allocator gives memory back again and again, which costs more than the reading
     os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")

@@ -10,20 +10,20 @@ from burg_drake.apps.options import add_group, add_verb
 
 def add_to(verbs: Any) -> None:
     """Adds the verbs."""
-    group = add_group(verbs, "hand", "list the built-in hands, check a hand document")
+    group = add_group(verbs, "hand", "list and check hands")
     add_verb(group, "list", run_list, "list the built-in hands", "burg-drake hand list")
     check = add_verb(
         group,
         "check",
         run_check,
-        "check a hand document against its model (exit code 2 if they do not agree)",
+        "check a hand file against its model",
         "burg-drake hand check wsg_50",
         "burg-drake hand check my_hand.yaml",
     )
     check.add_argument(
         "hand",
         metavar="HAND",
-        help="hand document, or name of a built-in one, see `burg-drake hand list`",
+        help="hand file, or built-in name (burg-drake hand list)",
     )
 
 

@@ -24,7 +24,7 @@ def add_to(verbs: Any) -> None:
         verbs,
         "ros",
         run,
-        "run a ROS 1 or ROS 2 node: overlay, pose of the camera, and the board on tf",
+        "run a ROS node: overlay, camera pose, board on tf",
         "burg-drake ros tabletop_six --image /camera/color/image_raw",
         "burg-drake ros my_scene.yaml --image /usb_cam/image_raw/compressed --frame board_link",
         options=_add_options,
@@ -39,39 +39,38 @@ def _add_options(parser: Parser) -> None:
         "--image",
         metavar="TOPIC",
         default=DEFAULT_IMAGE,
-        help="images; compressed ones if the name ends in /compressed (default: %(default)s)",
+        help="image topic; compressed if it ends in /compressed (default: %(default)s)",
     )
     parser.add_argument(
         "--camera-info",
         metavar="TOPIC",
         default="",
-        help="the camera's intrinsics (default: camera_info next to the images)",
+        help="intrinsics topic (default: camera_info beside the images)",
     )
-    add_intrinsics(parser, "take the intrinsics from a file, not from a topic")
+    add_intrinsics(parser, "intrinsics file instead of the topic")
     parser.add_argument(
         "--rectified",
         action="store_true",
-        help="the images are rectified (image_rect): no lens distortion",
+        help="the images have no distortion (image_rect)",
     )
     add_measured_board(parser)
     parser.add_argument(
         "--frame",
         metavar="NAME",
         default=Names.board_frame,
-        help="the board on tf (default: %(default)s)",
+        help="tf frame of the board (default: %(default)s)",
     )
     parser.add_argument(
         "--tf-parent",
         choices=[parent.value for parent in Parent],
         default=Names.parent.value,
-        help="parent frame on tf: the camera's or the board's; none publishes nothing on tf"
-        " (default: %(default)s)",
+        help="tf parent; none publishes nothing on tf (default: %(default)s)",
     )
     parser.add_argument(
         "--name",
         metavar="NODE",
         default=Names.node,
-        help="the node; it publishes NODE/overlay, NODE/camera_pose, NODE/status"
+        help="name of the node, which publishes NAME/overlay, NAME/camera_pose, NAME/status"
         " (default: %(default)s)",
     )
     parser.add_argument(

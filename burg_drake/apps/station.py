@@ -17,14 +17,13 @@ if TYPE_CHECKING:
 
 def add_to(verbs: Any) -> None:
     """Adds the verbs."""
-    group = add_group(verbs, "station", "list, check and show stations: robot, board, cameras")
+    group = add_group(verbs, "station", "list, check and show robot cells: arm, board, cameras")
     add_verb(group, "list", run_list, "list the built-in stations", "burg-drake station list")
     check = add_verb(
         group,
         "check",
         run_check,
-        "check a station: base, home posture, reach of the board, cameras (exit code 2 if it"
-        " cannot be used)",
+        "check a station: base, home, reach, cameras",
         "burg-drake station check panda_bin",
         "burg-drake station check my_station.yaml --scene my_scene.yaml",
     )
@@ -33,13 +32,13 @@ def add_to(verbs: Any) -> None:
         group,
         "show",
         run_show,
-        "show a station in Meshcat: cameras, and the part of the board that the arm reaches",
+        "show a station in 3D with the reach of its arm",
         "burg-drake station show panda_shelf",
         "burg-drake station show panda_tabletop --scene tabletop_six --html station.html",
         "burg-drake station show my_station.yaml --camera board",
     )
     _add_station(show)
-    show.add_argument("--camera", metavar="NAME", help="look through this camera of the station")
+    show.add_argument("--camera", metavar="NAME", help="look through this camera")
     add_view(show)
 
 
@@ -47,12 +46,12 @@ def _add_station(parser: Parser) -> None:
     parser.add_argument(
         "station",
         metavar="STATION",
-        help="station file, or name of a built-in one, see `burg-drake station list`",
+        help="station file, or built-in name (burg-drake station list)",
     )
     parser.add_argument(
         "--scene",
         metavar="SCENE",
-        help="scene that stands on it, file or built-in name (default: an empty board)",
+        help="scene to put on it, file or built-in name (default: an empty board)",
     )
 
 

@@ -74,7 +74,7 @@ FORMATS = {
         module="usd",
         writer="write_usd",
         main="scene.usda",
-        about="USD with rigid-body physics, as for Isaac Sim; needs pip install 'burg-drake[usd]'",
+        about="USD, for Isaac Sim; needs burg-drake[usd]",
         package=("usd-core", "pxr"),
     ),
 }

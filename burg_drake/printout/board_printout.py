@@ -50,16 +50,15 @@ class PrintSettings:
 
     page: str = setting(
         "A4",
-        "A4 to A0, letter, legal, tabloid, or WxH in mm; upright or across, whichever takes fewer"
-        " pages",
+        "paper: A4 to A0, letter, legal, tabloid, or WxH in mm",
         metavar="PAGE",
     )
-    margin: float = setting(
-        5e-3, "what the printer leaves white on all sides", unit=MILLIMETRES, low=0
-    )
+    margin: float = setting(5e-3, "unprintable margin of the printer", unit=MILLIMETRES, low=0)
     measured: tuple[float, float] = (0.1, 0.1)
-    height_map: bool = setting(True, "print the markers alone", name="no_height_map")
-    names: bool = setting(True, "do not print the objects' names", name="no_names")
+    height_map: bool = setting(
+        True, "print only markers, not where objects stand", name="no_height_map"
+    )
+    names: bool = setting(True, "do not print names of objects", name="no_names")
     instructions: bool = False
 
     def __post_init__(self) -> None:

@@ -7,9 +7,12 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from burg_drake.core import MissingDependencyError
-from burg_drake.ros.link import Link, Names
+
+if TYPE_CHECKING:
+    from burg_drake.ros.link import Link, Names
 
 CLIENTS = {1: "rospy", 2: "rclpy"}
 SYSTEM_PACKAGES = Path("/usr/lib/python3/dist-packages")

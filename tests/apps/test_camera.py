@@ -122,7 +122,7 @@ def test_a_result_that_tells_little_is_not_written(tmp_path: Path, capsys: Captu
     assert main(command) == 1
     err = capsys.readouterr().err
     assert "tilt the target by 20 to 45 degrees, so that it faces left" in err
-    assert "no file without --keep" in err and not output.exists()
+    assert "give --keep" in err and not output.exists()
     assert main([*command, "--keep"]) == 1
     assert output.exists()
 

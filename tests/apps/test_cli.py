@@ -21,7 +21,10 @@ from burg_drake.apps.runs import evaluate
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
 from burg_drake.core.paths.resources import builtin_names
 
-GROUPS = (["library"], ["scene"], ["camera"], ["grasps"], ["station"], ["hand"], ["trials"])
+GROUPS = tuple(
+    [name]
+    for name in ("library", "scene", "camera", "grasps", "station", "hand", "trials", "dataset")
+)
 HELP = (
     [],
     *GROUPS,
@@ -34,7 +37,9 @@ HELP = (
     *(["station", v] for v in ("list", "check", "show")),
     *(["hand", v] for v in ("list", "check")),
     *([v] for v in ("reach", "evaluate", "robustness", "replay", "report", "frames")),
-    *([v] for v in ("printout", "ar", "setup", "ros")),
+    *([v] for v in ("printout", "ar", "setup", "ros", "demo", "doctor", "render")),
+    *(["dataset", v] for v in ("generate", "check", "show", "export")),
+    *(["scene", v] for v in ("sample", "export")),
     *([v] for v in ("compare", "gap", "merge", "status")),
     *(["trials", v] for v in ("plan", "sheet", "export", "serve", "record", "show", "restore")),
 )
@@ -49,6 +54,36 @@ def test_help(verb: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert text.startswith(f"usage: burg-drake {' '.join(verb)}".strip())
     if verb not in GROUPS:
         assert "examples:\n  burg-drake " in text
+
+
+@pytest.mark.parametrize("columns", [80, 120])
+def test_help_fits_the_terminal(
+    columns: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(columns))
+    for verb in HELP:
+        with pytest.raises(SystemExit):
+            cli.build_parser().parse_args([*verb, "--help"])
+        lines = capsys.readouterr().out.splitlines()
+        wide = [line for line in lines if len(line) > min(columns, 100)]
+        assert [line for line in wide if not line.startswith("  burg-drake ")] == []
+
+
+@pytest.mark.parametrize("verb", [[], *GROUPS], ids=" ".join)
+def test_the_help_lists_each_verb_in_one_line(
+    verb: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit):
+        cli.main([*verb, "--help"])
+    listed = [line.split()[0] for line in capsys.readouterr().out.splitlines() if "  " in line[2:]]
+    with pytest.raises(SystemExit):
+        cli.main([*verb, "zzz"])
+    known = capsys.readouterr().err.partition("known: ")[2].partition(" (see")[0]
+    named, _, others = known.partition(" and ")
+    listed = [name for name in listed if name != "--version"]
+    assert set(named.split(", ")) <= set(listed)
+    assert len(listed) == len(set(listed)) == named.count(",") + 1 + int(others[:-7] or 0)
 
 
 def test_examples_of_the_help_can_be_parsed(capsys: pytest.CaptureFixture[str]) -> None:

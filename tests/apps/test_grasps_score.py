@@ -94,7 +94,9 @@ def test_a_station_that_is_gone_is_said(grasp_file: Path, tmp_path: Path, capsys
     GraspSet.create(grasps.X_OG, object=grasps.object, provenance=provenance).save(path)
     assert score(path) == 2
     said = capsys.readouterr().err
-    assert "moved.h5 names a station: " in said and said.endswith("; give --station\n")
+    assert "moved.h5 names a station that is not there: " in said and said.endswith(
+        "; give --station\n"
+    )
     assert score(path, "--station", "panda_tabletop", "--library", "household") == 0
 
 

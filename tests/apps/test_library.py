@@ -298,7 +298,7 @@ def test_the_help_describes_masses_files(capsys: Capture) -> None:
     with pytest.raises(SystemExit):
         build("--help")
     text = capsys.readouterr().out
-    assert "decomposition.threshold" in text and "up to 512 MB and 2,000,000 triangles" in text
+    assert "decomposition.threshold" in text and "2,000,000 triangles" in text
     assert "format of masses.yaml: 'NAME: KG' lines" in text and "\n  mug: 0.118\n" in text
 
 

@@ -125,7 +125,7 @@ def test_colours_are_never_mixed(
     command = [*COMMAND, recipe_file(tmp_path), "--quiet", "-o", str(colored)]
     assert main(command) == 2
     assert capsys.readouterr().err == (
-        f"burg-drake: error: the samples of {colored} have colours, and so must all that are added:"
+        f"burg-drake: error: the samples of {colored} have colours, and so must new ones:"
         f" {MISSING}\n"
     )
     assert main([*command, "--no-colors"]) == 2

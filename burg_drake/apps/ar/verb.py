@@ -41,7 +41,7 @@ def add_to(verbs: Any) -> None:
         verbs,
         "ar",
         run_ar,
-        "draw a scene over the picture of a camera, live in the browser",
+        "show where objects belong, live in the camera picture",
         "burg-drake ar my_scene.yaml --camera 0 --intrinsics camera.yaml",
         "burg-drake ar my_scene.yaml --camera photo.png --intrinsics camera.yaml",
         "burg-drake ar tabletop_six --camera sim:panda_tabletop/board",
@@ -57,8 +57,8 @@ def _add_options(parser: Parser) -> None:
         "--camera",
         metavar="SOURCE",
         default="0",
-        help="number of a camera, address of a stream, video, image, folder or pattern of images,"
-        " or sim:STATION/CAMERA (default: %(default)s)",
+        help="camera number, stream address, video, image, folder of images, or"
+        " sim:STATION/CAMERA (default: %(default)s)",
     )
     add_live_camera(parser)
     add_measured_board(parser)
@@ -71,20 +71,18 @@ def _add_view(parser: Any) -> None:
 
     view = parser.add_argument_group("view")
     add_options(view, OverlayStyle, "opacity", "tolerance", "angle_tolerance", unset=True)
-    add_page(view, "all of the network can see and use it, such as a tablet beside the board")
+    add_page(view, "all computers and tablets of the network can use it")
     view.add_argument(
         "--connections",
         type=positive_int,
         metavar="N",
         default=MOST_CONNECTIONS,
-        help="that the page serves at a time; a browser takes two to six, and more are told that"
-        " there are too many (default: %(default)s)",
+        help="largest number of connections; a browser takes two to six (default: %(default)s)",
     )
     view.add_argument(
         "--no-browser",
         action="store_true",
-        help="serve no page: process all frames, print the result, and end (a camera's frames end"
-        " with --frames, --seconds or Ctrl-C)",
+        help="process all images without a page, print the result and end",
     )
 
 
@@ -93,29 +91,29 @@ def _add_results(parser: Any) -> None:
     results.add_argument(
         "--record",
         metavar="FILE",
-        help="video (.mp4, .avi) of all frames, with a table of poses next to it",
+        help="record a video (.mp4, .avi) and a table of camera poses",
     )
     results.add_argument(
-        "--plain", action="store_true", help="recordings also get a video without overlay"
+        "--plain", action="store_true", help="also record the video without overlay"
     )
     results.add_argument(
         "--snapshot",
         metavar="FOLDER",
-        help="at the end, save the last frame that had a pose: picture, overlay, pose",
+        help="at the end, save picture, overlay and camera pose",
     )
     results.add_argument(
         "--check",
         action="store_true",
         help="at the end, measure how far objects are from their targets",
     )
-    results.add_argument("--frames", type=positive_int, metavar="N", help="end after N frames")
+    results.add_argument("--frames", type=positive_int, metavar="N", help="end after N images")
     results.add_argument("--seconds", type=positive, metavar="N", help="end after N seconds")
     results.add_argument(
         "-o",
         "--output",
         metavar="FOLDER",
         default=".",
-        help="folder for snapshots and recordings made on the page (default: here)",
+        help="folder for what is saved from the page (default: here)",
     )
 
 

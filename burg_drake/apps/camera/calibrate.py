@@ -25,48 +25,52 @@ def add_to(group: Any) -> None:
         group,
         "calibrate",
         run_calibrate,
-        "intrinsics of a camera, from photos of a ChArUco board or live",
+        "find the intrinsics of a camera, from photos or live",
         "burg-drake camera calibrate photos/*.jpg -o K.yaml --report calibration.html",
         "burg-drake camera calibrate --camera 0 --size 1280x720 -o K.yaml",
         "burg-drake camera calibrate photos --squares 5x7 --square-mm 30 --marker-mm 22 -o K.yaml",
         "",
-        "Exit code 1, and no file without --keep, if the photos do not determine the camera well.",
+        "Exit code 1 if the photos do not determine the camera well; the file is then written"
+        " only with --keep.",
         options=_add_options,
     )
 
 
 def _add_options(calibrate: Parser) -> None:
     calibrate.add_argument(
-        "images", metavar="IMAGE", nargs="*", help="photos of the target, folders, or a video"
+        "images",
+        metavar="IMAGE",
+        nargs="*",
+        help="photos of the calibration board, folders of them, or a video",
     )
     calibrate.add_argument(
         "--camera",
         metavar="CAMERA",
-        help="take views live from a camera: 0, /dev/video0, rtsp://...",
+        help="take the views live: 0, /dev/video0, rtsp://...",
     )
     calibrate.add_argument(
-        "--size", metavar="WxH", type=two_numbers, help="image size to request from the camera"
+        "--size", metavar="WxH", type=two_numbers, help="image size of the live camera"
     )
     calibrate.add_argument(
         "--views",
         metavar="N",
         type=positive_int,
         default=DEFAULT_VIEWS,
-        help="views to take live (default: %(default)s); Ctrl-C ends earlier and keeps them",
+        help="number of live views (default: %(default)s); Ctrl-C ends earlier",
     )
-    calibrate.add_argument("--save-views", metavar="FOLDER", help="keep the images taken live")
+    calibrate.add_argument("--save-views", metavar="FOLDER", help="save the live images here")
     calibrate.add_argument(
         "-o", "--output", metavar="FILE", required=True, help="intrinsics file to write (.yaml)"
     )
     calibrate.add_argument(
-        "--report", metavar="FILE", help="page to write with all residuals (.html)"
+        "--report", metavar="FILE", help="page with all residuals to write (.html)"
     )
     calibrate.add_argument(
         "--model",
         choices=MODELS,
         default="auto",
-        help="lens model: k1 k2 p1 p2 (radial4), and k3 (radial), and k4 k5 k6 (rational, for"
-        " wide lenses), none (pinhole), or a fisheye; auto chooses by the residuals (default:"
+        help="lens model: pinhole (no distortion), radial4 (k1 k2 p1 p2), radial (also k3),"
+        " rational (also k4 k5 k6), fisheye; auto chooses by the residuals (default:"
         " %(default)s)",
     )
     calibrate.add_argument("--name", default="", help="name of the camera, for the file")
@@ -106,7 +110,8 @@ def run_calibrate(arguments: argparse.Namespace) -> int:
         print(f"report  {arguments.report}")
     if useless and not arguments.keep:
         print(
-            "burg-drake: the views do not determine the camera well enough; no file without --keep",
+            "burg-drake: no file was written: the views do not determine the camera well enough;"
+            " take more, or give --keep",
             file=sys.stderr,
         )
     else:

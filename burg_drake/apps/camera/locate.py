@@ -23,7 +23,7 @@ def add_to(group: Any) -> None:
         group,
         "locate",
         run_locate,
-        "print where a fixed camera stands, from photos of the board, as lines for the station",
+        "find the pose of a fixed camera from photos of the board",
         "burg-drake camera locate tabletop_six photo.png --intrinsics K.yaml --station my.yaml",
         "burg-drake camera locate tabletop_six photos/ --intrinsics K.yaml --name top",
         options=_add_options,
@@ -36,8 +36,7 @@ def _add_options(parser: Parser) -> None:
         "photos",
         metavar="PHOTO",
         nargs="+",
-        help="image of the board, or a folder or pattern of images; the mean of several from the"
-        " same place is better than one",
+        help="photos of the board from the same place, or a folder of them",
     )
     add_intrinsics(parser, required=True)
     add_measured_board(parser)

@@ -35,14 +35,14 @@ def add_to(group: Any) -> None:
         group,
         "placement",
         run_placement,
-        "measure on a photo of the finished scene how far each object stands from its target",
+        "measure on a photo how far objects stand from their targets",
         "burg-drake camera placement tabletop_six photo.png --intrinsics K.yaml",
         "burg-drake camera placement scene.yaml photo.png --intrinsics K.yaml -o placement.yaml",
         "burg-drake camera placement scene.yaml left.png right.png --intrinsics K.yaml",
         "burg-drake camera placement scene.yaml photo.png --intrinsics K.yaml --depth depth.png",
         "",
-        "Exit code 1 if an object is not seen, a measurement is doubtful, or something else stands",
-        "there; 2 if there is no board in a photo, and then nothing is written.",
+        "Exit code 1 if an object is not seen, a measurement is doubtful, or something else"
+        " stands there; 2 if a photo does not show the board.",
         options=_add_options,
     )
 
@@ -53,19 +53,19 @@ def _add_options(parser: Parser) -> None:
         "photo",
         metavar="PHOTO",
         nargs="+",
-        help="image of the scene on its board; several are measured as one",
+        help="photo of the scene on its board; several are measured together",
     )
     add_intrinsics(parser, required=True)
     add_measured_board(parser)
     parser.add_argument(
         "--depth",
         metavar="FILE",
-        help="depth image of the same camera, to align the objects with: 16-bit .png or .npy",
+        help="depth image of the same camera (16-bit .png, or .npy)",
     )
     add_depth_unit(parser)
     parser.add_argument("-o", "--output", metavar="FILE", help="placement file to write (.yaml)")
     parser.add_argument(
-        "--overlay", metavar="FILE", help="image to write: the photo with targets and errors"
+        "--overlay", metavar="FILE", help="picture to write: the photo with targets and errors"
     )
 
 

@@ -17,7 +17,7 @@ def add_to(group: Any) -> None:
         group,
         "target",
         run_target,
-        "print a ChArUco board to calibrate cameras with, as a PDF at true scale",
+        "write a calibration board (ChArUco) as PDF",
         "burg-drake camera target -o target.pdf",
         "burg-drake camera target --page A3 --square-mm 30 --marker-mm 22 -o target.pdf",
         options=_add_options,
@@ -27,11 +27,13 @@ def add_to(group: Any) -> None:
 def _add_options(target: Parser) -> None:
     from burg_drake.printout import PrintSettings
 
-    target.add_argument("-o", "--output", metavar="FILE", required=True, help="PDF to write")
+    target.add_argument(
+        "-o", "--output", metavar="FILE", required=True, help="file to write (.pdf)"
+    )
     add_options(target, PrintSettings, "page")
     add_measured_board(
         target,
-        "what the rulers of 100 mm of an earlier print measured, for a printer that scales",
+        "length of the 100 mm rulers of an earlier print, to correct this one",
     )
     add_board(target)
 
@@ -40,7 +42,9 @@ def add_board(parser: Any) -> None:
     """The options about the board."""
     from burg_drake.cameras.calibration import CharucoTarget
 
-    board = parser.add_argument_group("the board", "what `burg-drake camera target` printed")
+    board = parser.add_argument_group(
+        "calibration board", "The defaults are those of `burg-drake camera target`."
+    )
     add_options(board, CharucoTarget)
 
 

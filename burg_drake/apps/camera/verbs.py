@@ -16,12 +16,12 @@ from burg_drake.apps.options import add_group, add_verb, input_file
 
 def add_to(verbs: Any) -> None:
     """Adds the verbs."""
-    group = add_group(verbs, "camera", "find, calibrate and place cameras, and check photos")
+    group = add_group(verbs, "camera", "find, calibrate and locate cameras; measure photos")
     add_verb(
         group,
         "list",
         run_list,
-        "print which cameras of this machine give images (exit code 1 if none does)",
+        "list the cameras of this machine that give images",
         "burg-drake camera list",
     )
     target.add_to(group)
@@ -37,7 +37,7 @@ def _add_show(group: Any) -> None:
         group,
         "show",
         run_show,
-        "print intrinsics, the field of view, and how far the lens distorts",
+        "print intrinsics, field of view and distortion",
         "burg-drake camera show K.yaml",
         "burg-drake camera show sim:panda_tabletop/board",
     )
@@ -49,7 +49,7 @@ def _add_convert(group: Any) -> None:
         group,
         "convert",
         run_convert,
-        "write intrinsics as our document, or as a camera_info file of ROS",
+        "convert intrinsics to or from ROS and OpenCV",
         "burg-drake camera convert K.yaml --to ros -o camera_info.yaml",
         "burg-drake camera convert camera_info.yaml -o K.yaml",
         "burg-drake camera convert opencv_calibration.yml -o K.yaml",
@@ -69,7 +69,7 @@ def _add_intrinsics(parser: Any) -> None:
         "intrinsics",
         metavar="INTRINSICS",
         type=input_file,
-        help="intrinsics: ours, camera_info of ROS, OpenCV's; or sim:STATION/CAMERA",
+        help="intrinsics file (ours, ROS's camera_info, OpenCV's), or sim:STATION/CAMERA",
     )
 
 

@@ -29,16 +29,15 @@ def add_to(verbs: Any) -> None:
         verbs,
         "compare",
         run_compare,
-        "compare simulated grasps with trials on the robot, or with another simulation",
+        "compare a run with trials on the robot, or another run",
         "burg-drake compare runs/first trials.yaml --html compare.html",
         "burg-drake compare runs/first trials.yaml --json",
         "burg-drake compare runs/first trials.yaml --rejudge --html compare.html",
         "burg-drake compare runs/screening runs/standard",
         "burg-drake compare runs/screening runs/standard trials.yaml",
         "",
-        "Of two runs, the second is in the place of what happened, though neither is the truth;",
-        "runs with other phases, limits or stations are refused. With trials, both are compared",
-        "with them, and McNemar's test says whether one is right more often.",
+        "With two runs, the second takes the place of the robot. With trials as well, both runs"
+        " are compared with them, and McNemar's test says whether one is right more often.",
         options=_add_options,
     )
 
@@ -46,18 +45,18 @@ def add_to(verbs: Any) -> None:
 def _add_options(parser: Parser) -> None:
     from burg_drake.experiment.comparison import LIMIT_MM, SUCCESSES
 
-    parser.add_argument("run_folder", metavar="RUN", help="folder of a run: its verdicts")
+    parser.add_argument("run_folder", metavar="RUN", help="folder of a run")
     parser.add_argument(
         "others",
         metavar="RUN|TRIALS",
         nargs="+",
-        help="trials file (.yaml), or folder of another run of the same grasps, or both",
+        help="trials file (.yaml), or folder of another run of the same grasps",
     )
     parser.add_argument(
         "--success",
         choices=SUCCESSES,
-        help="what counts as success: lifted, or held even if it turned in the hand or another"
-        " object was disturbed (default: what the trials were planned with, or lifted)",
+        help="what counts as success; held includes turned objects and moved neighbours (default:"
+        " as planned, else lifted)",
     )
     parser.add_argument(
         "--placement-limit-mm",
@@ -65,25 +64,24 @@ def _add_options(parser: Parser) -> None:
         type=not_negative,
         default=LIMIT_MM,
         help=(
-            "largest distance of any object from its target in trials with good placement"
-            " (default: %(default)g)"
+            "largest distance of objects from their targets in well placed trials (default:"
+            " %(default)g)"
         ),
     )
     parser.add_argument(
         "--robustness",
         metavar="FILE",
-        help="table of robustness whose shares of success are a predicted probability (default:"
-        " robustness.csv in RUN, if it is there)",
+        help="table of robustness with predicted probabilities (default: robustness.csv in RUN)",
     )
     parser.add_argument(
         "--seed",
         metavar="N",
         type=seed,
         default=0,
-        help="seed of the intervals (default: %(default)s)",
+        help="random seed of the intervals (default: %(default)s)",
     )
-    parser.add_argument("--html", metavar="FILE", help="write one self-contained page")
-    parser.add_argument("--json", action="store_true", help="print everything as JSON")
+    parser.add_argument("--html", metavar="FILE", help="page to write (.html)")
+    parser.add_argument("--json", action="store_true", help="print JSON")
     add_rejudge(parser)
 
 
@@ -169,7 +167,7 @@ def _others(first: str, paths: list[str]) -> tuple[str, str | None]:
         )
     if len(paths) == 2 and kinds != [False, True]:
         raise InvalidInputError(
-            f"of {shown(paths[0])} and {shown(paths[1])} the last one has to be a trials file"
-            " (.yaml), and it alone"
+            f"{shown(paths[0])} and {shown(paths[1])} are of the same kind; give another run, then"
+            " a trials file (.yaml)"
         )
     return paths[0], paths[1] if len(paths) == 2 else None

@@ -51,8 +51,7 @@ def add_to(verbs: Any) -> None:
         verbs,
         "gap",
         run_gap,
-        "judge the same grasps with the hand alone, with the arm's reach, with the whole arm,"
-        " and with displaced objects: how many each step loses",
+        "find what costs grasps: reach, the arm, misplaced objects",
         "burg-drake gap tabletop_six -o gap",
         "burg-drake gap runs/first -o gap",
         "burg-drake gap tabletop_six -n 50 --placement-sd-mm 5 --samples 10 -o gap",
@@ -60,8 +59,9 @@ def add_to(verbs: Any) -> None:
         "burg-drake gap tabletop_six --mode reach --samples 0 -o gap",
         "",
         (
-            "The same command continues where an interrupted one stopped. Every step is an"
-            " ordinary run."
+            "Evaluates the same grasps with the hand alone, with the arm's reach, with the whole"
+            " arm, and with displaced objects, and counts what each step loses. The same command"
+            " continues where an interrupted one stopped."
         ),
         options=_add_options,
     )
@@ -76,19 +76,18 @@ def _add_options(parser: Parser) -> None:
     parser.add_argument(
         "source",
         metavar="SCENE|RUN",
-        help="folder of a run, whose grasps are judged; or a scene file, or name of a built-in one:"
-        f" {scene_names()}",
+        help=f"folder of a run, scene file, or built-in scene: {scene_names()}",
     )
-    parser.add_argument("-o", "--output", metavar="GAP", required=True, help="folder for the steps")
+    parser.add_argument("-o", "--output", metavar="GAP", required=True, help="folder to write")
     add_station(
         parser,
-        f"with a scene: station file or built-in name (default: {DEFAULT_STATION})",
+        f"with a scene: station (default: {DEFAULT_STATION})",
         default=None,
     )
     parser.add_argument(
         "--mode",
         choices=MODES,
-        help="the last step before objects are displaced (default: arm, or hand without an arm)",
+        help="last step before objects are displaced (default: arm, or hand without an arm)",
     )
     _add_displaced(parser)
     which = parser.add_mutually_exclusive_group()
@@ -98,7 +97,7 @@ def _add_options(parser: Parser) -> None:
     who = parser.add_mutually_exclusive_group()
     add_workers(who)
     add_cluster(who)
-    parser.add_argument("--json", action="store_true", help="print the figures as JSON")
+    parser.add_argument("--json", action="store_true", help="print JSON")
     add_motion(parser)
     add_quiet(parser)
 
@@ -110,7 +109,7 @@ def _add_displaced(parser: Parser) -> None:
     add_options(group, PlacementNoise)
     add_options(group, GapSettings, "samples")
     group.add_argument(
-        "--trials", metavar="FILE", help="real trials, to compare each step's verdicts with"
+        "--trials", metavar="FILE", help="trials file, to compare each step with the robot"
     )
 
 

@@ -15,21 +15,19 @@ if TYPE_CHECKING:
 
 def add_rejudge(parser: Parser) -> None:
     """Adds the options."""
-    group = parser.add_argument_group("judging again")
+    group = parser.add_argument_group("evaluate again")
     group.add_argument(
         "--rejudge",
         metavar="FOLDER",
         nargs="?",
         const="",
-        help="judge each trial again with the objects where they were measured before it, to"
-        " separate placement from physics; verdicts are kept in FOLDER, where the same"
-        " command continues (default: the name of the trials file and of the run, beside"
-        " that file)",
+        help="evaluate each trial with objects where they were measured, to separate placement"
+        " from physics; results are kept in FOLDER (default: beside the trials file)",
     )
     who = group.add_mutually_exclusive_group()
-    add_workers(who, "with --rejudge, processes (default: one a processor)")
+    add_workers(who, "worker processes (default: one for each core)")
     add_cluster(who)
-    group.add_argument("--quiet", action="store_true", help="with --rejudge, no progress")
+    group.add_argument("--quiet", action="store_true", help="do not show progress")
 
 
 def rejudge_for(arguments: argparse.Namespace) -> Rejudging | None:

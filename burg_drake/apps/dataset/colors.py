@@ -46,7 +46,7 @@ def with_possible_colors(recipe: DatasetRecipe, folder: Path) -> DatasetRecipe:
         return recipe
     if _has_colors(folder):
         raise MissingDependencyError(
-            f"the samples of {folder} have colours, and so must all that are added:"
+            f"the samples of {folder} have colours, and so must new ones:"
             f" {describe_missing(missing)}"
         )
     dark = ", and its sensor depth no holes at dark surfaces" if recipe.sensor else ""

@@ -24,17 +24,17 @@ def add_to(group: Any) -> None:
         group,
         "export",
         run_export,
-        "write a data set in another project's format",
+        "convert to BOP, COCO, GraspNet or WebDataset",
         "burg-drake dataset export data --to bop -o data_bop",
         "burg-drake dataset export data --to graspnet --sensor-depth -o data_graspnet",
         "",
-        "What is damaged is named and left out; the exit code is 1 then.",
+        "Damaged samples are named and left out; the exit code is then 1.",
         options=_add_options,
     )
 
 
 def _add_options(parser: Parser) -> None:
-    parser.add_argument("data", metavar="DATA", help="folder of a data set")
+    parser.add_argument("data", metavar="DATA", help="folder of the data set")
     parser.add_argument("--to", required=True, choices=tuple(FORMATS), help="format")
     parser.add_argument(
         "-o", "--output", metavar="FOLDER", required=True, help="folder to write, new or empty"
@@ -42,15 +42,13 @@ def _add_options(parser: Parser) -> None:
     parser.add_argument(
         "--sensor-depth",
         action="store_true",
-        help="depth of the simulated sensor in place of the exact one (bop, graspnet; webdataset"
-        " has both)",
+        help="write the depth of the imitated camera, not the exact one",
     )
     parser.add_argument(
         "--depth-unit",
         metavar="METRES",
         type=positive,
-        help="what 1 stands for in a depth image (bop, webdataset; default: 0.0001; graspnet"
-        " always has 0.001)",
+        help="unit of depth images (default: 0.0001; graspnet: 0.001)",
     )
 
 

@@ -19,14 +19,14 @@ def add_to(verbs: Any) -> None:
         verbs,
         "render",
         run_render,
-        "render what a camera of the station sees of a scene",
+        "render what a camera of the station sees",
         "burg-drake render tabletop_six --camera board -o view.png",
         "burg-drake render tabletop_six --camera overview --arm -o view.png --depth --labels",
         "burg-drake render tabletop_six --renderer blender -o view.png",
         "",
-        "Depth, labels and normals go beside it: view.depth.png (16 bit, tenths of a millimetre,",
-        "0 is none), view.labels.png (numbers of the scene's instances from 1; 0 is all else) and",
-        "view.normals.png (16 bit; a component is (value - 32768) / 32767, in the camera frame).",
+        "Depth, labels and normals are written beside it: view.depth.png (16 bit, 0.1 mm, 0:"
+        " none), view.labels.png (instances from 1, 0: the rest), view.normals.png (16 bit,"
+        " component = (value - 32768) / 32767, camera frame).",
         options=_add_options,
     )
 
@@ -40,15 +40,15 @@ def _add_options(parser: Parser) -> None:
         "--camera",
         metavar="NAME",
         default="board",
-        help="of the station (default: %(default)s)",
+        help="camera of the station (default: %(default)s)",
     )
     parser.add_argument(
         "-o", "--output", metavar="FILE", required=True, help="file to write (.png)"
     )
-    parser.add_argument("--arm", action="store_true", help="with the arm, in its home posture")
+    parser.add_argument("--arm", action="store_true", help="show the arm in its home posture")
     add_options(parser, DatasetRecipe, "renderer")
     for kind in ("depth", "labels", "normals"):
-        parser.add_argument(f"--{kind}", action="store_true", help=f"write an image of {kind}, too")
+        parser.add_argument(f"--{kind}", action="store_true", help=f"also write {kind}")
 
 
 def run_render(arguments: argparse.Namespace) -> int:

@@ -15,7 +15,7 @@ def add_to(group: Any) -> None:
         group,
         "show",
         run_show,
-        "show a sample in Meshcat: scene, points, camera, grasps; or write a sheet of samples",
+        "show a sample in 3D, or many on a sheet",
         "burg-drake dataset show data",
         "burg-drake dataset show data --sample 000012_003 --html sample.html",
         "burg-drake dataset show data -o sheet.html",
@@ -25,23 +25,27 @@ def add_to(group: Any) -> None:
 
 
 def _add_options(parser: Parser) -> None:
-    parser.add_argument("data", metavar="DATA", help="folder of a data set")
+    parser.add_argument("data", metavar="DATA", help="folder of the data set")
     parser.add_argument(
         "--sample",
         metavar="KEY",
-        help="sample to show (default: the first one; on a sheet, some from all over)",
+        help="sample to show (default: the first)",
     )
     parser.add_argument(
         "-o",
         "--output",
         metavar="FILE",
-        help="write a sheet with colour, depth and labels of samples (.png or .html)",
+        help="write a sheet of samples (.png, .html)",
     )
     parser.add_argument(
-        "--rows", metavar="N", type=positive_int, default=4, help="of the sheet (default: 4)"
+        "--rows", metavar="N", type=positive_int, default=4, help="rows of the sheet (default: 4)"
     )
     parser.add_argument(
-        "--columns", metavar="N", type=positive_int, default=1, help="of the sheet (default: 1)"
+        "--columns",
+        metavar="N",
+        type=positive_int,
+        default=1,
+        help="columns of the sheet (default: 1)",
     )
     add_view(parser)
 

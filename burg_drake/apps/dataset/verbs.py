@@ -31,12 +31,12 @@ if TYPE_CHECKING:
 
 def add_to(verbs: Any) -> None:
     """Adds the verbs."""
-    group = add_group(verbs, "dataset", "training data: generate, check, show and export it")
+    group = add_group(verbs, "dataset", "make training data: images, labels, grasps")
     add_verb(
         group,
         "generate",
         run_generate,
-        "render views of many scenes with labels",
+        "render images with labels of many scenes",
         "burg-drake dataset generate --scenes 'scenes/*.yaml' --views 20 -o data",
         "burg-drake dataset generate --sample household:1000 -n 6 --workers 2 -o data",
         "burg-drake dataset generate --scenes tabletop_six --sensor d435 --grasps sample:100"
@@ -45,16 +45,15 @@ def add_to(verbs: Any) -> None:
         " -o data",
         "burg-drake dataset generate --scenes scenes/*.yaml --cluster cluster.yaml -o data",
         "",
-        "Interrupt it whenever you like: the same command continues. Every choice follows from",
-        "the seed. --recipe takes a YAML file for all that has no option; data/dataset.yaml has",
-        "one under `recipe`.",
+        "The same command continues where an interrupted one stopped. The same seed gives the"
+        " same data. data/dataset.yaml has a recipe for --recipe.",
         options=_add_generate_options,
     )
     add_verb(
         group,
         "check",
         run_check,
-        "look for damaged files, and render depth and labels anew to compare them",
+        "look for damaged files and wrong depth or labels",
         "burg-drake dataset check data",
         options=_add_data,
     )
@@ -63,7 +62,7 @@ def add_to(verbs: Any) -> None:
 
 
 def _add_data(parser: Parser) -> None:
-    parser.add_argument("data", metavar="DATA", help="folder of a data set")
+    parser.add_argument("data", metavar="DATA", help="folder of the data set")
 
 
 def _add_generate_options(parser: Parser) -> None:
@@ -72,10 +71,13 @@ def _add_generate_options(parser: Parser) -> None:
 
     source = parser.add_mutually_exclusive_group(required=True)
     source.add_argument(
-        "--scenes", metavar="SCENE", nargs="+", help="scenes: names, files or patterns of files"
+        "--scenes",
+        metavar="SCENE",
+        nargs="+",
+        help="scene files, patterns of files, or built-in scenes",
     )
     source.add_argument(
-        "--sample", metavar="LIBRARY:COUNT", help="sample so many scenes of a library's objects"
+        "--sample", metavar="LIBRARY:COUNT", help="sample COUNT scenes from a library"
     )
     parser.add_argument(
         "-n",
@@ -86,7 +88,11 @@ def _add_generate_options(parser: Parser) -> None:
     )
     add_station(parser)
     parser.add_argument(
-        "-o", "--output", metavar="DATA", required=True, help="folder to write, or to continue"
+        "-o",
+        "--output",
+        metavar="DATA",
+        required=True,
+        help="folder to write; the same command continues it",
     )
     parser.add_argument(
         "--camera",
@@ -101,16 +107,18 @@ def _add_generate_options(parser: Parser) -> None:
     parser.add_argument(
         "--plain",
         action="store_true",
-        help="as simulated cameras always see it: no varied lights, textures, distractors, noise",
+        help="no variation of light, textures, distractors and noise",
     )
     parser.add_argument(
         "--grasps",
         metavar="RUN|sample:N",
-        help="grasps of a run with their outcomes, or N sampled on each object",
+        help="grasps of a run with outcomes, or N sampled on each object",
     )
-    parser.add_argument("--recipe", metavar="FILE", help="YAML file with what has no option")
+    parser.add_argument(
+        "--recipe", metavar="FILE", help="YAML file with settings that have no option"
+    )
     who = parser.add_mutually_exclusive_group()
-    add_workers(who, "processes (default: %(default)d)", default=1)
+    add_workers(who, "worker processes (default: %(default)d)", default=1)
     add_cluster(who)
     add_quiet(parser)
 
@@ -131,7 +139,7 @@ def run_generate(arguments: argparse.Namespace) -> int:
         recipe = _replaced(recipe, sampled=sampled)
     elif arguments.objects is not None:
         raise InvalidInputError(
-            f"-n {arguments.objects}: how many objects stand in given scenes is in their documents"
+            f"-n {arguments.objects} is for sampled scenes; leave it out, or give --sample"
         )
     else:
         scenes = _given_scenes(arguments.scenes)

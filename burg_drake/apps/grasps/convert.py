@@ -36,7 +36,7 @@ def add_to(group: Any) -> None:
         group,
         "convert",
         run_convert,
-        "write grasps of one format in another",
+        "convert grasps between formats",
         "burg-drake grasps convert Mug_10f6_0.00027.h5 mug.h5 --rename mug",
         "burg-drake grasps convert grasps.h5 mug.yaml --to isaac_grasp --only mug",
         "burg-drake grasps convert grasps.h5 out/ --to graspgen --success-above 0.5",
@@ -44,11 +44,13 @@ def add_to(group: Any) -> None:
         "burg-drake grasps convert scene.npy grasps.h5 --scene tabletop_six --camera-pose cam.npy",
     )
     parser.add_argument(
-        "input", metavar="IN", type=input_file, help="file of grasps, or folder of a run"
+        "input", metavar="IN", type=input_file, help="grasp file, or folder of a run"
     )
-    parser.add_argument("output", metavar="OUT", help="file, or folder for one file an object")
+    parser.add_argument(
+        "output", metavar="OUT", help="file to write, or folder for a file per object"
+    )
     parser.add_argument("--formats", action=_ListFormats, nargs=0, help="list the formats and end")
-    add_file_options(parser)
+    add_file_options(parser, in_full=True)
     add_format(parser)
     add_hand(parser, default=None)
     _add_selection(parser)
@@ -63,7 +65,7 @@ def _add_selection(parser: Parser) -> None:
         "--success-above",
         metavar="SCORE",
         type=number,
-        help="count grasps of a higher score as successful, where OUT has success and no scores",
+        help="grasps with a higher score count as successful",
     )
 
 
@@ -71,20 +73,17 @@ def _add_placement(parser: Parser) -> None:
     """Options about frames."""
     group = parser.add_argument_group(
         "frames",
-        (
-            "For grasps whose poses in IN or OUT are given in the frame of a scene or a camera"
-            " instead of an object."
-        ),
+        ("For files whose poses are in the frame of a scene or a camera."),
     )
     group.add_argument("--scene", metavar="SCENE", help="scene in which the objects stand")
     add_camera_options(group)
     group.add_argument(
         "--frame",
         choices=tuple(FRAMES),
-        help="frame of the poses in IN, if not the one of its format",
+        help="frame of the poses in IN, if not the format's",
     )
     group.add_argument(
-        "--out-frame", choices=tuple(FRAMES), help="frame of the poses in OUT, likewise"
+        "--out-frame", choices=tuple(FRAMES), help="frame of the poses in OUT, if not the format's"
     )
 
 

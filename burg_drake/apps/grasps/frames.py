@@ -34,7 +34,7 @@ def add_to(verbs: Any) -> None:
         verbs,
         "frames",
         run_frames,
-        "explain our frames, and show the grasp frames of other projects next to ours",
+        "show frames and the grasp frames of other projects",
         "burg-drake frames --text",
         "burg-drake frames --html frames.html",
         "burg-drake frames acronym graspnet --hand wsg_50",
@@ -43,9 +43,7 @@ def add_to(verbs: Any) -> None:
         "names", metavar="NAME", nargs="*", help="formats of grasp files (default: all)"
     )
     add_hand(frames)
-    frames.add_argument(
-        "--text", action="store_true", help="print the tables alone, without a view"
-    )
+    frames.add_argument("--text", action="store_true", help="print only the tables")
     add_view(frames)
 
 

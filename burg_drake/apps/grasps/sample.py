@@ -40,21 +40,20 @@ def add_to(group: Any) -> None:
         group,
         "sample",
         run_sample,
-        "sample antipodal grasps on the objects of a scene or a library",
+        "sample antipodal grasps on objects",
         "burg-drake grasps sample tabletop_six -n 1000 -o grasps.h5",
         "burg-drake grasps sample tabletop_six --only mug --from-arm-side -o mug.h5",
         "burg-drake grasps sample household --only mug -n 500 --diverse 4 -o mug.npz",
         "burg-drake grasps sample household --standoffs-mm 0 4 -4 --approaches 6 -o many.h5",
         "",
-        "The grasps of an object follow from --seed, the object and its surroundings;",
-        "`evaluate` and `reach` sample the same ones with the same settings.",
+        "The same seed gives the same grasps; `evaluate` and `reach` sample them, too.",
         options=_add_options,
     )
 
 
 def _add_options(parser: Parser) -> None:
     parser.add_argument(
-        "source", metavar="SCENE|LIB", help="scene file or library folder, or a built-in name"
+        "source", metavar="SCENE|LIB", help="scene file, library folder, or built-in name"
     )
     add_sampling(parser, DEFAULT_GRASPS)
     parser.add_argument(
@@ -62,7 +61,7 @@ def _add_options(parser: Parser) -> None:
         "--output",
         metavar="OUT",
         required=True,
-        help="grasp file to write, such as .h5, or folder for one file an object",
+        help="grasp file to write, such as .h5, or folder for a file per object",
     )
     add_format(parser)
     add_station(parser)
@@ -81,8 +80,7 @@ def _add_settings(parser: Parser) -> None:
         nargs="+",
         default=[0.0],
         help=(
-            "shift of each grasp back along the approach; negative values shift it forward"
-            " (default: 0)"
+            "copies of each grasp, shifted back along its approach; negative: forward (default: 0)"
         ),
     )
     parser.add_argument(
@@ -91,7 +89,7 @@ def _add_settings(parser: Parser) -> None:
         type=_named_file,
         action="append",
         default=[],
-        help="density of contacts on each face of an object's surface; may be given several times",
+        help="weight of each mesh face when contacts are sampled; repeatable",
     )
     add_options(parser, SamplingSettings, "margin", "conservative", "diverse")
 

@@ -21,27 +21,30 @@ if TYPE_CHECKING:
     from burg_drake.core.grasps import GraspSet
 
 
+COLUMNS_TEXT = """\
+Adds these columns, which are nan where a pad meets nothing:
+  of the grasp  force_closure, friction_needed, antipodal_angle [rad],
+                slide [m] until the pads hold the object (inf: never)
+  of the grip   epsilon, volume, patch_area [m2], contact_offset [m],
+                load_margin (load in weights of the object, worst direction),
+                gravity_margin (the same along gravity, in a scene)
+  of the scene  clearance [m] (negative: overlap), nearest, screened,
+                collides_with"""
+
+
 def add_to(group: Any) -> None:
     """Adds the verb."""
     add_verb(
         group,
         "score",
         run_score,
-        "score grasps analytically: force closure, epsilon, the weight they can hold",
+        "score grasps by formulas: force closure, epsilon, load",
         "burg-drake grasps score grasps.h5 -o scored.h5",
         "burg-drake grasps score grasps.h5 --scene tabletop_six --by gravity_margin -o scored.h5",
         "burg-drake grasps score theirs.json --library household --rename mug -o ours.h5",
         "burg-drake grasps score grasps.h5 --friction 0.5 --friction mug=0.3",
         "",
-        "Adds a column for each metric. Of the grasp as given: force_closure, friction_needed,",
-        "antipodal_angle [rad]. Where pads meet faces that lean more than friction holds, the",
-        "object slides in the hand until they hold it: slide [m], inf if they never do. Of the",
-        "object at rest there: epsilon, volume, load_margin (how many times its weight the grip",
-        "withstands, in the worst direction), gravity_margin (along gravity, in a",
-        "scene; below 1 the object begins to turn in the hand, which need not be a drop),",
-        "patch_area [m2], contact_offset [m]. In a scene also clearance [m], negative where the",
-        "open hand overlaps something, nearest, screened (clear, or which collision),",
-        "collides_with. Where a pad meets nothing, metrics are nan.",
+        COLUMNS_TEXT,
         options=_add_options,
     )
 
@@ -59,7 +62,7 @@ def _add_options(parser: Parser) -> None:
         "-o",
         "--output",
         metavar="OUT",
-        help="grasp file to write, or folder for one file an object (default: only print)",
+        help="grasp file to write, or folder (default: only print)",
     )
     add_format(parser)
     add_source(parser)
@@ -68,8 +71,7 @@ def _add_options(parser: Parser) -> None:
         "--by",
         metavar="METRIC",
         default=DEFAULT_METRIC,
-        help="metric that becomes the score, its negative where less is better"
-        " (default: %(default)s)",
+        help="metric to use as score; its negative where less is better (default: %(default)s)",
     )
     parser.add_argument(
         "--friction",
@@ -77,7 +79,7 @@ def _add_options(parser: Parser) -> None:
         type=friction,
         action="append",
         default=[],
-        help="coefficient (default: the object's); may be given several times",
+        help="friction coefficient (default: the object's); repeatable",
     )
     add_renaming(parser)
     add_quiet(parser)

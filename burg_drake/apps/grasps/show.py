@@ -38,7 +38,7 @@ def add_to(group: Any) -> None:
         group,
         "show",
         run_show,
-        "show grasps in Meshcat, coloured by outcome, score or any other column",
+        "show grasps in 3D, coloured by outcome or score",
         "burg-drake grasps show runs/first",
         "burg-drake grasps show runs/first --only mug --outcome lifted,slipped --all",
         "burg-drake grasps show runs/first --select mug-0123456789ab",
@@ -46,9 +46,8 @@ def add_to(group: Any) -> None:
         "burg-drake grasps show grasps.h5 --color clearance --html grasps.html",
         "burg-drake grasps show mug.h5 --library household --only mug",
         "",
-        "A click on a grasp of a page, or in its list, shows the whole gripper there; in the live",
-        "view the slider `grasp` of Meshcat's controls does, in the order of the list: the highest",
-        "value of the coloured column first, or the best.",
+        "A click on a grasp, or on its line in the list, shows the whole gripper there. In the"
+        " live view the slider `grasp` does.",
     )
     show.add_argument(
         "file", metavar="RUN|FILE", type=input_file, help="folder of a run, or any grasp file"
@@ -61,16 +60,14 @@ def add_to(group: Any) -> None:
     show.add_argument(
         "--color",
         metavar="COLUMN",
-        help="column shown by colours, of the file or of the results of a run (default: outcome,"
-        " else score, if there is any)",
+        help="column to colour by (default: outcome, else score)",
     )
     show.add_argument(
         "--range",
         metavar=("LO", "HI"),
         nargs=2,
         type=number,
-        help="smallest and largest number on the colour scale (default: those of the grasps"
-        " shown, without outliers)",
+        help="ends of the colour scale (default: of the grasps shown, without outliers)",
     )
     add_view(show)
 

@@ -23,7 +23,7 @@ def add_choice(show: Parser) -> None:
         "--outcome",
         metavar="A,B",
         type=_outcomes,
-        help="only grasps with these outcomes: " + ", ".join(Outcome),
+        help="only grasps with these outcomes, such as lifted,slipped,no_ik",
     )
     count = show.add_mutually_exclusive_group()
     count.add_argument(
@@ -31,12 +31,10 @@ def add_choice(show: Parser) -> None:
         metavar="N",
         type=positive_int,
         default=DEFAULT_MOST,
-        help="the best N grasps of each object: of a run those that were lifted, as `replay --best`"
-        " ranks them, and then those that came farthest; of a file those with the highest scores,"
-        " or without scores evenly taken (default: %(default)s)",
+        help="show the best N grasps of each object (default: %(default)s)",
     )
-    count.add_argument("--all", action="store_true", help="all grasps")
-    show.add_argument("--select", metavar="ID", help="begin with the whole gripper at this grasp")
+    count.add_argument("--all", action="store_true", help="show all grasps")
+    show.add_argument("--select", metavar="ID", help="show the gripper at this grasp first")
 
 
 def choose(

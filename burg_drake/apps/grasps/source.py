@@ -67,10 +67,12 @@ def add_source(parser: Parser) -> None:
     """The options --scene and --library."""
     which = parser.add_mutually_exclusive_group()
     which.add_argument(
-        "--scene", metavar="SCENE", help="where the objects stand (default: what the file names)"
+        "--scene",
+        metavar="SCENE",
+        help="scene of the grasps (default: what the file names)",
     )
     which.add_argument(
-        "--library", metavar="LIB", help="where the objects are (default: what the file names)"
+        "--library", metavar="LIB", help="library of the grasps (default: what the file names)"
     )
 
 

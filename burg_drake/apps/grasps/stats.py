@@ -32,14 +32,13 @@ def add_to(group: Any) -> None:
         group,
         "stats",
         run_stats,
-        "print statistics of a set of grasps, and how well it covers another one",
+        "print statistics of a set of grasps, or compare two sets",
         "burg-drake grasps stats grasps.h5",
         "burg-drake grasps stats reference.h5 mine.h5 --translation-mm 10 --angle-deg 20",
         "burg-drake grasps stats reference.h5 mine.h5 --distance-mm 15 --angle-deg 180",
         "burg-drake grasps stats runs/first --ap outcome --json stats.json",
         "",
-        "Distances treat the two fingers as equal, and pair grasps of the same object only (and",
-        "of the same instance, where both sets name instances).",
+        "The two fingers count as equal. Only grasps of the same object are compared.",
         options=_add_options,
     )
 
@@ -56,14 +55,14 @@ def _add_options(parser: Parser) -> None:
     add_file_options(parser)
     add_hand(parser, default=None)
     add_renaming(parser)
-    match = parser.add_argument_group("what counts as a match of A and B (all must hold)")
+    match = parser.add_argument_group("grasps of A and B match if all hold")
     add_options(match, Tolerance, "translation", "angle", "distance")
     add_options(parser, Tolerance, "lever")
     parser.add_argument(
         "--ap",
         metavar="COLUMN",
-        help="average precision of the scores, judged by a column: friction_needed (where what"
-        " collides is bad, by clearance, screened or outcome), outcome, or one of 0 and 1",
+        help="average precision of the scores against a column: friction_needed, outcome, or one"
+        " of 0 and 1",
     )
     parser.add_argument("--json", metavar="FILE", help="write all figures to this file")
 

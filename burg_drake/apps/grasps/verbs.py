@@ -10,6 +10,6 @@ from burg_drake.apps.options import add_group
 
 def add_to(verbs: Any) -> None:
     """Adds the verbs."""
-    group = add_group(verbs, "grasps", "sample, score, look at, compare and exchange grasps")
+    group = add_group(verbs, "grasps", "sample, score, show, convert and compare grasps")
     for module in (sample, score, show, convert, stats):
         module.add_to(group)

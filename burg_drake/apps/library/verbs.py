@@ -23,14 +23,7 @@ from burg_drake.apps.options import (
 )
 
 FORMATS_TEXT = """\
-meshes: up to 512 MB and 2,000,000 triangles (1,000,000 of an open surface, which becomes a wall),
-textures up to 8192 x 8192 pixels; larger ones are refused
-
-format of masses.yaml: 'NAME: KG' lines, NAME a mesh file without its suffix
-  mug: 0.118
-  cracker_box: 0.411
-
-format of objects.yaml, which takes every setting of an object:
+objects.yaml takes all settings of an object:
   version: 1
   defaults: {unit: mm, friction: 0.4}
   objects:
@@ -39,16 +32,16 @@ format of objects.yaml, which takes every setting of an object:
     rack: {mesh: scans/rack.stl, mass: 0.4, decomposition: {threshold: 0.02}}
     chair: {mesh: chair.obj, mass: 0.9, pieces: [seat.obj, back.obj]}
 
-convex pieces: 'decomposition.threshold' says how finely a shape is cut into them (0.01 to 1,
-default 0.05). Pieces of more than 1.25 times the volume, or off by more than 5 % of the diagonal,
-are coarse: where no threshold is given, 0.02 and 0.01 are then tried, with at most 96 pieces, and
-build says what came of it. 'decomposition.timeout' bounds the CPU time of a cut (300 s); 'pieces'
-names mesh files of convex pieces of your own"""
+A smaller decomposition.threshold (0.01 to 1) makes finer convex pieces; where none is given and\
+ the pieces of 0.05 are coarse, 0.02 and 0.01 are tried. `pieces` names convex pieces of your own.
+
+Meshes may have 512 MB and 2,000,000 triangles, with openings 1,000,000; textures 8192 x 8192\
+ pixels."""
 
 
 def add_to(verbs: Any) -> None:
     """Adds the verbs."""
-    group = add_group(verbs, "library", "build, check and show object libraries")
+    group = add_group(verbs, "library", "make objects from meshes; check and show them")
     _add_build(group)
     _add_add(group)
     _add_imports(group)
@@ -60,7 +53,7 @@ def _add_build(group: Any) -> None:
         group,
         "build",
         run_build,
-        "make simulation-ready objects from meshes; what has not changed is not built again",
+        "make objects for simulation from meshes",
         "burg-drake library build scans/*.obj -o my_library",
         "burg-drake library build mug.stl -o my_library --unit mm --mass mug=0.118",
         "burg-drake library build scans/ -o my_library --masses masses.yaml --friction 0.4",
@@ -75,7 +68,8 @@ def _add_build_options(build: Parser) -> None:
         "meshes",
         metavar="MESH",
         nargs="+",
-        help="mesh files (obj, ply, stl, off, glb, gltf), folders of them, or an objects.yaml",
+        help="mesh files (.obj, .ply, .stl, .off, .glb, .gltf), folders of them, or an"
+        " objects.yaml",
     )
     _add_output(build)
     _add_named_values(build)
@@ -87,7 +81,7 @@ def _add_add(group: Any) -> None:
         group,
         "add",
         run_add,
-        "add one object to a library, or build it anew (what is not given gets its default)",
+        "add one object, or build it again",
         "burg-drake library add my_library mug.obj --mass 0.118 --friction 0.4",
         "burg-drake library add my_library scan_7.ply --name towel --mass 0.2"
         " --wall-thickness 0.005",
@@ -100,12 +94,15 @@ def _add_add_options(add: Parser) -> None:
 
     add.add_argument("library", metavar="LIBRARY", help="folder of the library")
     add.add_argument("mesh", metavar="MESH", help="mesh file")
-    add.add_argument("--name", help="the object's name (default: that of the mesh file)")
-    add.add_argument("--mass", metavar="KG", type=positive, help="mass")
+    add.add_argument("--name", help="name of the object (default: that of the mesh file)")
+    add.add_argument("--mass", metavar="KG", type=positive, help="mass in kg")
     add.add_argument(
-        "--friction", metavar="MU", type=coefficient, help=f"default: {DEFAULT_FRICTION:g}"
+        "--friction",
+        metavar="MU",
+        type=coefficient,
+        help=f"friction coefficient (default: {DEFAULT_FRICTION:g})",
     )
-    add.add_argument("--description", metavar="TEXT", help="for people")
+    add.add_argument("--description", metavar="TEXT", help="a note for people")
     _add_common_values(add)
 
 
@@ -114,7 +111,7 @@ def _add_imports(group: Any) -> None:
         group,
         "import-burg",
         run_import_burg,
-        "build a library from an object_library.yaml of BURG-Toolkit",
+        "build a library from BURG-Toolkit's",
         "burg-drake library import-burg object_library.yaml -o my_library",
         "burg-drake library import-burg object_library.yaml -o my_library --mass table=4",
         options=_add_burg_options,
@@ -123,24 +120,28 @@ def _add_imports(group: Any) -> None:
         group,
         "import-ycb",
         run_import_ycb,
-        "build a library from a download of the YCB object set, with its published masses",
+        "build a library from a download of the YCB objects",
         "burg-drake library import-ycb ~/data/ycb -o ycb_library",
         options=_add_ycb_options,
     )
 
 
 def _add_burg_options(burg: Parser) -> None:
-    burg.add_argument("file", metavar="FILE", help="object_library.yaml, version 1.0")
     burg.add_argument(
-        "--skip", metavar="NAME", action="append", default=[], help="leave an object out"
+        "file", metavar="FILE", help="object_library.yaml of BURG-Toolkit, version 1.0"
     )
-    _add_import_options(burg, " (default: they stay fixed, as background)")
+    burg.add_argument(
+        "--skip",
+        metavar="NAME",
+        action="append",
+        default=[],
+        help="leave out this object; repeatable",
+    )
+    _add_import_options(burg, " (default: such objects stay fixed, as background)")
 
 
 def _add_ycb_options(ycb: Parser) -> None:
-    ycb.add_argument(
-        "folder", metavar="DIR", help="folder that holds the objects' folders or files"
-    )
+    ycb.add_argument("folder", metavar="DIR", help="folder with the downloaded objects")
     _add_import_options(ycb)
 
 
@@ -164,32 +165,33 @@ def _add_views(group: Any) -> None:
         group,
         "check",
         run_check,
-        "report what pads touch, and what is missing, stale or implausible (exit code 1 if"
-        " something has to be fixed)",
+        "look for mistakes in a library",
         "burg-drake library check my_library",
     )
     show = add_verb(
         group,
         "show",
         run_show,
-        "show objects, their convex pieces, contact surfaces and stable poses in Meshcat",
+        "show objects in 3D: pieces, contact surfaces, stable poses",
         "burg-drake library show household",
         "burg-drake library show my_library --only mug,bowl",
         "burg-drake library show my_library --html gallery.html --sheet sheet.html",
     )
     for verb in (listing, check, show):
         verb.add_argument(
-            "library", metavar="LIBRARY", help="folder of a library, or name of a built-in one"
+            "library", metavar="LIBRARY", help="folder of a library, or the built-in household"
         )
     show.add_argument(
         "--only",
         metavar="A,B",
         type=names,
         action="extend",
-        help="these objects alone",
+        help="only these objects",
     )
     show.add_argument(
-        "--sheet", metavar="FILE", help="write a contact sheet: one page with pictures and figures"
+        "--sheet",
+        metavar="FILE",
+        help="also write a page with a picture and key figures of each object",
     )
     add_view(show)
 
@@ -198,7 +200,7 @@ def _add_output(parser: Parser) -> None:
     parser.add_argument(
         "-o", "--output", metavar="DIR", required=True, help="folder of the library"
     )
-    parser.add_argument("--name", help="the library's name (default: that of its folder)")
+    parser.add_argument("--name", help="name of the library (default: that of its folder)")
 
 
 def _add_named_values(parser: Parser) -> None:
@@ -210,13 +212,13 @@ def _add_named_values(parser: Parser) -> None:
         type=named_positive,
         action="append",
         default=[],
-        help="mass of an object; may be given several times",
+        help="mass of an object in kg; repeatable",
     )
     parser.add_argument(
         "--masses",
         metavar="FILE",
         type=input_file,
-        help="YAML file of 'NAME: KG' lines, - for the standard input; --mass goes first",
+        help="YAML file of 'NAME: KG' lines, '-' for standard input; --mass wins",
     )
     parser.add_argument(
         "--friction",
@@ -224,13 +226,16 @@ def _add_named_values(parser: Parser) -> None:
         type=friction,
         action="append",
         default=[],
-        help=f"coefficient of one object or of all (default: {DEFAULT_FRICTION:g})",
+        help=f"friction coefficient of one object or of all (default: {DEFAULT_FRICTION:g})",
     )
 
 
 def _add_density(parser: Parser, without: str = "") -> None:
     parser.add_argument(
-        "--density", metavar="KG/M3", type=positive, help=f"for objects without a mass{without}"
+        "--density",
+        metavar="KG/M3",
+        type=positive,
+        help=f"density of objects without a mass{without}",
     )
 
 
@@ -249,32 +254,30 @@ def _add_common_values(parser: Parser) -> None:
         help=f"unit of one mesh or of all: {', '.join(UNITS)} (default: m)",
     )
     scale.add_argument(
-        "--scale", type=positive, help="factor from the meshes' unit to metres: 0.0005, for example"
+        "--scale", type=positive, help="factor from the meshes' unit to metres, such as 0.0005"
     )
     parser.add_argument(
         "--wall-thickness",
         metavar="M",
         type=positive,
-        help=(
-            "closed surfaces are hollow with a wall of this thickness; open ones become such a wall"
-        ),
+        help=("treat surfaces as walls of this thickness in metres"),
     )
     parser.add_argument(
         "--openings",
         choices=get_args(Openings),
-        help="large openings: make the surface a wall (default), or close them",
+        help="large openings in a mesh: make the surface a wall (default), or close them",
     )
     parser.add_argument(
         "--contact",
         choices=CONTACT_KINDS,
-        help="collision geometry in simulation (default: chosen by the object's shape)",
+        help="collision geometry (default: chosen by the shape)",
     )
     _add_effort(parser)
 
 
 def _add_effort(parser: Parser) -> None:
     parser.add_argument(
-        "--no-confirm", action="store_true", help="do not simulate the stable poses"
+        "--no-confirm", action="store_true", help="skip the simulation that confirms stable poses"
     )
     add_workers(parser)
     add_quiet(parser)

@@ -1,6 +1,7 @@
 from .arguments import (
     DEFAULT_STATION as DEFAULT_STATION,
     Parser as Parser,
+    VerbGroup as VerbGroup,
     add_group as add_group,
     add_measured_board as add_measured_board,
     add_only as add_only,

@@ -31,11 +31,10 @@ def add_live_camera(parser: Any) -> None:
     """The options --intrinsics and --fps, of verbs that follow what a camera sees."""
     add_intrinsics(
         parser,
-        "intrinsics of the camera, our document or a camera_info file of ROS; see burg-drake"
-        " camera calibrate. Simulated cameras need none",
+        "intrinsics of the camera, by burg-drake camera calibrate; simulated cameras need none",
     )
     parser.add_argument(
-        "--fps", type=positive, metavar="N", help="frame rate of the camera, in images per second"
+        "--fps", type=positive, metavar="N", help="images per second to request from the camera"
     )
 
 
@@ -45,8 +44,7 @@ def add_depth_unit(parser: Any) -> None:
         "--depth-unit",
         metavar="M",
         type=positive,
-        help="unit of the depth image's numbers in metres"
-        " (default: 0.001 for whole numbers, 1 for others)",
+        help="unit of the depth image in metres (default: 0.001 for whole numbers, else 1)",
     )
 
 

@@ -20,8 +20,8 @@ def add_cluster(group: Any) -> None:
     group.add_argument(
         "--cluster",
         metavar="WHERE",
-        help="work on a cluster of Dask: tls://HOST:PORT of a scheduler, a cluster.yaml, or"
-        " local:N for N workers on this machine (needs burg-drake[dask]; see docs/scale.md)",
+        help="use a Dask cluster: tls://HOST:PORT, a cluster.yaml, or local:N (needs"
+        " burg-drake[dask])",
     )
 
 

@@ -32,15 +32,14 @@ def add_given(parser: Parser, which: Any) -> None:
         "--grasps",
         metavar="FILE|RUN",
         type=input_file,
-        help="judge the grasps of this file, in any known format, or those of a run's folder,"
-        " instead of sampling",
+        help="grasps of this file or run, instead of sampling",
     )
     group = parser.add_argument_group(
         "with --grasps",
-        "The format is recognised by the file's content; see `burg-drake grasps convert --help`.",
+        "`burg-drake grasps convert --formats` lists the formats.",
     )
     group.add_argument(
-        "--grasps-format", metavar="NAME", help="format of the file (default: by its content)"
+        "--grasps-format", metavar="NAME", help="format of the file (default: recognised)"
     )
     add_reading(group)
     group.add_argument(
@@ -49,12 +48,12 @@ def add_given(parser: Parser, which: Any) -> None:
         action="append",
         type=renaming,
         default=[],
-        help="object or instance of the scene that grasps are of; once for each name in the file",
+        help="object or instance of the grasps; once for each name in the file",
     )
     group.add_argument(
         "--grasps-frame",
         choices=tuple(FRAMES),
-        help="frame of the poses, if not the one of the format",
+        help="frame of the poses, if not the format's",
     )
     add_camera_options(group)
 

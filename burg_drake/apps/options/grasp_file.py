@@ -14,34 +14,38 @@ if TYPE_CHECKING:
     from burg_drake.station.document import Station
 
 DEFAULT_HAND = "panda_hand"
+CORRECTIONS = (
+    " (degrees about x, y or z), forward:103.4 (mm along the approach), inverse, transposed, wxyz,"
+    " xyzw, y_up, z_up, millimetres, half_widths"
+)
+"""After the first one, in a help text."""
 
 FRAMES = {"object": "object", "scene": "world", "camera": "camera"}
 """What `formats` calls the choices of options about frames."""
 
 
-def add_file_options(parser: Parser) -> None:
+def add_file_options(parser: Parser, *, in_full: bool = False) -> None:
     """The options --from, --gripper-link and --correction, by which a file is read."""
     parser.add_argument(
-        "--from", dest="source", metavar="FORMAT", help="format to read (default: by the content)"
+        "--from", dest="source", metavar="FORMAT", help="format to read (default: recognised)"
     )
-    add_reading(parser)
+    add_reading(parser, in_full=in_full)
 
 
-def add_reading(parser: Any) -> None:
+def add_reading(parser: Any, *, in_full: bool = False) -> None:
     """The options --gripper-link and --correction."""
     parser.add_argument(
         "--gripper-link",
         metavar="NAME",
-        help="name of the hand's body in isaac_grasp files (default: that in its model)",
+        help="hand's link in isaac_grasp files (default: its own)",
     )
     parser.add_argument(
         "--correction",
         metavar="NAME,...",
         type=lambda text: tuple(text.split(",")),
         default=(),
-        help="read poses that are meant otherwise: turn:z90 (degrees about z, the approach, x, the"
-        " closing direction, or y), forward:103.4 (mm along the approach), inverse, transposed,"
-        " wxyz, xyzw, y_up, z_up, millimetres, half_widths",
+        help="correct poses, such as turn:z90"
+        + (CORRECTIONS if in_full else " (see burg-drake grasps convert --help)"),
     )
 
 
@@ -51,8 +55,8 @@ def add_hand(parser: Parser, default: str | None = DEFAULT_HAND) -> None:
         "--hand",
         metavar="HAND",
         default=default,
-        help="hand that grasps are for: document or built-in name (default:"
-        f" {default or f'the one that a file of ours names, else {DEFAULT_HAND}'})",
+        help="hand file or built-in name (default:"
+        f" {default or f'that of the file, else {DEFAULT_HAND}'})",
     )
 
 
@@ -64,15 +68,15 @@ def add_camera_options(group: Any) -> None:
         type=input_file,
         nargs="+",
         default=[],
-        help="pose of the file's camera (or world) in the scene frame: 4x4 .npy, FILE:INDEX for"
-        " one of several, or YAML; several are multiplied",
+        help="pose of the camera in the scene: 4x4 .npy, FILE:INDEX, or YAML; several are"
+        " multiplied",
     )
     group.add_argument(
         "--object-ids",
         metavar="ID=NAME,...",
         type=numbering,
         default={},
-        help="instances by object id; without, grasps go to what is between their fingers",
+        help="instances by object id (default: the object between the fingers)",
     )
     group.add_argument("--scene-id", metavar="ID", help="scene to read from a file of several")
 
@@ -106,7 +110,7 @@ def add_file_station(parser: Parser) -> None:
     """The option --station, of verbs whose files may name one."""
     add_station(
         parser,
-        f"station file or built-in name (default: what the file names, else {DEFAULT_STATION})",
+        f"station file or built-in name (default: that of the file, else {DEFAULT_STATION})",
         default=None,
     )
 
@@ -126,7 +130,9 @@ def station_for(arguments: argparse.Namespace, path: str) -> Station:
         return load_station(arguments.station)
     reference = station_reference(path)
     if reference is not None and not is_resolved(reference, "stations"):
-        raise UnknownNameError(f"{path} names a station: {reference} is not there; give --station")
+        raise UnknownNameError(
+            f"{path} names a station that is not there: {reference}; give --station"
+        )
     try:
         return load_station(reference or DEFAULT_STATION)
     except UnknownNameError as error:
@@ -157,5 +163,5 @@ def _gripper_of_file(path: str | None) -> Gripper:
         return named_gripper(reference)
     except BurgError as error:
         raise UnknownNameError(
-            f"{path} has grasps for a hand that cannot be used; name one (--hand): {error}"
+            f"the hand that {path} names cannot be used; give another (--hand): {error}"
         ) from error

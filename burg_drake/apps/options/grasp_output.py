@@ -41,9 +41,9 @@ class Output:
         """
         if self.format.one_object and not self.is_folder and len(set(objects)) > 1:
             raise InvalidInputError(
-                f"the grasps are of {len(set(objects))} objects ({listing(sorted(set(objects)))})"
-                f" and a file of {self.format.title} holds those of one; choose one of them, or"
-                f" name a folder, which gets one file an object: {self.path.with_suffix('')}/"
+                f"a file of {self.format.title} holds grasps of one object, and these are of"
+                f" {len(set(objects))} ({listing(sorted(set(objects)))}); choose one, or give a"
+                f" folder for a file per object: {self.path.with_suffix('')}/"
             )
 
     def write(self, grasps: GraspSet, gripper: Gripper) -> None:
@@ -98,8 +98,8 @@ def output_of(path: str, target: str | None, *, frame: str | None = None) -> Out
         raise InvalidInputError(f"{error} (--to)") from error
     if frame is not None and format.frame != frame:
         raise InvalidInputError(
-            f"{format.title} has grasps in the {format.frame} frame; write a .h5 file, and bring"
-            " that into the other frame with `burg-drake grasps convert`"
+            f"{format.title} has grasps in the {format.frame} frame; write a .h5 file, then convert"
+            " it with `burg-drake grasps convert`"
         )
     require_writable(out / "grasps" if is_folder else out)
     return Output(out, format, is_folder)

@@ -20,8 +20,7 @@ def add_motion(parser: Parser) -> None:
 
     group = parser.add_argument_group(
         "motion of the hand",
-        "Defaults are those of the station's document, or else:\n100 mm straight in, and 300 mm"
-        " straight up.",
+        "Default: what the station says, else 100 mm approach and 300 mm lift.",
     )
     add_options(group, GraspMotion, unset=True)
 

@@ -10,14 +10,12 @@ from burg_drake.apps.options.values import port
 
 def add_view(parser: Parser) -> None:
     """The options of verbs that show something."""
+    parser.add_argument("--html", metavar="FILE", help="write one web page instead of a live view")
     parser.add_argument(
-        "--html", metavar="FILE", help="write one self-contained page instead of a live view"
+        "--port", type=port, metavar="N", help="port of the live view (default: first free)"
     )
     parser.add_argument(
-        "--port", type=port, metavar="N", help="where the live view listens (default: first free)"
-    )
-    parser.add_argument(
-        "--no-wait", action="store_true", help="do not keep the live view open until Ctrl-C"
+        "--no-wait", action="store_true", help="end at once instead of waiting for Ctrl-C"
     )
 
 
@@ -29,13 +27,13 @@ def add_page(parser: Any, network: str) -> None:
         network: who can do what with it if it is not for this computer alone, after "with 0.0.0.0".
     """
     parser.add_argument(
-        "--port", type=port, metavar="N", help="where the page is served (default: first free)"
+        "--port", type=port, metavar="N", help="port of the page (default: first free)"
     )
     parser.add_argument(
         "--host",
         metavar="ADDRESS",
         default="127.0.0.1",
-        help="address to serve it on. The default is for this computer alone; with 0.0.0.0"
+        help="address to serve on (default: 127.0.0.1, this computer alone); with 0.0.0.0"
         f" {network}",
     )
     parser.add_argument("--open", action="store_true", help="open the page in the browser")

@@ -15,8 +15,7 @@ def add_retry_failed(parser: argparse.ArgumentParser, what: str) -> None:
     parser.add_argument(
         "--retry-failed",
         action="store_true",
-        help=f"retry all {what} that an earlier command could not simulate; those whose worker"
-        " process was ended from outside are retried in any case",
+        help=f"also retry {what} that could not be simulated",
     )
 
 

@@ -1,4 +1,5 @@
 from . import (
+    demo as demo,
     evaluate as evaluate,
     merge as merge,
     reach as reach,

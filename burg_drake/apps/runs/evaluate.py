@@ -55,44 +55,40 @@ def add_to(verbs: Any) -> None:
         verbs,
         "evaluate",
         run_evaluate,
-        "judge grasps of scenes on a station: clear, reachable, planned, executed",
+        "evaluate grasps: clear hand, reach of the arm, lift",
         "burg-drake evaluate tabletop_six --grasps-per-object 100 -o runs/first",
-        "burg-drake evaluate my_scene.yaml --station my_station.yaml --table parquet -o runs/mine",
+        "burg-drake evaluate my_scene.yaml --station my_station.yaml -o runs/mine",
         "burg-drake evaluate tabletop_six --only mug,bowl -n 500 -o runs/two",
         "burg-drake evaluate tabletop_six --until-balanced 10 -o runs/lab",
-        "burg-drake evaluate my_scene.yaml --grasps my_grasps.npz --mode hand",
-        "burg-drake evaluate tabletop_six --grasps-per-object 20 --mode arm -o runs/arm",
-        "burg-drake evaluate my_scene.yaml --station panda_shelf --least-lift-mm 20",
+        "burg-drake evaluate tabletop_six -n 20 --mode arm -o runs/arm",
         "burg-drake evaluate my_scene.yaml --grasps Mug_3f2a_0.01.h5 --grasps-object mug",
         "burg-drake evaluate tabletop_six -n 1000 --cluster tls://head.example.org:8786",
         "burg-drake evaluate my_scene.yaml --grasps network.npy --camera-pose camera.yaml",
-        "burg-drake evaluate scenes/*.yaml -n 100 -o runs/many",
         "burg-drake evaluate scenes/ -n 100 --shard 2/8 -o runs/shard2",
         "burg-drake evaluate tabletop_six -o runs/first --rejudge contested --engine reference",
         "",
         "The same command continues where an interrupted one stopped.",
-        options=_add_options,
+        options=add_options_to,
     )
     parser.set_defaults(after_interrupt="; run the same command to continue")
 
 
-def _add_options(parser: Parser) -> None:
+def add_options_to(parser: Parser) -> None:
+    """Adds what the verb takes."""
     from burg_drake.evaluation.records import EvaluationSettings
 
     parser.add_argument(
         "scenes",
         metavar="SCENE",
         nargs="+",
-        help="scene file, folder of scenes, or name of a built-in one:"
-        f" {scene_names()}; several make one run over all of them",
+        help=f"scene file, folder of scenes, or built-in: {scene_names()}",
     )
     add_station(parser)
     parser.add_argument(
         "-o",
         "--output",
         metavar="RUN",
-        help=f"folder for the run (default: {DEFAULT_OUTPUT}/NAME-OF-THE-SCENE; required for"
-        " several scenes)",
+        help=f"folder of the run (default: {DEFAULT_OUTPUT}/SCENE; required for several scenes)",
     )
     which = parser.add_mutually_exclusive_group()
     add_sampling(parser, DEFAULT_GRASPS, which)
@@ -114,8 +110,7 @@ def _add_options(parser: Parser) -> None:
     parser.add_argument(
         "--scene-reports",
         action=argparse.BooleanOptionalAction,
-        help="write a report for each of several scenes, too (default: for up to a hundred"
-        " scenes). burg-drake report RUN/scenes/NAME makes one later",
+        help="also write a report for each of several scenes (default: for up to 100)",
     )
     add_quiet(parser)
 

@@ -14,12 +14,12 @@ def add_to(verbs: Any) -> None:
         verbs,
         "merge",
         run_merge,
-        "merge shards of a run, or copies of it that were interrupted",
+        "join the shards of a run",
         "burg-drake merge runs/shard* -o runs/whole",
     )
     parser.add_argument("runs", metavar="RUN", nargs="+", help="folder of a run")
     parser.add_argument(
-        "-o", "--output", metavar="RUN", required=True, help="folder for the merged run"
+        "-o", "--output", metavar="RUN", required=True, help="folder of the merged run"
     )
 
 

@@ -53,18 +53,16 @@ def add_to(verbs: Any) -> None:
         verbs,
         "reach",
         run_reach,
-        "find which grasps the arm can execute, and what prevents the others",
+        "find which grasps the arm can reach, and what stops it",
         "burg-drake reach tabletop_six --grasps grasps.h5 -o reach.csv",
         "burg-drake reach my_scene.yaml --grasps theirs.h5 --station panda_shelf -o reach.h5",
         "burg-drake reach tabletop_six --grasps-per-object 50 --plans plans/",
         "burg-drake reach tabletop_six --grasps grasps.h5 --only-reachable -o feasible.h5",
         "burg-drake reach my_scene.yaml --station panda_shelf --retreat-mm 100 --least-lift-mm 20",
         "",
-        "A grasp is reachable if the open hand is clear, also on the straight approach, and with",
-        "the object in it on the straight retreat and lift, the arm can follow them, and it finds",
-        "a path from home to the pregrasp. Each yes is checked by Drake's CollisionChecker;",
-        "each no says what failed first and what was in the way. Nothing is simulated; `evaluate`",
-        "does that.",
+        "A grasp is reachable if the open hand is clear, the arm can follow approach, retreat and"
+        " lift, and it finds a path from home. Each yes is checked by Drake. Nothing is"
+        " simulated; `evaluate` does that.",
         options=_add_options,
     )
 
@@ -82,30 +80,25 @@ def _add_options(parser: Parser) -> None:
         "-o",
         "--output",
         metavar="OUT",
-        help="table (.csv, .parquet) or grasp file (such as .npz, .h5), or folder for one file an"
+        help="table (.csv, .parquet), grasp file (.h5, .npz, ...), or folder for a file per"
         " object (default: only print)",
     )
     add_format(parser)
-    parser.add_argument(
-        "--only-reachable", action="store_true", help="write only grasps that the arm can execute"
-    )
+    parser.add_argument("--only-reachable", action="store_true", help="write only reachable grasps")
     parser.add_argument(
         "--plans",
         metavar="DIR",
-        help="folder for the timed motion of each grasp that the arm can execute, about 1.5 MB"
-        " each; the same command continues where an interrupted one stopped",
+        help="write the timed motion of each reachable grasp here, 1.5 MB each",
     )
     parser.add_argument(
         "--plan-format",
         choices=get_args(PlanFormat),
-        help="format of the plans: JSON laid out as ROS's JointTrajectory, or CSV tables;"
-        " load_plan in Python reads both (default: json)",
+        help="format of the motions: JSON like ROS's JointTrajectory, or CSV (default: json)",
     )
     parser.add_argument(
         "--screening",
         action="store_true",
-        help="decide by quick bounds instead of Drake's CollisionChecker: twice as fast, and wrong"
-        " about one or two grasps in a hundred, either way",
+        help="twice as fast, and wrong for one or two grasps in a hundred",
     )
     add_workers(parser)
     add_retry_failed(parser, "grasps")

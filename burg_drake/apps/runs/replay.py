@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from burg_drake.apps.options import add_only, add_verb, add_view, positive_int
+from burg_drake.apps.options import Parser, add_only, add_verb, add_view, positive_int
 from burg_drake.core import InvalidInputError
 
 if TYPE_CHECKING:
@@ -30,44 +30,43 @@ class ReplaySource:
 
 def add_to(verbs: Any) -> None:
     """Adds the verb."""
-    parser = add_verb(
+    add_verb(
         verbs,
         "replay",
         run_replay,
-        "execute one recorded trial again, compare it with the record, and show it in Meshcat",
+        "simulate one grasp again and show it in 3D",
         "burg-drake replay runs/first --best",
         "burg-drake replay runs/first --grasp mug-0123456789 --html replay.html",
         "burg-drake replay results.csv --row 17",
         "burg-drake replay one_row.csv --scene runs/first/scene.yaml",
         "",
-        "A row and its header are enough, wherever they were copied to.",
+        "One row with its header is enough. The new result is compared with the recorded one.",
+        options=add_options_to,
     )
+
+
+def add_options_to(parser: Parser) -> None:
+    """Adds what the verb takes."""
     parser.add_argument(
         "results",
         metavar="RESULTS",
-        help="folder of a run, or a table of results (.csv, .parquet), or a few rows of one",
+        help="folder of a run, or table of results (.csv, .parquet)",
     )
     which = parser.add_mutually_exclusive_group()
-    which.add_argument("--grasp", metavar="ID", help="id of a grasp, from the table of results")
-    which.add_argument(
-        "--row", metavar="N", type=positive_int, help="row of the table, the first one is 1"
-    )
+    which.add_argument("--grasp", metavar="ID", help="id of the grasp")
+    which.add_argument("--row", metavar="N", type=positive_int, help="row of the table, from 1")
     which.add_argument(
         "--best",
         action="store_true",
-        help="the lifted grasp with the most room around the open hand, the most likely one to"
-        " succeed again with displaced objects; among equal ones (to 0.5 mm) the one that"
-        " slipped, tilted and pushed others least",
+        help="the lifted grasp with the most room around the open hand",
     )
     add_only(parser, "with --best, the best grasp")
-    parser.add_argument(
-        "--scene", metavar="FILE", help="file of the trial's scene, if it has moved"
-    )
-    parser.add_argument("--station", metavar="FILE", help="file of its station, if it has moved")
+    parser.add_argument("--scene", metavar="FILE", help="scene file, if it has moved")
+    parser.add_argument("--station", metavar="FILE", help="station file, if it has moved")
     parser.add_argument(
         "--force",
         action="store_true",
-        help="replay even if the scene or station is not the one of the trial",
+        help="replay even if scene or station have changed",
     )
     add_view(parser)
 

@@ -14,7 +14,7 @@ def add_to(verbs: Any) -> None:
         verbs,
         "report",
         run_report,
-        "print what a run found so far, and write its report again",
+        "print what a run found so far; write its report again",
         "burg-drake report runs/first",
         "burg-drake report runs/many",
         "burg-drake report runs/many/scenes/kitchen_3",
@@ -22,7 +22,7 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "run_folder",
         metavar="RUN",
-        help="folder of a run, of one scene or of many, or RUN/scenes/NAME for one of these",
+        help="folder of a run, or RUN/scenes/NAME for one scene of many",
     )
 
 
@@ -41,6 +41,9 @@ def run_report(arguments: argparse.Namespace) -> int:
     write_report(run)
     print_summary(run)
     if not run.complete:
-        print(f"{len(run.verdicts)} of {len(run.mine)} grasps are judged; evaluate continues")
+        print(
+            f"{len(run.verdicts)} of {len(run.mine)} grasps are judged; the same"
+            " `evaluate` command continues"
+        )
     print(f"report  {run.report_path}")
     return 0

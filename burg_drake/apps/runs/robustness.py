@@ -31,13 +31,13 @@ def add_to(verbs: Any) -> None:
         verbs,
         "robustness",
         run_robustness,
-        "test how robust the lifted grasps of a run are: tug, shake, friction, noise",
+        "test lifted grasps: tug, shake, friction, noise",
         "burg-drake robustness runs/first",
         "burg-drake robustness runs/first --best 5 --only mug --tests tug,noise --repeats 50",
         "burg-drake robustness runs/first --grasp mug-0123456789 --translation-mm 2",
         "",
-        "The same command continues where an interrupted one stopped. The table keeps what earlier",
-        "commands found for the same grasps with the same settings.",
+        "The same command continues where an interrupted one stopped. The table keeps earlier"
+        " results.",
         options=_add_options,
     )
     parser.set_defaults(after_interrupt="; run the same command to continue")
@@ -61,10 +61,10 @@ def _add_options(parser: Parser) -> None:
         metavar="N",
         type=positive_int,
         default=DEFAULT_BEST,
-        help="the N best lifted grasps of each object: those with the most room around the open"
-        " hand, as `replay --best` ranks them (default: %(default)s)",
+        help="the N lifted grasps of each object with the most room around the hand (default:"
+        " %(default)d)",
     )
-    add_only(parser, "the best grasps")
+    add_only(parser, "only grasps")
     parser.add_argument(
         "--tests",
         metavar="LIST",
@@ -72,15 +72,15 @@ def _add_options(parser: Parser) -> None:
         default=TESTS,
         help=f"some of {','.join(TESTS)} (default: all)",
     )
-    noise = parser.add_argument_group("noise, as standard deviations")
+    noise = parser.add_argument_group("noise (standard deviations)")
     add_options(noise, RobustnessSettings, "repeats")
     add_options(noise, Noise)
-    noise.add_argument("--seed", metavar="N", type=seed, help="(default: the run's)")
+    noise.add_argument("--seed", metavar="N", type=seed, help="random seed (default: the run's)")
     parser.add_argument(
         "-o",
         "--output",
         metavar="FILE",
-        help="table, .csv or .parquet (default: robustness.csv in the run's folder)",
+        help="table to write (default: robustness.csv in the run's folder)",
     )
     add_workers(parser)
     add_retry_failed(parser, "tests")

@@ -28,9 +28,7 @@ def add_rejudge_contested(parser: Parser) -> None:
     parser.add_argument(
         "--rejudge",
         choices=REJUDGE,
-        help="when all grasps are judged, have the preset that --engine names execute again those"
-        " whose verdict is contested, and take its verdict; all grasps are judged first with the"
-        " engine of the run, or with a new run with standard",
+        help="afterwards, evaluate contested grasps again with the preset of --engine",
     )
 
 

@@ -25,7 +25,7 @@ def add_to(verbs: Any) -> None:
         verbs,
         "status",
         run_status,
-        "print the progress of a run: grasps, rate, time left, outcomes, scenes that failed",
+        "print the progress of a run",
         "burg-drake status runs/many",
         "burg-drake status runs/many --follow",
         "burg-drake status runs/many --json",
@@ -34,7 +34,7 @@ def add_to(verbs: Any) -> None:
     parser.add_argument(
         "--follow",
         action="store_true",
-        help="repeat until the run is complete, or until Ctrl-C; the run is not disturbed",
+        help="repeat until the run is complete",
     )
     parser.add_argument("--json", action="store_true", help="print JSON, one line per update")
 

@@ -15,12 +15,12 @@ def add_to(group: Any) -> None:
         group,
         "export",
         run_export,
-        "write a scene for another program",
+        "write a scene for Gazebo, Drake, MuJoCo or Isaac Sim",
         "burg-drake scene export tabletop_six --to sdf -o tabletop_sdf",
         "burg-drake scene export my_scene.yaml --station my_station.yaml --to mjcf -o my_mjcf",
         "burg-drake scene export tabletop_six --station panda_tabletop --to mjcf --hand -o hand",
         "",
-        "The folder has all that it needs, and can be moved or zipped.",
+        "The folder holds all files that it needs. Formats:",
         options=_add_options,
     )
 
@@ -37,19 +37,17 @@ def _add_options(parser: Parser) -> None:
         "--output",
         metavar="FOLDER",
         required=True,
-        help="new folder, or an earlier export, which is replaced",
+        help="folder to write; an earlier export is replaced",
     )
     add_station(
         parser,
-        "station file or built-in name: its table and obstacles are exported, too, in its world"
-        " (default: the objects alone, in the frame of the board)",
+        "export table and obstacles of this station, too",
         default=None,
     )
     parser.add_argument(
         "--hand",
         action="store_true",
-        help="with --to mjcf and --station: the station's hand floats above the scene, with its"
-        " actuators, as in trials of the engine mujoco",
+        help="with --to mjcf and --station, add the hand with its actuators",
     )
 
 

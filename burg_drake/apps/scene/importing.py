@@ -31,7 +31,7 @@ def add_to(group: Any) -> None:
         "--library",
         metavar="LIB",
         required=True,
-        help="object library: folder of what `library import-burg` made of the scene's library",
+        help="library made by `library import-burg`",
     )
     parser.add_argument(
         "-o", "--output", metavar="FILE", required=True, help="scene file to write (.yaml)"
@@ -40,8 +40,7 @@ def add_to(group: Any) -> None:
     parser.add_argument(
         "--station-out",
         metavar="FILE",
-        help="also write a station that the scene fits on: a built-in one, or else a table and an"
-        " arm laid out around the scene",
+        help="also write a station that the scene fits on",
     )
 
 

@@ -22,13 +22,13 @@ def add_to(verbs: Any) -> None:
         verbs,
         "printout",
         run_printout,
-        "print the board of a scene: markers at true scale, and where its objects stand",
+        "write the board of a scene as PDF, to print at true scale",
         "burg-drake printout tabletop_six -o board.pdf",
         "burg-drake printout tabletop_six --page A2 -o board.pdf",
         "burg-drake printout tabletop_six --measured-mm 98.5 -o board.pdf",
         "",
-        "Print at 100 % and hold a ruler to the two printed ones. If they are not 100 mm long,",
-        "give what they measure: --measured-mm 98.5, or along x and y --measured-mm 98.5,99.2.",
+        "Print at 100 % and measure the two printed rulers of 100 mm. If they are not 100 mm"
+        " long, print again with what they measure, such as --measured-mm 98.5,99.2.",
         options=_add_options,
     )
 
@@ -43,14 +43,13 @@ def _add_options(parser: Parser) -> None:
     add_options(parser, PrintSettings, "page", "margin")
     add_measured_board(
         parser,
-        "measured length of the printed 100 mm rulers, along x and y of the page; the print is"
-        " scaled to compensate",
+        "length of the printed 100 mm rulers along x and y, to correct the print (default: 100)",
     )
     add_options(parser, PrintSettings, "height_map", "names")
     parser.add_argument(
         "--no-instructions",
         action="store_true",
-        help="leave out the first page, which shows how the board is printed, assembled and used",
+        help="leave out the page of instructions",
     )
 
 

@@ -58,7 +58,7 @@ def _add_objects(parser: Any) -> None:
         help="objects in a scene (default: %(default)d)",
     )
     group.add_argument(
-        "--only", metavar="A,B", type=names, action="extend", help="draw from these objects alone"
+        "--only", metavar="A,B", type=names, action="extend", help="only these objects"
     )
     add_options(group, SceneRecipe, "repeat", "poses", "seed")
     group.add_argument(
@@ -68,7 +68,7 @@ def _add_objects(parser: Any) -> None:
         default=1,
         help="number of scenes (default: %(default)d)",
     )
-    add_workers(group, "processes (default: %(default)d)", default=1)
+    add_workers(group, "worker processes (default: %(default)d)", default=1)
 
 
 def _add_layout(parser: Any) -> None:
@@ -81,15 +81,15 @@ def _add_layout(parser: Any) -> None:
         default="A2",
         help="size of the board: A4 to A0, or WxH in mm (default: %(default)s)",
     )
-    group.add_argument("--portrait", action="store_true", help="turn a board A4 to A0 upright")
+    group.add_argument("--portrait", action="store_true", help="board in portrait format")
     how = group.add_mutually_exclusive_group()
     how.add_argument(
         "--spacing",
         choices=[name for name in LAYOUTS if name not in OWN_OPTIONS],
-        help="40 mm apart, 2 to 10 mm beside another one, or in contact (default: anywhere)",
+        help="space between objects: 40 mm, 2 to 10 mm, or contact (default: random)",
     )
-    how.add_argument("--packed", action="store_true", help="side by side, as dense as it gets")
-    how.add_argument("--heap", action="store_true", help="dropped on the middle of the board")
+    how.add_argument("--packed", action="store_true", help="pack objects side by side")
+    how.add_argument("--heap", action="store_true", help="drop objects in a heap")
     add_options(group, SceneRecipe, "tries", "fewer", "settle")
 
 

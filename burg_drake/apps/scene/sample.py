@@ -24,7 +24,7 @@ def add_to(group: Any) -> None:
         group,
         "sample",
         run_sample,
-        "draw scenes of a library's objects: anywhere, apart, together, packed or in heaps",
+        "make random scenes from the objects of a library",
         "burg-drake scene sample household -n 5 --seed 7 -o scene.yaml",
         "burg-drake scene sample household -n 6 --spacing close --count 1000 --workers 2 -o close/",
         "burg-drake scene sample household -n 10 --heap --station panda_bin -o heap.yaml",
@@ -32,34 +32,37 @@ def add_to(group: Any) -> None:
         " -o scene.yaml",
         "burg-drake scene sample --again close/scene_0007.yaml -o same.yaml",
         "",
-        "Each scene is drawn again until it meets all conditions, and settled in simulation.",
-        "Interrupt it whenever you like: the same command continues, and a larger --count adds",
-        "scenes. Exit code 1 if not all scenes were accepted; scenes.csv says why.",
+        "A scene is sampled again until it meets all rules, and is settled in simulation. The"
+        " same command continues where an interrupted one stopped; a larger --count adds scenes."
+        " Exit code 1 if scenes are missing; scenes.csv says why.",
         options=_add_options,
     )
 
 
 def _add_options(parser: Parser) -> None:
     parser.add_argument(
-        "library", metavar="LIBRARY", nargs="?", help="folder of a library, or `household`"
+        "library",
+        metavar="LIBRARY",
+        nargs="?",
+        help="folder of a library, or the built-in household",
     )
     parser.add_argument(
         "-o",
         "--output",
         metavar="SCENES",
         required=True,
-        help="folder to write, or the file of a single scene (.yaml)",
+        help="folder to write, or for one scene a file (.yaml)",
     )
     add_recipe(parser)
     parser.add_argument(
         "--again",
         metavar="SCENE",
-        help="make a sampled scene again from the origin recorded in its file",
+        help="make this scene again, from the origin recorded in its file",
     )
     parser.add_argument(
         "--force",
         action="store_true",
-        help="with --again: even if library, station or versions differ",
+        help="with --again, even if library, station or versions differ",
     )
     add_quiet(parser)
 

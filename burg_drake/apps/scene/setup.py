@@ -32,7 +32,7 @@ def add_to(verbs: Any) -> None:
         verbs,
         "setup",
         run_setup,
-        "compose a scene in the browser: place, check, settle, save, print",
+        "arrange a scene in the browser: place, check, save, print",
         "burg-drake setup",
         "burg-drake setup my_scene.yaml --station my_station.yaml",
         "burg-drake setup my_library",
@@ -48,14 +48,13 @@ def _add_options(parser: Parser) -> None:
         metavar="SCENE|LIBRARY",
         nargs="?",
         default=DEFAULT_LIBRARY,
-        help="scene file, which is opened in its folder; or the start of a new scene in the working"
-        f" directory: a library's folder, or a built-in name ({scene_names()},"
-        f" {DEFAULT_LIBRARY}) (default: %(default)s)",
+        help=f"scene to edit, or library for a new scene: a path, or built-in: {scene_names()},"
+        f" {DEFAULT_LIBRARY} (default: %(default)s)",
     )
     add_station(parser)
     add_page(
         parser,
-        "any other can open it, by an address that is printed and good for one browser",
+        "others can open it by the address that is printed, good for one browser",
     )
 
 

@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 
 def add_to(verbs: Any) -> None:
     """Adds the verbs."""
-    group = add_group(verbs, "scene", "show, validate, settle, sample, export and import scenes")
+    group = add_group(verbs, "scene", "show, check, settle, sample, export, import scenes")
     add_verb(
         group,
         "show",
         run_show,
-        "show a scene on its station in Meshcat",
+        "show a scene in 3D, on its station",
         "burg-drake scene show tabletop_six",
         "burg-drake scene show my_scene.yaml --station my_station.yaml",
         "burg-drake scene show tabletop_six --html scene.html",
@@ -44,7 +44,7 @@ def add_to(verbs: Any) -> None:
         group,
         "validate",
         run_validate,
-        "check a scene: bounds of the board, ground, overlaps (exit code 1 if anything is wrong)",
+        "check a scene: off the board, in the air, overlaps",
         "burg-drake scene validate my_scene.yaml",
         options=_add_validate_options,
     )
@@ -57,7 +57,7 @@ def add_to(verbs: Any) -> None:
 def _add_show_options(parser: Parser) -> None:
     add_scene(parser)
     add_station(parser)
-    parser.add_argument("--no-robot", action="store_true", help="leave the arm out")
+    parser.add_argument("--no-robot", action="store_true", help="hide the arm")
     add_view(parser)
 
 
@@ -71,12 +71,12 @@ def _add_settle(group: Any) -> None:
         group,
         "settle",
         run_settle,
-        "let the objects of a scene fall and come to rest, and write the settled scene",
+        "let objects fall and come to rest; write the new scene",
         "burg-drake scene settle heap.yaml -o settled.yaml",
         "burg-drake scene settle heap.yaml --station my_station.yaml --keep -o settled.yaml",
         "",
-        "Exit code 1, and no file without --keep, if something still moves, fell off the table, or",
-        "came to rest where `scene validate` refuses it.",
+        "Exit code 1 if an object still moves, fell off the table or came to rest where `scene"
+        " validate` refuses it; the scene is then written only with --keep.",
         options=_add_settle_options,
     )
 
@@ -95,18 +95,18 @@ def _add_settle_options(settle: Parser) -> None:
         metavar="S",
         type=positive,
         default=SETTLING_TIME,
-        help="simulated time allowed (default: %(default)g)",
+        help="simulated time in seconds (default: %(default)g)",
     )
     settle.add_argument(
         "--keep",
         action="store_true",
-        help="write the scene anyway, without objects that fell off the table",
+        help="write the scene anyway, without objects that fell off",
     )
     settle.add_argument(
         "--engine",
         choices=DRAKE_ENGINES,
         default=SETTLING_ENGINE,
-        help="engine preset while objects fall (default: %(default)s)",
+        help="physics preset (default: %(default)s)",
     )
     add_quiet(settle)
 

@@ -27,7 +27,7 @@ def add_moved(parser: Parser) -> None:
         type=_moved,
         action="append",
         default=[],
-        help="folder of a run, if it has moved since the trials file was written",
+        help="folder of a run, if it has moved",
     )
 
 
@@ -41,7 +41,7 @@ def add_show_simulated(parser: Parser, more: str = "") -> None:
     parser.add_argument(
         "--show-simulated",
         action="store_true",
-        help=f"show the simulated outcomes{more}; hidden by default, so that operators are blind",
+        help=f"show the simulated outcomes{more}; hidden to keep operators blind",
     )
 
 

@@ -28,13 +28,12 @@ def add_to(group: Any) -> None:
         group,
         "export",
         run_export,
-        "write the timed motion of each trial for the robot, one file a trial",
+        "write the robot motion of each trial to a file",
         "burg-drake trials export trials.yaml -o plans/",
         "burg-drake trials export trials.yaml -o plans/ --format csv --station my_cell.yaml",
         "",
-        "Files begin with the number of the trial; index.csv lists all trials, with what stops",
-        "the arm where there is no file. The same command continues where an interrupted one",
-        "stopped. Exit code 1 if a trial could not be judged.",
+        "The file index.csv lists all trials and what stops the arm. The same command continues"
+        " where an interrupted one stopped. Exit code 1 if a trial could not be planned.",
         options=_add_options,
     )
 
@@ -48,14 +47,13 @@ def _add_options(parser: Parser) -> None:
         "--output",
         metavar="DIR",
         required=True,
-        help="folder for the motions, about 1.5 MB each",
+        help="folder to write, 1.5 MB per motion",
     )
     parser.add_argument(
         "--format",
         choices=get_args(PlanFormat),
         default="json",
-        help="JSON laid out as ROS's JointTrajectory, or tables; load_plan in Python reads both"
-        " (default: %(default)s)",
+        help="JSON like ROS's JointTrajectory, or CSV tables (default: %(default)s)",
     )
     add_station(parser, "station with the arm (default: that of each run)", default=None)
     add_moved(parser)

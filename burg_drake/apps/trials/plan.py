@@ -19,13 +19,12 @@ def add_to(group: Any) -> None:
         group,
         "plan",
         run_plan,
-        "choose grasps of runs for trials on the robot, in a random order",
+        "choose grasps to try on the robot, in random order",
         "burg-drake trials plan runs/first --per-object 10 -o trials.yaml",
         "burg-drake trials plan runs/many --scenes 5 --balance margin:clearance -o t.yaml",
         "burg-drake trials plan runs/a runs/b --balance stage --among clear --seed 7 -o t.yaml",
         "",
-        "The same grasps are chosen whatever the order of the runs. A grasp that several runs have",
-        "judged on the same scene and station is tried once.",
+        "A grasp that several runs evaluated is tried once.",
         options=_add_options,
     )
 
@@ -39,7 +38,7 @@ def _add_options(parser: Parser) -> None:
     parser.add_argument(
         "--robustness",
         metavar="TABLE",
-        help="table with the probabilities (default: robustness.csv in the run's folder)",
+        help="table of robustness (default: robustness.csv in the run's folder)",
     )
     add_options(parser, SelectionSettings, "seed")
     parser.add_argument(

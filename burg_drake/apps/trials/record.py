@@ -35,29 +35,29 @@ def add_to(group: Any) -> None:
         group,
         "record",
         run_record,
-        "record the outcome of a trial on the robot",
+        "record the outcome of a trial",
         "burg-drake trials record trials.yaml 17 --outcome lifted",
         "burg-drake trials record trials.yaml next --outcome slipped --note 'wet fingers'",
         "burg-drake trials record trials.yaml 17 --photo photo.png --intrinsics K.yaml",
         "burg-drake trials record trials.yaml 17 --outcome dropped --correct",
         "",
-        "Only this trial changes in the file; what people have written stays. The journal next to",
-        "it keeps every entry, also those that are replaced. With intrinsics, the placement of the",
-        "objects is measured on the photo. Exit code 1 if there is no board in it; the rest of the",
-        "entry is recorded then.",
+        "Only this trial changes in the file; a journal beside it keeps every entry. Exit code 1"
+        " if a photo does not show the board; the rest is recorded.",
     )
     add_sheet(parser)
     parser.add_argument("number", metavar="NUMBER", help="number of the trial, or next")
-    parser.add_argument("--outcome", metavar="OUTCOME", help="such as lifted, slipped, no_ik")
-    for name, what in (("note", "remarks"), ("operator", "name of the operator")):
+    parser.add_argument(
+        "--outcome", metavar="OUTCOME", help="outcome, such as lifted, slipped, no_ik"
+    )
+    for name, what in (("note", "a note"), ("operator", "name of the operator")):
         parser.add_argument(f"--{name}", metavar="TEXT", help=what)
     parser.add_argument(
         "--time",
         metavar="TIME",
         type=_time,
-        help="when, ISO 8601; a day alone is kept as such (default: now)",
+        help="time in ISO 8601, or a day (default: now)",
     )
-    robot = parser.add_argument_group("what the robot reported at the end")
+    robot = parser.add_argument_group("what the robot measured at the end")
     robot.add_argument(
         "--width-mm", metavar="MM", type=not_negative, help="distance between the pads"
     )
@@ -65,17 +65,17 @@ def add_to(group: Any) -> None:
     _add_photo(parser.add_argument_group("photo of the scene before the trial"))
     add_moved(parser)
     how = parser.add_mutually_exclusive_group()
-    how.add_argument("--correct", action="store_true", help="replace the existing entry")
+    how.add_argument("--correct", action="store_true", help="replace the entry")
     how.add_argument(
         "--again",
         action="store_true",
-        help="the trial was repeated: replace all entries",
+        help="the trial was repeated: replace all its entries",
     )
 
 
 def _add_photo(group: Any) -> None:
-    group.add_argument("--photo", metavar="FILE", help="photo of the scene; copied to photos/")
-    add_intrinsics(group, "intrinsics of the camera, to measure where the objects are")
+    group.add_argument("--photo", metavar="FILE", help="photo, copied to photos/")
+    add_intrinsics(group, "intrinsics of the camera; the placement of objects is then measured")
     group.add_argument("--depth", metavar="FILE", help="depth image of the same camera")
     add_depth_unit(group)
     group.add_argument("--scene", metavar="SCENE", help="scene file (default: the run's copy)")

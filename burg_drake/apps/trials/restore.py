@@ -15,15 +15,12 @@ def add_to(group: Any) -> None:
         group,
         "restore",
         run_restore,
-        (
-            "restore recorded entries that the file has lost, for example when an editor saved"
-            " an old buffer"
-        ),
+        ("restore recorded outcomes that the file has lost"),
         "burg-drake trials restore trials.yaml",
         "burg-drake trials restore trials.yaml --number 17",
         "burg-drake trials restore trials.yaml --number 17 --keep",
         "",
-        "Values that were edited by hand and never recorded stay.",
+        "Values that were edited by hand stay.",
     )
     add_sheet(parser)
     parser.add_argument(
@@ -31,10 +28,10 @@ def add_to(group: Any) -> None:
         metavar="N",
         type=positive_int,
         action="append",
-        help="number of a trial (default: all); may be given several times",
+        help="number of a trial (default: all); repeatable",
     )
     parser.add_argument(
-        "--keep", action="store_true", help="keep the file as it is: it is right, not the journal"
+        "--keep", action="store_true", help="keep the file as it is; it is right, not the journal"
     )
 
 

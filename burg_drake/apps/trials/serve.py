@@ -39,8 +39,7 @@ def add_to(verbs: Any) -> None:
         verbs,
         "serve",
         run_serve,
-        "a page for the lab: the next trial, its picture, a button for each outcome; every entry"
-        " is saved at once",
+        "serve a page for the lab: next trial, picture, buttons",
         "burg-drake trials serve trials.yaml --open",
         "burg-drake trials serve trials.yaml --host 0.0.0.0",
         "burg-drake trials serve trials.yaml --camera 0 --intrinsics camera.yaml",
@@ -50,16 +49,15 @@ def add_to(verbs: Any) -> None:
     add_moved(parser)
     add_page(
         parser,
-        "tablets on the network can open it, each by an address with a token that is printed",
+        "tablets can open it, by the address with a token that is printed",
     )
     add_show_simulated(parser)
     camera = parser.add_argument_group("camera")
     camera.add_argument(
         "--camera",
         metavar="SOURCE",
-        help="number of a camera, address of a stream, video, image, folder or pattern of images,"
-        " or sim:STATION/CAMERA: the page shows the scene over its picture, and how far objects"
-        " stand from their places",
+        help="camera number, stream address, video, image, folder of images, or"
+        " sim:STATION/CAMERA; the page then shows where objects belong",
     )
     add_live_camera(camera)
     add_measured_board(camera)

@@ -20,18 +20,22 @@ def add_to(verbs: Any) -> None:
         verbs,
         "sheet",
         run_sheet,
-        "write the protocol of trials: their order, a picture of each grasp, boxes to tick",
+        "write a paper form: order, pictures, boxes to tick",
         "burg-drake trials sheet trials.yaml -o sheet.html",
         "burg-drake trials sheet trials.yaml -o sheet.html --show-simulated",
         "",
-        "The page needs nothing else and prints on A4 and letter. The printed board of each scene",
-        "is written next to it, as sheet_SCENE.pdf.",
+        "Print the page on A4 or letter. The board of each scene lies beside it, as"
+        " sheet_SCENE.pdf.",
     )
     add_sheet(parser)
     add_moved(parser)
-    parser.add_argument("-o", "--output", metavar="FILE", required=True, help="page to write")
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", required=True, help="page to write (.html)"
+    )
     add_show_simulated(parser)
-    parser.add_argument("--no-printouts", action="store_true", help="write no printed boards")
+    parser.add_argument(
+        "--no-printouts", action="store_true", help="do not write the boards to print"
+    )
 
 
 def run_sheet(arguments: argparse.Namespace) -> int:

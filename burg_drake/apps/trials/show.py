@@ -20,17 +20,16 @@ def add_to(group: Any) -> None:
         group,
         "show",
         run_show,
-        "print the progress of the trials, and whether the file lacks recorded entries",
+        "print the progress of the trials",
         "burg-drake trials show trials.yaml",
         "burg-drake trials show trials.yaml --all",
         "",
-        "Exit code 1 if the file lacks entries that its journal has, as after an editor has",
-        "written it from an old buffer; `trials restore` enters them again. Also 1 if lines of the",
-        "journal cannot be read.",
+        "Exit code 1 if the file lacks entries of its journal, as after an editor saved an old"
+        " version: `trials restore` brings them back.",
     )
     add_sheet(parser)
-    parser.add_argument("--all", action="store_true", help="print a line for each trial as well")
-    add_show_simulated(parser, " and, until trials have begun, the notes on the selection")
+    parser.add_argument("--all", action="store_true", help="also print a line for each trial")
+    add_show_simulated(parser, " and the notes on the selection")
 
 
 def run_show(arguments: argparse.Namespace) -> int:
@@ -109,7 +108,7 @@ def _print_lacking(path: str, lacking: Sequence[MissingValues]) -> None:
             print(f"trial {found.number}: {', '.join(found.edited)} edited by hand since recorded")
     if any(found.values for found in lacking):
         print(
-            f"burg-drake: `burg-drake trials restore {path}` enters it again; with --keep the file"
-            " counts as right",
+            f"burg-drake: `burg-drake trials restore {path}` brings it back; with --keep the file"
+            " stays as it is",
             file=sys.stderr,
         )

@@ -23,8 +23,6 @@ VERBS = (
 
 def add_to(verbs: Any) -> None:
     """Adds the verbs."""
-    group = add_group(
-        verbs, "trials", "choose grasps for trials on the robot, and record their outcomes"
-    )
+    group = add_group(verbs, "trials", "plan, export and record trials on your robot")
     for module in VERBS:
         module.add_to(group)

@@ -54,17 +54,17 @@ class CharucoTarget:
             number of rows, the upper left square is white.
     """
 
-    squares: tuple[int, int] = setting((8, 11), "columns and rows", metavar="CxR")
+    squares: tuple[int, int] = setting((8, 11), "columns and rows of squares", metavar="CxR")
     square: float = setting(
         0.020, "side of a square", unit=MILLIMETRES, metavar="SQUARE_MM", above=0
     )
     marker: float = setting(
         0.014, "side of a marker", unit=MILLIMETRES, metavar="MARKER_MM", above=0
     )
-    dictionary: str = setting("5X5_100", "of the markers", metavar="DICTIONARY")
+    dictionary: str = setting("5X5_100", "ArUco dictionary of the markers", metavar="DICTIONARY")
     legacy: bool = setting(
         False,
-        "a board of OpenCV before 4.6: with an even number of rows, white in the upper left",
+        "the board has the layout of OpenCV before 4.6",
     )
 
     def __post_init__(self) -> None:

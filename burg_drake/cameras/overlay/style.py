@@ -24,18 +24,27 @@ class OverlayStyle:
     """
 
     opacity: float = setting(
-        0.45, "of the objects, 0 (outlines) to 1", metavar="X", low=0, high=1, noun="a number"
+        0.45,
+        "opacity of the drawn objects, 0 (outlines) to 1",
+        metavar="X",
+        low=0,
+        high=1,
+        noun="a number",
     )
     outline_width: float = 2.0
     names: bool = True
     footprints: bool = True
     errors: bool = True
     tolerance: float = setting(
-        1e-3, "objects placed within it are green", unit=MILLIMETRES, metavar="X", above=0
+        1e-3,
+        "objects within this distance of their target are green",
+        unit=MILLIMETRES,
+        metavar="X",
+        above=0,
     )
     angle_tolerance: float = setting(
         math.radians(1.0),
-        "the same for how they are turned",
+        "objects within this angle of their target are green",
         unit=DEGREES,
         name="tolerance_deg",
         metavar="X",

@@ -1,3 +1,7 @@
+from .allocator import (
+    PRELOAD as PRELOAD,
+    worker_preload as worker_preload,
+)
 from .limits import TimeLimit as TimeLimit
 from .pool import WorkerPool as WorkerPool
 from .prefetch import Prefetcher as Prefetcher

@@ -51,23 +51,21 @@ class DatasetRecipe:
     }
 
     version: int = 1
-    seed: int = setting(0, high=LARGEST_SEED)
-    views: int = setting(20, "views of each scene", metavar="K", low=1)
+    seed: int = setting(0, "random seed", high=LARGEST_SEED)
+    views: int = setting(20, "images of each scene and camera", metavar="K", low=1)
     viewpoints: ViewpointSettings = ViewpointSettings()
     sensor: str = setting(
         "",
-        "depth camera with its intrinsics and noise: d435, d455, azure_kinect, zivid_two, kinect",
+        "depth camera to imitate: d435, d455, azure_kinect, zivid_two, kinect",
         metavar="NAME",
     )
     size: tuple[int, int] | None = None
     looks: AppearanceSettings | None = AppearanceSettings()
-    colors: bool = setting(
-        True, "write no images of colours, which alone need a renderer", name="no_colors"
-    )
+    colors: bool = setting(True, "do not write colour images", name="no_colors")
     renderer: RendererName = setting(
-        "drake", "of colours; blender is photorealistic, and slow", choices=RENDERERS
+        "drake", "renderer of colour images; blender is photorealistic and slow", choices=RENDERERS
     )
-    normals: bool = setting(False, "write images of normals, too")
+    normals: bool = setting(False, "also write normals")
     grasps_per_object: int = 0
     run: str = ""
     sampled: SceneRecipe | None = None

@@ -51,24 +51,24 @@ class SamplingSettings:
     """
 
     friction: float | None = setting(
-        None, "coefficient (default: the object's)", metavar="MU", above=0
+        None, "friction coefficient (default: the object's)", metavar="MU", above=0
     )
-    approaches: int = setting(1, "approach angles for each pair of contacts", metavar="K", low=1)
+    approaches: int = setting(
+        1, "approach directions for each pair of contacts", metavar="K", low=1
+    )
     approach_angle_deg: float | None = None
     from_arm_side: bool = setting(
-        False, "in a scene, only approaches that do not point back to the arm"
+        False, "in a scene, leave out approaches that point back to the arm"
     )
     standoffs: tuple[float, ...] = (0.0,)
     weights: Mapping[str, Array] = field(default_factory=dict)
     blind: bool = False
-    margin: float = setting(
-        0.0, "only grasps with this clearance of the open hand", unit=MILLIMETRES, low=0
-    )
+    margin: float = setting(0.0, "smallest clearance of the open hand", unit=MILLIMETRES, low=0)
     conservative: bool = setting(
-        False, "test clearance faster, at the cost of a tenth of the clear grasps"
+        False, "faster clearance test that loses a tenth of the clear grasps"
     )
     diverse: int = setting(
-        1, "sample K times as many and keep those that are farthest apart", metavar="K", low=1
+        1, "sample K times as many, keep those farthest apart", metavar="K", low=1
     )
     slippery: bool = False
 

@@ -66,31 +66,27 @@ class EvaluationSettings:
 
     grasps_per_object: int = setting(
         100,
-        "number of grasps to sample on each object; only those at which the open hand collides"
-        " with nothing, and its pads meet the object within the friction cones",
+        "grasps to sample on each object, of those where the open hand is clear",
         flags=("-n",),
         low=1,
     )
     until_balanced: int | None = setting(
         None,
-        "after the first grasps, go on sampling until each object has N that are lifted and N that"
-        " are not, so that trials on the robot can be balanced; of one scene",
+        "sample until each object has N lifted and N failed grasps (one scene)",
         low=1,
     )
     balanced_among: Among = setting(
         "executed",
-        "with {until_balanced}, count the grasps that were tried in simulation, those that the arm"
-        " can be at, those at which the hand is clear, or all, as `trials plan` chooses among them"
-        " (default: executed)",
+        "with {until_balanced}, which grasps count (default: executed)",
         choices=get_args(Among),
     )
     max_grasps_per_object: int = setting(
-        1000, "with {until_balanced}, sample no more than N grasps on each object", low=1
+        1000, "with {until_balanced}, at most N grasps on each object", low=1
     )
     approach_angle_deg: float = setting(
         DEFAULT_APPROACH_ANGLE_DEG,
-        "in a scene, sample grasps whose approach is within this angle of straight down"
-        f" (default: {DEFAULT_APPROACH_ANGLE_DEG:g}; 180: any)",
+        "largest angle of the approach from straight down (default:"
+        f" {DEFAULT_APPROACH_ANGLE_DEG:g}; 180: any)",
         name="approach_angle",
         metavar="DEG",
         above=0,
@@ -99,27 +95,25 @@ class EvaluationSettings:
     )
     blind: bool = setting(
         False,
-        "sample by contact points alone, regardless of the hand, as in the literature",
+        "also sample grasps where the hand collides",
     )
     only: Iterable[str] | None = None
     mode: Mode | None = setting(
         None,
-        "hand: simulate all grasps with the hand alone, which begins at the grasp, open: its"
-        " approach is not simulated (see {approach}); reach: likewise those that the arm can"
-        " execute; arm: those, with the whole arm from the pregrasp on (default: reach, or hand if"
-        " there is no arm)",
+        "hand: simulate the hand alone, from the grasp on; reach: the same, only grasps that the"
+        " arm can execute; arm: the whole arm, from the pregrasp on (default: reach, or hand"
+        " without an arm)",
         choices=MODES,
     )
     engine: Engine | str = setting(
         DEFAULT_ENGINE,
-        "engine preset: for reference values, for results, for a first look, or a second opinion"
-        " by MuJoCo (needs burg-drake[mujoco])",
+        "physics: reference (most accurate), standard, screening (fast), or mujoco for a second"
+        " opinion (needs burg-drake[mujoco])",
         choices=tuple(ENGINES),
     )
     tilt_limit_deg: float = setting(
         DEFAULT_TILT_LIMIT_DEG,
-        "what is held, but turned in the hand by more than this, ends as lifted_turned and not as"
-        " lifted (180: no limit)",
+        "objects that turned more in the hand are lifted_turned (180: no limit)",
         name="tilt_limit",
         metavar="DEG",
         above=0,
@@ -128,22 +122,20 @@ class EvaluationSettings:
     )
     slip_limit_mm: float = setting(
         DEFAULT_SLIP_LIMIT_MM,
-        "likewise what slid in the hand by more than this (inf: no limit)",
+        "likewise for objects that slid (inf: no limit)",
         metavar="MM",
         above=0,
         infinite=True,
     )
     approach: bool = setting(
         False,
-        "with the hand alone, simulate its approach, too: straight from the pregrasp, open;"
-        " otherwise it begins at the grasp. The whole arm (mode arm) does so anyway",
+        "with the hand alone, simulate its straight approach, too",
     )
     motion: GraspMotion | None = None
-    seed: int = setting(0, "seed of the sampling", high=LARGEST_SEED)
+    seed: int = setting(0, "random seed of the sampling", high=LARGEST_SEED)
     shard: Shard | str | None = setting(
         None,
-        "judge a share of the work, such as 2/8, on one of several machines: every N-th scene, or"
-        " of fewer than N scenes every N-th grasp; merge them with burg-drake merge",
+        "evaluate one share of the work, such as 2/8; burg-drake merge joins them",
         metavar="K/N",
     )
     table: TableFormat = setting(

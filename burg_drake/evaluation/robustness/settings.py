@@ -31,7 +31,7 @@ class RobustnessSettings:
     loads: LoadSettings = field(default_factory=LoadSettings)
     friction: FrictionSettings = field(default_factory=FrictionSettings)
     noise: Noise = field(default_factory=Noise)
-    repeats: int = setting(20, "perturbed repeats of each grasp", metavar="K", low=1)
+    repeats: int = setting(20, "repeats of each grasp with noise", metavar="K", low=1)
     seed: int = 0
 
     def __post_init__(self) -> None:

@@ -32,14 +32,14 @@ class PlacementNoise:
 
     place: float = setting(
         0.002,
-        "standard deviation of each object along x and along y",
+        "standard deviation along x and y",
         unit=THOUSANDTHS,
         name="placement_sd_mm",
         low=0,
     )
     turn: float = setting(
         math.radians(2.0),
-        "standard deviation of its rotation about the vertical",
+        "standard deviation about the vertical",
         unit=DEGREES,
         name="placement_sd_deg",
         low=0,

@@ -39,37 +39,26 @@ class SelectionSettings:
         InvalidInputError: a balance that does not exist, or a number that is too small.
     """
 
-    per_object: int = setting(
-        10, ("number of grasps of each object of a run, if there are so many"), low=1
-    )
+    per_object: int = setting(10, ("grasps of each object of a run"), low=1)
     balance: str = setting(
         "outcome",
-        "what the grasps of an object are balanced by, as far as there are enough: outcome"
-        " (success and failure in simulation), stage (each outcome by itself), margin:NAME,"
-        " probability (success under noise, of `robustness`) or none",
+        "balance grasps by: outcome, stage, margin:NAME, probability (of `robustness`) or none",
         metavar="BY",
     )
-    bins: int = setting(
-        4, ("number of bins of a margin or a probability, with equally many grasps each"), low=1
-    )
+    bins: int = setting(4, ("bins for a margin or probability"), low=1)
     among: Among = setting(
         "executed",
-        "choose among all grasps, also those at which the hand collides in simulation, those at"
-        " which it is clear, those that the arm can be at, or those that were tried in simulation"
-        " (default: executed; without an arm that is the same as clear)",
+        "choose among these: all, clear hand, reachable, or simulated grasps (default: executed)",
         choices=get_args(Among),
     )
     success: Success = setting(
         "lifted",
-        "what counts as success: lifted, or held even if it turned in the hand or another object"
-        " was moved",
+        "what counts as success; held includes turned objects and moved neighbours",
         choices=get_args(Success),
     )
-    scenes: int = setting(0, "draw N scenes (default: all)", low=1)
-    blocks: int = setting(
-        1, "blocks for the trials of a scene; each scene has one before any has its second", low=1
-    )
-    seed: int = setting(0, "seed of selection and order", high=LARGEST_SEED)
+    scenes: int = setting(0, "choose N scenes at random (default: all)", low=1)
+    blocks: int = setting(1, "set up each scene this many times", low=1)
+    seed: int = setting(0, "random seed of choice and order", high=LARGEST_SEED)
 
     def __post_init__(self) -> None:
         kinds = [name for name in get_args(Balance) if name != "margin"]

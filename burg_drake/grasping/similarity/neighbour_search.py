@@ -74,18 +74,20 @@ class Tolerance:
     """
 
     translation: float = setting(
-        0.015, "largest distance of the grasp frames", unit=MILLIMETRES, low=0
+        0.015, "largest distance between grasp frames", unit=MILLIMETRES, low=0
     )
-    angle: float = setting(math.radians(15.0), "largest angle between them", unit=DEGREES, low=0)
+    angle: float = setting(
+        math.radians(15.0), "largest angle between grasp frames", unit=DEGREES, low=0
+    )
     distance: float = setting(
         math.inf,
-        "largest sum of the two, with {lever} for each degree (default: not bounded)",
+        "largest combined distance, see {lever} (default: no limit)",
         unit=MILLIMETRES,
         low=0,
     )
     lever: float = setting(
         LEVER,
-        "what one degree counts in combined distances",
+        "millimetres that one degree counts in combined distances",
         unit=MILLIMETRES_A_DEGREE,
         name="mm_per_deg",
         low=0,

@@ -57,30 +57,28 @@ class SceneRecipe:
     library: str
     count: int = 6
     only: tuple[str, ...] = ()
-    repeat: bool = setting(False, "an object may be in a scene several times")
+    repeat: bool = setting(False, "allow an object several times in a scene")
     board: Board = Board()
     layout: LayoutName = "random"
     poses: PoseChoice = setting(
-        "probability", "how stable poses are drawn", choices=get_args(PoseChoice)
+        "probability", "how to choose an object's stable pose", choices=get_args(PoseChoice)
     )
-    tries: int = setting(TRIES, "random places for each object", metavar="K", low=1)
-    fewer: bool = setting(
-        False, "accept a scene in which not all objects found a place; they are reported"
-    )
-    seed: int = setting(0, high=LARGEST_SEED)
+    tries: int = setting(TRIES, "random places to try for each object", metavar="K", low=1)
+    fewer: bool = setting(False, "accept scenes with fewer objects if some found no place")
+    seed: int = setting(0, "random seed", high=LARGEST_SEED)
     station: str = "panda_tabletop"
-    settle: bool = setting(True, "leave objects as they were placed", name="no_settle")
-    attempts: int = setting(ATTEMPTS, "scenes that are drawn until one is accepted", low=1)
-    within_reach: bool = setting(False, "the arm can grasp every object where it is")
+    settle: bool = setting(True, "do not settle objects in simulation", name="no_settle")
+    attempts: int = setting(ATTEMPTS, "scenes to sample until one is accepted", low=1)
+    within_reach: bool = setting(False, "require that the arm can grasp each object")
     clear_grasps: int = setting(
         0,
-        "every object has so many grasps at which the hand touches nothing else",
+        "require K grasps on each object with a clear hand",
         metavar="K",
         low=1,
     )
     visible_from: str = setting(
         "",
-        "this camera of the station sees half of every object, at least",
+        "require that this camera of the station sees half of each object",
         metavar="CAMERA",
     )
 

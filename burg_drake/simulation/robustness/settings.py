@@ -78,12 +78,16 @@ class Noise:
         friction: of the target's coefficient, relative.
     """
 
-    translation: float = setting(0.005, "of the grasp along each axis", unit=MILLIMETRES, low=0)
-    rotation: float = setting(
-        math.radians(5.0), "of the grasp about each axis", unit=DEGREES, low=0
+    translation: float = setting(
+        0.005, "noise of the grasp along each axis", unit=MILLIMETRES, low=0
     )
-    mass: float = setting(0.1, "of the object's mass", unit=PERCENT, low=0)
-    friction: float = setting(0.2, "of the object's friction coefficient", unit=PERCENT, low=0)
+    rotation: float = setting(
+        math.radians(5.0), "noise of the grasp about each axis", unit=DEGREES, low=0
+    )
+    mass: float = setting(0.1, "noise of the object's mass", unit=PERCENT, low=0)
+    friction: float = setting(
+        0.2, "noise of the object's friction coefficient", unit=PERCENT, low=0
+    )
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():

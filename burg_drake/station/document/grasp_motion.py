@@ -53,26 +53,22 @@ class GraspMotion:
     standoff: float = _length(
         0.10,
         "standoff",
-        "length of the straight approach, from the pregrasp to the grasp",
+        "length of the straight approach",
     )
     retreat: float = _length(
         0.0,
         "retreat",
-        (
-            "length of the straight retreat with the object, back along the approach, before the"
-            " lift"
-        ),
+        ("length of the retreat along the approach, before the lift"),
     )
     lift_height: float = _length(0.30, "lift_height", "length of the lift", "lift_mm")
     least_lift: float | None = _length(
         None,
         "least_lift",
-        "lift as far as there is room, at most by {lift_height} and at least by this; the column"
-        " lift_height has the length",
+        "lift as far as there is room, at least by this",
     )
     lift_direction: Vector3 = setting(
         (0.0, 0.0, 1.0),
-        "direction of the lift in the world, of any length; 0 0 1 is up",
+        "direction of the lift in the world (0 0 1: up)",
         metavar=("X", "Y", "Z"),
     )
 

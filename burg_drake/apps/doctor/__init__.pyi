@@ -1,0 +1,1 @@
+from .verb import add_to as add_to

@@ -1,0 +1,39 @@
+"""`demo`: a run, its best grasp in 3D, and where to look."""
+
+from __future__ import annotations
+
+import webbrowser
+from pathlib import Path
+
+import pytest
+
+from burg_drake.apps.cli import main
+from burg_drake.apps.runs import demo
+from burg_drake.core.paths.resources import builtin_names
+from tests.apps.conftest import TWO
+
+
+def test_what_it_runs_is_there() -> None:
+    assert demo.SCENE in builtin_names("scenes")
+
+
+@pytest.mark.thorough
+def test_the_demo(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "two.yaml").write_text(TWO)
+    monkeypatch.setattr(demo, "SCENE", str(tmp_path / "two.yaml"))
+    monkeypatch.chdir(tmp_path)
+    opened: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", opened.append)
+    assert main(["demo", "-n", "2", "--workers", "1", "--quiet"]) == 0
+    told = capsys.readouterr().out
+    folder = tmp_path / "runs" / "demo_2"
+    for name in ("report.html", "replay.html", "results.csv"):
+        assert f"runs/demo_2/{name}  " in told
+        assert (folder / name).stat().st_size > 0
+    assert "\nall " in told and "as recorded" in told and opened == []
+    journal = (folder / "journal.jsonl").read_bytes()
+    assert main(["demo", "-n", "2", "--workers", "1", "--quiet", "--open"]) == 0
+    assert (folder / "journal.jsonl").read_bytes() == journal  # nothing was evaluated again
+    assert opened == [(folder / name).as_uri() for name in ("report.html", "replay.html")]

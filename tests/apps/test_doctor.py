@@ -1,0 +1,128 @@
+"""`doctor`: what is there, what is broken, and how this copy of burg_drake gets more."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from burg_drake.apps.cli import main
+from burg_drake.apps.doctor import checks, machine, packages
+from burg_drake.apps.doctor.checks import Check
+
+Capture = pytest.CaptureFixture[str]
+REQUIREMENTS = [
+    "numpy>=2.1",
+    'mujoco>=3.10; extra == "mujoco"',
+    'msgspec>=0.19; extra == "ui"',
+    'viser<1.2,>=1.1; extra == "ui"',
+    'viser>=1.1; extra == "dev"',
+    "cmeel-mimalloc>=3.4; sys_platform == 'linux'",
+]
+
+
+@pytest.fixture
+def declared(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
+    """Made-up requirements; what it is given is installed."""
+    installed: dict[str, str] = {}
+
+    def version(package: str) -> str:
+        if package in installed:
+            return installed[package]
+        raise importlib.metadata.PackageNotFoundError
+
+    monkeypatch.setattr(importlib.metadata, "requires", lambda _: REQUIREMENTS)
+    monkeypatch.setattr(importlib.metadata, "version", version)
+    return installed
+
+
+def test_what_is_here_is_told(capsys: Capture) -> None:
+    assert main(["doctor", "--json"]) == 0
+    found = {check["feature"]: check for check in json.loads(capsys.readouterr().out)["checks"]}
+    drake = found["simulation (Drake)"]
+    assert drake["state"] == "ok" and drake["required"]
+    assert drake["found"] == f"drake {importlib.metadata.version('drake')}"
+    for check in found.values():
+        assert bool(check["remedy"]) == (check["state"] != "ok"), check
+
+
+@pytest.mark.parametrize(
+    ("checks_", "code", "line"),
+    [
+        ([Check("a", "ok", required=True), Check("b", "missing", "", "get b")], 0, "-> get b"),
+        ([Check("a", "broken", "no x", "mend a", required=True)], 1, "cannot run: see a above"),
+    ],
+)
+def test_the_exit_code_is_about_evaluate(
+    checks_: list[Check],
+    code: int,
+    line: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: Capture,
+) -> None:
+    monkeypatch.setattr(checks, "all_checks", lambda: checks_)
+    assert main(["doctor"]) == code
+    assert line in capsys.readouterr().out
+
+
+def test_a_package_that_cannot_be_imported_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "without_library.py").write_text("raise ImportError('libz.so: no such file')")
+    (tmp_path / "deadly.py").write_text("import os\nos.abort()")
+    (tmp_path / "sound.py").write_text("")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    assert packages.import_error("sound") is None
+    assert packages.import_error("sound, without_library") == "ImportError: libz.so: no such file"
+    assert packages.import_error("deadly") == "import deadly ends the process (signal 6)"
+
+
+def test_requirements_of_an_extra(declared: dict[str, str]) -> None:
+    declared |= {"numpy": "2.0.9", "viser": "1.10.0", "msgspec": "0.19.0"}
+    assert packages.unmet_requirements() == ["numpy>=2.1 (2.0.9 is installed)"]
+    assert packages.unmet_requirements("mujoco") == ["mujoco>=3.10"]
+    assert packages.unmet_requirements("ui") == ["viser<1.2,>=1.1 (1.10.0 is installed)"]
+    declared |= {"numpy": "2.1", "viser": "1.1.9+local", "mujoco": "3.10.1rc1"}
+    for extra in ("", "ui", "mujoco"):
+        assert packages.unmet_requirements(extra) == []
+
+
+def test_each_installer_has_its_command(
+    declared: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    assert packages.how_to_install("ui", []).endswith("pip install 'burg-drake[ui]'")
+    (tmp_path / "uv-receipt.toml").touch()
+    assert packages.how_to_install("ui", ["usd"]) == "uv tool install 'burg-drake[usd,ui]'"
+    (tmp_path / "pipx_metadata.json").touch()
+    assert (
+        packages.how_to_install("ui", [])
+        == "pipx inject burg-drake 'msgspec>=0.19' 'viser<1.2,>=1.1'"
+    )
+
+
+def test_limits_of_a_container(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    limit, cpu = tmp_path / "memory.max", tmp_path / "cpu.max"
+    monkeypatch.setattr(machine, "CGROUP_LIMITS", (str(limit),))
+    monkeypatch.setattr(machine, "CGROUP_CPU", cpu)
+    whole, cores = machine.usable_memory(), machine.usable_cores()
+    limit.write_text("max\n")
+    cpu.write_text("max 100000\n")
+    assert (machine.usable_memory(), machine.usable_cores()) == (whole, cores)
+    limit.write_text("1048576\n")
+    cpu.write_text("50000 100000\n")
+    assert (machine.usable_memory(), machine.usable_cores()) == (1 << 20, 0.5)
+    assert checks._cores_and_memory().state == "low"
+
+
+def test_a_cache_that_cannot_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("BURG_DRAKE_CACHE", str(tmp_path / "file" / "cache"))
+    assert checks._cache().state == "broken"
+    monkeypatch.setenv("BURG_DRAKE_CACHE", str(tmp_path / "new" / "cache"))
+    assert checks._cache().state == "ok"
+    monkeypatch.setenv("BURG_DRAKE_CACHE", "off")
+    assert checks._cache().found == "off, by BURG_DRAKE_CACHE"
