@@ -20,6 +20,7 @@ from burg_drake.cameras.optics.intrinsics import Intrinsics
 from burg_drake.core.documents.schema import parse_document
 from burg_drake.evaluation.cluster.document import ClusterDocument
 from burg_drake.experiment.trials.sheet import TrialSheet
+from burg_drake.pipeline.recipe import RecipeDocument
 from burg_drake.scene.document.scene import SceneDocument
 from burg_drake.station.document.gripper_document import Hand
 from burg_drake.station.document.station_document import StationDocument
@@ -36,6 +37,7 @@ SCHEMAS = {
     "stratum: ": TrialSheet,
     "tls: {": ClusterDocument,
     "jobqueue:": ClusterDocument,
+    "{mesh: ": RecipeDocument,
 }
 """By words of a document in YAML, what it is."""
 PARTS = {
