@@ -33,23 +33,15 @@ SMALLER = {
         **SIX,
         "motion=low))\nrun": "motion=low, grasps_per_object=1, only=['mug']))\nrun",
     },
-    "scenes": {
-        '"tabletop_six"), burg.load_station("panda_tabletop")\nfor': "'small.yaml'), station\nfor",
-        '"close", 1000, workers=2)': '"close", 1)',
-        "size=(0.594, 0.420)), height": "size=(0.1, 0.1)), height",
-        "count_grasps(scene, station)": "count_grasps(scene, station, grasps_per_object=3)",
-        "duration=0.5)": "duration=0.05)",
-    },
     "trials": {'evaluate("tabletop_six"': "evaluate('small.yaml'"},
 }
 """What is printed, and what is run in its place, as it is quick."""
 HOLDS = {
-    "dataset": ["measured.shape == (480, 640) and ((measured > 0.2) & (measured < 2.0)).any()"],
+    "how_do_i_make_depth_images_look_like_my_sensors": ["np.abs(np.nanmedian(measured) - depth).max() < 0.01"],
     "README": [
         "run.complete and len(run.verdicts) == 2",
         "__import__('os').path.getsize('board.pdf')",
     ],
-    "scenes": ["plant.Finalize() or plant.num_bodies() == 1 + 6 + 1"],
 }
 """What is true after a page has run."""
 RUN = [page for page in PAGES if any(block.runs for block in blocks(page))]

@@ -21,6 +21,7 @@ from burg_drake.core.documents.kinds import DOCUMENT_KINDS, document_class
 from burg_drake.core.documents.schema import parse_document
 from burg_drake.evaluation.cluster.document import ClusterDocument
 from burg_drake.experiment.trials.sheet import TrialSheet
+from burg_drake.pipeline.recipe import RecipeDocument
 from burg_drake.scene.document.scene import SceneDocument
 from burg_drake.station.document.gripper_document import Hand
 from burg_drake.station.document.station_document import StationDocument
@@ -37,6 +38,7 @@ SCHEMAS = {
     "stratum: ": TrialSheet,
     "tls: {": ClusterDocument,
     "jobqueue:": ClusterDocument,
+    "{mesh: ": RecipeDocument,
 }
 """By words of a document in YAML, what it is, unless its first line or a comment says so."""
 PARTS = {

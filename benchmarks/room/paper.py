@@ -29,7 +29,7 @@ WITHOUT_OBJECTS = "version: 1\nname: room\nlibrary: household\ninstances: []\n"
 
 @dataclass(frozen=True)
 class Board:
-    """A board as docs/board.md has it, with that page's defaults.
+    """A board as docs/reference/board.md has it, with that page's defaults.
 
     Attributes:
         dictionary: OpenCV's name without `DICT_`.
