@@ -14,7 +14,7 @@ def add_to(verbs: Any) -> None:
         verbs,
         "schema",
         run_schema,
-        "list the kinds of YAML documents, or write their JSON Schemas, by which editors complete"
+        "list kinds of YAML files; write their JSON Schemas"
         " and check them",
         "burg-drake schema",
         "burg-drake schema scene -o scene.json",

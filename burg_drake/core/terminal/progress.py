@@ -73,6 +73,7 @@ class Progress:
 
 
 Listener = Callable[[Progress], None]
+"""Called with the progress each time it changes."""
 
 
 class ProgressMeter:

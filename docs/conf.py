@@ -1,0 +1,78 @@
+"""Sphinx's settings for the site. `tools/site.py` builds it: this folder, with generated pages."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from burg_drake import __version__
+
+project = "burg_drake"
+author = "burg_drake contributors"
+copyright = author
+release = version = __version__
+REPOSITORY = "https://github.com/burg-drake/burg_drake"
+
+extensions = [
+    "_schemas",
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+    "sphinx_design",
+]
+exclude_patterns = ["**.ipynb"]
+# Words of types in docstrings need not name one object only.
+suppress_warnings = ["ref.python"]
+
+myst_enable_extensions = ["colon_fence", "deflist", "attrs_block"]
+myst_heading_anchors = 4
+
+default_role = "code"
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
+autodoc_class_signature = "mixed"
+python_use_unqualified_type_names = True
+python_maximum_signature_line_length = 88
+napoleon_use_rtype = False
+napoleon_custom_sections = [
+    (f"{way} port{s}", "params_style") for way in ("Input", "Output") for s in ("", "s")
+] + [("Ports", "params_style")]
+napoleon_use_ivar = True
+napoleon_numpy_docstring = False
+add_module_names = False
+toc_object_entries_show_parents = "hide"
+
+html_theme = "furo"
+html_title = f"burg_drake {version}"
+html_baseurl = "https://burg-drake.github.io/burg_drake/"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_show_sphinx = False
+html_copy_source = False
+html_theme_options = {
+    "source_repository": REPOSITORY,
+    "source_branch": "main",
+    "source_directory": "docs/",
+    "light_css_variables": {"color-brand-primary": "#0b5c8a", "color-brand-content": "#0b5c8a"},
+    "dark_css_variables": {"color-brand-primary": "#7cc4ee", "color-brand-content": "#7cc4ee"},
+}
+pygments_style = "a11y-light"
+pygments_dark_style = "a11y-dark"
+
+
+def setup(app: Any) -> None:
+    """Called by Sphinx."""
+    # After napoleon: a name that ends with an underscore is a link in reStructuredText.
+    app.connect("autodoc-process-docstring", _without_trailing_underscores, priority=900)
+
+
+def _without_trailing_underscores(
+    app: Any, what: str, name: str, value: Any, options: Any, lines: list[str]
+) -> None:
+    lines[:] = [line.replace("numpy.str_", "str") for line in lines]
