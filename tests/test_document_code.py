@@ -46,7 +46,7 @@ SMALLER = {
 }
 """What is printed, and what is run in its place, as it is quick."""
 HOLDS = {
-    "how_do_i_make_depth_images_look_like_my_sensors": ["np.abs(np.nanmedian(measured) - depth).max() < 0.01"],
+    "how_do_i_make_depth_images_look_like_my_sensors": ["abs(np.median(measured) - 0.8) < 0.01"],
     "README": [
         "isinstance(plan, burg.Plan) and burg.load_plan('plan.json')",
         "result.outcome in set(burg.Outcome)",
