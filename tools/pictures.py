@@ -86,8 +86,8 @@ def render(scene: Scene, station: Station, camera: Camera, robot: str, file: str
 
 
 def save(pixels: np.ndarray, file: str) -> None:
-    """Writes an image of Drake's (H, W, 4)."""
-    image = Image.fromarray(np.ascontiguousarray(pixels[..., :3]))
+    """Writes an image of Drake's (H, W, 4), in 256 colours to keep it small."""
+    image = Image.fromarray(np.ascontiguousarray(pixels[..., :3])).quantize(256)
     IMAGES.mkdir(parents=True, exist_ok=True)
     image.save(IMAGES / file, optimize=True)
 

@@ -24,8 +24,8 @@ from burg_drake.printout.pen import Pen
 from burg_drake.printout.tiling import Tiling
 
 NEAREST, FARTHEST = 11.0, 22.0
-"""Distances of the camera in sides of a marker: 0.5 to 1 m for 45 mm, at which docs/concepts/camera_accuracy.md
-says what poses are worth."""
+"""Distances of the camera in sides of a marker: 0.5 to 1 m for 45 mm. How accurate poses are there
+is said in docs/concepts/camera_accuracy.md."""
 TILT_DEG = 50.0
 """Greatest angle off the vertical there [deg]."""
 
