@@ -36,12 +36,7 @@ SMALLER = {
         "AdvanceTo(plan.duration)": "AdvanceTo(0.1)",
         '"runs/best", grasps=best)': '"runs/best", grasps=best, settings=settings)',
     },
-    "arms": SIX,
     "compare": {'"tabletop_six"': "'small.yaml'"},
-    "reach": {
-        **SIX,
-        "motion=low))\nrun": "motion=low, grasps_per_object=1, only=['mug']))\nrun",
-    },
     "scenes": {
         '"tabletop_six"), burg.load_station("panda_tabletop")\nfor': "'small.yaml'), station\nfor",
         '"close", 1000, workers=2)': '"close", 1)',

@@ -93,7 +93,7 @@ def case(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
         return HANDS[request.param]
     folder = tmp_path_factory.mktemp("own")
     if request.param == "linkage":  # fingers that turn, as the page has them: two that slide
-        for block in blocks(ROOT / "docs/hands.md"):
+        for block in blocks(ROOT / "docs/reference/hands.md"):
             if block.remark.startswith("file "):
                 (folder / block.remark.removeprefix("file ")).write_text(block.code, "utf-8")
         return Case(str(folder / "robotiq_2f85.yaml"), 60.0, (0.022, 0.0375), 0.085)

@@ -22,7 +22,8 @@ class Finger:
 
     Attributes:
         body: link of the finger in the hand's model.
-        joint: prismatic joint that moves it. For hands whose fingers turn see docs/hands.md.
+        joint: prismatic joint that moves it. For hands whose fingers turn see
+            docs/reference/hands.md.
         pad: name of the collision geometry that touches the object; compliant, as objects are not.
         closed: joint position with the pads at the smallest distance [m].
         open: joint position with the pads at the largest distance [m].
