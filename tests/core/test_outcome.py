@@ -73,7 +73,8 @@ def test_each_outcome_says_what_it_means():
 
 def test_the_page_lists_every_outcome_at_its_stage() -> None:
     page = Path(__file__).parents[2] / "docs" / "concepts" / "outcomes.md"
-    listed, stage = {}, ""
+    listed: dict[str, str] = {}
+    stage = ""
     for first, names in re.findall(r"^\| (\w*) ?\| (\**`.+?) \|", page.read_text("utf-8"), re.M):
         stage = first or stage
         listed |= dict.fromkeys(re.findall(r"`(\w+)`", names), stage)
