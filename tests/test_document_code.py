@@ -27,12 +27,7 @@ instances:
 SIX = {'load_scene("tabletop_six")': "load_scene('small.yaml')"}
 """Two of its objects, where they are."""
 SMALLER = {
-    "arms": SIX,
     "compare": {'"tabletop_six"': "'small.yaml'"},
-    "reach": {
-        **SIX,
-        "motion=low))\nrun": "motion=low, grasps_per_object=1, only=['mug']))\nrun",
-    },
     "trials": {'evaluate("tabletop_six"': "evaluate('small.yaml'"},
 }
 """What is printed, and what is run in its place, as it is quick."""

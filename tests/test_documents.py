@@ -30,7 +30,9 @@ from tests.pages import PAGES, ROOT, Block, blocks
 SCHEMAS = {
     "name: breakfast": SceneDocument,
     "dictionary: ARUCO": SceneDocument,
+    "name: desk": SceneDocument,
     "hand: wsg_50": StationDocument,
+    "hand: robotiq_2f85.yaml": StationDocument,
     "kind: inverse_dynamics": StationDocument,
     "least_lift: ": StationDocument,
     "coupled: true": Hand,

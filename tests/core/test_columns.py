@@ -1,8 +1,7 @@
-"""Units and meaning of columns: one declaration, in every file and in the document."""
+"""Units and meaning of columns: one declaration, in every file."""
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import h5py
@@ -10,17 +9,8 @@ import numpy as np
 import pytest
 
 from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps.column_meanings import FAMILIES, GROUPS, describe
+from burg_drake.core.grasps.column_meanings import describe
 from burg_drake.core.grasps.grasp_set import GraspSet
-
-DOCUMENT = Path(__file__).parents[2] / "docs" / "results.md"
-
-
-def test_the_document_has_each_column_as_it_is_declared() -> None:
-    rows = re.findall(r"^\| `(.+?)` \| (.*?) \| (.+) \|$", DOCUMENT.read_text("utf-8"), re.M)
-    groups = [*GROUPS.values(), FAMILIES]
-    declared = [(n, c.unit, c.description) for group in groups for n, c in group.items()]
-    assert [(name, unit.strip(), text) for name, unit, text in rows] == declared
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import pickle
+import re
+from pathlib import Path
 
 from burg_drake.core.grasps.outcome import Outcome, Stage
 
@@ -67,3 +69,13 @@ def test_each_outcome_is_decided_by_one_stage():
 def test_each_outcome_says_what_it_means():
     assert len({outcome.meaning for outcome in Outcome if outcome.meaning}) == len(Outcome)
     assert pickle.loads(pickle.dumps(Outcome.NO_IK)) is Outcome("no_ik") is Outcome.NO_IK
+
+
+def test_the_page_lists_every_outcome_at_its_stage() -> None:
+    page = Path(__file__).parents[2] / "docs" / "concepts" / "outcomes.md"
+    listed: dict[str, str] = {}
+    stage = ""
+    for first, names in re.findall(r"^\| (\w*) ?\| (\**`.+?) \|", page.read_text("utf-8"), re.M):
+        stage = first or stage
+        listed |= dict.fromkeys(re.findall(r"`(\w+)`", names), stage)
+    assert listed == {outcome.value: outcome.stage.value for outcome in Outcome}

@@ -1,4 +1,4 @@
-"""docs/formats.md says of each format what the format says of itself."""
+"""docs/reference/grasp_formats.md says of each format what the format says of itself."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from burg_drake.formats.common.convention import convention_of
 from burg_drake.formats.common.grasp_format import PANDA
 from burg_drake.formats.grasp_files import FORMATS
 
-PAGE = Path(__file__).parents[2] / "docs" / "formats.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "grasp_formats.md"
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.simulation.trials.trial_settings import TrialSettings
 from burg_drake.station.document.gripper_document import load_hand
 from burg_drake.station.document.station_document import Station, StationDocument, Table
-from tests.pages import ROOT, blocks
+from tests.pages import ROOT
 
 NORMAL = TrialSettings()
 
@@ -92,11 +92,9 @@ def case(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     if request.param in HANDS:
         return HANDS[request.param]
     folder = tmp_path_factory.mktemp("own")
-    if request.param == "linkage":  # fingers that turn, as the page has them: two that slide
-        for block in blocks(ROOT / "docs/hands.md"):
-            if block.remark.startswith("file "):
-                (folder / block.remark.removeprefix("file ")).write_text(block.code, "utf-8")
-        return Case(str(folder / "robotiq_2f85.yaml"), 60.0, (0.022, 0.0375), 0.085)
+    if request.param == "linkage":  # fingers that turn, as the example has them: two that slide
+        document = ROOT / "examples" / "robotiq_2f85" / "robotiq_2f85.yaml"
+        return Case(str(document), 60.0, (0.022, 0.0375), 0.085)
     fingers = OWN_FINGER.format(name="a", offset=0.003)
     fingers += OWN_FINGER.format(name="b", offset=0.052)
     (folder / "pincer.sdf").write_text(OWN_SDF.format(fingers=fingers), encoding="utf-8")

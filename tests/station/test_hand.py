@@ -299,7 +299,7 @@ def test_depth_of_pads_on_cranks() -> None:
     and 44 mm forward with the hand open, the middle of the pads 141.5 mm before the flange."""
     rows = [
         [float(cell) for cell in re.findall(r"\| ([\d.]+)", line)]
-        for line in (ROOT / "docs/hands.md").read_text("utf-8").splitlines()
+        for line in (ROOT / "docs/reference/hands.md").read_text("utf-8").splitlines()
         if line.startswith(("| opening [mm]", "| middle of the pads"))
     ]
     opening, depth = np.array(rows)

@@ -1,7 +1,6 @@
 """What columns of tables and grasp sets mean, and their units: one declaration for all of them.
 
-Files carry it along: Parquet and HDF5 with each column, CSV in a file beside it. docs/results.md
-prints it, and a test holds the two together.
+Files carry it along: Parquet and HDF5 with each column, CSV in a file beside it.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Each field says what it means, in which unit, and of which kind it is (`verdict_field`). All that
 writes or reads verdicts goes by this declaration: journals, tables and the units and meanings in
-them, rows that are executed again, replays and docs/results.md. A new margin is one line of
+them, rows that are executed again, and replays. A new margin is one line of
 `Margins`, and one more where it is measured. What is measured more often than once a grasp is a
 field of its own.
 

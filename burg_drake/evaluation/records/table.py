@@ -1,6 +1,6 @@
 """The results table: its columns, one row a trial, in the order of the candidates.
 
-docs/results.md has unit and meaning of every column. A row tells, from left to right:
+`core.grasps.column_meanings` has unit and meaning of every column. A row tells, from left to right:
 
     which grasp it is, and how it ended      id, instance, object; outcome, stage, blocker, reason
     where the grasp is on its object         width, score, x ... qz

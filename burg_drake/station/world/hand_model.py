@@ -131,7 +131,8 @@ def find_hand(
             raise InvalidInputError(
                 f"hand {hand.name!r}: fingers[{i}].joint {finger.joint!r} is {kind} in its model"
                 f" {hand.model}; fingers have to be on prismatic joints: model a hand whose fingers"
-                " turn by two that slide, with the pads of the real one (docs/hands.md)"
+                " turn by two that slide, with the pads of the real one"
+                " (https://burg-drake.github.io/burg_drake/reference/hands.html)"
             )
         _check_name(hand, f"fingers[{i}].joint", finger.joint, sliding)
     one, other = hand.fingers
