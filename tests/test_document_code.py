@@ -37,7 +37,6 @@ SMALLER = {
         '"runs/best", grasps=best)': '"runs/best", grasps=best, settings=settings)',
     },
     "arms": SIX,
-    "compare": {'"tabletop_six"': "'small.yaml'"},
     "reach": {
         **SIX,
         "motion=low))\nrun": "motion=low, grasps_per_object=1, only=['mug']))\nrun",
@@ -49,7 +48,6 @@ SMALLER = {
         "count_grasps(scene, station)": "count_grasps(scene, station, grasps_per_object=3)",
         "duration=0.5)": "duration=0.05)",
     },
-    "trials": {'evaluate("tabletop_six"': "evaluate('small.yaml'"},
 }
 """What is printed, and what is run in its place, as it is quick."""
 HOLDS = {

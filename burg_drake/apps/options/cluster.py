@@ -21,7 +21,8 @@ def add_cluster(group: Any) -> None:
         "--cluster",
         metavar="WHERE",
         help="work on a cluster of Dask: tls://HOST:PORT of a scheduler, a cluster.yaml, or"
-        " local:N for N workers on this machine (needs burg-drake[dask]; see docs/scale.md)",
+        " local:N for N workers on this machine (needs burg-drake[dask]; see"
+        " https://burg-drake.github.io/burg_drake/tutorials/label_object_set.html)",
     )
 
 
