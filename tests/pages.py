@@ -3,7 +3,7 @@
 A comment of a page right before a block (`<!-- ... -->`) says what is special about it:
 
 - `not run: REASON`: of Python; it is compiled, and what it takes from burg_drake is looked up;
-- `run first` and lines of Python: what a reader has at hand, and the blocks take for granted;
+- `run first` and lines of Python: what a reader has at hand, or what holds after the block before;
 - `file NAME`: the block is written to that file, for those after it;
 - `scene`, `station` or another kind of document (`burg-drake schema`): of YAML; what it is;
 - `run`: of commands; they are run, and not only parsed.
@@ -18,17 +18,15 @@ from __future__ import annotations
 import ast
 import re
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 
 from markdown_it import MarkdownIt
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("**/[!_]*.md"))]
 REPLACEMENTS = re.compile(r"<!-- in tests\n(.*?)-->", re.DOTALL)
-AS_PRINTED: Mapping[str, str] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -65,18 +63,12 @@ class Block:
             yield shlex.split(line.partition(" > ")[0], comments=True)
 
 
-def blocks(page: Path, changes: Mapping[str, str] = AS_PRINTED) -> Iterator[Block]:
-    """The blocks of a page, in order.
-
-    Args:
-        page: its file.
-        changes: what is printed, each once, and what is taken in its place.
-    """
+def blocks(page: Path) -> Iterator[Block]:
+    """The blocks of a page, in order."""
     text = page.read_text("utf-8")
     lines = [line for comment in REPLACEMENTS.findall(text) for line in comment.splitlines()]
     text = REPLACEMENTS.sub(lambda found: "\n" * found[0].count("\n"), text)
-    changes = {**changes, **dict(line.split(" => ", 1) for line in lines)}
-    for printed, small in changes.items():
+    for printed, small in (line.split(" => ", 1) for line in lines):
         assert text.count(printed) == 1, printed
         text = text.replace(printed, small)
     remark = ""

@@ -494,7 +494,7 @@ def test_wrong_calls_are_refused_and_leave_nothing(tmp_path: Path) -> None:
 
 
 def test_the_example_of_the_document_is_a_sheet() -> None:
-    page = Path(__file__).resolve().parents[2] / "docs" / "trials.md"
+    page = Path(__file__).resolve().parents[2] / "docs/reference/trials.md"
     example = page.read_text(encoding="utf-8").split("```yaml\n", 1)[1].split("```", 1)[0]
-    trial = parse_document(example, TrialSheet, "docs/trials.md").trial(17)
+    trial = parse_document(example, TrialSheet, "docs/reference/trials.md").trial(17)
     assert trial.outcome is RealOutcome.SLIPPED and trial.placement["mug"].turn_deg == 0.8
