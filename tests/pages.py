@@ -60,7 +60,7 @@ class Block:
         """The arguments of each `burg-drake` in it; variables of a shell are 1."""
         text = re.sub(r"\$\w+", "1", self.code).replace("\\\n", " ")
         for line in re.findall(r"^(?:\$ |ssh .*? )?burg-drake (.*)$", text, re.MULTILINE):
-            yield shlex.split(line.partition(" > ")[0], comments=True)
+            yield shlex.split(re.split(r" \\?[>|] ", line)[0], comments=True)
 
 
 def blocks(page: Path) -> Iterator[Block]:

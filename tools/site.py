@@ -130,17 +130,21 @@ def write_source(folder: Path) -> None:
     for page in folder.rglob("*.md"):
         place = DOCS / page.relative_to(folder)
         page.write_text(_for_sphinx(page.read_text("utf-8"), place), "utf-8")
-    generated = {
+    for name, text in generated_pages().items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, "utf-8")
+
+
+def generated_pages() -> dict[str, str]:
+    """Markdown of the pages that code tells, by path below docs/."""
+    return {
         **dict(_python_pages()),
         **dict(_command_pages()),
         "reference/columns.md": _columns_page(),
         "reference/outcomes.md": _outcomes_page(),
         **dict(_gallery_pages()),
     }
-    for name, text in generated.items():
-        path = folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, "utf-8")
 
 
 def _for_sphinx(text: str, place: Path) -> str:
