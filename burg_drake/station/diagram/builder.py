@@ -26,9 +26,9 @@ With `drivers=True` arm and hand are commanded as Drake's stations are, and meas
              wrist.force_torque       of the hand on the arm, in H: torque, then force [Nm, N]
              reaction_forces          of all joints
 
-All inputs may be left out then: what nobody commands holds still. docs/tutorials/drake_diagram.md says what each
-means. Gravity does not pull the robot, as a real one compensates its own weight, unless the station
-gives its arm an inverse-dynamics controller (`ArmControl`).
+All inputs may be left out then: what nobody commands holds still. docs/tutorials/drake_diagram.md
+says what each means. Gravity does not pull the robot, as a real one compensates its own weight,
+unless the station gives its arm an inverse-dynamics controller (`ArmControl`).
 """
 
 from __future__ import annotations
