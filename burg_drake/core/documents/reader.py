@@ -58,7 +58,7 @@ class Reader:
         if required and not {key.value for key, _ in node.value}.intersection(required):
             kind = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", schema.__name__).lower()
             keys = ", ".join(["version", *required])
-            raise self.fail(node, "", f"this is no {kind}, which has keys {keys}")
+            raise self.fail(node, "", f"not a {kind}; one has the keys {keys}")
         raise self.fail(node, "version", f"missing; add 'version: {current}'")
 
     def read(self, node: yaml.Node, kind: Any, where: str) -> Any:
@@ -117,7 +117,7 @@ class Reader:
         found: dict[str, tuple[yaml.Node, yaml.Node]] = {}
         for key, value in node.value:
             if not isinstance(key, yaml.ScalarNode):
-                raise self.fail(key, where, "a key has to be a text, not a structure")
+                raise self.fail(key, where, "a key must be a text, not a list or a mapping")
             if key.value in found:
                 raise self.fail(key, where, f"key {quoted(key.value)} is given twice")
             found[key.value] = (key, value)
