@@ -127,10 +127,10 @@ def format_by_suffix(path: str | Path) -> GraspFormat:
     if not fitting:
         known = sorted({suffix for format in FORMATS.values() for suffix in format.suffixes})
         raise InvalidInputError(
-            f"{path}: no format of grasps has the suffix {suffix!r}; name one of the"
-            f" formats {', '.join(FORMATS)}, or use a suffix: {' '.join(known)}"
+            f"{path}: no format of grasps has the suffix {suffix!r}; give one of the"
+            f" formats {', '.join(FORMATS)}, or one of the suffixes {' '.join(known)}"
         )
     if len(fitting) > 1 and fitting[0].name != "burg_drake":
         names = " or ".join(format.name for format in fitting)
-        raise InvalidInputError(f"{path}: {suffix} can be {names}; name the format that you want")
+        raise InvalidInputError(f"{path}: the suffix {suffix} can mean {names}; give the format")
     return fitting[0]

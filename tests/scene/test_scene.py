@@ -118,5 +118,8 @@ def test_what_has_no_mass_cannot_be_free(make_scene: MakeScene, library: ObjectL
     library.objects["cube"] = dataclasses.replace(cube, mass_properties=fixed)
     library.save()
     assert list(make_scene(background=(("cube",),)).background) == ["fixed_0"]
-    with pytest.raises(DocumentError, match=r"instances\[0\]: 'cube' has no mass; list it under"):
+    with pytest.raises(
+        DocumentError,
+        match=r"instances\[0\]: 'cube' has no mass, so it cannot be a free object; list it under",
+    ):
         make_scene(("cube",))
