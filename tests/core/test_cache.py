@@ -200,6 +200,6 @@ def test_the_folder_is_the_user_s(
 def test_the_home_of_nobody_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("BURG_DRAKE_CACHE", "~nobody_of_this_name/cache")
     with pytest.raises(
-        InvalidInputError, match=r"\^BURG_DRAKE_CACHE: ~nobody_of.*write the whole path ou"
+        InvalidInputError, match=r"^BURG_DRAKE_CACHE: ~nobody_of.*write the whole path"
     ):
         cache_folder()

@@ -116,7 +116,8 @@ def test_require_sound_gives_one_line(make_scene: MakeScene) -> None:
     with pytest.raises(InvalidInputError) as caught:
         require_no_errors(scene, validate_scene(scene))
     assert str(caught.value) == (
-        f"{scene.path}: 'cube_0' is off the board: 30.0 mm over the left edge of the board (600 x 400 mm) (and 1 more; burg-drake scene validate lists all)"
+        f"{scene.path}: 'cube_0' is off the board: 30.0 mm over the left edge of the board"
+        " (600 x 400 mm) (and 1 more; burg-drake scene validate lists all)"
     )
 
 
