@@ -146,17 +146,17 @@ def test_the_bound_ends_it_and_what_is_missing_is_said(
     ("options", "message"),
     [
         ({"until_balanced": 0}, "until_balanced is 0; give 1 or more"),
-        ({"shard": "1/2"}, "leave out until_balanced or shard"),
+        ({"shard": "1/2"}, "leave out one of the two"),
         ({"max_grasps_per_object": 3}, "give a larger maximum"),
         ({"balanced_among": "cleared"}, "there is no balanced_among 'cleared'"),
         (
             {"balanced_among": "reachable", "mode": "hand"},
-            "mode hand does not ask what the arm can",
+            "mode hand does not check what the arm can",
         ),
-        ({"until_balanced": None, "balanced_among": "all"}, "balanced_among has an effect only"),
+        ({"until_balanced": None, "balanced_among": "all"}, "balanced_among has no effect without"),
         (
             {"until_balanced": None, "max_grasps_per_object": 50},
-            "max_grasps_per_object has an effect only with until_balanced",
+            "max_grasps_per_object has no effect without until_balanced",
         ),
     ],
 )

@@ -313,7 +313,7 @@ def test_some_objects_only(
     assert set(run.candidates.instance) == {"left"}
     assert load_run(run.path).document.grasps.objects == {"cube": 1}  # and no bar without grasps
     assert "grasps.npz --only left,right" in reproduce_command(run)
-    with pytest.raises(InvalidInputError, match=r"no grasps are of right; .* some of left, bar"):
+    with pytest.raises(InvalidInputError, match=r"no grasps of right; .* some of left, bar"):
         evaluate(
             scene,
             station,
@@ -429,7 +429,7 @@ def test_bad_input_is_said_before_any_work(
         evaluate_in("file")
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thesis.tex").write_text("")
-    with pytest.raises(InvalidInputError, match=r"is not empty and holds no run .*thesis.tex"):
+    with pytest.raises(InvalidInputError, match=r"is not empty and not a run: it has thesis.tex"):
         evaluate_in("full")
     with pytest.raises(InvalidInputError, match="workers is 0"):
         evaluate_in("run", workers=0)

@@ -232,7 +232,7 @@ def test_given_grasps_go_where_their_objects_are(
         scenes[2], station, tmp_path / "one", grasps=grasps, executor=Inline(), progress=False
     )
     assert same(campaign.run("three").results, alone.results)
-    assert summarize(campaign).notes == ("no grasps to judge in 1 scenes: cubes",)
+    assert summarize(campaign).notes == ("1 scenes have no grasps to judge: cubes",)
     only = run_all(scenes, station, tmp_path / "only", only=["bar"])
     assert set(only.columns(["object"])["object"].tolist()) == {"bar"}
     assert load_scene(scenes[0]).content == only.document.scenes[0].content

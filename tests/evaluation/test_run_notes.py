@@ -65,9 +65,9 @@ def test_nothing_executed_is_explained(judged_here: None, tmp_path: Path) -> Non
             break
     assert counts.total() == 20 and not set(counts) - {"collision_table", "collision_target"}
     (note,) = summarize(run).notes
-    assert note.startswith("screwdriver: nothing executed of 20 grasps: ")
+    assert note.startswith("screwdriver: none of 20 grasps was executed: ")
     assert f"hits the table in {counts[Outcome.COLLISION_TABLE]}" in note
-    assert note.endswith("; sample grasps at which the hand is clear, which is the default")
+    assert note.endswith("; sample grasps at which the hand is clear, as is the default")
 
 
 def test_a_margin_that_leaves_nothing_is_said(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -186,8 +186,8 @@ def test_unknown_keys_are_left_aside_with_a_note(tmp_path: Path) -> None:
         f"{path}:5: unknown key 'author' was ignored; known: description, name, objects,"
         " yaml_file_type, yaml_file_version",
         f"{path}:9: objects[0]: unknown key 'friction_coef' was ignored; did you mean"
-        " 'friction_coeff'? Known: friction_coeff, identifier, mass, mesh_fn, name, scale, stable_poses,"
-        " thumbnail_fn, urdf_fn, vhacd_fn",
+        " 'friction_coeff'? Known: friction_coeff, identifier, mass, mesh_fn, name, scale,"
+        " stable_poses, thumbnail_fn, urdf_fn, vhacd_fn",
     )
 
 

@@ -161,7 +161,7 @@ MIRROR = np.diag([1.0, 1.0, -1.0, 1.0]).tolist()
         ),
         (
             {"objects": instance(pose=MIRROR)},
-            r"scene.yaml:\d\+: pose of 'a'\[0\] is a reflection \(determinant -1\)",
+            r"scene.yaml:\d+: pose of 'a'\[0\] is a reflection",
         ),
     ],
 )

@@ -42,7 +42,7 @@ def test_a_cube_from_above(tmp_path: Path, assert_grips_the_cube: Callable[[Arra
     )
     imported = FORMAT.read(path, PANDA)
     assert imported.frame == "world"
-    assert imported.notes == ("width was ignored of 1 failures: it is the open hand's.",)
+    assert imported.notes == ("the width of 1 failed grasps was ignored: it is the open hand's.",)
     grasps = imported.grasps
     assert_grips_the_cube(grasps.X_OG[0])
     np.testing.assert_allclose(grasps.X_OG[1, :3, 3], [0.1, 0.2, 0.2595], atol=1e-15)

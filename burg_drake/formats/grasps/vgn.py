@@ -114,7 +114,7 @@ def _of_contacts(width: Array, label: NDArray[Any] | None) -> tuple[Array, tuple
     if label is None or label.dtype.kind != "f":
         return width, ()
     left = ~np.isnan(width) & (label == 0.0)
-    note = f"width was left aside of {int(left.sum())} failures: it is the open hand's."
+    note = f"the width of {int(left.sum())} failed grasps was ignored: it is the open hand's."
     return np.where(left, np.nan, width), (note,) if left.any() else ()
 
 
