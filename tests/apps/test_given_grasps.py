@@ -138,9 +138,9 @@ def test_turned_grasps_are_told_and_the_printed_command_corrects_them(
     assert "fit as they were read" not in capsys.readouterr().out
     assert typed([*words, "--correction", "turn:z90"], monkeypatch) == 2
     assert (
-        f"{run} holds another run (correction is none there, turn:z90 here); choose another folder"
-        in capsys.readouterr().err
-    )
+        f"{run} already holds another run (correction is none there, turn:z90 here);"
+        " choose another folder"
+    ) in capsys.readouterr().err
 
 
 def test_a_run_over_scenes_tells_the_mistake_of_its_file_once(

@@ -124,7 +124,7 @@ def test_the_last_bit_of_a_margin_is_compared(row_file: Path, capsys: Capture) -
     rewrite(row_file, slip=repr(1.001 * slip))
     assert replay(row_file) == 1
     out = capsys.readouterr().out.splitlines()
-    assert "not as recorded" in out
+    assert "differs from what was recorded" in out
     assert f"slip: recorded {1.001 * slip!r}, now {slip!r}" in out
 
 
@@ -173,7 +173,7 @@ def test_a_scene_that_is_gone_or_changed(run: Run, row_file: Path, capsys: Captu
     assert replay(row_file, "--scene", str(changed), "--force") == 1
     captured = capsys.readouterr()
     assert "the scene is not the one of the trial" in captured.err
-    assert "not as recorded" in captured.out
+    assert "differs from what was recorded" in captured.out
 
 
 @pytest.mark.thorough

@@ -67,7 +67,7 @@ def test_plan_tells_what_was_chosen_and_what_it_will_tell(planned: Path, capsys:
     assert "precision" in printed and "McNemar's exact test" in printed
     assert f"wrote 4 trials to {planned / 'other.yaml'}" in printed
     assert trials("plan", planned / "no_run", "-o", planned / "x.yaml") == 2
-    assert "holds no run" in capsys.readouterr().err
+    assert "is not the folder of a run" in capsys.readouterr().err
     assert not (planned / "x.yaml").exists()
 
 

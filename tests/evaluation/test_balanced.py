@@ -135,8 +135,8 @@ def test_the_bound_ends_it_and_what_is_missing_is_said(
     assert max(map(sum, run.document.grasps.asked.values())) <= 20
     lifted, failed = counts(run, "bar", {Outcome.LIFTED}), counts(run, "bar", FAILED)
     (note,) = [note for note in run_notes(run) if note.startswith("bar: ")]
-    missing = f"{lifted} of the 30 lifted and {failed} of the 30 failing grasps asked for"
-    assert note.startswith(f"bar: {missing} (executed ones count), after ")
+    missing = f"{lifted} of the 30 lifted and {failed} of the 30 failing grasps were found"
+    assert note.startswith(f"bar: only {missing} (only executed grasps count) among ")
     assert note.endswith(" grasps (max_grasps_per_object is 20)")
     partial = replace(run, document=run.document).with_verdicts({})
     assert not [note for note in run_notes(partial) if "max_grasps" in note]

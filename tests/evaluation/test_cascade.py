@@ -200,8 +200,8 @@ def test_grasps_whose_workers_were_ended_are_tried_again(
     short = ShortOfMemory(killed=(killed,), crashing=(crashing,))
     run = judge(short, "run")
     assert run.complete and run.failures == [killed, crashing] and run.interrupted == [killed]
-    assert run.row(killed)["reason"] == "the worker process was ended from outside by SIGKILL"
-    assert run.row(crashing)["reason"] == "the worker process was ended by SIGSEGV"
+    assert run.row(killed)["reason"] == "the worker process was killed from outside by SIGKILL"
+    assert run.row(crashing)["reason"] == "the worker process was killed by SIGSEGV"
 
     run = judge(replace(short, log=tmp_path / "short again"), "run")  # dies again: no endless loop
     assert judged("short again") == [killed] and run.interrupted == [killed]
@@ -250,8 +250,8 @@ def test_another_run_is_not_mixed_in(
             progress=False,
         )
     assert str(error.value) == (
-        f"{run} holds another run (engine is standard there, reference here; grasps are 5 an"
-        " object, sampled blind there, 6 an object, sampled blind here); choose another folder, or"
+        f"{run} already holds another run (engine is standard there, reference here; grasps are 5"
+        " an object, sampled blind there, 6 an object, sampled blind here); choose another folder, or"
         " delete it"
     )
     with pytest.raises(InvalidInputError) as error:
@@ -387,7 +387,7 @@ def test_own_files_are_not_overwritten(
             progress=False,
         )
     assert str(error.value) == (
-        f"{mine} is not empty and holds no run ({name} is in it); choose another folder"
+        f"{mine} is not empty and not a run: it has {name} in it; choose another folder"
     )
     assert {path.name: path.read_text() for path in mine.iterdir()} == {name: "my work"}
 

@@ -120,8 +120,8 @@ def test_faults_cost_only_the_grasps_that_cause_them(cluster: Cluster) -> None:
     assert outcomes(answers) == {g.id: expected(g.id) for g in grasps(40)} | failed
     reasons = {g.id: v.reason for _, g, v in answers if g.id in how}
     assert [reasons[id] for id in how] == [
-        "the worker process was ended by SIGSEGV",
-        "the worker process was ended from outside by SIGKILL",
+        "the worker process was killed by SIGSEGV",
+        "the worker process was killed from outside by SIGKILL",
         "took longer than 0.25 s of CPU time",
         "MemoryError",
     ]

@@ -61,7 +61,7 @@ def test_files_are_found_beside_the_document(tmp_path: Path) -> None:
     found = read_cluster(document(tmp_path, f"address: tls://head:8786\n{tls}")).tls
     assert found is not None
     assert found.key == str(tmp_path / "key.pem")
-    with pytest.raises(DocumentError, match="address is tcp://127.0.0.1:1, but tls files"):
+    with pytest.raises(DocumentError, match=r"address is tcp://127.0.0.1:1, but tls files"):
         read_cluster(document(tmp_path, f"address: tcp://127.0.0.1:1\n{tls}"))
 
 

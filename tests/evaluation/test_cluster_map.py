@@ -95,7 +95,7 @@ def test_faults_cost_only_the_work_that_causes_them(executor: DaskExecutor) -> N
         **{k: (k * k, "known") for k in (0, 3, 6, 7)},
         1: "no square of 1",
         2: "ZeroDivisionError: by nothing",
-        4: "the worker process was ended by SIGSEGV",
+        4: "the worker process was killed by SIGSEGV",
         5: "5 does not travel",
     }
 

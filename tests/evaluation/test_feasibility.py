@@ -260,7 +260,7 @@ def test_what_cannot_be_answered_has_no_outcome(
     found = reach(scene, station, given, workers=2)
     empty = found.column("outcome") == ""
     assert found.id[empty].tolist() == [judged.id[2]]
-    assert found.column("reason")[empty].tolist() == ["the worker process was ended by SIGSEGV"]
+    assert found.column("reason")[empty].tolist() == ["the worker process was killed by SIGSEGV"]
 
 
 def test_a_set_has_to_name_its_objects(station: Station) -> None:

@@ -83,7 +83,7 @@ def test_the_table_of_a_run_is_no_grasp_file(run: Run, table: str, tmp_path: Pat
 
 
 def test_a_folder_without_a_run(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match="holds no run"):
+    with pytest.raises(InvalidInputError, match="is not the folder of a run"):
         read_input(tmp_path)
 
 

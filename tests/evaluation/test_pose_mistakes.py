@@ -96,7 +96,7 @@ def test_a_planted_mistake_is_named_and_undone(
     assert found is not None
     assert ",".join(found.mistake.correction) == correction
     assert found.before <= 2 and found.after == found.count == 12
-    assert found.text().startswith(f"{found.before} of the 12 grasps fit as they were read: the ")
+    assert found.text().startswith(f"As they were read, {found.before} of the 12 grasps fit: ")
     assert "12 of 12 fit." in found.text()
     assert f"very likely means that; --correction {correction} reads" in found.text()
     undone = corrected_poses(spoiled, np.eye(4), correction.split(","))
@@ -277,7 +277,7 @@ def test_half_widths_and_widths_beyond_the_opening(
     wide = np.where(np.arange(12) < 3, 0.0951, right.width)
     GraspSet.create(right.X_OG, object="mug", width=wide).save(tmp_path / "wide.npz")
     (note,) = read_grasps(six, tmp_path / "wide.npz", PANDA).notes
-    assert "width of 3 of 12 grasps" in note and "(largest 95.1 mm)" in note
+    assert "width of 3 of 12 grasps" in note and "(the largest is 95.1 mm)" in note
     assert "hand open at 80 mm" in note
 
 

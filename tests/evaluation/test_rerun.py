@@ -115,7 +115,9 @@ def test_other_versions_are_named() -> None:
     origin = dataclasses.replace(ORIGIN, versions={**ORIGIN.versions, "drake": "1.2.3"})
     found = differences(VERDICT, changed(slip=0.4))
     first, *_ = comparison(found, origin)
-    assert first == f"not as recorded (with drake 1.2.3, now {software_versions()['drake']})"
+    assert first == (
+        f"differs from what was recorded (with drake 1.2.3, now {software_versions()['drake']})"
+    )
     assert comparison([], origin) == ["as recorded"]
 
 
@@ -126,4 +128,4 @@ def test_a_version_of_the_engine_is_named_if_it_executed_the_trial() -> None:
     assert comparison(found, origin)[0] == "differs from what was recorded"
     now = importlib.metadata.version("mujoco")
     first, *_ = comparison(found, origin.judged_by("mujoco"))
-    assert first == f"not as recorded (with mujoco 1.2.3, now {now})"
+    assert first == f"differs from what was recorded (with mujoco 1.2.3, now {now})"

@@ -248,7 +248,7 @@ def test_other_scenes_and_other_grasps_are_refused(tmp_path: Path) -> None:
         compare(away, sheet)
     with pytest.raises(InvalidInputError, match=r"no grasp of .* is judged in"):
         compare(others, sheet)
-    with pytest.raises(InvalidInputError, match="holds no run"):
+    with pytest.raises(InvalidInputError, match="is not the folder of a run"):
         compare(first, tmp_path)
 
 

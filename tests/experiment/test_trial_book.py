@@ -130,7 +130,9 @@ def test_a_file_system_without_locks_is_named(
 ) -> None:
     book = TrialBook(write_sheet(tmp_path))
     monkeypatch.setattr(fcntl, "flock", no_locks)
-    with pytest.raises(InvalidInputError, match=r"trials.yaml is on a file system without locks"):
+    with pytest.raises(
+        InvalidInputError, match=r"trials.yaml is on a file system without file locks"
+    ):
         book.record(1, outcome="lifted")
     assert book.entries() == [] and book.sheet() == make_sheet()
 

@@ -29,7 +29,7 @@ def test_clicks_survive_the_death_of_the_server(page: Page, trials: Path) -> Non
     page.clock.fast_forward(700)  # clicks right after a trial comes up do not count
     page.fill("#width", "abc")
     page.click('[data-outcome="slipped"]')
-    expect(page.locator("#widthnote")).to_contain_text("Not a width in mm")
+    expect(page.locator("#widthnote")).to_contain_text("not a width in mm")
     expect(page.locator("#width")).to_have_value("abc")
     expect(number).to_have_text("1")
     page.fill("#width", "500")
@@ -123,9 +123,9 @@ def test_what_is_refused_for_good_can_be_dropped(page: Page, trials: Path) -> No
         expect(page.locator("#saved")).to_contain_text("holds other trials by now")
         expect(troubles).to_be_hidden()  # it may pass
         page.clock.fast_forward(10_000)
-        expect(troubles).to_contain_text("Trial 1, slipped, is refused: ")
+        expect(troubles).to_contain_text("Trial 1, slipped, cannot be saved yet: ")
         expect(troubles).to_contain_text("start the page again. It is sent again until")
-        troubles.get_by_role("button", name="Drop it").click()
+        troubles.get_by_role("button", name="Discard").click()
         expect(troubles).to_be_hidden()
         trials.write_text(text)
         expect(page.locator("#saved")).to_have_text("All saved")
