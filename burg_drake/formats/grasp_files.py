@@ -45,6 +45,12 @@ class _Formats(Mapping[str, GraspFormat]):
 FORMATS: Mapping[str, GraspFormat] = _Formats()
 """Formats by name."""
 
+ADVICE = {
+    ".npz": " GraspSet.create(X_OG, object=NAME).save(FILE) writes an .npz that can be read;",
+    ".npy": " an .npy of bare poses has shape (N, 4, 4);",
+}
+"""What files of arrays have to be like, by suffix."""
+
 
 def read_grasp_file(
     path: str | Path, format: str | None = None, gripper: Gripper = PANDA
@@ -86,8 +92,9 @@ def format_of(path: str | Path) -> GraspFormat:
     if path.suffix == ".json":
         load_json(path, GRASP_FILE)
     raise InvalidInputError(
-        f"{path} is not a file of grasps in a known format ({', '.join(FORMATS)}); if it is, name"
-        " the format to see what is wrong"
+        f"{path} is not a file of grasps in a known format ({', '.join(FORMATS)});"
+        f"{ADVICE.get(path.suffix.lower(), '')} if it should be in one of them, name the format to"
+        " see what is wrong"
     ).about("format")
 
 

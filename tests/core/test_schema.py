@@ -101,6 +101,7 @@ def test_numbers_in_every_spelling(number):
         ("- 1\n", "d.yaml:1: expected keys with values ('key: value' lines)"),
         ("name: a\n", "d.yaml:1: version: missing; add 'version: 1'"),
         ("mug: 0.1\n", "d.yaml:1: not a document; one has the keys version, name"),
+        ("version: 1\nmug: 0.1\n", "d.yaml:1: not a document; one has the keys version, name"),
         ("name: a\nversion: 3\n",
          "d.yaml:2: version: 3 cannot be read; this release reads version 1"),
         ("version: [1]\n",

@@ -251,8 +251,8 @@ def test_another_run_is_not_mixed_in(
         )
     assert str(error.value) == (
         f"{run} already holds another run (engine is standard there, reference here; grasps are 5"
-        " an object, sampled blind there, 6 an object, sampled blind here); choose another folder, or"
-        " delete it"
+        " an object, sampled blind there, 6 an object, sampled blind here); choose another"
+        " folder, or delete it"
     )
     with pytest.raises(InvalidInputError) as error:
         evaluate(

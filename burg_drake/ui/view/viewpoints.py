@@ -67,7 +67,9 @@ def viewpoint(board: Board, back: Array, fov: float, aspect: float) -> tuple[Arr
     share = PHONE_HEIGHT if aspect < PHONE_ASPECT else 1.0
     half_height = VIEW_MARGIN_FACTOR * (depth * back[2] + tall) / 2.0
     half = max(half_height / share, VIEW_MARGIN_FACTOR * width / 2.0 / aspect)
-    middle = min(0.5, share - half_height / half / 2.0)  # from the page's upper edge, in its heights
+    middle = min(
+        0.5, share - half_height / half / 2.0
+    )  # from the page's upper edge, in its heights
     distance = half / np.tan(fov / 2.0) + depth / 2.0 * level
     up = np.array([*ahead * back[2], level])
     target = np.array([*size / 2.0, 0.0])
