@@ -55,8 +55,7 @@ UNSOUND = {
     ),
     "in the ground": (
         ("[0.12, 0.11, 0.0]", "[0.12, 0.11, -0.02]"),
-        "'mug' is in the ground: it reaches 20.0 mm below the board;"
-        " z = 0.0000 would put it on top",
+        "'mug' reaches 20.0 mm below the surface of the board; set z = 0.0000 to put it on top",
     ),
     "overlap": (
         ("[0.12, 0.11, 0.0]", "[0.29, 0.11, 0.0]"),

@@ -153,11 +153,13 @@ def test_next_is_what_is_open_when_it_is_recorded(
     photo = sheet.parent / "any.png"
     photo.write_bytes(b"any")
     assert trials("record", sheet, "next", "--outcome", "slipped", "--photo", photo) == 2
-    assert "any.png is not an image that can be read" in capsys.readouterr().err
+    assert "any.png is not a readable image" in capsys.readouterr().err
     write_image(photo, np.zeros((4, 6, 3), np.uint8))
     assert trials("record", sheet, "next", "--outcome", "slipped", "--photo", photo) == 2
     told = capsys.readouterr().err
-    assert "trial 3 was changed meanwhile; nothing was recorded, but the photo is kept" in told
+    assert (
+        "trial 3 was changed by someone else; nothing was recorded, but the photo is kept" in told
+    )
     assert trial(sheet, 3).photo == "" and trial(sheet, 4).outcome is None
     assert (sheet.parent / "photos" / "003.png").read_bytes() == photo.read_bytes()
 
@@ -215,7 +217,7 @@ def test_a_photo_is_measured_and_kept(sheet: Path, capsys: Capture) -> None:
     kept.write_text(kept.read_text().replace(scene.content, "0" * 64))
     capsys.readouterr()
     assert trials("record", sheet, "4", "--placement", kept, "--correct") == 2
-    assert "is of scene 'two' (000000000000); trial 4 is on 'two'" in capsys.readouterr().err
+    assert "is of scene 'two' (000000000000), but trial 4 is on 'two'" in capsys.readouterr().err
 
 
 def _about_z(degrees: float) -> np.ndarray:

@@ -119,5 +119,5 @@ def test_another_recipe_is_refused(
     assert contents(whole) == before
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.tex").write_text("")
-    with pytest.raises(InvalidInputError, match="is not empty, and holds no sampled scenes"):
+    with pytest.raises(InvalidInputError, match="is not empty and has no sampled scenes"):
         sample_scenes(RECIPE, household, tabletop, tmp_path / "mine", 1)

@@ -97,12 +97,13 @@ def test_what_was_made_with_other_things_is_refused(
     with pytest.raises(InvalidInputError) as caught:
         sample_again(other)
     assert str(caught.value) == (
-        "scene_0000.yaml was made with other things (the library has content 000000000000 there,"
-        f" {origin.library_content} here; drake is 1.0 there, {origin.versions['drake']} here), and"
-        " may come out another way; it has to be forced"
+        "scene_0000.yaml have changed (the library has content 000000000000 there,"
+        f" {origin.library_content} here; drake is 1.0 there, {origin.versions['drake']}"
+        " here), so the scene may come out differently; make it by force to go on all the"
+        " same"
     )
     assert sample_again(other, force=True).scene is not None
-    with pytest.raises(InvalidInputError, match="has no `origin`: it was not sampled"):
+    with pytest.raises(InvalidInputError, match="has no `origin`, so it was not sampled"):
         sample_again(Scene(replace(scene.document, origin=None), household, scene.path))
 
 

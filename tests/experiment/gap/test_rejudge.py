@@ -190,7 +190,7 @@ def test_what_the_hand_alone_cannot_predict_is_left_to_nothing(
     assert told.precision(measured=False, every=True) == (0, 3)
     assert told.precision(measured=False) == (0, 1) and told.precision(measured=True) == (0, 1)
     words = " ".join(rejudged_words(told))
-    assert "2 trials failed for reasons that a run of the hand alone does not predict (" in words
+    assert "2 trials failed for reasons that a run of the hand alone cannot predict (" in words
     assert "(1 no path, 1" in words
     assert re.search(r"as planned 0 of 3 \(0\S* %\) with them, 0 of 1 \(0\S* %\) without", words)
     assert "Of the 1 that disagrees as planned" in words and "1 is left to physics" in words
