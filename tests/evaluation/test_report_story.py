@@ -51,7 +51,7 @@ def test_the_first_sentence_and_the_tiles_have_the_figures_of_the_run(run: Run, 
     lead = page.find("p", "lead")[0].text.replace("\xa0", " ")
     assert lead.startswith(
         f"{lifted} of {judged} grasps lifted their object ({100 * lifted / judged:.1f} %,"
-        f" interval {wilson(lifted, judged)})."
+        f" 95 % interval {wilson(lifted, judged)})."
     )
     assert f"{100 * lifted / executed:.1f} %, interval {wilson(lifted, executed)}" in lead
     assert f"the open hand collides in {found[Outcome.COLLISION_TABLE]}" in lead

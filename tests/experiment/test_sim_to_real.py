@@ -371,5 +371,5 @@ def test_two_trials_do_not_tell_which_margins_predict(tmp_path: Path) -> None:
     assert "AUROC" not in text and "interval" in text
     assert found.notes[-1] == (
         "figures for all grasps leave out 3 of the 10 grasps from which the trials were"
-        " chosen, as no trial of box was compared (failure)"
+        " chosen, as no trial of box (failure) was compared"
     )

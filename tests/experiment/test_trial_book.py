@@ -215,11 +215,11 @@ def test_the_same_entry_twice_is_one_and_another_one_is_refused(tmp_path: Path) 
     first = book.record(1, outcome="slipped", operator="Ada")
     assert book.record(1, outcome="slipped", operator="Ada") == first
     assert len(book.entries()) == 1
-    with pytest.raises(InvalidInputError, match=r"trial 1 has outcome 'slipped' already"):
+    with pytest.raises(InvalidInputError, match=r"trial 1 already has outcome 'slipped'"):
         book.record(1, outcome="lifted")
     more = book.record(1, note="more is known", robot={"width_mm": 41.5})
     assert (more.outcome, more.time) == (first.outcome, first.time)
-    with pytest.raises(InvalidInputError, match="has robot already"):
+    with pytest.raises(InvalidInputError, match="already has robot"):
         book.record(1, robot={"width_mm": 40.0})
     assert book.record(1, robot={"effort_n": 30.0}).robot == RobotReport(width_mm=41.5, effort_n=30)
     right = book.record(1, correct=True, outcome="lifted")

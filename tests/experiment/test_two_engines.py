@@ -131,7 +131,7 @@ def test_all_of_it_is_told(
     text = page.read_text(encoding="utf-8")
     assert Page(text).open == []
     assert "First: engine screening; second: engine standard." in text
-    for title in ("Agreement on holding,", "Where the runs disagree", "How much margins"):
+    for title in ("Agreement on holding", "Where the runs disagree", "How much margins"):
         assert f"<h2>{title}" in text
     assert main([*words, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
@@ -402,7 +402,7 @@ def test_of_two_modes_only_what_both_executed_is_compared(tmp_path: Path) -> Non
     scene = known_runs.make_scene(tmp_path)
     nothing: list[Verdict | None] = [known_runs.ended("no_ik")] * 4
     out_of_reach = known_runs.make_run(tmp_path / "c", scene, {"mug": nothing}, mode="arm")
-    with pytest.raises(InvalidInputError, match="different modes (hand and arm), and no grasp"):
+    with pytest.raises(InvalidInputError, match=r"different modes \(hand and arm\), and no grasp"):
         compare(tmp_path / "a", out_of_reach)
 
 

@@ -373,5 +373,5 @@ def test_what_overlaps_a_little_is_moved_apart(run: Run, check: SceneCheck) -> N
     deep = {"bottle": place(shifted(scene, "bottle", -near - 0.03))}
     assert "overlap by" in measured_scene(scene, deep, check.issues).reason
     nowhere = {"bottle": place(shifted(scene, "bottle", 120.0))}
-    assert "out of bounds" in measured_scene(scene, nowhere, check.issues).reason
+    assert "off the board" in measured_scene(scene, nowhere, check.issues).reason
     assert "no 'cup'" in measured_scene(scene, {"cup": unseen()}, check.issues).reason

@@ -190,7 +190,7 @@ def test_a_photo_and_the_placement_are_kept_before_a_trial(
     over.check(5, keep=True)  # of what is there after the trial
     over.wait_for_check()
     told = over.status()["check"]
-    assert not told["kept"] and "carried out already" in told["problem"] and told["objects"]
+    assert not told["kept"] and "already has an outcome" in told["problem"] and told["objects"]
     assert load_trials(trials).trial(5).photo == trial.photo
 
 
