@@ -129,7 +129,7 @@ def test_files_of_other_projects_name_the_mesh(
         for out, format in ((graspgen, "graspgen"), (acronym, "acronym")):
             assert main(["grasps", "convert", ours, str(out), "--to", format, *RENAMED]) == 0
     said = capsys.readouterr()
-    assert "nothing says which mesh" not in said.out + said.err
+    assert "it is not known which mesh" not in said.out + said.err
     mug = load_library("household").entry("mug")
     mesh = f"package://burg_drake/models/household/{mug.mesh}"
     told = json.loads(graspgen.read_text())["object"]
@@ -205,7 +205,7 @@ def test_an_object_without_grasps_is_said(
         (["tabletop", "-o", "x.h5"], "tabletop is neither a scene nor an object library"),
         (["household", "--only", "bxo", "-o", "x.h5"], "has no object 'bxo'; did you mean 'box'?"),
         (["household", "--only", "mug, bxo", "-o", "x.h5"], "has no object 'bxo'; did you mean"),
-        (["household", "--approach-angle", "60", "-o", "x.h5"], "limit the approach in a scene"),
+        (["household", "--approach-angle", "60", "-o", "x.h5"], "limit the approach"),
         (["tabletop_six", "--only", "can", "-o", "x.h5"], "has no free object 'can'"),
         (["tabletop_six", "-o", "x.txt"], "no format of grasps has the suffix '.txt'"),
         (["tabletop_six", "-o", "x.csv"], "has grasps in the world frame; write a .h5 file"),
@@ -213,7 +213,7 @@ def test_an_object_without_grasps_is_said(
         (["household", "--weights", "mug=no.npy", "-o", "x.h5"], "cannot read no.npy"),
         (
             ["household", "--margin-mm", "3", "--blind", "-o", "x.h5"],
-            "margin and conservative are for the hand, which blind sampling ignores",
+            "margin and conservative concern the hand, which blind sampling ignores",
         ),
         (["household", "--standoffs-mm", "20", "-o", "x.h5"], "give -9 to 9.5 mm"),
     ],

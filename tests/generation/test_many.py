@@ -113,8 +113,8 @@ def test_another_recipe_is_refused(
         sample_scenes(other, household, tabletop, whole, 12)
     assert str(caught.value) == (
         f"{whole} already holds other scenes (only is box, can, marble, mug there, none here;"
-        " layout is random there, close here; fewer is off there, on here; seed is 0 there, 8 here); choose"
-        " another folder, or delete it"
+        " layout is random there, close here; fewer is off there, on here; seed is 0 there, 8"
+        " here); choose another folder, or delete it"
     )
     assert contents(whole) == before
     (tmp_path / "mine").mkdir()
