@@ -156,7 +156,7 @@ def test_a_run_over_scenes_tells_the_mistake_of_its_file_once(
     assert typed(words, monkeypatch) == 0
     printed = capsys.readouterr().out
     assert printed.count("As they were read") == 1
-    assert "note: Scene first: 0 of the 3 grasps fit" in printed
+    assert "note: Scene first: As they were read, 0 of the 3 grasps fit" in printed
     (line,) = [line for line in printed.splitlines() if line.startswith("    burg-drake ")]
     assert line.strip() in (tmp_path / "all" / "report.html").read_text(encoding="utf-8")
     assert typed([*words, "--correction", "turn:z90"], monkeypatch) == 2

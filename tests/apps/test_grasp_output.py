@@ -85,4 +85,4 @@ def test_what_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert sum("has no place for id, maker" in line for line in lines) == 1  # it is alike for both
     success = of("a", "b").with_columns(object_in_gripper=[np.nan, 1.0])
     output_of("out", "graspgen").write(success, PANDA)
-    assert "  a.json: There is no object_in_gripper" in capsys.readouterr().out
+    assert "  a.json: The file has no object_in_gripper" in capsys.readouterr().out

@@ -189,7 +189,7 @@ def test_an_object_without_grasps_is_said(
     assert sample(scene_file, *options) == 0
     (note,) = (line for line in capsys.readouterr().out.splitlines() if "note" in line)
     counts = re.findall(r"(?<![\d.])[\d,]+(?= [a-z])", note.partition("through it")[2])
-    assert note.startswith("note: box: 0 of 5 grasps: of 262,144 lines through it ")
+    assert note.startswith("note: box: only 0 of 5 grasps were found: of 262,144 lines through it ")
     assert "allow no approach within the limits" in note and note.endswith("would help")
     lines = GraspSet.load(out).provenance["parts"]["box"]["left_out"]
     assert counts == [f"{n:,}" for n in sorted(lines.values(), reverse=True) if n]

@@ -120,7 +120,7 @@ def test_the_last_bit_of_a_margin_is_compared(row_file: Path, capsys: Capture) -
     slip = float(read_table(row_file)["slip"][0])
     rewrite(row_file, slip=repr(math.nextafter(slip, 1.0)))
     assert replay(row_file) == 0
-    assert "as recorded, but for the last digits of slip" in capsys.readouterr().out
+    assert "as recorded, except for the last digits of slip" in capsys.readouterr().out
     rewrite(row_file, slip=repr(1.001 * slip))
     assert replay(row_file) == 1
     out = capsys.readouterr().out.splitlines()
@@ -241,7 +241,7 @@ def test_a_header_alone_has_no_rows(row_file: Path, capsys: Capture) -> None:
         assert capsys.readouterr().err == f"burg-drake: error: {row_file} has no rows\n"
 
 
-TWELVE = "it has to be the 12 numbers of the upper three rows of the pose"
+TWELVE = "it must be the 12 numbers of the upper three rows of the pose"
 
 
 @pytest.mark.parametrize(
@@ -252,7 +252,7 @@ TWELVE = "it has to be the 12 numbers of the upper three rows of the pose"
         ({"engine": "warp (custum)"}, "engine 'warp (custum)' is not a preset of this release"),
         ({"engine": "screening"}, "engine 'screening' and engine_settings contradict each other"),
         ({"X_OG": "1 0 0 0.1"}, f"X_OG has 4 numbers; {TWELVE}"),
-        ({"X_OG": "1 0 0 x"}, f"X_OG has 'x' in it; {TWELVE}"),
+        ({"X_OG": "1 0 0 x"}, f"X_OG contains 'x'; {TWELVE}"),
         ({"outcome": "liftd"}, "outcome 'liftd' is not known to this release; did you mean 'lif"),
         ({"stage": "dreamt"}, "stage 'dreamt' is not known to this release; known: clear, exec"),
     ],

@@ -266,7 +266,7 @@ def test_grasps_in_colour(run: Run, tmp_path: Path, capsys: Capture) -> None:
     page = tmp_path / "grasps.html"
     assert main(["grasps", "show", str(run.path), "--html", str(page)]) == 0
     assert capsys.readouterr().out.splitlines() == [
-        "note: no grasps to judge for mug",
+        "note: there are no grasps to judge for mug",
         "■ lifted (1)",
         "■ never held (1)",
         "■ hand collides (1)",

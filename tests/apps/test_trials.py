@@ -80,7 +80,7 @@ def test_record_and_show(sheet: Path, capsys: Capture) -> None:
     assert (done.outcome, done.note, done.operator) == ("slipped", "wet", "Ada")
     assert done.robot is not None and (done.robot.width_mm, done.robot.effort_n) == (12.5, 30.0)
     for words, message in (
-        (("1", "--outcome", "lifted"), "trial 1 has outcome 'slipped' already"),
+        (("1", "--outcome", "lifted"), "trial 1 already has outcome 'slipped'"),
         (("2", "--outcome", "liftet"), "no outcome 'liftet'; did you mean 'lifted'?"),
         (("2",), "nothing to record"),
         (("7", "--outcome", "lifted"), "there is no trial 7; they have 1 to 4"),
