@@ -45,8 +45,8 @@ def test_build_and_check_say_what_pads_touch(mesh: Path, tmp_path: Path, capsys:
     assert build(mesh, tmp_path / "ring.ply", QUICK, "-o", library, *masses) == 0
     faces = len(load_library(library).mesh("ring/contact.obj").faces)
     expected = [
-        "block: gripper pads touch a box, within ",
-        f"ring: gripper pads touch a surface of {faces} faces, within 0.",
+        "block: gripper pads touch a box, at most ",
+        f"ring: gripper pads touch a surface with {faces} faces, at most 0.",
     ]
 
     def told() -> list[str]:
@@ -79,7 +79,7 @@ def test_a_library_of_an_earlier_release_is_told_and_built_again(
     assert build(torus, QUICK, "-o", library, "--mass", "ring=0.1") == 0
     told = capsys.readouterr()
     assert "1 built, 0 up to date, 0 failed" in told.out
-    assert "built again: pads now touch the object's own surface" in told.out + told.err
+    assert "built again: finger pads now touch the object's own surface" in told.out + told.err
     assert main(["library", "check", str(library)]) == 0
 
 
