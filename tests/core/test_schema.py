@@ -129,7 +129,8 @@ def test_numbers_in_every_spelling(number):
         ("version: 1\nname: a\nsize: [1, x]\n", "d.yaml:3: size[1]: 'x' is not a finite number"),
         ("version: 1\nname: a\nsize: 1\n", "d.yaml:3: size: expected a list such as [a, b, c]"),
         ("version: 1\nname: a\nmodel: hydro\n",
-         "d.yaml:3: model: 'hydro' is not valid; known: hydroelastic, point"),
+         ("d.yaml:3: model: 'hydro' is not valid; did you mean 'hydroelastic'? Known:"
+             " hydroelastic, point")),
         ("version: 1\nname: a\nshading: smoth\n",
          "d.yaml:3: shading: 'smoth' is not valid; did you mean 'smooth'? Known: flat, smooth"),
         ("version: 1\nname: a\nparts:\n- {name: b, mass: -1}\n",

@@ -242,11 +242,11 @@ def test_an_applied_force_is_felt_in_joints_and_wrist(free: StationDiagram) -> N
     [
         (
             {"arm__position": np.zeros(7), "arm__desired_state": np.zeros(14)},
-            "^arm.position and arm.desired_state are both connected; connect one of them$",
+            "^ports arm.position and arm.desired_state are both connected; connect one of them$",
         ),
         (
             {"hand__position": [0.1], "hand__desired_state": np.zeros(4)},
-            "^hand.position and hand.desired_state are both connected; connect one",
+            "^ports hand.position and hand.desired_state are both connected; connect one",
         ),
         (
             {"hand__position": [40.0]},
