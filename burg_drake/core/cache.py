@@ -117,7 +117,9 @@ def _read(path: Path, made_by: str) -> Arrays | None:
             origin = archive.array(VERSION_KEY).read("U", ()).item()
             found = _arrays(archive) if origin == made_by else None
     except InvalidInputError as error:
-        _log.warning("burg-drake: %s; it is only a copy, and is computed again", error)
+        _log.warning(
+            "burg-drake: %s; this was only a cached copy, so the result is computed again", error
+        )
         return None
     if found is None:
         _log_other_version(path.parent)
@@ -143,9 +145,9 @@ def _log_other_version(folder: Path) -> None:
             with contextlib.suppress(OSError):
                 other.unlink()
     _log.warning(
-        "burg-drake: the results kept in %s are of another version of burg_drake or of a package"
-        " that it uses; this command computes what it needs again, and takes longer. There is"
-        " nothing for you to do",
+        "burg-drake: the cache in %s was made with another version of burg_drake or of a"
+        " package that it uses. This command computes what it needs again and takes"
+        " longer. You need not do anything",
         folder,
     )
 

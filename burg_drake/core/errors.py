@@ -142,9 +142,12 @@ def nearest(name: str, known: Iterable[str], *, ordered: bool = False) -> str:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Such as `did you mean 'mug'?`; empty if nothing is near."""
-    close = difflib.get_close_matches(name, sorted(known), n=1, cutoff=0.6)
-    return f"did you mean {close[0]!r}?" if close else ""
+    """Such as `did you mean 'mug'?`; empty if nothing is near, or several names begin like that."""
+    names = sorted(known)
+    longer = [other for other in names if len(name) > 2 and other.startswith(name)]
+    near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
+    close = difflib.get_close_matches(name, near, n=1, cutoff=0.85) or longer or near
+    return f"did you mean {close[0]!r}?" if len(close) == 1 else ""
 
 
 def listing(names: Sequence[str]) -> str:

@@ -154,9 +154,9 @@ def check_pose(X_AB: ArrayLike, name: str) -> Array:
         off > POSE_TOLERANCE,
         f"is not a rigid transform: its rotation part is off by {worst} from orthonormal",
     )
-    refuse(mirrored, "is not a rigid transform: its rotation part is a mirror image")
+    refuse(mirrored, "is not a rigid transform: its rotation part is a reflection (determinant -1)")
     last = np.abs(X[..., 3, :] - (0.0, 0.0, 0.0, 1.0)).max(axis=-1)
-    refuse(last > POSE_TOLERANCE, "has a last row other than 0 0 0 1")
+    refuse(last > POSE_TOLERANCE, "has a last row that is not 0 0 0 1")
     return X
 
 
@@ -203,7 +203,9 @@ def grasp_from_axes(closing: ArrayLike, approach: ArrayLike, p_AG: ArrayLike) ->
         length = np.linalg.norm(z, axis=-1, keepdims=True)
         z = z / length
     if not (length > 1e-9).all():
-        raise InvalidInputError("closing and approach directions must not be parallel or zero")
+        raise InvalidInputError(
+            "closing and approach directions must not be zero or parallel to each other"
+        )
     x, z = np.broadcast_arrays(x, z)
     return make_pose(np.stack([x, np.cross(z, x), z], axis=-1), p_AG)
 

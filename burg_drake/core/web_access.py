@@ -76,7 +76,11 @@ def require_local_host(header: Callable[[str], str | None], *, served: str, is_p
     """
     host, origin = header("Host") or "", header("Origin")
     if not is_local_host(host, served):
-        raise RequestError(HTTPStatus.FORBIDDEN, f"this is not {shown(host) or 'a nameless host'}")
+        raise RequestError(
+            HTTPStatus.FORBIDDEN,
+            f"this server is not {shown(host) or 'a nameless host'}; open it by the address"
+            " that was printed",
+        )
     if origin is not None and origin != f"http://{host}":
         raise RequestError(HTTPStatus.FORBIDDEN, f"requests from {shown(origin)} are refused")
     if header("Sec-Fetch-Site") == "cross-site" and not is_page:
@@ -99,5 +103,8 @@ def address_in_use_error(host: str, ports: range, *, any_of_them: bool) -> str:
         any_of_them: the user left the choice to us.
     """
     if any_of_them:
-        return f"all ports from {ports[0]} to {ports[-1]} of {host} are in use; give another one"
-    return f"port {ports[0]} of {host} is in use; give another one, or none for the first free one"
+        return f"all ports of {host} from {ports[0]} to {ports[-1]} are in use; choose another one"
+    return (
+        f"port {ports[0]} of {host} is in use; choose another one, or leave it out to take"
+        " the first free one"
+    )

@@ -139,10 +139,12 @@ def evaluate(
     if executor is None:
         executor = LocalExecutor.of_this_machine(workers)
     elif workers is not None:
-        raise InvalidInputError("give workers or an executor, which has its own, not both")
+        raise InvalidInputError(
+            "give either workers or an executor; an executor has workers of its own"
+        )
     if settings.until_balanced is not None and grasps is not None:
         raise InvalidInputError(
-            "until_balanced goes on sampling, and grasps are given; leave out either"
+            "until_balanced samples more grasps, but grasps are given; leave out one of the two"
         ).about("until_balanced", "grasps")
     request = Request.of(station, settings, grasps, retry_failed=retry_failed)
     require_writer(request.settings.table)
@@ -150,8 +152,8 @@ def evaluate(
         return _evaluate_one(scene, request, Path(out), executor, progress)
     if settings.until_balanced is not None:
         raise InvalidInputError(
-            "until_balanced is for one scene at a time, and several are given; evaluate each by"
-            " itself: `trials plan` takes the runs together"
+            "until_balanced works on one scene at a time, but several are given;"
+            " evaluate each by itself: `trials plan` takes the runs together"
         ).about("until_balanced")
     return evaluate_scenes(scene, request, Path(out), executor, progress)
 

@@ -111,9 +111,7 @@ def reach(
 
     scene, station = as_scene(scene), as_station(station)
     if station.document.arm is None:
-        raise InvalidInputError(
-            f"station {station.name!r} has no arm to reach with; give another one"
-        )
+        raise InvalidInputError(f"station {station.name!r} has no arm; give a station with an arm")
     motion = motion or station.document.motion
     given = by_names(scene, grasps) if isinstance(grasps, GraspSet) else grasps
     candidates = given_candidates(scene, given)

@@ -119,7 +119,7 @@ def comparison(found: Sequence[Difference], origin: TrialOrigin) -> list[str]:
         return ["as recorded"]
     if all(difference.rounding for difference in found):
         names = ", ".join(difference.name for difference in found)
-        return [f"as recorded, but for the last digits of {names}: the table was rounded"]
+        return [f"as recorded, except for the last digits of {names}, which the table rounds"]
     there = origin.versions
     here = software_versions({**JUDGING, **origin.engine.packages})
     changed = [
@@ -128,7 +128,7 @@ def comparison(found: Sequence[Difference], origin: TrialOrigin) -> list[str]:
         if name in here and there[name] != here[name].replace(" ", "_")
     ]
     versions = f" (with {'; '.join(changed)})" if changed else ""
-    return [f"not as recorded{versions}", *map(str, found)]
+    return [f"differs from what was recorded{versions}", *map(str, found)]
 
 
 def _results(verdict: Verdict) -> dict[str, float | str]:
@@ -167,7 +167,7 @@ def motion_figures(trial: RecordedTrial, origin: TrialOrigin) -> list[str]:
     if motion is None or motion == GraspMotion():
         return []
     whole = trial.lift is None or trial.lift >= motion.lift_height
-    room = "" if whole else f"; there is room for a lift of {1e3 * (trial.lift or 0.0):g} mm"
+    room = "" if whole else f"; there is room to lift it {1e3 * (trial.lift or 0.0):g} mm"
     return [f"motion: {motion_text(motion)}{room}"]
 
 

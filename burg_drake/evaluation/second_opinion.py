@@ -116,8 +116,7 @@ def judge_again(
     require_second_engine(engine, found.document.engine, found.document.mode)
     if found.document.shard:
         raise InvalidInputError(
-            f"{found.path} is shard {found.document.shard} of a run; merge the shards, and then"
-            " judge again what is contested"
+            f"{found.path} is shard {found.document.shard} of a run; merge the shards first"
         )
     _require_complete(found)
     executor = executor or LocalExecutor.of_this_machine(workers)
@@ -149,8 +148,8 @@ def _require_complete(found: Run | Campaign) -> None:
         complete, which = not left, f" ({listing(left)})"
     if not complete:
         raise InvalidInputError(
-            f"{found.path} is not complete{which}; run the command that began it to the end first:"
-            f" {found.document.command}"
+            f"{found.path} is not complete{which}; finish it first with the command that"
+            f" began it: {found.document.command}"
         )
 
 

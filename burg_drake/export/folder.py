@@ -71,8 +71,8 @@ def require_own_folder(folder: str | Path) -> Path:
     foreign = sorted(set(present) - {*known, RECORD_FILE})
     if foreign:
         raise InvalidInputError(
-            f"{folder} is an earlier export, but has files in it that it did not write"
-            f" ({listing(foreign)}); move them away, or choose a new folder"
+            f"{folder} is an earlier export, but has files in it that the export did not"
+            f" write ({listing(foreign)}); move them away, or choose a new folder"
         )
     return path
 

@@ -34,7 +34,7 @@ class LegalNames:
     def notes(self) -> tuple[str, ...]:
         """Which names are others, one sentence each."""
         return tuple(
-            f"{name!r} is called {legal!r}, as the format does not allow that name"
+            f"{name!r} is called {legal!r} in the export, as the format does not allow the name"
             for name, legal in self.by_name.items()
             if legal != name
         )

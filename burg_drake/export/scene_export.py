@@ -133,9 +133,9 @@ def export_scene(
     if hand and (station is None or not chosen.with_hand):
         able = ", ".join(name for name, format in FORMATS.items() if format.with_hand)
         raise InvalidInputError(
-            f"a hand is exported to {able} alone, not to {to}"
+            f"a hand can only be exported to {able}, not to {to}"
             if not chosen.with_hand
-            else "a hand is a station's; name the station, too"
+            else "a hand belongs to a station; name the station, too"
         )
     write = _writer(to)
     path = require_own_folder(folder)

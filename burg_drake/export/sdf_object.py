@@ -93,8 +93,8 @@ def _require_mass(model: Element, entry: ObjectEntry, path: Path) -> None:
         mass = math.nan
     if not math.isclose(mass, entry.mass, rel_tol=SAME_MASS):
         raise InvalidInputError(
-            f"{path} has a mass of {text} kg, and library.yaml says {entry.mass:g} kg; build the"
-            " library again"
+            f"{path} has a mass of {text} kg, but library.yaml says {entry.mass:g} kg;"
+            " build the library again"
         )
 
 
@@ -116,4 +116,4 @@ def _read(path: Path) -> Element:
     try:
         return ElementTree.fromstring(read_bytes(path, DOCUMENT.size))
     except ElementTree.ParseError as error:
-        raise DocumentError(f"{path} is no SDF: {error}; build the library again") from error
+        raise DocumentError(f"{path} is not an SDF: {error}; build the library again") from error

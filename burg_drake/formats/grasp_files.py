@@ -45,6 +45,12 @@ class _Formats(Mapping[str, GraspFormat]):
 FORMATS: Mapping[str, GraspFormat] = _Formats()
 """Formats by name."""
 
+ADVICE = {
+    ".npz": " GraspSet.create(X_OG, object=NAME).save(FILE) writes an .npz that can be read;",
+    ".npy": " an .npy of bare poses has shape (N, 4, 4);",
+}
+"""What files of arrays have to be like, by suffix."""
+
 
 def read_grasp_file(
     path: str | Path, format: str | None = None, gripper: Gripper = PANDA
@@ -86,8 +92,9 @@ def format_of(path: str | Path) -> GraspFormat:
     if path.suffix == ".json":
         load_json(path, GRASP_FILE)
     raise InvalidInputError(
-        f"{path} is not a file of grasps in a known format ({', '.join(FORMATS)}); if it is, name"
-        " the format to see what is wrong"
+        f"{path} is not a file of grasps in a known format ({', '.join(FORMATS)});"
+        f"{ADVICE.get(path.suffix.lower(), '')} if it should be in one of them, name the format to"
+        " see what is wrong"
     ).about("format")
 
 
@@ -127,10 +134,10 @@ def format_by_suffix(path: str | Path) -> GraspFormat:
     if not fitting:
         known = sorted({suffix for format in FORMATS.values() for suffix in format.suffixes})
         raise InvalidInputError(
-            f"{path}: no format of grasps has the suffix {suffix!r}; name one of the"
-            f" formats {', '.join(FORMATS)}, or use a suffix: {' '.join(known)}"
+            f"{path}: no format of grasps has the suffix {suffix!r}; give one of the"
+            f" formats {', '.join(FORMATS)}, or one of the suffixes {' '.join(known)}"
         )
     if len(fitting) > 1 and fitting[0].name != "burg_drake":
         names = " or ".join(format.name for format in fitting)
-        raise InvalidInputError(f"{path}: {suffix} can be {names}; name the format that you want")
+        raise InvalidInputError(f"{path}: the suffix {suffix} can mean {names}; give the format")
     return fitting[0]

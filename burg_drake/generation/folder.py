@@ -135,13 +135,13 @@ class SceneFolder:
             found = there.differences(provenance)
             if found:
                 raise InvalidInputError(
-                    f"{self.path} holds other scenes ({'; '.join(found)}); choose another folder,"
-                    " or delete it"
+                    f"{self.path} already holds other scenes ({'; '.join(found)}); choose"
+                    " another folder, or delete it"
                 ).about("folder")
         elif any(self.path.iterdir()):
             raise InvalidInputError(
-                f"{self.path} is not empty, and holds no sampled scenes ({RECIPE_FILE} is missing);"
-                " choose another folder"
+                f"{self.path} is not empty and has no sampled scenes ({RECIPE_FILE} is"
+                " missing); choose another folder"
             ).about("folder")
         else:
             save_document(provenance, recipe, "What the scenes of this folder were made with.")
@@ -173,8 +173,8 @@ class SceneFolder:
                 stream.write(row.text())
         except OSError as error:
             raise InvalidInputError(
-                f"cannot write {self._table}: {error.strerror}; what is there is kept; run the"
-                " same command to continue"
+                f"cannot write {self._table}: {error.strerror}; the scenes so far are"
+                " kept. Run the same command to continue"
             ) from error
         self.rows[row.scene] = row
 

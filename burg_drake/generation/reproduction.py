@@ -44,15 +44,16 @@ def sample_again(scene: Scene, *, force: bool = False) -> ReproducedScene:
     origin = scene.document.origin
     if origin is None:
         raise InvalidInputError(
-            f"{scene.path} has no `origin`: it was not sampled, or was changed since"
+            f"{scene.path} has no `origin`, so it was not sampled or was edited since; it"
+            " cannot be made again"
         )
     station = load_station(resolve(origin.recipe.station, "stations", scene.path.parent))
     here = provenance_of(origin.recipe, scene.library, station)
     differences = origin.differences(here)
     if differences and not force:
         raise InvalidInputError(
-            f"{scene.path} was made with other things ({'; '.join(differences)}), and may come out"
-            " another way; it has to be forced"
+            f"the inputs of {scene.path} have changed ({'; '.join(differences)}), so the"
+            " scene may come out differently; make it by force to go on all the same"
         ).about("force")
     sampler = SceneSampler(origin.recipe, scene.library, station)
     sampled = sampler.sample(origin.number, scene.path.parent)

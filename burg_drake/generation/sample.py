@@ -49,9 +49,9 @@ the last attempts, so that a set for which there is no room does not cost the sc
 
 NO_ROOM = "an object found no place"
 REASONS = {
-    "out_of_bounds": "an object came to lie beyond the edge of board or table",
-    "in_ground": "an object is in the ground",
-    "overlap": "objects overlap, or are in what stands around the board",
+    "out_of_bounds": "an object came to rest beyond the edge of the board or table",
+    "in_ground": "an object reaches into the table",
+    "overlap": "objects overlap each other or what stands around the board",
 }
 """Why a scene is refused, by what is wrong with it."""
 FALLEN = "an object fell off the table"

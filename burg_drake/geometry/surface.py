@@ -55,10 +55,10 @@ class Surface:
         length = np.linalg.norm(cross, axis=1)
         kept = length > 0.0
         if not kept.any():
-            raise MeshError("the mesh has no faces with area; nothing can be grasped")
+            raise MeshError("no face of the mesh has an area, so there is nothing to grasp")
         volume = np.einsum("ij,ij->", triangles[:, 0] - vertices.mean(axis=0), cross) / 6.0
         if volume < 0.0 and mesh.is_watertight:
-            raise MeshError("the mesh is wound inside out; flip its faces with mesh.invert()")
+            raise MeshError("the mesh is inside out; flip its faces with mesh.invert()")
         mass = length if weights is None else length * checked_weights(weights, len(faces))
         total = np.cumsum(mass[kept])
         if not total[-1] > 0.0:

@@ -232,7 +232,7 @@ def _check_names(sources: Sequence[ObjectSource]) -> None:
     for name, count in Counter(s.name for s in sources).items():
         if count > 1:
             files = ", ".join(str(s.mesh) for s in sources if s.name == name)
-            raise InvalidInputError(f"{count} meshes make the same object {name!r}: {files}")
+            raise InvalidInputError(f"{count} meshes have the same object name {name!r}: {files}")
 
 
 def _open(root: Path, name: str | None) -> ObjectLibrary:

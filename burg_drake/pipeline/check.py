@@ -65,7 +65,7 @@ def check_library(library: ObjectLibrary) -> tuple[LibraryIssue, ...]:
         issues += sorted(found, key=lambda issue: not issue.is_error)
     for folder in sorted(p for p in library.root.iterdir() if p.is_dir()):
         if folder.name not in library.objects and is_object_folder(folder):
-            text = f"{folder} is an object that library.yaml does not list; add it again"
+            text = f"{folder} is an object that is not in library.yaml; add it again"
             issues.append(LibraryIssue(object="", kind="missing", message=text))
     return tuple(issues)
 
@@ -80,21 +80,27 @@ def _file_issues(library: ObjectLibrary, name: str, entry: ObjectEntry) -> Itera
             name, "missing", f"{library.root / missing[0]} is missing{more}; build it again"
         )
     if record is None:
-        text = f"{home} was built by another release; build it again"
+        text = f"{home} was built by another release of burg_drake; build it again"
         yield _issue(name, "stale", text)
     else:
         yield from _record_issues(library, name, record, home)
     source = library.root / entry.source.path
     traced = bool(entry.source.path) and source.is_file()
     if traced and record is not None and _hash(source) != record.keys.mesh:
-        yield _issue(name, "stale", f"{source.resolve()} has changed since; build it again")
+        yield _issue(
+            name,
+            "stale",
+            f"{source.resolve()} has changed since the object was built; build it again",
+        )
     if traced:
         for sentence in missing_textures(source):
             yield _issue(name, "unsure", sentence)
     if not missing:
         drake_problem = drake_error(library.root / entry.sdf)
         if drake_problem:
-            yield _issue(name, "broken", f"Drake about {library.root / entry.sdf}: {drake_problem}")
+            yield _issue(
+                name, "broken", f"Drake cannot load {library.root / entry.sdf}: {drake_problem}"
+            )
 
 
 def _hash(source: Path) -> str:
@@ -119,10 +125,13 @@ def _record_issues(
         text = f"{home / changed[0]} was changed after it was built{more}; build it again"
         yield _issue(name, "changed", text)
     if record.keys.build != entry.build:
-        text = f"{home} and library.yaml are of different builds; build it again"
+        text = f"{home} and library.yaml come from different builds; build it again"
         yield _issue(name, "stale", text)
     elif record.entry != entry_hash(entry):
-        text = "library.yaml says other than what was built; change values by building it again"
+        text = (
+            "library.yaml was edited: its values differ from what was built; to change"
+            " values, build again"
+        )
         yield _issue(name, "changed", text)
 
 
@@ -132,11 +141,14 @@ def _value_issues(name: str, entry: ObjectEntry) -> Iterator[LibraryIssue]:
         yield _issue(name, "implausible", sentence)
     if properties.source == "density":
         density = properties.mass / properties.volume
-        text = f"mass {properties.mass:.3g} kg was not given; it follows from {density:.0f} kg/m^3"
+        text = (
+            f"mass {properties.mass:.3g} kg was computed from a density of {density:.0f}"
+            " kg/m^3, as none was given"
+        )
         yield _issue(name, "unsure", text)
     low, high = USUAL_FRICTION
     if not low <= entry.friction <= high:
-        text = f"friction {entry.friction:g} is not that of household materials ({low} to {high})"
+        text = f"friction {entry.friction:g} is unusual: household materials have {low} to {high}"
         yield _issue(name, "implausible", text)
     yield from _fit_issues(name, entry)
     if entry.contact.reason:

@@ -77,12 +77,13 @@ def cut(source: ObjectSource, mesh: SurfaceMesh) -> Cut:
             better = deviation(finer.fit, mesh.surface) < deviation(best.fit, mesh.surface)
             if better and len(finer.pieces) <= MOST_PIECES:
                 best = finer
-    note = f"finer cuts with at most {MOST_PIECES} pieces fit no better" if tried else ""
+    note = f"more pieces, up to {MOST_PIECES}, do not fit better" if tried else ""
     if best is not first and first.fit is not None and best.fit is not None:
         note = (
-            f"cut again with threshold {best.threshold:g} in place of {first.threshold:g}, as the"
-            f" {len(first.pieces)} pieces were coarse ({describe_fit(first.fit)}):"
-            f" {len(best.pieces)} pieces ({describe_fit(best.fit)})"
+            f"cut again with decomposition.threshold {best.threshold:g} instead of "
+            f"{first.threshold:g}, as the {len(first.pieces)} pieces did not fit well ("
+            f"{describe_fit(first.fit)}): now {len(best.pieces)} pieces ("
+            f"{describe_fit(best.fit)})"
         )
     return replace(best, note=note, seconds=seconds)
 

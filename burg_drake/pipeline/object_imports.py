@@ -76,8 +76,8 @@ def fixed_note(library: BurgLibrary, sources: Iterable[ObjectSource]) -> str:
     if not fixed:
         return ""
     return (
-        f"{library.path}: fixed in BURG-Toolkit, as of mass 0, and hence background of scenes:"
-        f" {', '.join(fixed)}; what has a mass is free"
+        f"{library.path}: these objects have mass 0 in BURG-Toolkit and become"
+        f" background, which does not move: {', '.join(fixed)}"
     )
 
 
@@ -165,8 +165,9 @@ class PoseComparison:
             listed += f" ({self.distinct} different)"
         unknown = ""
         if self.unknown:
-            unknown = f"; {len(self.unknown)} of the listed {_is_none(len(self.unknown))} of these"
-        return f"{listed}, {_count(self.here, 'pose')} here{unknown}"
+            was = "was" if len(self.unknown) == 1 else "were"
+            unknown = f"; {len(self.unknown)} of the listed {was} not found"
+        return f"{listed}, {_count(self.here, 'pose')} found here{unknown}"
 
 
 def compare_poses(recorded: Sequence[Pose], library: ObjectLibrary, name: str) -> PoseComparison:
@@ -225,7 +226,9 @@ def _by_identifier(
     identifiers |= {identifier: identifier for identifier in names}
     for key in values:
         if key not in identifiers:
-            raise UnknownNameError(f"{what} is given for {key!r}; {nearest(key, names.values())}")
+            raise UnknownNameError(
+                f"{what} is given for unknown object {key!r}; {nearest(key, names.values())}"
+            )
     return {identifiers[key]: value for key, value in values.items()}
 
 
@@ -238,7 +241,3 @@ def _ycb_description(item: YcbObject, weighed: bool) -> str:
 
 def _count(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
-
-
-def _is_none(number: int) -> str:
-    return "is none" if number == 1 else "are none"

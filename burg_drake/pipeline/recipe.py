@@ -104,9 +104,9 @@ class Defaults:
         for label, unit in (("scale", ""), ("density", " kg/m^3"), ("wall_thickness", " m")):
             _check_positive(label, getattr(self, label), unit)
         if self.friction is not None and self.friction < 0.0:
-            raise InvalidInputError(f"friction is {self.friction:g}; it must be 0 or more")
+            raise InvalidInputError(f"friction is {self.friction:g}; it must be at least 0")
         if self.rgba is not None and not all(0.0 <= c <= 1.0 for c in self.rgba):
-            raise InvalidInputError(f"rgba is {list(self.rgba)}; each must be in [0, 1]")
+            raise InvalidInputError(f"rgba is {list(self.rgba)}; each number must be from 0 to 1")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,7 +140,7 @@ class RecipeObject(Defaults):
         _check_positive("mass", self.mass, " kg")
         if self.inertia is not None and min(self.inertia[:3]) <= 0.0:
             raise InvalidInputError(
-                f"inertia is {list(self.inertia)}; its moments Ixx, Iyy, Izz must be above 0"
+                f"inertia is {list(self.inertia)}; its moments Ixx, Iyy and Izz must be above 0"
             )
 
 
@@ -222,7 +222,7 @@ def _bad_name(name: str) -> str:
         hint = f", such as {object_name(name)!r}"
     except InvalidInputError:
         hint = ""
-    return f"{name!r} is not a name for an object; use a-z, 0-9 and underscores{hint}"
+    return f"{name!r} is not a valid object name; use a-z, 0-9 and underscores{hint}"
 
 
 def _check_positive(label: str, value: float | None, unit: str) -> None:

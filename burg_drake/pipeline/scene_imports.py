@@ -57,14 +57,15 @@ def import_burg_scene(
         if library.entry(instance.object).is_fixed:
             fixed.append(instance)
             notes.append(
-                f"{scene.path}:{item.line}: {instance.object!r} has no mass, and stays fixed"
+                f"{scene.path}:{item.line}: {instance.object!r} has no mass, so it"
+                " becomes background, which does not move"
             )
         else:
             free.append(instance)
     fixed += [names.instance(item) for item in scene.bg_objects]
     notes += [
-        f"an instance of {i.object!r} is called {i.name!r}, as something of every station is"
-        f" called {i.object!r}"
+        f"an instance of object {i.object!r} is called {i.name!r}, as every station has"
+        f" something called {i.object!r} already"
         for i in (*free, *fixed)
         if i.object in MODEL_NAMES
     ]

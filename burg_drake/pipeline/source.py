@@ -92,7 +92,7 @@ def object_name(text: str) -> str:
     name = re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
     if not name:
         raise InvalidInputError(
-            f"{quoted(text)} makes no object name; use letters or digits a-z, 0-9"
+            f"{quoted(text)} gives no object name; use letters or digits a-z, 0-9"
         )
     return name
 
@@ -119,8 +119,8 @@ def check_source(source: ObjectSource) -> None:
     """
     if not NAME_PATTERN.fullmatch(source.name):
         raise InvalidInputError(
-            f"{source.name!r} is not a name for an object; use a-z, 0-9 and underscores, such as"
-            f" {object_name(source.name + '_0').removesuffix('_0') or 'mug'!r}"
+            f"{source.name!r} is not a valid object name; use a-z, 0-9 and underscores,"
+            f" such as {object_name(source.name + '_0').removesuffix('_0') or 'mug'!r}"
         )
     for label, value, unit in (
         ("mass", source.mass, " kg"),
@@ -135,7 +135,9 @@ def check_source(source: ObjectSource) -> None:
             )
     if not 0.0 <= source.coefficient < float("inf"):
         raise InvalidInputError(
-            f"{source.name}: friction is {source.coefficient:g}; it must be 0 or more"
+            f"{source.name}: friction is {source.coefficient:g}; it must be at least 0"
         )
     if source.rgba is not None and not all(0.0 <= c <= 1.0 for c in source.rgba):
-        raise InvalidInputError(f"{source.name}: rgba is {source.rgba}; each must be in [0, 1]")
+        raise InvalidInputError(
+            f"{source.name}: rgba is {source.rgba}; each number must be from 0 to 1"
+        )

@@ -76,8 +76,8 @@ def check_targets(sources: Sequence[ObjectSource], root: Path, known: Collection
     for home in homes:
         if os.path.lexists(home) and home.name not in known and not is_object_folder(home):
             raise InvalidInputError(
-                f"{home} exists and is no object of this library; move it away, rename the mesh,"
-                " or choose another output folder"
+                f"{home} exists and is not an object of this library; move it away,"
+                " rename the mesh, or choose another output folder"
             )
     replaced = {_identity(home): home for home in homes if home.exists()}
     files = [s.mesh for s in sources if not isinstance(s.mesh, trimesh.Trimesh)]
@@ -87,8 +87,8 @@ def check_targets(sources: Sequence[ObjectSource], root: Path, known: Collection
             inside = replaced.get(_identity(folder)) if folder.exists() else None
             if inside is not None:
                 raise InvalidInputError(
-                    f"{mesh} lies in {inside}, which the build replaces; move the mesh out,"
-                    " or choose another output folder"
+                    f"{mesh} lies in {inside}, which the build would overwrite; move the"
+                    " mesh, or choose another output folder"
                 )
 
 

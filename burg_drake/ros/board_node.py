@@ -46,7 +46,7 @@ class Sighting:
         if estimate.reason:
             remarks.append(estimate.reason)
         if not self.camera_frame:
-            remarks.append("not on tf, as the images name no frame_id")
+            remarks.append("not sent to tf, as the images have no frame_id")
         return "; ".join(remarks)
 
 
@@ -125,13 +125,13 @@ class BoardNode:
             )
         else:
             raise InvalidInputError(
-                "there was no camera_info yet; if the camera has none, give its intrinsics as a"
-                " file"
+                "no camera_info has arrived yet; if the camera publishes none, give its"
+                " intrinsics as a file"
             ).about("intrinsics")
         height, width = image.shape[:2]
         if (width, height) != (found.width, found.height):
             raise InvalidInputError(
-                f"the image has {width} x {height} pixels, its {source}"
-                f" {found.width} x {found.height}"
+                f"the image has {width} x {height} pixels, but its {source} {found.width}"
+                f" x {found.height}"
             )
         return found

@@ -79,8 +79,8 @@ def _raw(message: Any) -> NDArray[np.uint8]:
     octets = np.frombuffer(message.data, np.uint8)
     if min(height, width) < 1 or step < row or len(octets) < height * step:
         raise InvalidInputError(
-            f"damaged image: {len(octets)} bytes in rows of {step} are no {width} x {height}"
-            f" pixels of {message.encoding}"
+            f"damaged image: {len(octets)} bytes in rows of {step} do not make {width} x "
+            f"{height} pixels of {message.encoding}"
         )
     rows = np.ascontiguousarray(octets[: height * step].reshape(height, step)[:, :row])
     values = rows.view(dtype).reshape(height, width, encoding.channels)

@@ -64,7 +64,7 @@ class StatusLog:
         silent = [topic for topic, count in publishers.items() if not count]
         if silent:
             return f"nobody publishes {' and '.join(silent)}; is the camera running? Still waiting"
-        return f"no images on {next(iter(publishers))}, though it is published; still waiting"
+        return f"{next(iter(publishers))} is published, but no images arrive; still waiting"
 
     def rate(self, now: float, *, last: bool = False) -> str | None:
         """Images answered a second, and how many of them with a pose.

@@ -161,4 +161,4 @@ def test_the_command_line_adds_the_option_of_an_argument(
     np.save(poses, np.eye(4)[None])
     words = ["reach", "tabletop_six", "--grasps", str(poses), "--grasps-frame", "camera"]
     assert main(words) == 2
-    assert capsys.readouterr().err.endswith("frame they are (--camera-pose, --grasps-frame)\n")
+    assert capsys.readouterr().err.endswith("really in (--camera-pose, --grasps-frame)\n")

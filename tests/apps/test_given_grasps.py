@@ -64,8 +64,8 @@ def test_a_network_s_grasps_seen_by_a_camera(tmp_path: Path, capsys: Capture) ->
     np.testing.assert_allclose(results["given_depth"], 0.03, rtol=1e-6)
     printed = capsys.readouterr().out
     assert printed.startswith(
-        "note: 1 of 2 grasps have no object between their fingers; they are given to the one with"
-        " the nearest surface.\n"
+        "note: 1 of 2 grasps have no object between their fingers; each was assigned to"
+        " the object with the nearest surface.\n"
     )
 
 
@@ -79,7 +79,7 @@ def test_a_data_set_s_grasps_of_an_object(tmp_path: Path, capsys: Capture) -> No
         file["grasps/transforms"] = X_OG @ make_pose(p_AB=(0.0, 0.0, -0.1034))
         file["grasps/qualities/flex/object_in_gripper"] = np.array([0, 1])
     assert main(["evaluate", "tabletop_six", "--grasps", str(path)]) == 2
-    assert "say which one it is, 3f2a=NAME" in capsys.readouterr().err
+    assert "say which of the scene's objects it is, 3f2a=NAME" in capsys.readouterr().err
     millimetres = tmp_path / "millimetres.h5"
     with h5py.File(path) as file, h5py.File(millimetres, "w") as other:
         X_OB = file["grasps/transforms"][()]
@@ -87,7 +87,7 @@ def test_a_data_set_s_grasps_of_an_object(tmp_path: Path, capsys: Capture) -> No
         other["object/file"], other["object/scale"] = "box.obj", 1.0
         other["grasps/transforms"] = X_OB
     assert main(["evaluate", "tabletop_six", "--grasps", str(millimetres)]) == 2
-    assert "lengths have to be metres" in capsys.readouterr().err
+    assert "are lengths in metres" in capsys.readouterr().err
     results = judged(tmp_path, "--grasps", str(path), "--grasps-object", "box")
     assert results["outcome"].tolist() == OUTCOMES
     assert np.isfinite(results["q_grasp_7"]).all()  # the whole arm was asked
@@ -126,21 +126,21 @@ def test_turned_grasps_are_told_and_the_printed_command_corrects_them(
     assert "lifted" not in read_table(run / "results.csv")["outcome"].tolist()
     printed = capsys.readouterr().out
     told = " ".join(printed.split())
-    assert "note: 0 of the 3 grasps fit as they were read: the open hand is clear of the" in told
+    assert "note: As they were read, 0 of the 3 grasps fit: the open hand is clear of the" in told
     assert "Turned by 90 degrees about the approach, 3 of 3 fit." in told
-    assert "The file perhaps means them so; --correction turn:z90 reads them that way." in told
+    assert "The file perhaps means that; --correction turn:z90 reads it that way." in told
     assert "sample grasps" not in told
     (line,) = [line for line in printed.splitlines() if line.startswith("    burg-drake ")]
     assert line.strip() in (run / "report.html").read_text(encoding="utf-8")
     assert typed(shlex.split(line)[1:], monkeypatch) == 0
     corrected = read_table(tmp_path / "run_corrected" / "results.csv")
     assert corrected["outcome"].tolist() == ["lifted"] * 3
-    assert "fit as they were read" not in capsys.readouterr().out
+    assert "As they were read" not in capsys.readouterr().out
     assert typed([*words, "--correction", "turn:z90"], monkeypatch) == 2
     assert (
-        f"{run} holds another run (correction is none there, turn:z90 here); choose another folder"
-        in capsys.readouterr().err
-    )
+        f"{run} already holds another run (correction is none there, turn:z90 here);"
+        " choose another folder"
+    ) in capsys.readouterr().err
 
 
 def test_a_run_over_scenes_tells_the_mistake_of_its_file_once(
@@ -155,8 +155,8 @@ def test_a_run_over_scenes_tells_the_mistake_of_its_file_once(
     words += ["-o", str(tmp_path / "all"), "--no-scene-reports", *QUICK]
     assert typed(words, monkeypatch) == 0
     printed = capsys.readouterr().out
-    assert printed.count("grasps fit as they were read") == 1
-    assert "note: Scene first: 0 of the 3 grasps fit" in printed
+    assert printed.count("As they were read") == 1
+    assert "note: Scene first: As they were read, 0 of the 3 grasps fit" in printed
     (line,) = [line for line in printed.splitlines() if line.startswith("    burg-drake ")]
     assert line.strip() in (tmp_path / "all" / "report.html").read_text(encoding="utf-8")
     assert typed([*words, "--correction", "turn:z90"], monkeypatch) == 2
@@ -200,7 +200,10 @@ def test_grasps_for_another_hand_are_judged_with_a_note(tmp_path: Path, capsys: 
     hand = {"hand": {"name": "wsg_50"}}
     GraspSet.create(X_OG, object="box", provenance=hand).save(path)
     judged(tmp_path, "--grasps", str(path), "--mode", "hand")
-    note = "note: The grasps are for hand 'wsg_50' and are taken for those of 'panda_hand'.\n"
+    note = (
+        "note: The grasps were made for hand 'wsg_50'; they are judged as those of hand"
+        " 'panda_hand'.\n"
+    )
     assert capsys.readouterr().out.startswith(note)
 
 
@@ -230,10 +233,10 @@ def test_a_file_that_does_not_say_which_scene_it_is_of(tmp_path: Path) -> None:
         (["--grasps", "a.npy", "--blind"], "--blind is for sampled grasps; leave out either it or"),
         (["--grasps", "a.npy", "--approach-angle", "30"], "--approach-angle is for sampled"),
         (["--max-grasps-per-object", "50"], "(--max-grasps-per-object, --until-balanced)"),
-        (["--balanced-among", "all"], "balanced_among has an effect only with until_balanced; add"),
+        (["--balanced-among", "all"], "balanced_among has no effect without until_balanced; add"),
         (
             ["--until-balanced", "3", "--balanced-among", "reachable", "--mode", "hand"],
-            "does not ask what the arm can reach; balance among executed, clear or all, or give",
+            "does not check what the arm can reach; balance among executed, clear or all, or give",
         ),
         (["--grasps", "missing.npy"], "missing.npy does not exist"),
         (["--grasps", "a.npy", "--camera-pose", "missing.npy"], "cannot read missing.npy"),

@@ -57,7 +57,7 @@ def test_formats_of_one_object_are_told_beforehand(name: str) -> None:
         output.require_fits(["a", "b"])
         format.write(of("a", "b"), Path(path), PANDA)
         return
-    with pytest.raises(InvalidInputError, match=r"of 2 objects \(a, b\) .* name a folder.*: x/"):
+    with pytest.raises(InvalidInputError, match=r"of 2 objects \(a, b\).* name a folder.*: x/"):
         output.require_fits(["a", "b"])
     with pytest.raises(InvalidInputError, match="of 2 objects"):
         format.write(of("a", "b"), Path(path), PANDA)
@@ -85,4 +85,4 @@ def test_what_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert sum("has no place for id, maker" in line for line in lines) == 1  # it is alike for both
     success = of("a", "b").with_columns(object_in_gripper=[np.nan, 1.0])
     output_of("out", "graspgen").write(success, PANDA)
-    assert "  a.json: There is no object_in_gripper" in capsys.readouterr().out
+    assert "  a.json: The file has no object_in_gripper" in capsys.readouterr().out

@@ -130,7 +130,7 @@ def test_the_hand_is_that_of_the_set(mug: str, capsys: pytest.CaptureFixture[str
         assert convert("wsg.h5", "w.yaml", "--to", "isaac_grasp", *asked) == 0
         grasp = yaml.safe_load(Path("w.yaml").read_text())["grasps"]["grasp_0"]
         assert joints in grasp["cspace_position"]
-        said = "for hand 'wsg_50' and are taken for those of 'panda_hand'"
+        said = "for hand 'wsg_50'; they are judged as those of hand 'panda_hand'"
         assert (said in capsys.readouterr().out) == (hand is not None)
     lost = GraspSet.create(np.eye(4), object="a", provenance={"hand": {"name": "gone_hand"}})
     lost.save("lost.h5")

@@ -129,7 +129,7 @@ def test_files_of_other_projects_name_the_mesh(
         for out, format in ((graspgen, "graspgen"), (acronym, "acronym")):
             assert main(["grasps", "convert", ours, str(out), "--to", format, *RENAMED]) == 0
     said = capsys.readouterr()
-    assert "nothing says which mesh" not in said.out + said.err
+    assert "it is not known which mesh" not in said.out + said.err
     mug = load_library("household").entry("mug")
     mesh = f"package://burg_drake/models/household/{mug.mesh}"
     told = json.loads(graspgen.read_text())["object"]
@@ -189,7 +189,7 @@ def test_an_object_without_grasps_is_said(
     assert sample(scene_file, *options) == 0
     (note,) = (line for line in capsys.readouterr().out.splitlines() if "note" in line)
     counts = re.findall(r"(?<![\d.])[\d,]+(?= [a-z])", note.partition("through it")[2])
-    assert note.startswith("note: box: 0 of 5 grasps: of 262,144 lines through it ")
+    assert note.startswith("note: box: only 0 of 5 grasps were found: of 262,144 lines through it ")
     assert "allow no approach within the limits" in note and note.endswith("would help")
     lines = GraspSet.load(out).provenance["parts"]["box"]["left_out"]
     assert counts == [f"{n:,}" for n in sorted(lines.values(), reverse=True) if n]
@@ -205,7 +205,7 @@ def test_an_object_without_grasps_is_said(
         (["tabletop", "-o", "x.h5"], "tabletop is neither a scene nor an object library"),
         (["household", "--only", "bxo", "-o", "x.h5"], "has no object 'bxo'; did you mean 'box'?"),
         (["household", "--only", "mug, bxo", "-o", "x.h5"], "has no object 'bxo'; did you mean"),
-        (["household", "--approach-angle", "60", "-o", "x.h5"], "limit the approach in a scene"),
+        (["household", "--approach-angle", "60", "-o", "x.h5"], "limit the approach"),
         (["tabletop_six", "--only", "can", "-o", "x.h5"], "has no free object 'can'"),
         (["tabletop_six", "-o", "x.txt"], "no format of grasps has the suffix '.txt'"),
         (["tabletop_six", "-o", "x.csv"], "has grasps in the world frame; write a .h5 file"),
@@ -213,7 +213,7 @@ def test_an_object_without_grasps_is_said(
         (["household", "--weights", "mug=no.npy", "-o", "x.h5"], "cannot read no.npy"),
         (
             ["household", "--margin-mm", "3", "--blind", "-o", "x.h5"],
-            "margin and conservative are for the hand, which blind sampling ignores",
+            "margin and conservative concern the hand, which blind sampling ignores",
         ),
         (["household", "--standoffs-mm", "20", "-o", "x.h5"], "give -9 to 9.5 mm"),
     ],

@@ -57,7 +57,7 @@ def test_other_formats(grasp_file: Path, tmp_path: Path, capsys: Capture) -> Non
     assert sorted(path.name for path in out.iterdir()) == ["box.yaml", "can.yaml"]
     capsys.readouterr()
     for options, message in (
-        ((tmp_path / "x.yaml",), "name the format that you want (--to)"),
+        ((tmp_path / "x.yaml",), "give the format (--to)"),
         ((tmp_path / "x.yaml", "--to", "isaac_grasp"), "the grasps are of 2 objects (box, can)"),
         ((tmp_path / "x.csv",), "VGN and GIGA has grasps in the world frame"),
         ((grasp_file / "x.h5",), "cannot write"),
@@ -83,7 +83,10 @@ def test_another_hand_is_said(tmp_path: Path, capsys: Capture) -> None:
     for station, said in zip(told, (False, True, False), strict=True):
         capsys.readouterr()
         assert score(path, *station) == 0
-        note = "note: The grasps are for hand 'wsg_50' and are taken for those of 'panda_hand'.\n"
+        note = (
+            "note: The grasps were made for hand 'wsg_50'; they are judged as those of hand"
+            " 'panda_hand'.\n"
+        )
         assert (note in capsys.readouterr().out) == said
 
 
@@ -107,7 +110,7 @@ def test_millimetres_are_refused(grasp_file: Path, tmp_path: Path, capsys: Captu
     path = tmp_path / "mm.h5"
     GraspSet.create(X_OG, object=grasps.object, provenance=grasps.provenance).save(path)
     assert score(path) == 2
-    assert "lengths have to be metres" in capsys.readouterr().err
+    assert "are lengths in metres" in capsys.readouterr().err
 
 
 def test_nothing_is_written_unasked(grasp_file: Path) -> None:
@@ -120,8 +123,8 @@ def test_one_line_says_what_is_wrong(grasp_file: Path, capsys: Capture) -> None:
     capsys.readouterr()
     for options, message in (
         (("--by", "epsilom"), "there is no metric 'epsilom'"),
-        (("--by", "gravity_margin"), "gravity_margin needs to know where up is; give a scene"),
-        (("--friction", "cup=0.3"), "friction is given for 'cup', of which there are no grasps"),
+        (("--by", "gravity_margin"), "gravity_margin depends on where up is; give a scene"),
+        (("--friction", "cup=0.3"), "friction is given for 'cup', but there are no grasps"),
         (("--scene", "tabletop_six"), "has 0 instances of 'can'"),
     ):
         assert score(grasp_file, *options) == 2

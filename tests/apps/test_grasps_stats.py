@@ -145,7 +145,7 @@ def test_names_with_brackets_are_printed_as_they_are(
     ("options", "text"),
     [
         (["--ap", "lable"], "the grasps have no column 'lable'"),
-        (["--ap", "width"], "column 'width' judges none of the grasps"),
+        (["--ap", "width"], "column 'width' has no values"),
         (["missing.npz"], "missing.npz does not exist"),
     ],
 )

@@ -35,6 +35,6 @@ def test_check_of_an_own_document(tmp_path: Path, capsys: Capture) -> None:
     assert capsys.readouterr().out.startswith("mine: the document agrees with ")
     own.write_text(text.replace("opening: [0.0, 0.11]", "opening: [0.0, 0.1]"), encoding="utf-8")
     assert main(["hand", "check", str(own)]) == 2
-    assert "the pads are 110.0 mm apart along x of G; opening says 100.0 mm" in (
+    assert "the pads are 110.0 mm apart along x of G, but opening says 100.0 mm" in (
         capsys.readouterr().err
     )

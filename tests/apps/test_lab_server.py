@@ -106,7 +106,7 @@ BAD: list[tuple[dict[str, object], int, str]] = [
     ({"width_mm": -1}, 400, "width_mm must be from 0"),
     ({"width_mm": 1e300}, 400, "width_mm must be from 0"),
     ({"plan": "another"}, 409, "another trials file"),
-    ({"replaces": "other"}, 409, "was changed meanwhile: it has nothing"),
+    ({"replaces": "other"}, 409, "was changed by someone else: it now has nothing"),
 ]
 
 

@@ -45,8 +45,8 @@ def test_build_and_check_say_what_pads_touch(mesh: Path, tmp_path: Path, capsys:
     assert build(mesh, tmp_path / "ring.ply", QUICK, "-o", library, *masses) == 0
     faces = len(load_library(library).mesh("ring/contact.obj").faces)
     expected = [
-        "block: gripper pads touch a box, within ",
-        f"ring: gripper pads touch a surface of {faces} faces, within 0.",
+        "block: gripper pads touch a box, at most ",
+        f"ring: gripper pads touch a surface with {faces} faces, at most 0.",
     ]
 
     def told() -> list[str]:
@@ -75,11 +75,11 @@ def test_a_library_of_an_earlier_release_is_told_and_built_again(
     capsys.readouterr()
     assert main(["library", "check", str(library)]) == 1
     told = capsys.readouterr()
-    assert "ring was built by another release; build it again" in told.out + told.err
+    assert "ring was built by another release of burg_drake; build it again" in told.out + told.err
     assert build(torus, QUICK, "-o", library, "--mass", "ring=0.1") == 0
     told = capsys.readouterr()
     assert "1 built, 0 up to date, 0 failed" in told.out
-    assert "built again: pads now touch the object's own surface" in told.out + told.err
+    assert "built again: finger pads now touch the object's own surface" in told.out + told.err
     assert main(["library", "check", str(library)]) == 0
 
 
@@ -178,7 +178,7 @@ def test_a_wrong_unit_is_told_before_the_others_are_built(
     trimesh.creation.box((50, 40, 60)).export(tmp_path / "wrong.stl")
     meshes = (mesh, tmp_path / "wrong.stl")
     assert build(*meshes, QUICK, "-o", tmp_path / "library") == 1
-    assert len(told) == 1 and "wrong.stl: largest extent is 60 m" in told[0]
+    assert len(told) == 1 and "wrong.stl: taken as metres, the mesh is 60 m long" in told[0]
     assert told[0].endswith("; for this mesh alone --unit wrong=mm\n")
     capsys.readouterr()
     assert build(*meshes, QUICK, "-o", tmp_path / "library", "--unit", "wrong=mm") == 0
@@ -211,7 +211,7 @@ def test_folders_of_the_users_are_not_replaced(
     monkeypatch.chdir(tmp_path)
     assert build("cube/cube.obj", "-o", ".") == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"burg-drake: error: {tmp_path / 'cube'} exists and is no object of")
+    assert line.startswith(f"burg-drake: error: {tmp_path / 'cube'} exists and is not an object of")
     assert (tmp_path / "cube" / "cube.obj").read_bytes() == before
     assert [p.name for p in tmp_path.rglob("*")] == ["cube", "cube.obj"]
 

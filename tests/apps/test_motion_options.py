@@ -31,9 +31,9 @@ def test_an_option_counts_more_than_the_station_and_that_more_than_the_usual() -
     [
         (
             "reach --lift-mm 10 --least-lift-mm 20",
-            "no more than lift_height (--lift-mm, --least-lift-mm)",
+            "give at most lift_height (--lift-mm, --least-lift-mm)",
         ),
-        ("reach --lift-mm 0", "1 mm at least with the object (--lift-mm)"),
+        ("reach --lift-mm 0", "at least 1 mm with the object (--lift-mm)"),
         ("reach --lift-direction 0 0 0", "[0, 0, 1] for up (--lift-direction)"),
         ("evaluate --retreat-mm -1", "--retreat-mm: -1 is not a length from 0 to 1000 mm"),
         ("evaluate --lift-mm 9000", "--lift-mm: 9000 is not a length from 0 to 2000 mm"),

@@ -119,7 +119,7 @@ def test_a_pipe_that_never_ends_is_read_within_bounds(
     endless.kill()
     endless.wait()
     assert end.value.code == 2
-    assert "more than 0 MiB came; save it to a file first" in capsys.readouterr().err
+    assert "more than 0 MiB arrived; save it to a file first" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -40,7 +40,7 @@ def test_out_of_bounds_is_a_warning(tmp_path: Path, capsys: Capture) -> None:
     assert main(["printout", str(scene), "-o", str(tmp_path / "board.pdf")]) == 0
     (line,) = capsys.readouterr().err.splitlines()
     assert line == (
-        f"burg-drake: warning: {scene}: 'mug' is out of bounds: 20.5 mm over the left edge of the"
+        f"burg-drake: warning: {scene}: 'mug' is off the board: 20.5 mm over the left edge of the"
         " board (594 x 420 mm)"
     )
 

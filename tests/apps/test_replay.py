@@ -120,11 +120,11 @@ def test_the_last_bit_of_a_margin_is_compared(row_file: Path, capsys: Capture) -
     slip = float(read_table(row_file)["slip"][0])
     rewrite(row_file, slip=repr(math.nextafter(slip, 1.0)))
     assert replay(row_file) == 0
-    assert "as recorded, but for the last digits of slip" in capsys.readouterr().out
+    assert "as recorded, except for the last digits of slip" in capsys.readouterr().out
     rewrite(row_file, slip=repr(1.001 * slip))
     assert replay(row_file) == 1
     out = capsys.readouterr().out.splitlines()
-    assert "not as recorded" in out
+    assert "differs from what was recorded" in out
     assert f"slip: recorded {1.001 * slip!r}, now {slip!r}" in out
 
 
@@ -173,7 +173,7 @@ def test_a_scene_that_is_gone_or_changed(run: Run, row_file: Path, capsys: Captu
     assert replay(row_file, "--scene", str(changed), "--force") == 1
     captured = capsys.readouterr()
     assert "the scene is not the one of the trial" in captured.err
-    assert "not as recorded" in captured.out
+    assert "differs from what was recorded" in captured.out
 
 
 @pytest.mark.thorough
@@ -241,7 +241,7 @@ def test_a_header_alone_has_no_rows(row_file: Path, capsys: Capture) -> None:
         assert capsys.readouterr().err == f"burg-drake: error: {row_file} has no rows\n"
 
 
-TWELVE = "it has to be the 12 numbers of the upper three rows of the pose"
+TWELVE = "it must be the 12 numbers of the upper three rows of the pose"
 
 
 @pytest.mark.parametrize(
@@ -252,7 +252,7 @@ TWELVE = "it has to be the 12 numbers of the upper three rows of the pose"
         ({"engine": "warp (custum)"}, "engine 'warp (custum)' is not a preset of this release"),
         ({"engine": "screening"}, "engine 'screening' and engine_settings contradict each other"),
         ({"X_OG": "1 0 0 0.1"}, f"X_OG has 4 numbers; {TWELVE}"),
-        ({"X_OG": "1 0 0 x"}, f"X_OG has 'x' in it; {TWELVE}"),
+        ({"X_OG": "1 0 0 x"}, f"X_OG contains 'x'; {TWELVE}"),
         ({"outcome": "liftd"}, "outcome 'liftd' is not known to this release; did you mean 'lif"),
         ({"stage": "dreamt"}, "stage 'dreamt' is not known to this release; known: clear, exec"),
     ],

@@ -186,11 +186,11 @@ def altered(run: Run, folder: Path, verdict: Verdict, **versions: str) -> Path:
 @pytest.mark.parametrize(
     ("verdict", "versions", "line"),
     [
-        (Verdict(Outcome.NO_IK, Stage.REACHABLE), {}, "not as recorded"),
+        (Verdict(Outcome.NO_IK, Stage.REACHABLE), {}, "differs from what was recorded"),
         (
             Verdict(Outcome.SIMULATION_FAILED, Stage.EXECUTED),
             {"drake": "1.2.3"},
-            f"not as recorded (with drake 1.2.3, now {version('drake')})",
+            f"differs from what was recorded (with drake 1.2.3, now {version('drake')})",
         ),
     ],
 )
@@ -257,14 +257,16 @@ def test_replay_of_the_best_where_nothing_was_lifted(
 def test_no_run_there(verb: list[str], tmp_path: Path, capsys: Capture) -> None:
     assert main([*verb, str(tmp_path)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"burg-drake: error: {tmp_path} holds no run (run.yaml is missing)")
+    assert line.startswith(
+        f"burg-drake: error: {tmp_path} is not the folder of a run (run.yaml is missing)"
+    )
 
 
 def test_grasps_in_colour(run: Run, tmp_path: Path, capsys: Capture) -> None:
     page = tmp_path / "grasps.html"
     assert main(["grasps", "show", str(run.path), "--html", str(page)]) == 0
     assert capsys.readouterr().out.splitlines() == [
-        "note: no grasps to judge for mug",
+        "note: there are no grasps to judge for mug",
         "■ lifted (1)",
         "■ never held (1)",
         "■ hand collides (1)",

@@ -40,23 +40,22 @@ MISTAKES = {
     ),
     "name of the robot": (
         ("- object: mug", "- name: hand\n    object: mug"),
-        "SCENE: instance name 'hand' is taken by the station; choose another",
+        "SCENE: the station has something called 'hand' already",
     ),
 }
 UNSOUND = {
     "out of bounds": (
         ("[0.12, 0.11, 0.0]", "[0.12, 0.0, 0.0]"),
-        "'mug' is out of bounds: 40.5 mm over the lower edge of the board (594 x 420 mm)",
+        "'mug' is off the board: 40.5 mm over the lower edge of the board (594 x 420 mm)",
     ),
     "millimetres": (
         ("[0.12, 0.11, 0.0]", "[120.0, 0.11, 0.0]"),
-        "'mug' is out of bounds: 119 m over the right edge of the board (594 x 420 mm);"
-        " translations are in metres",
+        "'mug' is off the board: 119 m over the right edge of the board (594 x 420 mm);"
+        " check that translations are in metres",
     ),
     "in the ground": (
         ("[0.12, 0.11, 0.0]", "[0.12, 0.11, -0.02]"),
-        "'mug' is in the ground: it reaches 20.0 mm below the board;"
-        " z = 0.0000 would put it on top",
+        "'mug' reaches 20.0 mm below the surface of the board; set z = 0.0000 to put it on top",
     ),
     "overlap": (
         ("[0.12, 0.11, 0.0]", "[0.29, 0.11, 0.0]"),
@@ -125,7 +124,7 @@ def test_an_unsound_scene_is_shown_with_a_warning(scene_file: Path, capsys: Capt
     assert captured.out == f"wrote {page}\n"
     text = page.read_text()
     assert "<title>two</title>" in text
-    assert "out of bounds" in text
+    assert "off the board" in text
     assert not re.search(r"<(script|img|link)[^>]*(src|href)=", text)
 
 

@@ -37,5 +37,5 @@ def test_a_faulty_scene_is_exported_and_what_is_wrong_is_told(
     scene_file.write_text(scene_file.read_text().replace("0.12,", "1.2,"))
     arguments = ["scene", "export", str(scene_file), "--to", "dmd", "-o", str(tmp_path / "out")]
     assert main(arguments) == 0
-    warning = f"burg-drake: warning: {scene_file}: 'mug' is out of bounds: "
+    warning = f"burg-drake: warning: {scene_file}: 'mug' is off the board: "
     assert capsys.readouterr().err.startswith(warning)

@@ -78,7 +78,7 @@ def test_no_room(tmp_path: Path, capsys: Captured) -> None:
         ),
         (["household", "-n", "5000", "-o", "x"], "-n 5000: a scene has 1000 objects at most"),
         (["household", "--force", "-o", "x"], "--force goes with --again"),
-        (["--again", "tabletop_six", "-o", "x.yaml"], "has no `origin`: it was not sampled"),
+        (["--again", "tabletop_six", "-o", "x.yaml"], "has no `origin`, so it was not sampled"),
         (
             ["--again", "tabletop_six", "--seed", "3", "-o", "x.yaml"],
             "--again takes the recipe of its scene: leave out --seed",

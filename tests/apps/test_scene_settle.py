@@ -113,7 +113,7 @@ def test_what_validate_refuses_is_not_settled(scene_file: Path, capsys: Capture)
     printed = capsys.readouterr()
     assert code == 1 and not out.exists() and "wrote" not in printed.out
     (line,) = printed.err.splitlines()
-    assert line.startswith(f"burg-drake: {scene_file}: 'mug' is out of bounds: ")
+    assert line.startswith(f"burg-drake: {scene_file}: 'mug' is off the board: ")
     code, out = settle(scene_file, "--keep")
     assert code == 1 and f"wrote {out}" in capsys.readouterr().out
     assert main(["scene", "validate", str(out)]) == 1

@@ -67,7 +67,7 @@ def test_plan_tells_what_was_chosen_and_what_it_will_tell(planned: Path, capsys:
     assert "precision" in printed and "McNemar's exact test" in printed
     assert f"wrote 4 trials to {planned / 'other.yaml'}" in printed
     assert trials("plan", planned / "no_run", "-o", planned / "x.yaml") == 2
-    assert "holds no run" in capsys.readouterr().err
+    assert "is not the folder of a run" in capsys.readouterr().err
     assert not (planned / "x.yaml").exists()
 
 
@@ -80,7 +80,7 @@ def test_record_and_show(sheet: Path, capsys: Capture) -> None:
     assert (done.outcome, done.note, done.operator) == ("slipped", "wet", "Ada")
     assert done.robot is not None and (done.robot.width_mm, done.robot.effort_n) == (12.5, 30.0)
     for words, message in (
-        (("1", "--outcome", "lifted"), "trial 1 has outcome 'slipped' already"),
+        (("1", "--outcome", "lifted"), "trial 1 already has outcome 'slipped'"),
         (("2", "--outcome", "liftet"), "no outcome 'liftet'; did you mean 'lifted'?"),
         (("2",), "nothing to record"),
         (("7", "--outcome", "lifted"), "there is no trial 7; they have 1 to 4"),
@@ -153,11 +153,13 @@ def test_next_is_what_is_open_when_it_is_recorded(
     photo = sheet.parent / "any.png"
     photo.write_bytes(b"any")
     assert trials("record", sheet, "next", "--outcome", "slipped", "--photo", photo) == 2
-    assert "any.png is not an image that can be read" in capsys.readouterr().err
+    assert "any.png is not a readable image" in capsys.readouterr().err
     write_image(photo, np.zeros((4, 6, 3), np.uint8))
     assert trials("record", sheet, "next", "--outcome", "slipped", "--photo", photo) == 2
     told = capsys.readouterr().err
-    assert "trial 3 was changed meanwhile; nothing was recorded, but the photo is kept" in told
+    assert (
+        "trial 3 was changed by someone else; nothing was recorded, but the photo is kept" in told
+    )
     assert trial(sheet, 3).photo == "" and trial(sheet, 4).outcome is None
     assert (sheet.parent / "photos" / "003.png").read_bytes() == photo.read_bytes()
 
@@ -215,7 +217,7 @@ def test_a_photo_is_measured_and_kept(sheet: Path, capsys: Capture) -> None:
     kept.write_text(kept.read_text().replace(scene.content, "0" * 64))
     capsys.readouterr()
     assert trials("record", sheet, "4", "--placement", kept, "--correct") == 2
-    assert "is of scene 'two' (000000000000); trial 4 is on 'two'" in capsys.readouterr().err
+    assert "is of scene 'two' (000000000000), but trial 4 is on 'two'" in capsys.readouterr().err
 
 
 def _about_z(degrees: float) -> np.ndarray:

@@ -139,15 +139,15 @@ def test_what_cannot_be_used_is_told_once_and_nothing_is_preloaded(
     spaced = tmp_path / "a b" / "libmimalloc.so"
     spaced.parent.mkdir()
     spaced.write_bytes(library.read_bytes())
-    unsuitable = "is not an allocator that can be preloaded here"
-    unnamed = "has a space or colon in its path, so that it cannot be preloaded"
+    unsuitable = "is not an allocator that can be preloaded on this system"
+    unnamed = "has a space or a colon in its path and so cannot be preloaded"
     absent = tmp_path / "absent.so"
     expected = dict.fromkeys((cut, text, tmp_path, Path(maths)), unsuitable)
     for path, why in (expected | {spaced: unnamed, absent: "cannot be found"}).items():
         caplog.clear()
         with caplog.at_level(logging.WARNING, "burg_drake"):
             assert of(path) == of(path) == {}
-        assert caplog.messages == [f"{VARIABLE}: {path} {why}; workers do without"]
+        assert caplog.messages == [f"{VARIABLE}: {path} {why}; workers run without it"]
     assert capfd.readouterr() == ("", "")
 
 

@@ -80,7 +80,7 @@ def test_a_damaged_entry_is_told_and_replaced(
     assert_same(cached("thing", KEY, compute))
     (line,) = caplog.messages
     assert str(entry(folder)) in line and line.endswith(
-        "; it is only a copy, and is computed again"
+        "; this was only a cached copy, so the result is computed again"
     )
     assert_same(cached("thing", KEY, never))
 
@@ -95,8 +95,8 @@ def test_an_entry_of_another_version_is_told_and_replaced(
     for kind in kinds:
         assert_same(cached(kind, KEY, compute))
     (line,) = caplog.messages
-    assert line.startswith(f"burg-drake: the results kept in {folder} are of another version")
-    assert line.endswith("There is nothing for you to do")
+    assert line.startswith(f"burg-drake: the cache in {folder} was made with another version")
+    assert line.endswith("You need not do anything")
     for kind in kinds:
         assert_same(cached(kind, KEY, never))
 
@@ -200,6 +200,6 @@ def test_the_folder_is_the_user_s(
 def test_the_home_of_nobody_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("BURG_DRAKE_CACHE", "~nobody_of_this_name/cache")
     with pytest.raises(
-        InvalidInputError, match=r"^BURG_DRAKE_CACHE: ~nobody_of.*write the path ou"
+        InvalidInputError, match=r"^BURG_DRAKE_CACHE: ~nobody_of.*write the whole path"
     ):
         cache_folder()

@@ -34,6 +34,8 @@ def test_errors_survive_the_way_back_from_a_worker_process():
 def test_nearest_suggests_and_lists():
     known = ["mug", "bowl", "marble"]
     assert errors.nearest("mog", known) == "did you mean 'mug'? Known: bowl, marble, mug"
+    assert errors.nearest("panda", ["panda_wsg", "panda_bin"]) == "known: panda_bin, panda_wsg"
+    assert errors.nearest("panda", ["ur5e", "panda_bin"]).startswith("did you mean 'panda_bin'?")
     assert errors.nearest("spaceship", known) == "known: bowl, marble, mug"
     assert errors.nearest("spaceship", known, ordered=True) == "known: mug, bowl, marble"
     assert errors.nearest("mug", []) == "known: (none)"

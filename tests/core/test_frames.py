@@ -155,7 +155,7 @@ def test_grasp_from_axes_keeps_closing_and_the_perpendicular_part_of_approach():
     [([1, 0, 0], [-3, 0, 0]), ([0, 0, 0], [0, 0, 1]), ([1, 0, 0], [0, 0, 0])],
 )
 def test_grasp_from_axes_refuses_degenerate_directions(closing, approach):
-    with pytest.raises(InvalidInputError, match="must not be parallel or zero"):
+    with pytest.raises(InvalidInputError, match="must not be zero or parallel to each other"):
         frames.grasp_from_axes(closing, approach, [0, 0, 0])
 
 
@@ -181,10 +181,12 @@ def test_check_pose_error_texts():
         "X_SO of 'mug'[2] is not a rigid transform: its rotation part is off by 0.02"
         " from orthonormal"
     )
-    assert message(np.diag([1.0, 1.0, -1.0, 1.0])).endswith("its rotation part is a mirror image")
+    assert message(np.diag([1.0, 1.0, -1.0, 1.0])).endswith(
+        "its rotation part is a reflection (determinant -1)"
+    )
     bad = good.copy()
     bad[0, 3, 0] = 0.5
-    assert message(bad) == "X_SO of 'mug'[0] has a last row other than 0 0 0 1"
+    assert message(bad) == "X_SO of 'mug'[0] has a last row that is not 0 0 0 1"
 
 
 def test_check_pose_accepts_what_text_files_round():

@@ -51,7 +51,7 @@ def test_nothing_outside_of_the_file_is_read(
         assert file["x"].shape == (4,)  # HDF5 itself would follow it
     with open_hdf5(path) as tree, pytest.raises(InvalidInputError) as caught:
         tree.array("x").read("f")
-    assert str(caught.value).startswith((f"{path}: x is a link", f"{path}: x has its data in"))
+    assert str(caught.value).startswith((f"{path}: x is a link", f"{path}: x keeps its data in"))
 
 
 def most_memory() -> int:
@@ -122,7 +122,7 @@ def test_what_is_no_plain_dataset_is_refused(tmp_path: Path) -> None:
     for name in ("empty", "lzf", "lists", "pointer", "missing"):
         with open_hdf5(path) as tree, pytest.raises(InvalidInputError, match=f"^{path}: {name} "):
             tree.array(name).read("f")
-    with open_hdf5(path) as tree, pytest.raises(InvalidInputError, match="many is not a single"):
+    with open_hdf5(path) as tree, pytest.raises(InvalidInputError, match="many must be a single"):
         tree.attribute("many")
 
 

@@ -134,6 +134,6 @@ def test_messages_tell_what_was_searched(tmp_path: Path, monkeypatch: pytest.Mon
     assert message("package://my_arm/link.obj") == (
         f"package://my_arm/link.obj does not exist: 'my_arm' is {mine}"
     )
-    assert message("package:///link.obj").endswith("names no package; write package://NAME/FILE")
+    assert message("package:///link.obj").endswith("has no package name; write package://NAME/FILE")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert f"Drake's cache ({tmp_path}/drake/package_map/" in message("package://drake_models/x")

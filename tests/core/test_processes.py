@@ -57,7 +57,7 @@ def test_what_ends_a_worker_from_outside(echo: str, number: str, outside: bool) 
     process.send_signal(signal.Signals[number])
     assert was_ended_from_outside(process) is outside
     where = " from outside" if outside else ""
-    assert exit_cause(process) == f"the worker process was ended{where} by {number}"
+    assert exit_cause(process) == f"the worker process was killed{where} by {number}"
 
 
 def test_there_is_a_processor() -> None:

@@ -34,7 +34,7 @@ class Part:
 
     def __post_init__(self) -> None:
         if self.mass <= 0.0:
-            raise InvalidInputError(f"mass is {self.mass:g} kg; it has to be above 0")
+            raise InvalidInputError(f"mass is {self.mass:g} kg; it must be above 0")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,7 +100,8 @@ def test_numbers_in_every_spelling(number):
              " shading, size, tags, parts, by_name, limit"),
         ("- 1\n", "d.yaml:1: expected keys with values ('key: value' lines)"),
         ("name: a\n", "d.yaml:1: version: missing; add 'version: 1'"),
-        ("mug: 0.1\n", "d.yaml:1: this is no document, which has keys version, name"),
+        ("mug: 0.1\n", "d.yaml:1: not a document; one has the keys version, name"),
+        ("version: 1\nmug: 0.1\n", "d.yaml:1: not a document; one has the keys version, name"),
         ("name: a\nversion: 3\n",
          "d.yaml:2: version: 3 cannot be read; this release reads version 1"),
         ("version: [1]\n",
@@ -115,7 +116,7 @@ def test_numbers_in_every_spelling(number):
          "d.yaml:7: by_name.b.X_SO: unknown key 'rpy'; did you mean 'rpy_deg'? Known:"
          " quaternion_wxyz, rpy_deg, translation"),
         ("version: 1\nname: a\nname: b\n", "d.yaml:3: key 'name' is given twice"),
-        ("version: 1\n? [a, b]\n: c\n", "d.yaml:2: a key has to be a text, not a structure"),
+        ("version: 1\n? [a, b]\n: c\n", "d.yaml:2: a key must be a text, not a list or a mapping"),
         ("version: 1\nname: a\ncount: 1.5\n", "d.yaml:3: count: '1.5' is not a whole number"),
         ("version: 1\nname: a\nlimit: .nan\n", "d.yaml:3: limit: '.nan' is not a finite number"),
         ("version: 1\nname: a\nlimit: nan\n", "d.yaml:3: limit: 'nan' is not a finite number"),
@@ -128,11 +129,12 @@ def test_numbers_in_every_spelling(number):
         ("version: 1\nname: a\nsize: [1, x]\n", "d.yaml:3: size[1]: 'x' is not a finite number"),
         ("version: 1\nname: a\nsize: 1\n", "d.yaml:3: size: expected a list such as [a, b, c]"),
         ("version: 1\nname: a\nmodel: hydro\n",
-         "d.yaml:3: model: 'hydro' is not valid; known: hydroelastic, point"),
+         ("d.yaml:3: model: 'hydro' is not valid; did you mean 'hydroelastic'? Known:"
+             " hydroelastic, point")),
         ("version: 1\nname: a\nshading: smoth\n",
          "d.yaml:3: shading: 'smoth' is not valid; did you mean 'smooth'? Known: flat, smooth"),
         ("version: 1\nname: a\nparts:\n- {name: b, mass: -1}\n",
-         "d.yaml:4: parts[0]: mass is -1 kg; it has to be above 0"),
+         "d.yaml:4: parts[0]: mass is -1 kg; it must be above 0"),
         ("version: 1\nname: a\nparts:\n- name: b\n  X_SO: {rpy_deg: [0, 0, 0], "
          "quaternion_wxyz: [1, 0, 0, 0]}\n",
          "d.yaml:5: parts[0].X_SO: give rpy_deg or quaternion_wxyz, not both"),

@@ -97,7 +97,7 @@ def test_a_death_costs_the_task_that_causes_it(number: signal.Signals, outside: 
         error = deadly.exception(HANG_GUARD)
         assert isinstance(error, WorkerDied) and error.from_outside is outside
         where = " from outside" if outside else ""
-        assert str(error) == f"the worker process was ended{where} by {number.name}"
+        assert str(error) == f"the worker process was killed{where} by {number.name}"
         assert [f.result(HANG_GUARD) for f in futures] == [x * x for x in range(10)] * 2
         gave_up = pool.submit(jobs.give_up).exception(HANG_GUARD)
         assert str(gave_up) == "the worker process ended: SystemExit: abort: Failure at plant.cc"
@@ -189,7 +189,7 @@ def test_sessions_are_built_once_a_worker_and_a_few_are_kept(tmp_path: Path) -> 
         assert add(pool, again)[:2] == ("a", 3)
         assert add(pool, c)[0] == "c" and pool.sessions(0) == ("a", "c")
         assert add(pool, b)[:2] == ("b", 1)
-        with pytest.raises(InvalidInputError, match="have to be of the same session"):
+        with pytest.raises(InvalidInputError, match="must belong to the same session"):
             pool.submit_tasks([Task(jobs.add, (1,), session=s) for s in (a, b)])
     assert [line.split()[0] for line in log.read_text().splitlines()] == ["a", "b", "c", "b"]
     with WorkerPool(2) as pool:
@@ -210,7 +210,7 @@ def test_sessions_that_cannot_be_built(tmp_path: Path) -> None:
         deadly = Session("deadly", partial(jobs.build_and_die, log), attempts=3)
         futures = [pool.submit_task(Task(jobs.add, (1,), session=deadly)) for _ in range(4)]
         assert {str(f.exception(HANG_GUARD)) for f in futures} == {
-            "the worker process was ended by SIGSEGV"
+            "the worker process was killed by SIGSEGV"
         }
         assert deadly.error is futures[0].exception()
         assert len(log.read_text().split()) == 3

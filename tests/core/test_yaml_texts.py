@@ -42,7 +42,7 @@ def test_texts_are_those_of_pyyaml(tmp_path: Path, flow: bool | None) -> None:
         ("# nothing\n", "the document is empty"),
         ("a: 1\nb: 2\na: 3\n", r"a\.yaml:3: 'a' appears twice"),
         ("a: {b: 1, b: 2}\n", r"a\.yaml:1: 'b' appears twice"),
-        ("? [1, 2]\n: 3\n", r"a\.yaml:1: a key is a structure"),
+        ("? [1, 2]\n: 3\n", r"a\.yaml:1: a key is a list or a mapping"),
         ("a: *b\n", r"a\.yaml:1: alias \*b has no anchor"),
         ("a: &b [*b]\n", r"a\.yaml:1: alias \*b has no anchor"),
         ("a: [1, 2\n", r"a\.yaml:\d: not valid YAML"),

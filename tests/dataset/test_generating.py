@@ -105,7 +105,7 @@ def test_bad_requests(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
         (["--scenes", "tabletop_six", "--grasps", "sample:no"], "as in sample:100"),
         (["--scenes", "tabletop_six", "--sensor", "d436"], "'d436'"),
         (["--scenes", "tabletop_six", "--camera", "sphre"], "did you mean 'sphere'"),
-        (["--scenes", "tabletop_six", "--grasps", "no/run"], "no/run holds no run"),
+        (["--scenes", "tabletop_six", "--grasps", "no/run"], "no/run is not the folder of a run"),
     ):
         assert main(["dataset", "generate", *arguments, *output]) == 2
         assert told in capsys.readouterr().err

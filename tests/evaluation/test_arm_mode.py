@@ -60,7 +60,7 @@ def test_the_arm_lifts_what_the_hand_lifts(run: Run) -> None:
     assert summary.steps[:5] == ["candidates", "clear", "reachable", "planned", "executed"]
     assert [summary.total.funnel[name] for name in summary.steps[:5]] == [2, 1, 1, 1, 1]
     assert [cost.name for cost in summary.costs] == [str(stage) for stage in Stage]
-    text = "The approach pushed something by more than 1 mm in 0 of 1 trials."
+    text = "The approach moved an object by more than 1 mm in 0 of 1 trials."
     assert str(summary.pushes) == text
     stream = io.StringIO()
     Console(file=stream, width=80).print(summary_view(summary))

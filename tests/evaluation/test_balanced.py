@@ -135,8 +135,8 @@ def test_the_bound_ends_it_and_what_is_missing_is_said(
     assert max(map(sum, run.document.grasps.asked.values())) <= 20
     lifted, failed = counts(run, "bar", {Outcome.LIFTED}), counts(run, "bar", FAILED)
     (note,) = [note for note in run_notes(run) if note.startswith("bar: ")]
-    missing = f"{lifted} of the 30 lifted and {failed} of the 30 failing grasps asked for"
-    assert note.startswith(f"bar: {missing} (executed ones count), after ")
+    missing = f"{lifted} of the 30 lifted and {failed} of the 30 failing grasps were found"
+    assert note.startswith(f"bar: only {missing} (only executed grasps count) among ")
     assert note.endswith(" grasps (max_grasps_per_object is 20)")
     partial = replace(run, document=run.document).with_verdicts({})
     assert not [note for note in run_notes(partial) if "max_grasps" in note]
@@ -146,17 +146,17 @@ def test_the_bound_ends_it_and_what_is_missing_is_said(
     ("options", "message"),
     [
         ({"until_balanced": 0}, "until_balanced is 0; give 1 or more"),
-        ({"shard": "1/2"}, "leave out until_balanced or shard"),
+        ({"shard": "1/2"}, "leave out one of the two"),
         ({"max_grasps_per_object": 3}, "give a larger maximum"),
         ({"balanced_among": "cleared"}, "there is no balanced_among 'cleared'"),
         (
             {"balanced_among": "reachable", "mode": "hand"},
-            "mode hand does not ask what the arm can",
+            "mode hand does not check what the arm can",
         ),
-        ({"until_balanced": None, "balanced_among": "all"}, "balanced_among has an effect only"),
+        ({"until_balanced": None, "balanced_among": "all"}, "balanced_among has no effect without"),
         (
             {"until_balanced": None, "max_grasps_per_object": 50},
-            "max_grasps_per_object has an effect only with until_balanced",
+            "max_grasps_per_object has no effect without until_balanced",
         ),
     ],
 )

@@ -78,7 +78,7 @@ def test_grasps_that_are_listed_more_than_once_are_told(scene: Scene, tmp_path: 
     grasps = GraspSet.create(down((0, 0, 0), (0, 0, 0.01)), object="bar").select([0, 1, 0, 0])
     grasps.save(tmp_path / "a.h5")
     (note,) = read_grasps(scene, tmp_path / "a.h5").notes
-    assert note == f"2 grasps of {tmp_path / 'a.h5'} repeat others; each is judged once."
+    assert note == f"2 grasps of {tmp_path / 'a.h5'} are duplicates; each is judged once."
 
 
 def test_grasps_of_several_objects(scene: Scene, tmp_path: Path) -> None:
@@ -90,7 +90,9 @@ def test_grasps_of_several_objects(scene: Scene, tmp_path: Path) -> None:
         "right": [[0.0, 0.0, 0.02]],
         "bar": [[0.0, 0.0, 0.01]],
     }
-    with pytest.raises(InvalidInputError, match=r"of 3 objects \(a, b, bar\); say which is which"):
+    with pytest.raises(
+        InvalidInputError, match=r"of 3 objects \(a, b, bar\); say which of them is which"
+    ):
         read_grasps(scene, tmp_path / "a.h5", objects={"": "cube"})
     with pytest.raises(UnknownNameError, match="no grasps of object 'c'; known: a, b, bar"):
         read_grasps(scene, tmp_path / "a.h5", objects={"c": "cube"})
@@ -116,7 +118,7 @@ def test_grasps_in_the_frame_of_a_camera(scene: Scene, tmp_path: Path) -> None:
     }
     assert given.notes == ()
     assert given.by_instance["left"].column("depth").tolist() == [pytest.approx(0.02)]
-    with pytest.raises(InvalidInputError, match="give the camera's pose in the scene"):
+    with pytest.raises(InvalidInputError, match="give the pose of the camera in the scene"):
         read_grasps(scene, path)
     with pytest.raises(InvalidInputError, match=r"none of the 3 grasps .* between its fingers; is"):
         read_grasps(scene, path, X_SF=X_SC @ make_pose(p_AB=(0.0, 0.0, 0.5)))
@@ -131,8 +133,10 @@ def test_grasps_that_hold_nothing_are_kept_and_counted(scene: Scene, tmp_path: P
         "bar": [[0.0, 0.0, 0.385]],
     }
     assert given.notes == (
-        "2 of 3 grasps have no object between their fingers; they are given to the one with the"
-        " nearest surface.",
+        (
+            "2 of 3 grasps have no object between their fingers; each was assigned to the"
+            " object with the nearest surface."
+        ),
     )
 
 
@@ -144,9 +148,9 @@ def test_object_ids_and_names_decide(scene: Scene, tmp_path: Path) -> None:
     }  # fmt: skip
     only = read_grasps(scene, path, X_SF=X_SC, objects={"": "cube"}).by_instance
     assert {name: len(grasps) for name, grasps in only.items()} == {"left": 3}
-    with pytest.raises(InvalidInputError, match="grasps of object id 0, for which no"):
+    with pytest.raises(InvalidInputError, match="grasps of object id 0, but no"):
         read_grasps(scene, path, X_SF=X_SC, object_ids={7: "bar"})
-    with pytest.raises(InvalidInputError, match=r"7 is given as 'cube', of which .* left, right"):
+    with pytest.raises(InvalidInputError, match=r"7 is named 'cube', but .* left, right"):
         read_grasps(scene, path, X_SF=X_SC, object_ids={0: "bar", 7: "cube"})
     with pytest.raises(UnknownNameError, match="no free object 'baar'; did you mean 'bar'"):
         read_grasps(scene, path, X_SF=X_SC, object_ids={0: "baar", 7: "bar"})
@@ -175,7 +179,7 @@ def test_a_frame_in_place_of_the_formats(scene: Scene, tmp_path: Path) -> None:
     assert poses(read_grasps(scene, path).by_instance) == {"left": [[0.0, 0.0, 0.0]]}
     on_the_mesh = read_grasps(scene, path, frame="object", objects={"": "bar"}).by_instance
     assert poses(on_the_mesh) == {"bar": [list(LEFT)]}
-    with pytest.raises(InvalidInputError, match="does not say which object its grasps are of"):
+    with pytest.raises(InvalidInputError, match="does not say of which object its grasps are"):
         read_grasps(scene, path, frame="object")
     with pytest.raises(UnknownNameError, match="no grasps of object 'a'; it names no objects"):
         read_grasps(scene, path, frame="object", objects={"a": "bar"})
@@ -197,19 +201,28 @@ def test_there_and_back(format: str, scene: Scene, station: Station, tmp_path: P
 
 def test_options_that_do_not_apply(scene: Scene, tmp_path: Path) -> None:
     path = acronym_file(tmp_path / "a.h5")
-    with pytest.raises(UnknownNameError, match=r"object '3f2a', .* say which one it is, 3f2a=NAME"):
+    with pytest.raises(
+        UnknownNameError,
+        match=r"object '3f2a', .* say which of the scene's objects it is, 3f2a=NAME",
+    ):
         read_grasps(scene, path)
-    with pytest.raises(InvalidInputError, match="of their objects, to which neither a pose"):
+    with pytest.raises(
+        InvalidInputError,
+        match="of their objects; leave out the pose and the object ids, which do not",
+    ):
         read_grasps(scene, path, objects={"": "cube"}, X_SF=X_SC)
-    with pytest.raises(InvalidInputError, match="of their objects, to which neither a pose"):
+    with pytest.raises(
+        InvalidInputError,
+        match="of their objects; leave out the pose and the object ids, which do not",
+    ):
         read_grasps(scene, path, objects={"": "cube"}, object_ids={0: "left"})
-    with pytest.raises(NoSceneIdsError, match="no scene ids to choose by"):
+    with pytest.raises(NoSceneIdsError, match="no scene ids; leave the scene id out"):
         read_grasps(scene, path, objects={"": "cube"}, scene_id="one")
     with pytest.raises(UnknownNameError, match="no free object 'cub'; did you mean 'cube'"):
         read_grasps(scene, path, objects={"": "cub"})
     burg = tmp_path / "a.npy"
     write_grasp_file(GraspSet.create(down(LEFT), object=""), burg, "burg")
-    with pytest.raises(InvalidInputError, match="no object ids to name"):
+    with pytest.raises(InvalidInputError, match="no object ids; leave their names out"):
         read_grasps(scene, burg, object_ids={0: "left"})
 
 

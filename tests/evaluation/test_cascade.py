@@ -200,8 +200,8 @@ def test_grasps_whose_workers_were_ended_are_tried_again(
     short = ShortOfMemory(killed=(killed,), crashing=(crashing,))
     run = judge(short, "run")
     assert run.complete and run.failures == [killed, crashing] and run.interrupted == [killed]
-    assert run.row(killed)["reason"] == "the worker process was ended from outside by SIGKILL"
-    assert run.row(crashing)["reason"] == "the worker process was ended by SIGSEGV"
+    assert run.row(killed)["reason"] == "the worker process was killed from outside by SIGKILL"
+    assert run.row(crashing)["reason"] == "the worker process was killed by SIGSEGV"
 
     run = judge(replace(short, log=tmp_path / "short again"), "run")  # dies again: no endless loop
     assert judged("short again") == [killed] and run.interrupted == [killed]
@@ -250,9 +250,9 @@ def test_another_run_is_not_mixed_in(
             progress=False,
         )
     assert str(error.value) == (
-        f"{run} holds another run (engine is standard there, reference here; grasps are 5 an"
-        " object, sampled blind there, 6 an object, sampled blind here); choose another folder, or"
-        " delete it"
+        f"{run} already holds another run (engine is standard there, reference here; grasps are 5"
+        " an object, sampled blind there, 6 an object, sampled blind here); choose another"
+        " folder, or delete it"
     )
     with pytest.raises(InvalidInputError) as error:
         evaluate(
@@ -313,7 +313,7 @@ def test_some_objects_only(
     assert set(run.candidates.instance) == {"left"}
     assert load_run(run.path).document.grasps.objects == {"cube": 1}  # and no bar without grasps
     assert "grasps.npz --only left,right" in reproduce_command(run)
-    with pytest.raises(InvalidInputError, match=r"no grasps are of right; .* some of left, bar"):
+    with pytest.raises(InvalidInputError, match=r"no grasps of right; .* some of left, bar"):
         evaluate(
             scene,
             station,
@@ -387,7 +387,7 @@ def test_own_files_are_not_overwritten(
             progress=False,
         )
     assert str(error.value) == (
-        f"{mine} is not empty and holds no run ({name} is in it); choose another folder"
+        f"{mine} is not empty and not a run: it has {name} in it; choose another folder"
     )
     assert {path.name: path.read_text() for path in mine.iterdir()} == {name: "my work"}
 
@@ -429,7 +429,7 @@ def test_bad_input_is_said_before_any_work(
         evaluate_in("file")
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thesis.tex").write_text("")
-    with pytest.raises(InvalidInputError, match=r"is not empty and holds no run .*thesis.tex"):
+    with pytest.raises(InvalidInputError, match=r"is not empty and not a run: it has thesis.tex"):
         evaluate_in("full")
     with pytest.raises(InvalidInputError, match="workers is 0"):
         evaluate_in("run", workers=0)

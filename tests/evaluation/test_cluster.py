@@ -120,8 +120,8 @@ def test_faults_cost_only_the_grasps_that_cause_them(cluster: Cluster) -> None:
     assert outcomes(answers) == {g.id: expected(g.id) for g in grasps(40)} | failed
     reasons = {g.id: v.reason for _, g, v in answers if g.id in how}
     assert [reasons[id] for id in how] == [
-        "the worker process was ended by SIGSEGV",
-        "the worker process was ended from outside by SIGKILL",
+        "the worker process was killed by SIGSEGV",
+        "the worker process was killed from outside by SIGKILL",
         "took longer than 0.25 s of CPU time",
         "MemoryError",
     ]
@@ -153,7 +153,10 @@ def test_lost_workers_cost_nothing_but_a_grasp_at_which_several_are_lost(
     assert outcomes(answers) == {g.id: expected(g.id) for g in grasps(60)} | failed
     verdict = next(v for _, g, v in answers if g.id == guilty)
     assert verdict.interrupted
-    assert verdict.reason == "2 workers of the cluster were lost at it, one after the other"
+    assert (
+        verdict.reason
+        == "2 workers of the cluster were lost while working on it, one after the other"
+    )
 
 
 @pytest.mark.thorough
@@ -272,9 +275,7 @@ def test_a_killed_driver_leaves_nothing_behind(tmp_path: Path) -> None:
 @pytest.mark.thorough
 def test_a_scheduler_that_is_not_there_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("burg_drake.evaluation.cluster.dask_executor.REACH", 1.0)
-    reached = (
-        r"^no Dask scheduler was reached at tcp://127.0.0.1:9 within 1 s: nobody listens there"
-    )
+    reached = "^no Dask scheduler answered at tcp://127.0.0.1:9 within 1 s: nobody listens there"
     with pytest.raises(ClusterError, match=reached), connect_cluster("tcp://127.0.0.1:9"):
         pass
 
@@ -287,7 +288,10 @@ def test_a_scheduler_that_dies_is_said_in_one_line(
     job = Job("job", Make(KnownJudge(pause=0.05)), grasps(200))
     factory = StationJudgeFactory(scene, station, ENGINES["standard"], "hand", TrialSettings())
     answers = []
-    lost = r"^the scheduler at tcp://127\S+ does not answer any more; what is done is kept"
+    lost = (
+        "^the scheduler at tcp://127\S+ does not answer any more; the results so far are"
+        " kept: start a scheduler"
+    )
     with connect_cluster(nodes.address) as executor, connect_cluster(nodes.address) as other:
         with pytest.raises(ClusterError, match=lost):
             for answer in executor.judge([job]):
@@ -317,7 +321,10 @@ def test_a_scheduler_that_dies_at_the_start_is_said_in_one_line(
 
     monkeypatch.setattr(ClusterWorkers, "update", look_and_kill)
     try:
-        lost = r"^the scheduler at tcp://127\S+ does not answer any more; what is done is kept"
+        lost = (
+            "^the scheduler at tcp://127\S+ does not answer any more; the results so far are"
+            " kept: start a scheduler"
+        )
         with pytest.raises(ClusterError, match=lost), connect_cluster(nodes.address) as executor:
             list(executor.judge([Job("job", Make(KnownJudge()), grasps(3))]))
     finally:

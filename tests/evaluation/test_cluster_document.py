@@ -31,7 +31,7 @@ def test_short_forms() -> None:
         ("http://head", "'http://head' is not an address of a scheduler; write tls://HOST:PORT"),
         (
             "tls://head:99999",
-            "tls://head:99999: port 99999 does not exist; they go from 1 to 65535",
+            "tls://head:99999: there is no port 99999; ports go from 1 to 65535",
         ),
         ("missing.yaml", "missing.yaml does not exist"),
     ):
@@ -42,7 +42,9 @@ def test_short_forms() -> None:
 
 @pytest.mark.parametrize("host", ["10.0.0.1", "head.example.org", "[2001:db8::1]", "0.0.0.0"])
 def test_plain_tcp_beyond_this_machine_is_refused(host: str) -> None:
-    with pytest.raises(ClusterError, match=r"is not encrypted, and whoever reaches its port runs"):
+    with pytest.raises(
+        ClusterError, match="is not encrypted: whoever reaches this port can run programs"
+    ):
         require_safe(f"tcp://{host}:8786")
     require_safe(f"tls://{host}:8786")
 
@@ -59,7 +61,7 @@ def test_files_are_found_beside_the_document(tmp_path: Path) -> None:
     found = read_cluster(document(tmp_path, f"address: tls://head:8786\n{tls}")).tls
     assert found is not None
     assert found.key == str(tmp_path / "key.pem")
-    with pytest.raises(DocumentError, match=r"address is tcp://127.0.0.1:1 with tls files"):
+    with pytest.raises(DocumentError, match=r"address is tcp://127.0.0.1:1, but tls files"):
         read_cluster(document(tmp_path, f"address: tcp://127.0.0.1:1\n{tls}"))
 
 
@@ -76,7 +78,10 @@ def test_a_batch_system(tmp_path: Path) -> None:
     for text, message in (
         (queue, "give either scale or adapt with a jobqueue"),
         (f"{queue}address: tls://a:1\nscale: 2\n", "give either address or jobqueue"),
-        ("address: tls://a:1\nscale: 2\n", "scale and adapt are for a jobqueue"),
+        (
+            "address: tls://a:1\nscale: 2\n",
+            "scale and adapt belong to a jobqueue, which is missing",
+        ),
         (f"{queue}scale: 0\n", "scale is 0; give 1 or more"),
         (f"{queue}adapt: {{minimum: 3, maximum: 2}}\n", "adapt from 3 to 2 jobs"),
         (queue.replace("slurm", "slrum"), "slurm"),

@@ -95,7 +95,7 @@ def test_faults_cost_only_the_work_that_causes_them(executor: DaskExecutor) -> N
         **{k: (k * k, "known") for k in (0, 3, 6, 7)},
         1: "no square of 1",
         2: "ZeroDivisionError: by nothing",
-        4: "the worker process was ended by SIGSEGV",
+        4: "the worker process was killed by SIGSEGV",
         5: "5 does not travel",
     }
 
@@ -116,7 +116,7 @@ def test_work_at_which_several_workers_are_lost_is_given_up(
     found = squares(executor, [Known(k, "parent" if k == 1 else "") for k in range(4)])
     assert found == {
         **{k: (k * k, "known") for k in (0, 2, 3)},
-        1: "2 workers of the cluster were lost at it, one after the other",
+        1: "2 workers of the cluster were lost while working on it, one after the other",
     }
 
 
@@ -191,7 +191,10 @@ def test_a_bundle_that_never_arrives_is_told_of(
 @pytest.mark.thorough
 def test_a_scheduler_that_dies_is_said_in_one_line() -> None:
     nodes = LocalNodes(1)
-    lost = r"^the scheduler at tcp://127\S+ does not answer any more; what is done is kept"
+    lost = (
+        "^the scheduler at tcp://127\S+ does not answer any more; the results so far are"
+        " kept: start a scheduler"
+    )
     try:
         with (
             connect_cluster(nodes.address) as executor,

@@ -37,7 +37,7 @@ def judged_here(known_judge: None) -> None:
 
 
 def test_a_run_with_open_grasps_is_an_error(scene: Scene, station: Station, tmp_path: Path) -> None:
-    with pytest.raises(SimulationError, match=r"^13 of 15 grasps have come back without a verdict"):
+    with pytest.raises(SimulationError, match=r"^13 of 15 grasps have no verdict yet"):
         evaluate(scene, station, tmp_path / "run", **asked(executor=Short(), **OPTIONS))
     assert not list((tmp_path / "run").glob("results.*"))
     assert not (tmp_path / "run/report.html").exists()
@@ -47,7 +47,7 @@ def test_a_run_with_open_grasps_is_an_error(scene: Scene, station: Station, tmp_
 
 def test_a_run_with_open_scenes_is_an_error(scene: Scene, station: Station, tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
-    with pytest.raises(SimulationError, match=r"^1 of 1 scenes were not judged to the end"):
+    with pytest.raises(SimulationError, match=r"^1 of 1 scenes are not complete"):
         evaluate([scene], station, tmp_path / "runs", **asked(executor=Short(), **OPTIONS))
 
 
@@ -62,4 +62,4 @@ def test_the_command_does_not_end_as_if_all_were_well(
     monkeypatch.setattr(local, lambda workers: Short())
     call = ["evaluate", "tabletop_six", "-n", "1", "--mode", "hand", "--blind", "--quiet"]
     assert main([*call, "-o", str(tmp_path / "run")]) == 2
-    assert re.search(r"\d of \d grasps have come back without a verdict", capsys.readouterr().err)
+    assert re.search("\d of \d grasps have no verdict yet", capsys.readouterr().err)

@@ -90,7 +90,7 @@ def test_what_is_missing_is_named(scene: Scene, file: Path, tmp_path: Path) -> N
         InvalidInputError, match=r"in the frame of their object.*a scene.*the scene"
     ):
         read_in_frame(file, "world")
-    with pytest.raises(InvalidInputError, match=r"wanted in a camera.*its pose"):
+    with pytest.raises(InvalidInputError, match=r"frame of a camera need its pose"):
         read_in_frame(file, "camera", seen=SeenScene(scene=scene))
     write_grasp_file(GraspSet.load(file), tmp_path / "a.csv")
     with pytest.raises(InvalidInputError, match=r"in a scene.*a camera.*pose"):

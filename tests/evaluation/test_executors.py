@@ -56,8 +56,8 @@ def test_deaths_cost_only_the_grasps_that_cause_them() -> None:
     assert len(judged) == 30
     failed = {id: v for id, v in judged.items() if v.outcome is Outcome.SIMULATION_FAILED}
     assert {id: v.reason for id, v in failed.items()} == {
-        "cube-0002": "the worker process was ended by SIGSEGV",
-        "cube-0003": "the worker process was ended by SIGSEGV",
+        "cube-0002": "the worker process was killed by SIGSEGV",
+        "cube-0003": "the worker process was killed by SIGSEGV",
         "cube-0004": "the worker process ended: SystemExit: a condition of Drake failed",
         "cube-0017": "RuntimeError: the solver did not converge",
     }
@@ -69,7 +69,7 @@ def test_deaths_cost_only_the_grasps_that_cause_them() -> None:
 
 @pytest.mark.thorough
 def test_a_death_while_screening_costs_only_the_grasp_that_causes_it() -> None:
-    died = "the worker process was ended by SIGSEGV"
+    died = "the worker process was killed by SIGSEGV"
     expect = {
         "cube-0003": ("screen", Stage.CLEAR, died),
         "cube-0012": ("screen_error", Stage.CLEAR, "RuntimeError: not a pose"),
@@ -125,7 +125,7 @@ def test_a_replacement_that_dies_while_starting_is_replaced(tmp_path) -> None:
     assert judged == {c.id: expected(c.id) for c in grasps(10)} | failed
     assert len((tmp_path / "twice").read_text().split()) == 5
     make = DieOnStart(judge, tmp_path / "in a row", n=(2, 3))
-    with pytest.raises(SimulationError, match=r"cannot build the simulation: .* ended by SIGSEGV"):
+    with pytest.raises(SimulationError, match=r"cannot build the simulation: .* killed by SIGSEGV"):
         list(judge_all(grasps(10), make, workers=1))
 
 
@@ -163,7 +163,7 @@ def test_a_slow_grasp_is_not_one_that_takes_too_long() -> None:
 def test_what_cannot_be_built_is_said_as_it_is() -> None:
     with pytest.raises(InvalidInputError, match=r"^no such model$"):
         list(judge_all(grasps(3), refuse, workers=1))
-    with pytest.raises(SimulationError, match=r"cannot build the simulation: .* ended by SIGSEGV"):
+    with pytest.raises(SimulationError, match=r"cannot build the simulation: .* killed by SIGSEGV"):
         list(judge_all(grasps(3), die, workers=1))
     with pytest.raises(InvalidInputError, match="workers is 0; give 1 or more"):
         list(judge_all(grasps(3), refuse, workers=0))

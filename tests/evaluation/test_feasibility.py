@@ -151,9 +151,9 @@ def test_plans_go_to_a_folder_of_their_own(
     with pytest.raises(InvalidInputError) as error:
         reach(scene, station, given, exact=False, plans=PlanOutput(plans, format="csv"))
     assert re.fullmatch(
-        rf"folder {plans} has plans of something else \(grasps are 4 there, 2 here; check is exact"
-        r" there, screening here; format is json there, csv here\); choose another one, or delete"
-        r" it",
+        rf"folder {plans} has plans of another evaluation \(grasps are 4 there, 2 here;"
+        r" check is exact there, screening here; format is json there, csv here\); choose"
+        r" another one, or delete it",
         str(error.value),
     )
     assert contents(plans) == before
@@ -260,7 +260,7 @@ def test_what_cannot_be_answered_has_no_outcome(
     found = reach(scene, station, given, workers=2)
     empty = found.column("outcome") == ""
     assert found.id[empty].tolist() == [judged.id[2]]
-    assert found.column("reason")[empty].tolist() == ["the worker process was ended by SIGSEGV"]
+    assert found.column("reason")[empty].tolist() == ["the worker process was killed by SIGSEGV"]
 
 
 def test_a_set_has_to_name_its_objects(station: Station) -> None:
@@ -268,8 +268,9 @@ def test_a_set_has_to_name_its_objects(station: Station) -> None:
     with pytest.raises(InvalidInputError) as error:
         reach(scene, station, GraspSet.create(GRASPS, object=""))
     assert str(error.value) == (
-        "the set does not say which object its grasps are of; name it (GraspSet.create(...,"
-        " object=NAME)); scene 'tabletop_six' has banana, bottle, bowl, box, mug, screwdriver"
+        "the set does not say of which object its grasps are; name it"
+        " (GraspSet.create(..., object=NAME)); scene 'tabletop_six' has banana, bottle,"
+        " bowl, box, mug, screwdriver"
     )
     with pytest.raises(UnknownNameError) as unknown:
         reach(scene, station, GraspSet.create(GRASPS, object="bax"))

@@ -140,7 +140,7 @@ def test_an_object_that_the_hand_does_not_take_says_why(panda: Station) -> None:
     scene = replace(ALONE, document=replace(ALONE.document, instances=(lying,)))
     count = count_grasps(scene, panda, grasps_per_object=2, reach=False)["box"]
     assert count.sampled < 2
-    assert count.note.startswith(f"box: {count.sampled} of 2 grasps: of ")
+    assert count.note.startswith(f"box: only {count.sampled} of 2 grasps were found: of ")
 
 
 def test_only_some_and_none(panda: Station) -> None:

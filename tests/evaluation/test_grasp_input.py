@@ -83,7 +83,7 @@ def test_the_table_of_a_run_is_no_grasp_file(run: Run, table: str, tmp_path: Pat
 
 
 def test_a_folder_without_a_run(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match="holds no run"):
+    with pytest.raises(InvalidInputError, match="is not the folder of a run"):
         read_input(tmp_path)
 
 
@@ -97,7 +97,7 @@ def test_sampled_sets_name_their_hand(scene: Scene, tmp_path: Path) -> None:
     assert (hand_of(both) or {})["name"] == "wsg_50"
     both.save(tmp_path / "both.h5")
     assert hand_reference(tmp_path / "both.h5") == str(station.hand_path)
-    note = "The grasps are for hand 'wsg_50' and are taken for those of 'panda_hand'."
+    note = "The grasps were made for hand 'wsg_50'; they are judged as those of hand 'panda_hand'."
     assert read_grasps(scene, tmp_path / "both.h5", PANDA).notes == (note,)
     assert read_input(tmp_path / "both.h5").notes == ()
     other = sample_grasps(

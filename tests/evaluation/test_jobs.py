@@ -78,9 +78,9 @@ def test_a_job_that_cannot_be_done_does_not_end_the_others() -> None:
     assert len(lost) == 2
     assert {failure.job.key: str(failure.error) for failure in failed} == {
         "bad": "no such model",
-        "deadly": "cannot build the simulation: the worker process was ended by SIGSEGV",
+        "deadly": "cannot build the simulation: the worker process was killed by SIGSEGV",
         "worse": "2 grasps in a row could not be simulated; the last one: the worker process was"
-        " ended by SIGSEGV",
+        " killed by SIGSEGV",
     }
     with pytest.raises(InvalidInputError, match="no such model"):
         list(LocalExecutor(1).judge(jobs[1:2]))

@@ -133,7 +133,7 @@ def test_a_file_system_without_locks_is_named(
     with Journal(path):
         assert is_locked(path)
     monkeypatch.setattr(fcntl, "flock", no_locks)
-    expected = f"{tmp_path} is on a file system without locks (No locks available), where two"
+    expected = f"{tmp_path} is on a file system without file locks (No locks available), where two"
     for writer in (Journal, Lock):
         with pytest.raises(InvalidInputError) as refused:
             writer(path)

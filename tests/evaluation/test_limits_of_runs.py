@@ -132,10 +132,10 @@ def test_numbers_read_back_to_the_same_numbers() -> None:
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"tilt_limit_deg": 0.0}, "tilt_limit_deg is 0; give more than 0, and 180 for no limit"),
+        ({"tilt_limit_deg": 0.0}, "tilt_limit_deg is 0; give more than 0"),
         ({"tilt_limit_deg": 181.0}, "tilt_limit_deg is 181; give"),
         ({"tilt_limit_deg": math.nan}, "tilt_limit_deg is nan; give"),
-        ({"slip_limit_mm": -1.0}, "slip_limit_mm is -1; give more than 0, and inf for no limit"),
+        ({"slip_limit_mm": -1.0}, "slip_limit_mm is -1; give more than 0"),
         ({"slip_limit_mm": math.nan}, "slip_limit_mm is nan; give"),
     ],
 )

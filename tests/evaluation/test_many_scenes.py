@@ -119,9 +119,9 @@ def test_what_is_not_the_same_is_refused(
         run_all(scenes[:2], station, out)
     with pytest.raises(InvalidInputError, match=r"\(seed is 0 there, 1 here\)"):
         run_all(scenes, station, out, seed=1)
-    with pytest.raises(InvalidInputError, match="holds all of this run, and shard 1/2 is given"):
+    with pytest.raises(InvalidInputError, match="holds all of this run, but shard 1/2 is given"):
         run_all(scenes, station, out, shard="1/2")
-    with pytest.raises(InvalidInputError, match=r"holds no run .* is in it"):
+    with pytest.raises(InvalidInputError, match=r"not a run: it has .* in it"):
         run_all(scenes, station, tmp_path)
     with pytest.raises(InvalidInputError, match=r"cubes\.yaml is given twice; give it once"):
         run_all([scenes[0], scenes[0]], station, tmp_path / "twice")
@@ -212,7 +212,7 @@ def test_names_and_places(
     assert campaign.run("cubes_2").scene().path.parent == campaign.path / "scenes/cubes_2"
     assert scene_references([str(scenes[0].parent)]) == [str(path) for path in scenes]
     assert scene_references([f"{scenes[0].parent}/*e*.yaml"]) == [str(path) for path in scenes]
-    with pytest.raises(InvalidInputError, match="is a folder without scenes"):
+    with pytest.raises(InvalidInputError, match="has no scenes"):
         scene_references([str(tmp_path / "all/scenes")])
 
 
@@ -232,7 +232,7 @@ def test_given_grasps_go_where_their_objects_are(
         scenes[2], station, tmp_path / "one", grasps=grasps, executor=Inline(), progress=False
     )
     assert same(campaign.run("three").results, alone.results)
-    assert summarize(campaign).notes == ("no grasps to judge in 1 scenes: cubes",)
+    assert summarize(campaign).notes == ("1 scenes have no grasps to judge: cubes",)
     only = run_all(scenes, station, tmp_path / "only", only=["bar"])
     assert set(only.columns(["object"])["object"].tolist()) == {"bar"}
     assert load_scene(scenes[0]).content == only.document.scenes[0].content

@@ -74,9 +74,9 @@ def test_shards_of_one_scene(
     assert nothing.judged == 0
     two = merge_folders([shards[0].path, shards[2].path], tmp_path / "two")
     assert two.notes == (
-        "5 grasps are not judged",
+        "5 grasps are not judged yet",
         "shards that were not given: 2/3",
-        f"to judge the rest, evaluate the same into {tmp_path / 'two'}, with no shard",
+        f"to judge the rest, run the same evaluation into {tmp_path / 'two'}, with no shard",
     )
     rest = run_one(scene, station, tmp_path / "two", executor=(executor := Inline()))
     assert executor.judged == 5 and same(whole.results, rest.results)
@@ -104,7 +104,7 @@ def test_shards_of_many_scenes(
     assert nothing.judged == 0 and same(whole.results, again.results)
     part = merge_folders(folders[1:], tmp_path / "part")
     if count == 2:
-        alone = ("only shard 2/2 was given, so the merged run is only that shard",)
+        alone = ("only shard 2/2 was given, so the merged run has that shard alone",)
         assert part.notes == alone and part.result.complete
         return
     assert f"shards that were not given: 1/{count}" in part.notes
@@ -144,9 +144,9 @@ def test_verdicts_give_way(
     instead = Outcome.DROPPED if outcome is not Outcome.DROPPED else Outcome.LIFTED
     change(load_run(tmp_path / "other"), outcome=instead)
     message = (
-        f"grasp {id} ended as {outcome} in {whole.path} and as {instead} in {tmp_path}/other; the"
-        " same run gives the same verdict everywhere, so that one of them was judged otherwise:"
-        " leave it out"
+        f"grasp {id} ended as {outcome} in {whole.path} and as {instead} in"
+        f" {tmp_path}/other; the same run gives the same verdict on every machine, so one"
+        " of them was judged in another way: leave it out"
     )
     with pytest.raises(InvalidInputError) as error:
         merge_folders([whole.path, tmp_path / "other"], tmp_path / "no")
@@ -161,10 +161,10 @@ def test_refusals(
     b = run_one(scene, station, tmp_path / "b", grasps_per_object=1, seed=1)
     many = run_all(scenes, station, tmp_path / "many", grasps_per_object=1)
     for paths, out, message in (
-        ([a.path, b.path], "c", "(seed is 0 there, 1 here); only shards and copies of one run"),
-        ([a.path, many.path], "c", "many one of many; only runs of the same can be merged"),
-        ([a.path], "b", "b is there already; choose another folder"),
-        ([tmp_path / "nothing"], "c", "holds no run (run.yaml is missing)"),
+        ([a.path, b.path], "c", "(seed is 0 there, 1 here); only shards or copies of the same run"),
+        ([a.path, many.path], "c", "many one of many scenes; merge runs of one kind"),
+        ([a.path], "b", "b exists already; choose another folder"),
+        ([tmp_path / "nothing"], "c", "is not the folder of a run (run.yaml is missing)"),
         ([], "c", "no runs are given; give the folders of one or more"),
     ):
         with pytest.raises(InvalidInputError) as error:
@@ -202,7 +202,7 @@ def test_the_same_merge_finishes_what_was_killed(
         assert not (out / "report.html").exists()
         (note,) = out.glob(".merge.*")
         assert UNFINISHED.fullmatch(note.name)  # `evaluate` removes it
-        with pytest.raises(InvalidInputError, match="is there already; choose another folder"):
+        with pytest.raises(InvalidInputError, match="exists already; choose another folder"):
             merge_folders(paths[:1], out)
         merged = merge_folders(reversed(paths), out)
         assert same(merged.result.results, whole.result.results)

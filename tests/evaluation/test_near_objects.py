@@ -24,7 +24,7 @@ def test_the_distance_is_that_of_the_bounding_box(scene: Scene) -> None:
     require_near(at(3 * (corner - 1e-6,)), scene.library, "mine.h5")
     with pytest.raises(InvalidInputError, match=r"^mine.h5: .* object 'cube' is 0.25 m away"):
         require_near(at(3 * (-corner - 1e-6,)), scene.library, "mine.h5")
-    with pytest.raises(InvalidInputError, match=r"'bar' is 0.9 m away .* metres.*another object"):
+    with pytest.raises(InvalidInputError, match=r"'bar' is 0.9 m away .* metres.*right object"):
         require_near(at((1.0, 0.0, 0.0), object="bar"), scene.library, "mine.h5")
 
 

@@ -96,9 +96,9 @@ def test_a_planted_mistake_is_named_and_undone(
     assert found is not None
     assert ",".join(found.mistake.correction) == correction
     assert found.before <= 2 and found.after == found.count == 12
-    assert found.text().startswith(f"{found.before} of the 12 grasps fit as they were read: the ")
+    assert found.text().startswith(f"As they were read, {found.before} of the 12 grasps fit: ")
     assert "12 of 12 fit." in found.text()
-    assert f"very likely means them so; --correction {correction} reads" in found.text()
+    assert f"very likely means that; --correction {correction} reads" in found.text()
     undone = corrected_poses(spoiled, np.eye(4), correction.split(","))
     fingers_swapped = undone @ pose((0, 0, 180))
     same = [np.abs(X - right.X_OG).max(axis=(1, 2)) < 1e-9 for X in (undone, fingers_swapped)]
@@ -112,7 +112,7 @@ def test_what_the_grasps_of_one_object_show(right: GraspSet, six: Scene, panda: 
     found = find_mistake(both, panda, six)
     assert found is not None and found.only == "mug"
     assert found.options() == ["--correction", "turn:z90", "--only", "mug"]
-    assert " of the 12 grasps of mug fit as they were read: " in found.text()
+    assert " of the 12 grasps of mug fit: " in found.text()
     assert find_mistake({**of_mug(right.X_OG), "banana": others}, panda, six) is None
 
 
@@ -167,7 +167,9 @@ def test_a_distance_that_no_format_has_is_told_with_its_range(
     assert found is not None and found.after == 12 and found.reach_mm is not None
     assert found.reach_mm[0] <= 30.0 <= found.reach_mm[1]
     low, high = found.reach_mm
-    assert f"12 of 12 fit. Any distance from {low:g} to {high:g} mm fits as well." in found.text()
+    assert (
+        f"12 of 12 fit. Any distance from {low:g} to {high:g} mm fits equally well." in found.text()
+    )
 
 
 def test_right_grasps_and_exchanged_fingers_are_no_mistake(
@@ -275,7 +277,7 @@ def test_half_widths_and_widths_beyond_the_opening(
     wide = np.where(np.arange(12) < 3, 0.0951, right.width)
     GraspSet.create(right.X_OG, object="mug", width=wide).save(tmp_path / "wide.npz")
     (note,) = read_grasps(six, tmp_path / "wide.npz", PANDA).notes
-    assert "width of 3 of 12 grasps" in note and "(largest 95.1 mm)" in note
+    assert "width of 3 of 12 grasps" in note and "(the largest is 95.1 mm)" in note
     assert "hand open at 80 mm" in note
 
 

@@ -93,7 +93,7 @@ def test_the_figures_are_those_of_the_scenes_together(campaign: Campaign, page: 
     assert lead.startswith(f"{total[Outcome.LIFTED]} of {total.total()} grasps lifted their object")
     tiles = page.find(style="tiles")[0].text
     assert f"Executed {executed(total)} " in tiles and "in 3 scenes" in tiles
-    rows = part(page, "From candidates to lifted").find("li")
+    rows = part(page, "From candidates to lifts").find("li")
     assert rows[-1].find("span", "passed")[0].text == str(total[Outcome.LIFTED])
     assert page.find("h1")[0].text == "3 scenes on panda_tabletop"
 

@@ -80,7 +80,7 @@ def test_the_last_bit_counts() -> None:
     assert [difference.name for difference in found] == ["slip"]
     assert found[0].rounding
     assert comparison(found, ORIGIN) == [
-        "as recorded, but for the last digits of slip: the table was rounded"
+        "as recorded, except for the last digits of slip, which the table rounds"
     ]
     assert [d.name for d in differences(VERDICT, changed(overlap=-0.0))] == ["overlap"]
 
@@ -102,7 +102,7 @@ def test_everything_that_differs_is_listed() -> None:
         displacements=moved,
     )
     assert comparison(differences(VERDICT, other), ORIGIN) == [
-        "not as recorded",
+        "differs from what was recorded",
         "outcome: recorded 'lifted', now 'lifted_disturbed'",
         "blocker: recorded '', now 'box'",
         f"slip: recorded {0.1 + 0.2!r}, now 0.4",
@@ -115,7 +115,9 @@ def test_other_versions_are_named() -> None:
     origin = dataclasses.replace(ORIGIN, versions={**ORIGIN.versions, "drake": "1.2.3"})
     found = differences(VERDICT, changed(slip=0.4))
     first, *_ = comparison(found, origin)
-    assert first == f"not as recorded (with drake 1.2.3, now {software_versions()['drake']})"
+    assert first == (
+        f"differs from what was recorded (with drake 1.2.3, now {software_versions()['drake']})"
+    )
     assert comparison([], origin) == ["as recorded"]
 
 
@@ -123,7 +125,7 @@ def test_a_version_of_the_engine_is_named_if_it_executed_the_trial() -> None:
     pytest.importorskip("mujoco")
     origin = dataclasses.replace(ORIGIN, versions={**ORIGIN.versions, "mujoco": "1.2.3"})
     found = differences(VERDICT, changed(slip=0.4))
-    assert comparison(found, origin)[0] == "not as recorded"
+    assert comparison(found, origin)[0] == "differs from what was recorded"
     now = importlib.metadata.version("mujoco")
     first, *_ = comparison(found, origin.judged_by("mujoco"))
-    assert first == f"not as recorded (with mujoco 1.2.3, now {now})"
+    assert first == f"differs from what was recorded (with mujoco 1.2.3, now {now})"

@@ -39,7 +39,9 @@ def test_an_object_without_clear_grasps_is_explained_wherever_the_run_is_shown(
         evaluate(scene, station, out, **asked(grasps_per_object=5, **options))
     ).notes
     tried, *counts = (int(n) for n in re.findall(r"(\d+)(?: antipodal|,| and|;)", note)[:3])
-    assert note.startswith(f"scissors: 0 of 5 grasps: of {tried} antipodal grasps tried, the open")
+    assert note.startswith(
+        f"scissors: only 0 of 5 grasps were found: of {tried} antipodal grasps tried, the open"
+    )
     assert sum(counts) == tried >= 400
     blind = sample_grasps(
         scene, station, tried, settings=SamplingSettings(blind=True), only=["scissors"]
@@ -65,9 +67,9 @@ def test_nothing_executed_is_explained(judged_here: None, tmp_path: Path) -> Non
             break
     assert counts.total() == 20 and not set(counts) - {"collision_table", "collision_target"}
     (note,) = summarize(run).notes
-    assert note.startswith("screwdriver: nothing executed of 20 grasps: ")
+    assert note.startswith("screwdriver: none of 20 grasps was executed: ")
     assert f"hits the table in {counts[Outcome.COLLISION_TABLE]}" in note
-    assert note.endswith("; sample grasps at which the hand is clear, which is the default")
+    assert note.endswith("; sample grasps at which the hand is clear, as is the default")
 
 
 def test_a_margin_that_leaves_nothing_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -78,7 +80,7 @@ def test_a_margin_that_leaves_nothing_is_said(monkeypatch: pytest.MonkeyPatch) -
     grasps = sample_grasps(household, station, 2, settings=settings, only=["box"])
     note = shortfall("box", 2, grasps.provenance["parts"]["box"], len(grasps))
     assert re.fullmatch(
-        r"box: 0 of 2 grasps: of (\d+) antipodal grasps tried, the open hand comes within 200 mm of"
-        r" the object itself in \1; a smaller margin would help",
+        r"box: only 0 of 2 grasps were found: of (\d+) antipodal grasps tried, the"
+        r" open hand comes within 200 mm of the object itself in \1; a smaller margin would help",
         note,
     )

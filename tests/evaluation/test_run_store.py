@@ -94,7 +94,9 @@ def test_a_run_moves_with_its_library_or_without(run: Run, tmp_path: Path) -> No
     assert load_run(alone).scene().content == content  # the library is where it was
     shutil.move(tmp_path / "shapes", tmp_path / "elsewhere" / "deep" / "shapes")
     assert load_run(alone).scene().content == content  # beside the run, as it was
-    with pytest.raises(InvalidInputError, match=r"library ../shapes is gone, .* not at .*shapes"):
+    with pytest.raises(
+        InvalidInputError, match=r"library ../shapes is missing, .* not at .*shapes"
+    ):
         run.scene()
 
 
@@ -104,7 +106,9 @@ def test_a_changed_object_is_named(run: Run, scene: Scene) -> None:
     objects = {**library.objects, "bar": changed}
     document = dataclasses.replace(library, objects=objects)
     dataclasses.replace(scene.library, document=document).save()
-    with pytest.raises(InvalidInputError, match=r"^bar in library .* changed since .* was judged"):
+    with pytest.raises(
+        InvalidInputError, match=r"^bar in library .* has changed since .* was judged"
+    ):
         load_run(run.path).scene()
     del objects["bar"]
     dataclasses.replace(scene.library, document=document).save()
@@ -126,10 +130,10 @@ def test_a_changed_copy_is_noticed(run: Run) -> None:
 
 
 def test_what_is_no_run_is_said(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match="nowhere holds no run"):
+    with pytest.raises(InvalidInputError, match="nowhere is not the folder of a run"):
         load_run(tmp_path / "nowhere")
     (tmp_path / "results.csv").write_text("")
-    with pytest.raises(InvalidInputError, match=r"results.csv is a file, not the folder of a run"):
+    with pytest.raises(InvalidInputError, match=r"results.csv is a file; give the folder of a run"):
         load_run(tmp_path / "results.csv")
     (tmp_path / "run.yaml").write_text("version: 1\nsceen: {}\n")
     with pytest.raises(DocumentError, match=r"run.yaml:2: sceen: unknown key|unknown key 'sceen'"):
@@ -203,7 +207,7 @@ def test_what_makes_another_run_is_told_without_hashes(run: Run) -> None:
     moved = replace(station, content="0", path="other.yaml")
     assert told(station=moved) == f"station is {station.path} there, other.yaml here"
     assert told(station=replace(station, content="0")) == (
-        f"station {station.path} has changed, or models that it names have"
+        f"station {station.path} has changed, or models that it uses have"
     )
     built = replace(there.library, objects={**there.library.objects, "bar": "0"})
     assert told(scene=replace(scene, content="0"), library=built) == (

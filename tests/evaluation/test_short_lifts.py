@@ -12,8 +12,8 @@ def test_only_shorter_lifts_are_told() -> None:
     assert short_lifts(np.array([0.3, whole, np.nan]), whole) is None
     found = short_lifts(np.array([0.3, 0.02, np.nan, 0.25, 0.08]), whole)
     assert str(found) == (
-        "In 3 of 4 grasps there is no room for the whole lift of 300 mm:"
-        " the median of these is 80 mm, the shortest 20 mm."
+        "For 3 of 4 grasps there is no room to lift the whole 300 mm: the median is 80"
+        " mm, the shortest lift is 20 mm."
     )
     one = short_lifts(np.array([0.3, 0.02]), whole)
-    assert str(one).endswith("the whole lift of 300 mm: it is 20 mm.")
+    assert str(one).endswith("to lift the whole 300 mm: it is lifted 20 mm.")

@@ -281,9 +281,9 @@ def test_damaged_cells_are_named(tmp_path: Path) -> None:
     path = tmp_path / "r.csv"
     for text, message in (
         ("id,slip\na,1\nb\n", "row 2 has 1 cells, the header has 2"),
-        ("id,slip\na,1\nb,much\n", "row 2: slip is 'much'; it has to be a number, or empty"),
-        ("id,moved_mug\na,much\n", "row 1: moved_mug is 'much'; it has to be a number, or empty"),
-        ("id,seed\na,1.5\n", "row 1: seed is '1.5'; it has to be a whole number"),
+        ("id,slip\na,1\nb,much\n", "row 2: slip is 'much'; it must be a number, or empty"),
+        ("id,moved_mug\na,much\n", "row 1: moved_mug is 'much'; it must be a number, or empty"),
+        ("id,seed\na,1.5\n", "row 1: seed is '1.5'; it must be a whole number"),
         ("id;slip\na;0,1\n", "its cells are separated by semicolons; save it with commas"),
         ("\n", "it is empty"),
     ):

@@ -248,7 +248,7 @@ def test_other_scenes_and_other_grasps_are_refused(tmp_path: Path) -> None:
         compare(away, sheet)
     with pytest.raises(InvalidInputError, match=r"no grasp of .* is judged in"):
         compare(others, sheet)
-    with pytest.raises(InvalidInputError, match="holds no run"):
+    with pytest.raises(InvalidInputError, match="is not the folder of a run"):
         compare(first, tmp_path)
 
 
@@ -402,7 +402,7 @@ def test_page(tmp_path: Path) -> None:
     assert "&lt;b&gt;slipped&lt;/b&gt; &amp; fell" in text and "<b>slipped</b>" not in text
     assert "first simulator" in text and "McNemar" in text and "http" not in text
     assert text.count('class="plot"') >= 4
-    for title in ("By object", "What became of each verdict"):
+    for title in ("By object", "How each verdict turned out"):
         assert f"<h2>{title}, selected trials (first simulator)</h2>" in text
     text = comparison_page(compare(first, second))
     Page(text)

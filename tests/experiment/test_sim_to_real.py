@@ -187,11 +187,11 @@ def test_what_the_hand_alone_cannot_predict_is_shown_apart(
     out = " ".join(capsys.readouterr().out.split())
     told = " ".join(re.sub(r"<[^>]+>", " ", page.read_text()).replace("\u00a0", " ").split())
     for text in (out, told):
-        assert "7 trials failed for reasons that a run of the hand alone does not predict" in text
+        assert "7 trials failed for reasons that a run of the hand alone cannot predict" in text
         assert "(6 no path, 1 protective stop), 5 of them after a predicted success" in text
         assert "without them precision is 80 %" in text and "instead of 60 %" in text
     assert "Success predicted, failure seen: 3 " in told
-    assert "Success predicted, failed for reasons that the hand alone does not predict: 5 " in told
+    assert "Success predicted, failed for reasons that the hand alone cannot predict: 5 " in told
 
 
 def test_a_run_with_the_arm_has_to_predict_it(tmp_path: Path) -> None:
@@ -370,6 +370,6 @@ def test_two_trials_do_not_tell_which_margins_predict(tmp_path: Path) -> None:
     assert words in comparison_page(found)
     assert "AUROC" not in text and "interval" in text
     assert found.notes[-1] == (
-        "figures for all grasps leave out 3 of the 10 grasps that the trials were chosen from, as"
-        " no trial was compared of box (failure)"
+        "figures for all grasps leave out 3 of the 10 grasps from which the trials were"
+        " chosen, as no trial of box (failure) was compared"
     )

@@ -130,7 +130,9 @@ def test_a_file_system_without_locks_is_named(
 ) -> None:
     book = TrialBook(write_sheet(tmp_path))
     monkeypatch.setattr(fcntl, "flock", no_locks)
-    with pytest.raises(InvalidInputError, match=r"trials.yaml is on a file system without locks"):
+    with pytest.raises(
+        InvalidInputError, match=r"trials.yaml is on a file system without file locks"
+    ):
         book.record(1, outcome="lifted")
     assert book.entries() == [] and book.sheet() == make_sheet()
 
@@ -213,11 +215,11 @@ def test_the_same_entry_twice_is_one_and_another_one_is_refused(tmp_path: Path) 
     first = book.record(1, outcome="slipped", operator="Ada")
     assert book.record(1, outcome="slipped", operator="Ada") == first
     assert len(book.entries()) == 1
-    with pytest.raises(InvalidInputError, match=r"trial 1 has outcome 'slipped' already"):
+    with pytest.raises(InvalidInputError, match=r"trial 1 already has outcome 'slipped'"):
         book.record(1, outcome="lifted")
     more = book.record(1, note="more is known", robot={"width_mm": 41.5})
     assert (more.outcome, more.time) == (first.outcome, first.time)
-    with pytest.raises(InvalidInputError, match="has robot already"):
+    with pytest.raises(InvalidInputError, match="already has robot"):
         book.record(1, robot={"width_mm": 40.0})
     assert book.record(1, robot={"effort_n": 30.0}).robot == RobotReport(width_mm=41.5, effort_n=30)
     right = book.record(1, correct=True, outcome="lifted")
@@ -228,7 +230,7 @@ def test_the_same_entry_twice_is_one_and_another_one_is_refused(tmp_path: Path) 
         *("slipped", "slipped", "slipped", "lifted", "dropped")
     ]
     assert book.record("next", outcome="lifted").number == 2
-    with pytest.raises(TrialChanged, match="trial 1 was changed meanwhile") as caught:
+    with pytest.raises(TrialChanged, match="trial 1 was changed by someone else") as caught:
         book.record(1, expected=first, correct=True, outcome="lifted")
     assert caught.value.trial == once_more
     assert book.record(1, expected=once_more, note="so it is").note == "so it is"
@@ -449,17 +451,21 @@ def test_flow_style_can_be_changed_and_an_alias_is_refused(tmp_path: Path) -> No
     ("old", "new", "message"),
     [
         ("note_", "notes", r":\d+: trials\[0\]: unknown key 'notes'; did you mean 'note'\?"),
-        ("number: 2", "number: 1", r":\d+: number 1 is given twice, to trials 1 and 2"),
+        ("number: 2", "number: 1", ":\d+: number 1 is used twice, by entries 1 and 2"),
         ("stratum: mug", "stratum: mag", r":\d+: there is no stratum 'mag'; did you mean 'mug'\?"),
         (
             "run: two\n    gr",
             "run: too\n    gr",
             r":\d+: there is no run 'too'; did you mean 'two'",
         ),
-        ("number: 1", "number: 0", r":\d+: trials\[0\]: number is 0; it has to be 1 at least"),
+        ("number: 1", "number: 0", r":\d+: trials\[0\]: number is 0; it must be at least 1"),
         ("block: 1", "time: lunch", r":\d+: trials\[0\]: time is 'lunch'; write it as in 2026"),
         ("block: 1", "outcome: sliped", r":\d+: .*'sliped' is not valid; did you mean 'slipped'"),
-        ("population: 4", "population: 3", r":\d+: strata.mug: population 3 is less than selected"),
+        (
+            "population: 4",
+            "population: 3",
+            ":\d+: strata.mug: population 3 is smaller than selected,",
+        ),
     ],
 )
 def test_what_does_not_fit_is_refused_with_its_line(

@@ -59,9 +59,11 @@ def test_motions_go_by_numbers_and_are_kept(
     monkeypatch.setattr("burg_drake.experiment.trials.export.judge_all", _nothing_left)
     assert main(words) == 0 and file.stat().st_mtime_ns == stamp
     save_trials(replace(sheet, trials=(good,)), path)
-    with pytest.raises(InvalidInputError, match="has plans of something else"):
+    with pytest.raises(InvalidInputError, match="has plans of another evaluation"):
         export_trials(path, out)
-    with pytest.raises(InvalidInputError, match=r"is not empty, it has plans, and no exported"):
+    with pytest.raises(
+        InvalidInputError, match="is not empty and not an export of trials: it has plans in it;"
+    ):
         export_trials(path, tmp_path)
 
 

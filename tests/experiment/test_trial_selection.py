@@ -71,7 +71,7 @@ def test_success_and_failure_are_balanced_as_far_as_there_are_enough(hand: Run) 
     } | {k: n for k, n in counts(sheet).items() if k[1] in ("slipped", "lifted_disturbed")}
     strata = {(s.object, s.label): s for s in sheet.strata.values()}
     assert (strata["mug", "success"].population, strata["mug", "failure"].population) == (12, 6)
-    assert sheet.notes == ("2 grasps of run two could not be simulated; left out",)
+    assert sheet.notes == ("2 grasps of run two could not be simulated and are left out",)
     more = planned(hand, per_object=16)
     chosen = {(s.object, s.label): (s.selected, s.wanted) for s in more.strata.values()}
     assert chosen["mug", "failure"] == (6, 8) and chosen["mug", "success"] == (10, 8)
@@ -90,8 +90,10 @@ def test_shortfalls_of_a_kind_are_one_line_and_a_class_that_is_missing_is_said(
     run = make_run(tmp_path / "run", make_scene(tmp_path), {"mug": lifted, "box": lifted})
     assert planned(run, per_object=4).notes == (
         "box, mug of run two: 0 of 2 with failure; others make up for it",
-        "0 of 8 are failures in simulation: almost nothing here measures how well failures are"
-        " predicted; evaluate with until_balanced=10 to get more",
+        (
+            "only 0 of 8 are failures in simulation, so the trials hardly tell how well failures"
+            " are predicted; evaluate with until_balanced=10 to get more"
+        ),
     )
     verdicts = {"mug": [*lifted, ended("slipped")], "box": lifted}
     uneven = make_run(tmp_path / "uneven", make_scene(tmp_path), verdicts)
@@ -100,7 +102,7 @@ def test_shortfalls_of_a_kind_are_one_line_and_a_class_that_is_missing_is_said(
     )
     verdicts = {"mug": lifted, "box": [ended("slipped")]}
     mixed = make_run(tmp_path / "mixed", make_scene(tmp_path), verdicts)
-    assert not any("almost nothing" in note for note in planned(mixed, per_object=4).notes)
+    assert not any("hardly tell" in note for note in planned(mixed, per_object=4).notes)
 
 
 def test_predicted_collisions_can_be_chosen(hand: Run) -> None:
@@ -131,7 +133,7 @@ def test_bins_of_a_margin_hold_as_many_grasps_each(hand: Run) -> None:
     for trial in sheet.trials:
         place = int(np.searchsorted(edges, rows[trial.grasp], side="right")) + 1
         assert trial.stratum.endswith(f"({place} of 3)")
-    assert "23 grasps have no clearance; left out" in sheet.notes  # 3 mugs and all 20 boxes
+    assert "23 grasps have no clearance and are left out" in sheet.notes  # 3 mugs and all 20 boxes
     assert "box of run two: no grasp to choose from" in sheet.notes
 
 
@@ -166,7 +168,7 @@ def test_order_of_runs_and_seed(hand: Run, other: Run) -> None:
     assert scenes[0] != scenes[4] and scenes[8] != scenes[12]  # each scene once in a round
     drawn = planned([hand, other], per_object=4, scenes=1)
     assert len(drawn.runs) == 1 and grasps(drawn) < grasps(one)
-    with pytest.raises(InvalidInputError, match="3 scenes are wanted; the runs have 2"):
+    with pytest.raises(InvalidInputError, match="3 scenes were asked for, but only 2 have"):
         planned([hand, other], scenes=3)
 
 
@@ -188,11 +190,11 @@ def test_a_grasp_of_two_runs_is_tried_once(folder: Path, hand: Run) -> None:
     sheet = planned([hand, arm], per_object=30)
     assert set(sheet.runs) == {"two-reach"}
     assert len({trial.content for trial in sheet.trials}) == len(sheet.trials) == 17 + 20
-    assert any("38 grasps of run two-hand are in another run" in note for note in sheet.notes)
+    assert any("38 grasps of run two-hand are also in another run" in note for note in sheet.notes)
     clear = planned(arm, per_object=30, among="clear")
     assert counts(clear)["mug", "no_ik"] == 1
     assert counts(planned(arm, per_object=30, among="reachable"))["mug", "no_ik"] == 0
-    with pytest.raises(InvalidInputError, match="mode hand, which asks no arm"):
+    with pytest.raises(InvalidInputError, match="mode hand, which does not check what the arm"):
         planned([hand], among="reachable")
 
 
@@ -277,7 +279,7 @@ def test_grasps_that_changed_are_refused(folder: Path, tmp_path: Path, change: s
     message = {
         "gone": f"trial {trial.number}: grasp '.*x' is not in .*did you mean '{trial.grasp}'",
         "moved": f"trial {trial.number}: grasp {trial.grasp} of .* when the trials were planned",
-        "unjudged": "is not judged any more",
+        "unjudged": "has no verdict in",
         "another outcome": "simulated is slipped, but .* has dropped",
     }[change]
     with pytest.raises(InvalidInputError, match=message):

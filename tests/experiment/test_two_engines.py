@@ -127,11 +127,11 @@ def test_all_of_it_is_told(
     out = " ".join(capsys.readouterr().out.split())
     assert "Held in both or in neither: " in out
     assert "First: engine screening; second: engine standard." in out
-    assert "along the first run's margins" in out and "second run less first" in out
+    assert "along the margins of the first run" in out and "second run minus first" in out
     text = page.read_text(encoding="utf-8")
     assert Page(text).open == []
     assert "First: engine screening; second: engine standard." in text
-    for title in ("Held or not held alike", "At which stage they part", "How far apart margins"):
+    for title in ("Agreement on holding", "Where the runs disagree", "How much margins"):
         assert f"<h2>{title}" in text
     assert main([*words, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
@@ -215,12 +215,12 @@ def test_grasps_that_part_are_named(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert list(groups) == ["below 0.9", "0.9 to 0.95", "above 0.95"]
 
     page = comparison_page(comparison)
-    listed = page[page.index("<h2>Grasps that only one of them holds") :]
+    listed = page[page.index("<h2>Grasps that only one of the runs holds") :]
     listed = listed[: listed.index("</table>")]
     assert [id in listed for id in ids] == [True] * 50 + [False] * 3
     commands = re.sub("<[^>]*>", "", listed)
     assert all(f"burg-drake replay {run.path} --grasp {ids[0]}" in commands for run in runs)
-    assert "<h2>Do contested grasps part?" in page
+    assert "<h2>Do the runs disagree on contested grasps?" in page
     words = ["compare", *(str(run.path) for run in runs)]
     assert main(words) == 0
     out = capsys.readouterr().out
@@ -397,12 +397,12 @@ def test_of_two_modes_only_what_both_executed_is_compared(tmp_path: Path) -> Non
     ]
     found = compare(*made_up(tmp_path, by_hand, with_arm, mode="reach"))
     assert found.coverage.compared == 2
-    assert found.coverage.left_out == {"not executed in both runs, whose modes differ": 2}
+    assert found.coverage.left_out == {"not executed in both runs, which have different modes": 2}
     assert found.agreement is not None and found.agreement.alike.value == 0.5
     scene = known_runs.make_scene(tmp_path)
     nothing: list[Verdict | None] = [known_runs.ended("no_ik")] * 4
     out_of_reach = known_runs.make_run(tmp_path / "c", scene, {"mug": nothing}, mode="arm")
-    with pytest.raises(InvalidInputError, match="different modes, hand and arm, and have no grasp"):
+    with pytest.raises(InvalidInputError, match=r"different modes \(hand and arm\), and no grasp"):
         compare(tmp_path / "a", out_of_reach)
 
 

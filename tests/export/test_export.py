@@ -54,7 +54,7 @@ def test_a_missing_mesh_leaves_nothing_behind(scene: Scene, tmp_path: Path) -> N
     entry = replace(scene.entry("mug"), mesh="mug/gone.obj")
     objects = {**scene.library.objects, "mug": entry}
     library = replace(scene.library, document=replace(scene.library.document, objects=objects))
-    with pytest.raises(UnknownNameError, match=r"gone.obj is missing; build the library"):
+    with pytest.raises(UnknownNameError, match=r"gone.obj is missing; build library"):
         burg.export_scene(Scene(scene.document, library, scene.path), tmp_path / "out", "mjcf")
     assert list(tmp_path.iterdir()) == []
 

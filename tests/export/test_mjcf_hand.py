@@ -69,7 +69,7 @@ def test_its_actuators_grasp_and_lift(exported: Exported, scene: Scene, station:
 def test_only_mjcf_has_a_hand_and_only_a_station_gives_one(
     scene: Scene, station: Station, tmp_path: Path
 ) -> None:
-    with pytest.raises(InvalidInputError, match="exported to mjcf alone, not to sdf"):
+    with pytest.raises(InvalidInputError, match="exported to mjcf, not to sdf"):
         export_scene(scene, tmp_path / "out", "sdf", station, hand=True)
     with pytest.raises(InvalidInputError, match="name the station, too"):
         export_scene(scene, tmp_path / "out", "mjcf", hand=True)

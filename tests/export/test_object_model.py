@@ -16,11 +16,11 @@ from burg_drake.objects.library.document import load_library
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("<mass>0.349<", "<mass>0.5<", "has a mass of 0.5 kg, and library.yaml says 0.349 kg"),
+        ("<mass>0.349<", "<mass>0.5<", "has a mass of 0.5 kg, but library.yaml says 0.349 kg"),
         ("<mass>0.349<", "<mass>heavy<", "has a mass of heavy kg"),
         (">mesh.obj<", ">gone.obj<", "can.sdf: gone.obj does not exist"),
         (">mesh.obj<", ">package://nowhere/gone.obj<", "package 'nowhere' is not found"),
-        ("<sdf", "<<sdf", "can.sdf is no SDF"),
+        ("<sdf", "<<sdf", "can.sdf is not an SDF"),
         ("</link>", "</link><include><uri>x</uri></include>", "includes other models"),
         ("model", "world", "has no model"),
     ],

@@ -42,8 +42,9 @@ def test_names_that_usd_does_not_allow_are_told(
     stage: Usd.Stage, exports: dict[str, Exported]
 ) -> None:
     assert prim(stage, "2-can.b").GetDisplayName() == "2-can.b"
-    assert "'2-can.b' is called '_2_can_b', as the format does not allow that name" in (
-        exports["usd"].notes
+    assert (
+        "'2-can.b' is called '_2_can_b' in the export, as the format does not allow the name"
+        in (exports["usd"].notes)
     )
 
 

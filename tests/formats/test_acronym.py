@@ -259,4 +259,7 @@ def test_another_hand_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match=r"gripper/type.*panda_hand.*wsg"):
         acronym.read(path, replace(PANDA, name="wsg_50"))
     path = dataset_file(tmp_path / "b.h5", DOWN[None], [1], **{"gripper/type": "robotiq"})
-    assert any("'robotiq' was taken for" in note for note in acronym.read(path, PANDA).notes)
+    assert any(
+        "the file names a hand 'robotiq', which was taken to be" in note
+        for note in acronym.read(path, PANDA).notes
+    )

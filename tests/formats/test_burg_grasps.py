@@ -98,7 +98,7 @@ def test_no_grasps(tmp_path: Path) -> None:
     [
         (np.zeros((3, 13)), r"has shape \(3, 13\); grasps of BURG-Toolkit have \(n, 4, 4\) or"),
         (np.eye(4), r"has shape \(4, 4\); grasps of BURG-Toolkit have"),
-        (np.zeros((1, 4, 4)), r"\[0\] has a last row other than 0 0 0 1"),
+        (np.zeros((1, 4, 4)), r"\[0\] has a last row that is not 0 0 0 1"),
         (np.stack([np.eye(4), make_pose(2 * np.eye(3))]), r"\[1\] is not a rotation"),
         (make_pose(p_AB=[[np.nan, 0, 0]]), r"\[0\] has NaN or infinite numbers"),
         (np.zeros((1, 14)), r"columns 0 to 11\[0\] is not a rotation"),

@@ -183,11 +183,11 @@ def test_unknown_keys_are_left_aside_with_a_note(tmp_path: Path) -> None:
     assert library.objects[0].friction is None
     path = library.path
     assert library.notes == (
-        f"{path}:5: key 'author' was left aside; known: description, name, objects,"
+        f"{path}:5: unknown key 'author' was ignored; known: description, name, objects,"
         " yaml_file_type, yaml_file_version",
-        f"{path}:9: objects[0]: key 'friction_coef' was left aside; did you mean 'friction_coeff'?"
-        " Known: friction_coeff, identifier, mass, mesh_fn, name, scale, stable_poses,"
-        " thumbnail_fn, urdf_fn, vhacd_fn",
+        f"{path}:9: objects[0]: unknown key 'friction_coef' was ignored; did you mean"
+        " 'friction_coeff'? Known: friction_coeff, identifier, mass, mesh_fn, name, scale,"
+        " stable_poses, thumbnail_fn, urdf_fn, vhacd_fn",
     )
 
 
@@ -214,8 +214,8 @@ TURNED = math.sqrt(0.5)
          " which did not write it, add the lines 'yaml_file_type: ObjectLibrary' and"
          " 'yaml_file_version: \"1.0\"'"),
         ("yaml_file_type: Scene\nyaml_file_version: '1.0'\n",
-         "FILE:1: yaml_file_type: 'Scene' cannot be read; expected 'ObjectLibrary'; give the"
-         " object library that the scene names as object_library_fn"),
+         ("FILE:1: yaml_file_type: 'Scene' cannot be read; expected 'ObjectLibrary'; give"
+             " the object library that the scene names under object_library_fn")),
         (HEAD.replace("1.0", "2.0") + "objects: []\n",
          "FILE:2: yaml_file_version: '2.0' cannot be read; expected '1.0'"),
         (HEAD, "FILE:1: key 'objects' is missing"),
@@ -226,14 +226,14 @@ TURNED = math.sqrt(0.5)
         (HEAD + "objects:\n- identifier: ''\n  mesh_fn: mug.obj\n",
          "FILE:6: objects[0]: identifier is empty; give the object a name"),
         (HEAD + "objects:\n- identifier: mug\n",
-         "FILE:6: objects[0]: 'mug' has no mesh_fn; BURG-Toolkit had its mesh in memory only: save"
-         " the mesh to a file and name it here"),
+         ("FILE:6: objects[0]: 'mug' has no mesh_fn: BURG-Toolkit had its mesh only in"
+             " memory; save the mesh to a file and name it here")),
         (HEAD + "objects:\n- identifier: mug\n  mesh_fn: null\n",
-         "FILE:6: objects[0]: 'mug' has no mesh_fn; BURG-Toolkit had its mesh in memory only: save"
-         " the mesh to a file and name it here"),
+         ("FILE:6: objects[0]: 'mug' has no mesh_fn: BURG-Toolkit had its mesh only in"
+             " memory; save the mesh to a file and name it here")),
         (one_object("- identifier: mug\n  mesh_fn: b.obj\n"),
-         "FILE:8: objects[1].identifier: 'mug' is taken by the object in line 6; identifiers must"
-         " differ"),
+         ("FILE:8: objects[1].identifier: 'mug' is taken by the object in line 6;"
+             " identifiers must differ")),
         (one_object("  mesh_fn: b.obj\n"), "FILE:8: objects[0]: key 'mesh_fn' is given twice"),
         (one_object("  mass: light\n"),
          "FILE:8: objects[0].mass: 'light' is not a finite number"),
@@ -252,8 +252,8 @@ TURNED = math.sqrt(0.5)
         (one_object("  stable_poses: {poses: []}\n"),
          "FILE:8: objects[0].stable_poses: key 'probabilities' is missing"),
         (poses(IDENTITY, IDENTITY),
-         "FILE:9: objects[0].stable_poses: has 1 probabilities and 2 poses; expected one"
-         " probability a pose"),
+         "FILE:9: objects[0].stable_poses: has 1 probabilities, but 2 poses; give one"
+         " probability for each pose"),
         (poses(IDENTITY, probabilities="[-0.5]"),
          "FILE:9: objects[0].stable_poses: probabilities[0] is -0.5; it must be >= 0"),
         (poses("[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]"),
@@ -265,10 +265,10 @@ TURNED = math.sqrt(0.5)
          "FILE:9: objects[0].stable_poses: poses[1] is not a rigid transform: its rotation part is"
          " off by 3 from orthonormal"),
         (poses(IDENTITY.replace("[0, 1, 0, 0]", "[0, -1, 0, 0]")),
-         "FILE:9: objects[0].stable_poses: poses[0] is not a rigid transform: its rotation part is"
-         " a mirror image"),
+         ("FILE:9: objects[0].stable_poses: poses[0] is not a rigid transform: its"
+             " rotation part is a reflection (determinant -1)")),
         (poses(IDENTITY.replace("[0, 0, 0, 1]", "[0, 0, 1, 1]")),
-         "FILE:9: objects[0].stable_poses: poses[0] has a last row other than 0 0 0 1"),
+         "FILE:9: objects[0].stable_poses: poses[0] has a last row that is not 0 0 0 1"),
     ],
 )  # fmt: skip
 def test_messages_name_file_line_key_and_remedy(tmp_path: Path, text: str, message: str) -> None:

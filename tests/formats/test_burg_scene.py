@@ -103,7 +103,7 @@ def test_what_it_may_lack_and_have(tmp_path: Path) -> None:
     scene = read_burg_scene(changed(tmp_path, object_library_fn=None, bg_objects=None, objects=[]))
     assert (scene.library, scene.objects, scene.bg_objects) == (None, (), ())
     (unknown,) = read_burg_scene(changed(tmp_path, lights=3)).notes
-    assert "key 'lights' was left aside" in unknown
+    assert "key 'lights' was ignored" in unknown
 
 
 MARKERS = {
@@ -126,8 +126,8 @@ def test_its_printed_board(tmp_path: Path) -> None:
     (note,) = read_burg_scene(path).notes
     line = path.read_text().splitlines().index("printout:") + 1
     assert note == (
-        f"{path}:{line}: the board is the printout, 2100 x 1600 mm; the ground area of"
-        " 2000 x 1500 mm was left aside"
+        f"{path}:{line}: the board gets the size of the printout, 2100 x 1600 mm; the ground"
+        " area of 2000 x 1500 mm was ignored"
     )
 
 
@@ -159,7 +159,10 @@ MIRROR = np.diag([1.0, 1.0, -1.0, 1.0]).tolist()
             {"printout": {"size": [1, 1], "marker_info": MARKERS | {"marker_size_mm": -57}}},
             r":\d+: printout.marker_info: marker_size_mm is -57; it must be above 0",
         ),
-        ({"objects": instance(pose=MIRROR)}, r"scene.yaml:\d+: pose of 'a'\[0\] is a mirror image"),
+        (
+            {"objects": instance(pose=MIRROR)},
+            r"scene.yaml:\d+: pose of 'a'\[0\] is a reflection",
+        ),
     ],
 )
 def test_malformed(values: dict[str, Any], message: str, tmp_path: Path) -> None:

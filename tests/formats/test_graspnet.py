@@ -113,7 +113,7 @@ def test_what_is_not_known_gets_what_networks_write(tmp_path: Path) -> None:
     assert notes == (
         "GraspNet-1Billion has no place for id.",
         "2 grasps of unknown width got the hand's opening of 0.08 m.",
-        "2 grasps without a score got 0.",
+        "2 grasps without a score got score 0.",
         SINGLE,
     )
     rows = np.load(tmp_path / "a.npy").astype(float)
@@ -181,8 +181,10 @@ def test_openings_are_given_known_or_assumed(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.load(tmp_path / "a.npy")[:, 1], [0.06, 0.05, 0.08, 0.08])
     assert notes == (
         "GraspNet-1Billion has no place for width, id.",
-        "width is the opening on arrival there: 2 grasps got the distance of their contacts and"
-        " 20 mm, at most 0.08 m.",
+        (
+            "The width in the file is the opening when the hand arrives: 2 grasps got the"
+            " distance of their contacts and 20 mm, at most 0.08 m."
+        ),
         "1 grasps of unknown width got the hand's opening of 0.08 m.",
         SINGLE,
     )
@@ -211,10 +213,16 @@ MIRRORED = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]]
 @pytest.mark.parametrize(
     ("row", "message"),
     [
-        ((0, 0, 0, np.nan, np.eye(3), (0, 0, 0), 0), "row 1 has depth nan; it has to be in metres"),
-        ((0, 0, 0, 20.0, np.eye(3), (0, 0, 0), 0), "row 1 has depth 20; it has to be in metres"),
+        (
+            (0, 0, 0, np.nan, np.eye(3), (0, 0, 0), 0),
+            "row 1 has depth nan; depths must be in metres",
+        ),
+        ((0, 0, 0, 20.0, np.eye(3), (0, 0, 0), 0), "row 1 has depth 20; depths must be in metres"),
         ((0, 0, 0, 0.02, np.zeros((3, 3)), (0, 0, 0), 0), r"columns 4 to 15\[1\] is not a"),
-        ((0, 0, 0, 0.02, MIRRORED, (0, 0, 0), 0), r"columns 4 to 15\[1\] is a mirror image"),
+        (
+            (0, 0, 0, 0.02, MIRRORED, (0, 0, 0), 0),
+            r"columns 4 to 15\[1\] is a reflection",
+        ),
         ((0, 0, 0, 0.02, np.eye(3), (0, np.inf, 0), 0), r"columns 4 to 15\[1\] has NaN or inf"),
     ],
 )
@@ -235,9 +243,9 @@ def test_other_files(tmp_path: Path) -> None:
     for name, message in {
         "rect.npy": r"has shape \(3, 7\); expected \(N, 17\)",
         "text.npy": r"has shape \(1,\); expected \(N, 17\)",
-        "objects.npy": "holds Python objects, which are not read",
+        "objects.npy": "holds pickled Python objects, which are not read",
         "zip.npy.npz": "is not a .npy file of numbers: the magic string is not correct",
-        "cut.npy": "is damaged or cut off: an array of shape",
+        "cut.npy": "is damaged or cut off: its array of shape",
         "empty.npy": "is not a .npy file of numbers",
         "missing.npy": "cannot read .*: No such file or directory",
     }.items():

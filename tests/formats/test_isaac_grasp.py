@@ -169,7 +169,9 @@ grasps:
     assert graspgen_yaml.FORMAT.recognises(path)
     read = graspgen_yaml.FORMAT.read(path, PANDA)
     assert read.grasps.score[0] == 0.9679833054542542
-    assert any("no gripper frame; fingers were taken to close along its x" in n for n in read.notes)
+    assert any(
+        "no gripper frame; the fingers were taken to close along its x" in n for n in read.notes
+    )
 
 
 def test_grasps_for_grasp_data_gen_may_name_a_file_instead_of_a_frame(
@@ -179,7 +181,9 @@ def test_grasps_for_grasp_data_gen_may_name_a_file_instead_of_a_frame(
     assert isaac_grasp.FORMAT.recognises(path) and not graspgen_yaml.FORMAT.recognises(path)
     read = isaac_grasp.FORMAT.read(path, PANDA)
     assert_grips_the_cube(read.grasps.X_OG[0])
-    assert any("no gripper frame; fingers were taken to close along its y" in n for n in read.notes)
+    assert any(
+        "no gripper frame; the fingers were taken to close along its y" in n for n in read.notes
+    )
 
 
 @pytest.mark.parametrize("module", [isaac_grasp, graspgen_yaml])
@@ -235,8 +239,10 @@ def test_widths_that_the_hand_does_not_have_are_said(tmp_path: Path) -> None:
     four = GraspSet.create(np.repeat(np.eye(4)[None], 4, 0), object="mug", score=1.0)
     wide = GraspSet.create(four.X_OG, object="mug", score=1.0, width=[0.02, 0.12, -0.01, 0.08])
     expected = (
-        "widths of 2 grasps are beyond the opening of hand 'panda_hand', 0 to 0.08 m; so are their"
-        " joints.",
+        (
+            "widths of 2 grasps are outside the opening of hand 'panda_hand', 0 to 0.08 m; so"
+            " are their joints."
+        ),
         "Isaac Sim grasp editor has no place for id.",
     )
     assert isaac_grasp.FORMAT.write(wide, tmp_path / "a.yaml", PANDA) == expected
@@ -306,7 +312,7 @@ def test_values_by_the_names_of_our_own_columns_are_left_aside(file: Callable[[s
     read = isaac_grasp.FORMAT.read(file(text), PANDA)
     assert read.grasps.width[0] == pytest.approx(2 * 0.00943)
     assert read.grasps.columns["group"].tolist() == ["left"]
-    assert any("Left aside: width" in note for note in read.notes)
+    assert any("Ignored: width" in note for note in read.notes)
 
 
 def test_no_grasps_are_no_error(file: Callable[[str], Path]) -> None:
@@ -327,24 +333,48 @@ QUATERNION = "{w: 0.00332, xyz: [0.98453, 0.16837, 0.04837]}"
         (MANUAL.replace("isaac_grasp", "acronym"), "format: 'acronym' instead of isaac_grasp"),
         (MANUAL.replace("version: 1.0", "version: 2.0"), "format_version: '2.0' cannot be read"),
         (MANUAL.replace("grasps:", "poses:"), "grasps: missing"),
-        (MANUAL.split("  grasp_0")[0] + "  - a\n", "grasps: a list instead of grasps by name"),
+        (
+            MANUAL.split("  grasp_0")[0] + "  - a\n",
+            "grasps: a list instead of grasps by name",
+        ),
         (MANUAL.split("  grasp_0")[0] + "  a: 1\n", r"grasps\.a: '1' instead of position"),
         (TWICE, r":16: 'grasp_0' appears twice"),
         (MANUAL.replace("position: [-", "place: [-", 1), r"grasps\.grasp_0\.position: missing"),
-        (MANUAL.replace("-0.04346, ", ""), r"grasp_0\.position: a list instead of 3 numbers"),
+        (
+            MANUAL.replace("-0.04346, ", ""),
+            r"grasp_0.position: a list instead of 3 numbers",
+        ),
         (MANUAL.replace("[-0.04346, 0.06759, 0.19895]", "[[1, 2, 3]]"), "instead of 3 numbers"),
-        (MANUAL.replace("confidence: 1.0", "confidence: [1.0]"), "confidence: a list instead of"),
+        (
+            MANUAL.replace("confidence: 1.0", "confidence: [1.0]"),
+            "confidence: a list instead of",
+        ),
         (MANUAL.replace("-0.04346", "left"), r"grasp_0\.position: 'left' instead of a finite"),
         (MANUAL.replace("-0.04346", ".nan"), r"grasp_0\.position: '\.nan' instead of a finite"),
         (MANUAL.replace("-0.04346", ".inf"), r"grasp_0\.position: '\.inf' instead of a finite"),
         (MANUAL.replace("-0.04346", "inf"), r"grasp_0\.position: 'inf' instead of a finite"),
-        (MANUAL.replace("-0.04346", "[1]"), r"grasp_0\.position: a list instead of a finite"),
-        (MANUAL.replace(QUATERNION, "[1, 0, 0, 0]"), r"grasp_0\.orientation: a list instead of"),
-        (MANUAL.replace("w: 0.00332, ", ""), r"grasp_0\.orientation: a dict instead of \{w"),
-        (MANUAL.replace("xyz:", "xyzw:"), r"grasp_0\.orientation: a dict instead of \{w"),
-        (MANUAL.replace("0.16837, ", ""), r"grasp_0\.orientation: a list instead of 4 numbers"),
-        (MANUAL.replace("0.98453", "0.9"), r"grasp_0\.orientation: a quaternion of length 0\.9"),
-        (MANUAL.replace(QUATERNION, "{w: 0, xyz: [0, 0, 0]}"), r"quaternion of length 0;"),
+        (
+            MANUAL.replace("-0.04346", "[1]"),
+            r"grasp_0.position: a list instead of a finite",
+        ),
+        (
+            MANUAL.replace(QUATERNION, "[1, 0, 0, 0]"),
+            r"grasp_0.orientation: a list instead of",
+        ),
+        (
+            MANUAL.replace("w: 0.00332, ", ""),
+            r"grasp_0.orientation: a dict instead of {w",
+        ),
+        (
+            MANUAL.replace("xyz:", "xyzw:"),
+            r"grasp_0.orientation: a dict instead of {w",
+        ),
+        (
+            MANUAL.replace("0.16837, ", ""),
+            r"grasp_0.orientation: a list instead of 4 numbers",
+        ),
+        (MANUAL.replace("0.98453", "0.9"), r"grasp_0.orientation: the quaternion has length 0.9"),
+        (MANUAL.replace(QUATERNION, "{w: 0, xyz: [0, 0, 0]}"), "quaternion has length 0;"),
         (MANUAL.replace("confidence: 1.0", "confidence: high"), r"confidence: 'high' instead of"),
         (MANUAL.replace("0.00943", "wide"), r"cspace_position\.panda_finger_joint1: 'wide'"),
         (

@@ -108,5 +108,7 @@ def test_names_of_hands() -> None:
     assert check_hand("panda_hand", PANDA, "a.h5") == ()
     assert check_hand("mine", replace(PANDA, name="mine"), "a.h5") == ()
     assert len(check_hand("robotiq", PANDA, "a.h5")) == 1
-    with pytest.raises(InvalidInputError, match=r"a\.h5: the grasps are of hand 'panda_hand'"):
+    with pytest.raises(
+        InvalidInputError, match=r"a.h5: the grasps were made for hand 'panda_hand', but hand"
+    ):
         check_hand("panda", replace(PANDA, name="wsg_50"), "a.h5")

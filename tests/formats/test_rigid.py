@@ -53,8 +53,11 @@ def test_four_decimals_become_the_nearest_rotation_with_a_note(poses: Array) -> 
         (lambda X: X.__setitem__((3, 2, 3), np.inf), r"file: key\[3\] has NaN or infinite"),
         (lambda X: X.__setitem__((3, slice(0, 3), 0), 0.0), r"file: key\[3\] is not a rotation"),
         (lambda X: X.__setitem__(3, X[3] * [[2.0], [2.0], [2.0], [1.0]]), r"\[3\] is not a"),
-        (lambda X: X.__setitem__((3, 3, 0), 0.5), r"file: key\[3\] has a last row other than"),
-        (lambda X: X.__setitem__((3, slice(0, 3), 0), -X[3, :3, 0]), r"\[3\] is a mirror image"),
+        (lambda X: X.__setitem__((3, 3, 0), 0.5), r"file: key\[3\] has a last row that is not"),
+        (
+            lambda X: X.__setitem__((3, slice(0, 3), 0), -X[3, :3, 0]),
+            r"\[3\] is a reflection",
+        ),
     ],
 )
 def test_what_is_not_rigid_is_refused(poses: Array, corrupt, said: str) -> None:  # type: ignore[no-untyped-def]
@@ -70,9 +73,9 @@ def test_wrong_shapes_are_refused(shape: tuple[int, ...]) -> None:
 
 
 def test_ragged_lists_and_texts_are_refused() -> None:
-    with pytest.raises(InvalidInputError, match="file: key does not hold"):
+    with pytest.raises(InvalidInputError, match="file: key must hold"):
         nearest_rigid([[[1.0, 2.0], [3.0]]], "file: key")
-    with pytest.raises(InvalidInputError, match="file: key does not hold"):
+    with pytest.raises(InvalidInputError, match="file: key must hold"):
         nearest_rigid([[["a"] * 4] * 4], "file: key")
 
 

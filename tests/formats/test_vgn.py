@@ -42,7 +42,7 @@ def test_a_cube_from_above(tmp_path: Path, assert_grips_the_cube: Callable[[Arra
     )
     imported = FORMAT.read(path, PANDA)
     assert imported.frame == "world"
-    assert imported.notes == ("width was left aside of 1 failures: it is the open hand's.",)
+    assert imported.notes == ("the width of 1 failed grasps was ignored: it is the open hand's.",)
     grasps = imported.grasps
     assert_grips_the_cube(grasps.X_OG[0])
     np.testing.assert_allclose(grasps.X_OG[1, :3, 3], [0.1, 0.2, 0.2595], atol=1e-15)
@@ -71,7 +71,7 @@ def test_round_trip(seed: int, random_grasps: Callable[..., GraspSet], tmp_path:
     failed = grasps.column("label") == 0
     assert FORMAT.write(grasps, path, PANDA) == (
         "VGN and GIGA has no place for id, object, score.",
-        f"{failed.sum()} failures got the hand's opening of 0.08 m as width.",
+        f"{failed.sum()} failed grasps got the hand's opening of 0.08 m as width.",
     )
     assert FORMAT.recognises(path)
     back = FORMAT.read(path, PANDA).grasps
@@ -106,8 +106,8 @@ def test_outcomes_of_trials_become_labels(tmp_path: Path) -> None:
     notes = FORMAT.write(grasps, tmp_path / "scene_7.csv", PANDA)
     assert notes == (
         "VGN and GIGA has no place for id.",
-        "1 failures got the hand's opening of 0.08 m as width.",
-        "2 grasps have no width; empty cells.",
+        "1 failed grasps got the hand's opening of 0.08 m as width.",
+        "2 grasps have no width; their cells are empty.",
     )
     back = FORMAT.read(tmp_path / "scene_7.csv", PANDA).grasps
     np.testing.assert_array_equal(back.column("label"), [1.0, 0.0, np.nan])
@@ -116,7 +116,7 @@ def test_outcomes_of_trials_become_labels(tmp_path: Path) -> None:
     plain = GraspSet.create(X_OG, object="", width=0.05)
     assert FORMAT.write(plain, tmp_path / "b.csv", PANDA) == (
         "VGN and GIGA has no place for id.",
-        "No grasp has a label; these cells are empty.",
+        "No grasp has a label; the cells for it are empty.",
     )
 
 
@@ -138,14 +138,18 @@ def test_no_grasps(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("header", "line", "message"),
     [
-        (HEADER, f"a,{DOWN},0,0,0.1,0.08", ":2: has 9 cells, the first line has 10"),
+        (HEADER, f"a,{DOWN},0,0,0.1,0.08", ":2: the row has 9 cells, the header has 10"),
         (HEADER, f"a,{DOWN},0,zero,0.1,0.08,1", ":2: y is 'zero', not a number"),
         (HEADER, f"a,{DOWN},0,nan,0.1,0.08,1", ":2: y is nan; give a finite number"),
         (HEADER, f"a,{DOWN},0,0,0.1,inf,1", ":2: width is inf; give a finite number"),
         (HEADER, "a,0,0,0,0,0,0,0.1,0.08,1", ":2: qx, qy, qz, qw have length 0; a rotation has"),
         (HEADER, "a,1,1,0,0,0,0,0.1,0.08,1", ":2: qx, qy, qz, qw have length 1.41421; a rotation"),
-        ("scene_id,x,y,z", "a,0,0,0", " has no column qx, qy, qz, qw; grasps of VGN have scene_id"),
-        (HEADER + ",x", f"a,{DOWN},0,0,0.1,0.08,1,2", ":1: column 'x' is there twice"),
+        (
+            "scene_id,x,y,z",
+            "a,0,0,0",
+            " has no column qx, qy, qz, qw; a file of VGN has the columns scene_id",
+        ),
+        (HEADER + ",x", f"a,{DOWN},0,0,0.1,0.08,1,2", ":1: column 'x' appears twice"),
     ],
 )
 def test_malformed(header: str, line: str, message: str, tmp_path: Path) -> None:
@@ -164,7 +168,7 @@ def test_empty_lines_are_passed_over_and_counted(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match=r"a\.csv:5: qx, qy, qz, qw have length"):
         FORMAT.read(path, PANDA)
     path = grasps_csv(tmp_path / "a.csv", "", good, "", "a,1")
-    with pytest.raises(InvalidInputError, match=r"a\.csv:5: has 2 cells"):
+    with pytest.raises(InvalidInputError, match=r"a\.csv:5: the row has 2 cells"):
         FORMAT.read(path, PANDA)
     assert len(FORMAT.read(grasps_csv(path, "", good, "", good), PANDA).grasps) == 2
 

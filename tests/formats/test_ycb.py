@@ -163,8 +163,8 @@ def test_the_table_holds_together() -> None:
 
 def test_a_folder_without_ycb_objects(tmp_path: Path) -> None:
     looked = (
-        f"no YCB objects in {tmp_path}: looked in it and its subfolders for folders such as"
-        " 003_cracker_box/google_16k with a textured.obj, and for files such as"
+        f"no YCB objects found in {tmp_path} or its subfolders; expected folders such as"
+        " 003_cracker_box/google_16k with a textured.obj, or files such as"
         " 003_cracker_box.obj;"
     )
     make(tmp_path, "mug.obj")

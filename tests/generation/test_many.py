@@ -112,12 +112,12 @@ def test_another_recipe_is_refused(
     with pytest.raises(InvalidInputError) as caught:
         sample_scenes(other, household, tabletop, whole, 12)
     assert str(caught.value) == (
-        f"{whole} holds other scenes (only is box, can, marble, mug there, none here; layout is"
-        " random there, close here; fewer is off there, on here; seed is 0 there, 8 here); choose"
-        " another folder, or delete it"
+        f"{whole} already holds other scenes (only is box, can, marble, mug there, none here;"
+        " layout is random there, close here; fewer is off there, on here; seed is 0 there, 8"
+        " here); choose another folder, or delete it"
     )
     assert contents(whole) == before
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.tex").write_text("")
-    with pytest.raises(InvalidInputError, match="is not empty, and holds no sampled scenes"):
+    with pytest.raises(InvalidInputError, match="is not empty and has no sampled scenes"):
         sample_scenes(RECIPE, household, tabletop, tmp_path / "mine", 1)

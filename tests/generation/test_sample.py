@@ -97,12 +97,13 @@ def test_what_was_made_with_other_things_is_refused(
     with pytest.raises(InvalidInputError) as caught:
         sample_again(other)
     assert str(caught.value) == (
-        "scene_0000.yaml was made with other things (the library has content 000000000000 there,"
-        f" {origin.library_content} here; drake is 1.0 there, {origin.versions['drake']} here), and"
-        " may come out another way; it has to be forced"
+        "the inputs of scene_0000.yaml have changed (the library has content 000000000000 there,"
+        f" {origin.library_content} here; drake is 1.0 there, {origin.versions['drake']}"
+        " here), so the scene may come out differently; make it by force to go on all the"
+        " same"
     )
     assert sample_again(other, force=True).scene is not None
-    with pytest.raises(InvalidInputError, match="has no `origin`: it was not sampled"):
+    with pytest.raises(InvalidInputError, match="has no `origin`, so it was not sampled"):
         sample_again(Scene(replace(scene.document, origin=None), household, scene.path))
 
 
@@ -156,13 +157,14 @@ def test_too_small_a_board(household: ObjectLibrary, tabletop: Station) -> None:
     [
         (
             {"only": ("can", "cup")},
-            "object 'cup' is not in library {root}, or has no mass or no stable pose; known:"
+            "object 'cup' cannot be arranged: library {root} does not have it, or it has no mass or"
+            " no stable pose; known:"
             " airplane, banana, bottle, bowl, box, can, marble, mug, scissors, screwdriver",
         ),
         (
             {"count": 4},
-            "4 different objects are asked for, and there are 3 to choose from; ask for fewer, or"
-            " let objects repeat",
+            "4 different objects were asked for, but there are only 3 to choose from; ask for"
+            " fewer, or allow objects to repeat",
         ),
         (
             {"visible_from": "boards"},

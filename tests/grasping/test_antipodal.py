@@ -280,9 +280,9 @@ def test_unusable_meshes():
     broken = lumpy()
     broken.vertices[3, 1] = np.nan
     cases = {
-        "no faces with area": trimesh.Trimesh(),
+        "no face of the mesh has an area": trimesh.Trimesh(),
         "not finite": broken,
-        r"wound inside out; flip its faces with mesh.invert\(\)": inverted,
+        r"inside out; flip its faces with mesh.invert\(\)": inverted,
     }
     for message, mesh in cases.items():
         with pytest.raises(MeshError, match=message):

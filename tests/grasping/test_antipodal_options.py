@@ -119,7 +119,7 @@ def test_every_grasp_is_given_with_each_standoff():
 @pytest.mark.parametrize("distance", [-0.0091, 0.0096, 0.02, np.nan])
 def test_a_standoff_off_the_pads(distance):
     mm = f"{1e3 * distance:g}"
-    message = f"standoff {mm} mm puts the contacts off the finger pads; give -9 to 9.5 mm"
+    message = f"standoff {mm} mm puts the contacts outside the finger pads; give -9 to 9.5 mm"
     with pytest.raises(InvalidInputError, match=f"^{message}$"):
         grasp(lumpy(), standoffs=(0.0, distance))
 
@@ -179,7 +179,7 @@ def test_the_effort_is_bounded_by_the_grasps_that_are_wanted(n: int, monkeypatch
 
 
 def test_a_test_that_does_not_answer_for_each_grasp():
-    with pytest.raises(InvalidInputError, match=r"accept gave an array of shape \(3,\) for "):
+    with pytest.raises(InvalidInputError, match=r"accept returned an array of shape \(3,\) for "):
         grasp(lumpy(), accept=lambda X: np.ones(3, bool))
 
 
@@ -220,5 +220,7 @@ def test_where_there_are_few_the_diverse_are_these():
 
 
 def test_less_than_once_as_many():
-    with pytest.raises(InvalidInputError, match="diverse is 0; give how many times n to sample"):
+    with pytest.raises(
+        InvalidInputError, match="diverse is 0; give a factor of 1 or more: so many times n"
+    ):
         grasp(lumpy(), diverse=0)

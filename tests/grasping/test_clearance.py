@@ -163,7 +163,10 @@ def test_a_shape_that_the_screen_does_not_know_is_named() -> None:
     source = graph.RegisterSource("test")
     tip = GeometryInstance(RigidTransform(), Capsule(0.01, 0.02), "tip")
     geometry = graph.RegisterAnchoredGeometry(source, tip)
-    with pytest.raises(InvalidInputError, match=r"'tip' is a Capsule; .* knows boxes, cylinders"):
+    with pytest.raises(
+        InvalidInputError,
+        match=r"'tip' is a Capsule; .* clearance check of the hand supports boxes, cylinders",
+    ):
         shape_of(graph.model_inspector(), geometry, np.eye(4))
 
 

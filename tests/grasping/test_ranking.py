@@ -102,10 +102,12 @@ def test_an_unknown_column() -> None:
 
 @pytest.mark.parametrize("values", [[math.nan, math.nan], ["", ""]])
 def test_empty_columns(values: ArrayLike) -> None:
-    with pytest.raises(InvalidInputError, match="column 'label' judges none of the grasps"):
+    with pytest.raises(InvalidInputError, match="column 'label' has no values"):
         rank_by(with_column([2, 1], label=values), "label")
 
 
 def test_scores_are_needed() -> None:
-    with pytest.raises(InvalidInputError, match="ranks grasps by score, and none of those that"):
+    with pytest.raises(
+        InvalidInputError, match="ranks grasps by score, but no grasp with a value of"
+    ):
         rank_by(with_column([math.nan, 1.0], label=[1.0, math.nan]), "label")

@@ -19,8 +19,8 @@ SIZE = np.array([0.1, 0.06, 0.04])
 VOLUME = float(SIZE.prod())
 BALL = 4.0 / 3.0 * np.pi * 0.05**3
 
-WALL = "; wall_thickness sets it, openings='close' caps it"
-CAPS = "; openings='wall' makes a wall of the surface instead"
+WALL = "; mm; set the thickness with wall_thickness, or close it with caps by openings='close'"
+CAPS = "; openings='wall' makes the surface a wall instead"
 
 
 DEFAULT = Preparation()
@@ -160,7 +160,12 @@ REPAIRABLE = {
     "small hole": Repairable(_holed, ("filled 1 small holes",), VOLUME),
     "large opening, as a wall": Repairable(
         _lidless,
-        (f"made the open surface (largest opening 117 mm wide) a wall 2 mm thick{WALL} instead",),
+        (
+            (
+                "made the open surface (largest opening 117 mm wide) a wall of 2 mm; set the"
+                " thickness with wall_thickness, or close it with caps by openings='close'"
+            ),
+        ),
         # outside and inside of the bottom and the sides, 1 mm from the sheet either way
         0.102 * 0.062 * 0.041 - 0.098 * 0.058 * 0.039,
     ),
@@ -172,7 +177,12 @@ REPAIRABLE = {
     ),
     "perfectly flat, as a wall": Repairable(
         lambda: _raw([[0, 0, 0], [0.2, 0, 0], [0.2, 0.1, 0], [0, 0.1, 0]], [[0, 1, 2], [0, 2, 3]]),
-        (f"made the open surface (largest opening 224 mm wide) a wall 3 mm thick{WALL} instead",),
+        (
+            (
+                "made the open surface (largest opening 224 mm wide) a wall of 3 mm; set the"
+                " thickness with wall_thickness, or close it with caps by openings='close'"
+            ),
+        ),
         0.2 * 0.1 * 0.003,
         preparation=Preparation(wall_thickness=0.003),
     ),
@@ -180,20 +190,22 @@ REPAIRABLE = {
         _moebius,
         (
             "turned 40 faces to a consistent winding",
-            "left open (largest opening 191 mm wide), as it has only one side (a Moebius strip);"
-            " the volume is taken from the convex pieces",
+            (
+                "the surface stays open (largest opening 191 mm wide), as it has only one"
+                " side (a Moebius strip); the volume is that of the convex pieces"
+            ),
         ),
         None,
     ),
     "specks": Repairable(
         lambda: _both(_box(), _moved(_ball(1, 2e-4), 0.0, 0.0, 0.1)),
-        ("dropped 1 specks (80 faces)",),
+        ("dropped 1 tiny separate parts (80 faces)",),
         VOLUME,
     ),
-    "fin": Repairable(_finned, ("dropped 1 faces of fins without thickness",), VOLUME),
+    "fin": Repairable(_finned, ("dropped 1 faces without thickness",), VOLUME),
     "overlapping bodies": Repairable(
         lambda: _both(_box(), _moved(_box(), 0.05)),
-        ("united 2 bodies that overlap (25 % of their volume would have counted twice)",),
+        ("united 2 bodies that overlap (they share 25 % of their volume, which now counts once)",),
         1.5 * VOLUME,
     ),
     "bodies with a face in common": Repairable(
@@ -211,19 +223,21 @@ REPAIRABLE = {
     "passes through itself": Repairable(
         _dented,
         (
-            "passes through itself: about 0.68 % of its inside counts twice or is inside out; its"
-            " mass properties are that much in doubt",
+            (
+                "the surface passes through itself: about 0.68 % of its volume counts twice"
+                " or is inside out, so mass properties may be that far off"
+            ),
         ),
         None,
     ),
     "bodies that touch along an edge": Repairable(
         lambda: _glued(_both(_box(), _moved(_box(), SIZE[0], SIZE[1]))),
-        ("separated bodies that touch along edges",),
+        ("separated bodies that touch along an edge",),
         2.0 * VOLUME,
     ),
     "finer than contact needs": Repairable(
         lambda: _box(6),
-        ("decimated from 49152 to 12 faces, at most 0.001 mm away",),
+        ("reduced from 49152 to 12 faces, at most 0.001 mm off",),
         VOLUME,
     ),
 }

@@ -45,8 +45,9 @@ def test_pads_meet_the_pieces_where_there_is_no_surface(tmp_path: Path) -> None:
     contact, written = contact_geometry(None, holey, False, [torus()], tmp_path)
     assert contact == ContactGeometry(reason="its surface is not closed") and written == ()
     assert pieces_instead(contact, 12) == (
-        "pads touch 12 convex pieces, because its surface is not closed; make the mesh watertight"
-        " and smooth it, or accept the pieces by 'contact: pieces' in an objects.yaml"
+        "finger pads touch 12 convex pieces, because its surface is not closed; make the"
+        " mesh watertight and smooth it, or accept that by 'contact: pieces' in an"
+        " objects.yaml"
     )
     assert pieces_instead(ContactGeometry(), 12) == ""
 
@@ -57,9 +58,9 @@ def test_what_pads_touch_is_told(tmp_path: Path) -> None:
     faces = sum(line.startswith("f ") for line in lines)
     fit = household.entry("mug").contact.fit
     assert fit is not None
-    expected = f"a surface of {faces} faces, within {1e3 * fit.hausdorff:.2g} mm"
+    expected = f"a surface with {faces} faces, at most {1000.0 * fit.hausdorff:.2g} mm off"
     assert touched_by_pads(household, "mug") == expected
-    assert touched_by_pads(household, "can").startswith("a cylinder, within 1.")
+    assert touched_by_pads(household, "can").startswith("a cylinder, at most 1.")
     entry = replace(household.entry("mug"), contact=ContactGeometry())
     document = replace(household.document, objects={"mug": entry})
     assert touched_by_pads(ObjectLibrary(document, tmp_path), "mug") == (
@@ -101,7 +102,7 @@ def test_what_cannot_be_is_said(tmp_path: Path) -> None:
         match=r"^contact 'surface': its surface is not closed; make the mesh watertight and",
     ):
         contact_geometry("surface", holey, False, [torus()], tmp_path)
-    with pytest.raises(MeshError, match=r"no box, cylinder or sphere has about this volume"):
+    with pytest.raises(MeshError, match="no box, cylinder or sphere comes close to its volume"):
         contact_geometry("primitive", torus(), True, [], tmp_path)
     bottle = load_library("household").surface("bottle")
     with pytest.raises(MeshError, match=r"^contact 'primitive': .*; choose 'pieces'"):

@@ -143,7 +143,10 @@ def test_why_there_is_none() -> None:
         contact_surface(sphere(2), False)
     rough, rng = sphere(6), np.random.default_rng(0)
     rough.vertices += rng.normal(0.0, 4e-4, rough.vertices.shape)
-    text = r"^its surface cannot be decimated to 10000 faces within 0\.25 mm and 10 degrees$"
+    text = (
+        r"^its surface cannot be reduced to 10000 faces without being more than 0.25 mm or 10"
+        r" degrees off$"
+    )
     with pytest.raises(MeshError, match=text):
         contact_surface(rough, True)
 

@@ -130,6 +130,6 @@ def test_a_crash_of_the_library_is_an_error() -> None:
 def test_too_long_is_an_error() -> None:
     with pytest.raises(
         MeshError,
-        match=r"longer than 0\.01 s of CPU time; .*threshold above 0\.05\), or give convex pieces",
+        match=r"longer than 0.01 s of CPU time; .*threshold above 0.05, or give convex pieces",
     ):
         convex_pieces(_corner(), closed=True, parameters=Decomposition(timeout=0.01))

@@ -92,7 +92,9 @@ def test_density() -> None:
 @pytest.mark.parametrize("mass", [0.0, -1.0, float("nan"), float("inf")])
 def test_masses_that_no_object_has(mass: float) -> None:
     box = solid_of_surface(trimesh.creation.box((0.1, 0.1, 0.1)))
-    with pytest.raises(InvalidInputError, match=r"mass is .* kg; a free object needs one above 0"):
+    with pytest.raises(
+        InvalidInputError, match=r"mass is .* kg; for a free object it must be above 0"
+    ):
         mass_properties(box, mass=mass)
 
 
@@ -158,13 +160,17 @@ def test_a_given_centre_of_mass_alone_leaves_the_inertia() -> None:
     [
         (
             (1e-4, 1e-4, 3e-4, 0.0, 0.0, 0.0),
-            "inertia is that of no body: its principal moments are 0.0001, 0.0001 and 0.0003"
-            " kg m^2; the largest must not exceed the sum of the others",
+            (
+                "no body has this inertia: its principal moments are 0.0001, 0.0001 and"
+                " 0.0003 kg m^2; the largest must be at most the sum of the others"
+            ),
         ),
         (
             (1e-4, 1e-4, 1e-4, 2e-4, 0.0, 0.0),
-            "inertia is not positive definite: its principal moments are -0.0001, 0.0001 and"
-            " 0.0003 kg m^2; all must be > 0",
+            (
+                "inertia is not positive definite: its principal moments are -0.0001, 0.0001"
+                " and 0.0003 kg m^2; all must be above 0"
+            ),
         ),
         (
             (1e-4, 1e-4, float("nan"), 0.0, 0.0, 0.0),
@@ -220,20 +226,30 @@ def test_ycb_masses_are_plausible() -> None:
 
 def test_what_is_implausible_is_said() -> None:
     assert _remarks(0.1, mass=30.0) == (
-        "density is 3e+04 kg/m^3 (30 kg in 1e+03 cm^3), denser than copper: things have 10 to"
-        " 9000; check mass and unit of length",
-        "mass is 30 kg, more than its bounding box full of copper",
+        (
+            "density is 3e+04 kg/m^3 (30 kg in 1e+03 cm^3), denser than copper: usual are 10"
+            " to 9000; check the mass and the unit of length"
+        ),
+        (
+            "mass is 30 kg, more than a bounding box full of copper has; check the mass and"
+            " the unit of length"
+        ),
     )
     assert _remarks(0.1, mass=0.001) == (
-        "density is 1 kg/m^3 (0.001 kg in 1e+03 cm^3), lighter than foam: things have 10 to"
-        " 9000; check mass and unit of length",
-        "mass is 0.001 kg, less than the air in its bounding box",
+        (
+            "density is 1 kg/m^3 (0.001 kg in 1e+03 cm^3), lighter than foam: usual are 10 to"
+            " 9000; check the mass and the unit of length"
+        ),
+        (
+            "mass is 0.001 kg, less than that of the air in its bounding box; check the mass"
+            " and the unit of length"
+        ),
     )
     g_mm2 = 1e9 * 0.3 * 0.1**2 / 6.0
     for wrong in (g_mm2, 1e-9 * 0.3 * 0.1**2 / 6.0):
         (remark,) = _remarks(0.1, mass=0.3, inertia=(wrong, wrong, wrong, 0.0, 0.0, 0.0))
-        assert remark.startswith("inertia gives a radius of gyration of ")
-        assert "half the diagonal of its bounding box is 86.6 mm" in remark
+        assert remark.startswith("inertia is too large: its radius of gyration is ")
+        assert "half the diagonal of the bounding box is 86.6 mm" in remark
     assert _remarks(0.1, mass=0.3, center_of_mass=(0.0, 0.0, 0.051)) == (
         "centre of mass [0.0, 0.0, 0.051] lies outside the bounding box [-0.05, -0.05, -0.05] to"
         " [0.05, 0.05, 0.05] (metres, object frame)",

@@ -118,18 +118,20 @@ MM, CM, M, INCH = (
 @pytest.mark.parametrize(
     ("extent", "scale", "expected"),
     [
-        (200.0, 1.0, f"is 200 m, but lengths are in metres; try {MM} 200 mm)"),
-        (2000.0, 1.0, f"is 2000 m, but lengths are in metres; try {MM} 2 m)"),
+        (200.0, 1.0, f"is 200 m long; try {MM} 200 mm)"),
+        (2000.0, 1.0, f"is 2000 m long; try {MM} 2 m)"),
         (20.0, 1.0, f"try {MM} 20 mm) or {CM} 200 mm) or {INCH} 508 mm)"),
-        (5.0, 1.0, f"is 5 m, but lengths are in metres; try {CM} 50 mm) or {INCH} 127 mm)"),
-        (0.1, 1000.0, f"is 100 m, but lengths are in metres; try {M} 100 mm)"),
-        (0.1, 0.001, f"is 0.1 mm, but lengths are in metres; try {M} 100 mm)"),
-        (1e-4, 1.0, "is 0.1 mm, but lengths are in metres; try scale=1000"),
+        (5.0, 1.0, f"is 5 m long; try {CM} 50 mm) or {INCH} 127 mm)"),
+        (0.1, 1000.0, f"is 100 m long; try {M} 100 mm)"),
+        (0.1, 0.001, f"is 0.1 mm long; try {M} 100 mm)"),
+        (1e-4, 1.0, "is 0.1 mm long; try scale=1000"),
     ],
 )
 def test_a_wrong_unit_is_recognised(extent: float, scale: float, expected: str) -> None:
     message = _message(trimesh.creation.box((0.6 * extent, extent, 0.5 * extent)), scale)
-    assert message.startswith("mesh in memory: largest extent is ") and message.endswith(expected)
+    assert message.startswith("mesh in memory: taken as metres, the mesh is ") and message.endswith(
+        expected
+    )
 
 
 @pytest.mark.parametrize("extent", [7e6, 3e-7])
@@ -155,8 +157,15 @@ def test_missing_file(tmp_path: Path) -> None:
         ("a.stl", b"\x00\x01\x02 this is no mesh", "the mesh file has no triangles"),
         ("a.glb", b"glTF but not really", "not a readable .glb mesh"),
         ("a.gltf", b"{]", "not a readable .gltf mesh"),
-        ("a", b"v", "the name has no suffix; those of meshes are .obj, .ply,"),
-        ("a.dae", b"<x/>", ".dae is not one of .obj, .ply, .stl, .off, .glb, .gltf"),
+        ("a", b"v", "the file name has no suffix; give one of .obj, .ply,"),
+        (
+            "a.dae",
+            b"<x/>",
+            (
+                ".dae is not a mesh format that can be read; those are .obj, .ply, .stl, .off,"
+                " .glb, .gltf"
+            ),
+        ),
         ("a.stl", b"\0" * 80 + struct.pack("<I", 0), "the mesh"),
     ],
 )
@@ -231,7 +240,7 @@ def test_closed_sheets_without_thickness() -> None:
     bent = trimesh.creation.icosphere(subdivisions=2, radius=0.05)
     below = bent.vertices[:, 2] < 0
     bent.vertices[below, 2] = -bent.vertices[below, 2] - 2e-8
-    assert "encloses no volume (a sheet without thickness?)" in _message(bent)
+    assert "encloses no volume (is it a sheet without thickness?)" in _message(bent)
 
 
 def test_all_vertices_at_one_point() -> None:
@@ -295,7 +304,7 @@ def test_an_alpha_in_the_colours_does_not_make_a_mesh_translucent(
             mesh = tmp_path / f"{alpha}.glb"
             coloured(kind, alpha).export(mesh)
         loaded = load_mesh(mesh)
-        assert any("colours made opaque" in line for line in loaded.repairs) is told
+        assert any("colours opaque" in line for line in loaded.repairs) is told
         write_visual(loaded.visual, tmp_path / "mesh.obj", rgba=loaded.rgba)
         material = (tmp_path / "mesh.mtl").read_text()
         assert set(re.findall(r"^d (.*)$", material, flags=re.MULTILINE)) == {"1"}

@@ -38,7 +38,7 @@ def test_a_box_without_a_lid(inverted: bool, subdivisions: int) -> None:
     assert result.mesh.volume == pytest.approx(0.1 * 0.06 * 0.04, rel=1e-9)
     assert result.sentences[-1] == (
         "closed 1 openings with flat caps (largest opening 117 mm wide); openings='wall'"
-        " makes a wall of the surface instead"
+        " makes the surface a wall instead"
     )
 
 
@@ -90,7 +90,7 @@ def test_small_fins_are_dropped_and_large_ones_become_walls(subdivisions: int, k
         assert result.mesh.volume - box.volume == pytest.approx(area * 0.002, rel=1e-6)
     else:
         assert result.mesh.volume == pytest.approx(box.volume, rel=1e-12)
-        assert result.sentences == ["dropped 1 faces of fins without thickness"]
+        assert result.sentences == ["dropped 1 faces without thickness"]
 
 
 def test_bodies_that_touch_along_an_edge_are_closed() -> None:
@@ -102,4 +102,4 @@ def test_bodies_that_touch_along_an_edge_are_closed() -> None:
     close_openings(result, "wall", None)
     assert is_closed(result.mesh)
     assert result.mesh.volume == pytest.approx(2e-3)
-    assert result.sentences[-1] == "separated bodies that touch along edges"
+    assert result.sentences[-1] == "separated bodies that touch along an edge"

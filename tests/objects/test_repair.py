@@ -80,7 +80,7 @@ def test_specks_are_dropped(box: trimesh.Trimesh) -> None:
     speck = trimesh.creation.icosphere(subdivisions=1, radius=2e-4).apply_translation([0, 0, 0.1])
     result = repair(trimesh.util.concatenate([box, speck]))
     assert result.mesh.volume == pytest.approx(VOLUME)
-    assert result.sentences == ["dropped 1 specks (80 faces)"]
+    assert result.sentences == ["dropped 1 tiny separate parts (80 faces)"]
 
 
 def test_degenerate_and_duplicate_faces_are_dropped(box: trimesh.Trimesh) -> None:

@@ -60,8 +60,8 @@ def test_walls_thicker_than_the_body_allows(t: float) -> None:
     with pytest.raises(InvalidInputError) as caught:
         solid_of_shell(trimesh.creation.box(BOX).subdivide(), t)
     assert str(caught.value) == (
-        f"wall_thickness is {1e3 * t:.3g} mm, but the body has no room for it: give less than"
-        " 15 mm, or leave it out for a solid body"
+        f"wall_thickness is {1000.0 * t:.3g} mm, which is too much for this body; give"
+        " less than 15 mm, or leave it out for a solid body"
     )
 
 

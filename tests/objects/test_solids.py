@@ -22,7 +22,9 @@ def test_overlap_counts_once() -> None:
     whole, said = _united(_box(0, 0, 0, 4, 1, 1), _box(3, 0, 0, 4, 1, 5))
     assert whole.volume == pytest.approx(4 + 5 - 1)
     assert is_closed(whole)
-    assert said == ["united 2 bodies that overlap (11 % of their volume would have counted twice)"]
+    assert said == [
+        "united 2 bodies that overlap (they share 11 % of their volume, which now counts once)"
+    ]
 
 
 def test_bodies_that_lie_apart_or_touch_with_parts_of_their_faces_stay() -> None:
@@ -67,7 +69,7 @@ def test_fine_spheres_become_coarser_and_stay_where_they_are() -> None:
     assert is_closed(coarse)
     assert len(coarse.faces) <= 20_000
     start, _, away = said.partition(" faces, at most ")
-    assert start == f"decimated from {len(sphere.faces)} to {len(coarse.faces)}"
+    assert start == f"reduced from {len(sphere.faces)} to {len(coarse.faces)}"
     stated = float(away.split()[0]) * 1e-3
     # independent of the code: by how much samples of the coarse one lie below the sphere's surface
     samples, _ = trimesh.sample.sample_surface(coarse, 20_000, seed=5)
@@ -84,7 +86,7 @@ def test_flat_faces_are_decimated_without_deviation() -> None:
     coarse, (said,) = decimated(box, 20_000)
     assert len(coarse.faces) < 200
     assert coarse.volume == pytest.approx(0.1 * 0.06 * 0.03, rel=1e-9)
-    assert said.endswith("at most 0.001 mm away")
+    assert said.endswith("at most 0.001 mm off")
 
 
 def test_surfaces_with_few_faces_stay() -> None:
@@ -100,7 +102,7 @@ def test_what_is_too_rough_stays() -> None:
     )
     same, said = decimated(rough, 5000)
     assert same is rough
-    assert said == ["left at 20480 faces, as it is too rough to decimate"]
+    assert said == ["kept all 20480 faces, as the surface is too rough to reduce"]
 
 
 def test_farthest_is_exact_on_a_box() -> None:

@@ -77,7 +77,7 @@ def test_three_sheets_on_one_edge_become_walls_that_overlap_there() -> None:
     whole, said = united(walls)
     assert whole.volume == pytest.approx((3.0 * a * t - t * t / 2.0) * a, rel=1e-9)
     assert said == [
-        "united 3 bodies that overlap (0.33 % of their volume would have counted twice)"
+        "united 3 bodies that overlap (they share 0.33 % of their volume, which now counts once)"
     ]
 
 

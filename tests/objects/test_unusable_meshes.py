@@ -68,27 +68,35 @@ IN_MEMORY: dict[str, tuple[Callable[[], trimesh.Trimesh], str]] = {
     ),
     "on a line": (
         lambda: _raw(_box(0).vertices * [1, 0, 0], _box(0).faces),
-        "the mesh is flat (0 x 0 x 0 mm); an object needs a volume: wall_thickness"
-        " makes a wall of it",
+        (
+            "the mesh is flat (0 x 0 x 0 mm), but an object needs a volume: wall_thickness"
+            " makes it a wall"
+        ),
     ),
     "perfectly flat": (
         lambda: _raw([[0, 0, 0], [0.2, 0, 0], [0.2, 0.1, 0]], [[0, 1, 2]]),
-        "the mesh is flat (200 x 100 x 0 mm); an object needs a volume: wall_thickness"
-        " makes a wall of it",
+        (
+            "the mesh is flat (200 x 100 x 0 mm), but an object needs a volume:"
+            " wall_thickness makes it a wall"
+        ),
     ),
     "closed sheet without thickness": (
         _doubled,
-        "the closed surface encloses no volume (a sheet without thickness?); give one side of it"
-        " as an open surface, which becomes a wall",
+        (
+            "the closed surface encloses no volume (is it a sheet without thickness?); give"
+            " only one side of it, as an open surface, and it becomes a wall"
+        ),
     ),
     "millimetres": (
         lambda: _raw(1e3 * _box().vertices, _box().faces),
-        "largest extent is 100 m, but lengths are in metres; try unit mm (scale=0.001 makes it"
-        " 100 mm) or unit cm (scale=0.01 makes it 1000 mm)",
+        (
+            "taken as metres, the mesh is 100 m long; try unit mm (scale=0.001 makes it 100"
+            " mm) or unit cm (scale=0.01 makes it 1000 mm)"
+        ),
     ),
     "kilometres": (
         lambda: _raw(1e-3 * _box().vertices, _box().faces),
-        "largest extent is 0.1 mm, but lengths are in metres; try scale=1000",
+        "taken as metres, the mesh is 0.1 mm long; try scale=1000",
     ),
 }
 
@@ -118,7 +126,10 @@ FILES: dict[str, tuple[str, Callable[[], bytes], str]] = {
     "another format": (
         "a.step",
         lambda: b"ISO-10303-21;",
-        ".step is not one of .obj, .ply, .stl, .off, .glb, .gltf",
+        (
+            ".step is not a mesh format that can be read; those are .obj, .ply, .stl, .off,"
+            " .glb, .gltf"
+        ),
     ),
     "truncated": ("a.stl", lambda: _stl()[:3000], f"{STL} it has 3000 of 9684 bytes"),
     "truncated header": (
@@ -155,7 +166,7 @@ def test_a_name_that_is_not_utf_8(tmp_path: Path) -> None:
     with pytest.raises(MeshError) as caught:
         load_mesh(tmp_path / os.fsdecode(b"b\xe4r.obj"))
     assert str(caught.value) == (
-        f"{tmp_path}/b\\xe4r.obj: the name is not UTF-8; rename the file, or the folder it is in"
+        f"{tmp_path}/b\\xe4r.obj: the path is not valid UTF-8; rename the file or its folder"
     )
 
 
@@ -179,7 +190,9 @@ def test_triangles_are_counted_before_a_file_is_read(tmp_path: Path, name: str) 
 def test_meshes_of_too_many_triangles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(size_limits, "MOST_TRIANGLES", 100)
     _box(2).export(tmp_path / "box.ply")
-    with pytest.raises(MeshError, match=r"box\.ply: 192 triangles; a mesh may have 100: decimate"):
+    with pytest.raises(
+        MeshError, match=r"box.ply: 192 triangles; a mesh may have 100: reduce the number of faces"
+    ):
         load_mesh(tmp_path / "box.ply")
     sheet = _raw(_box(2).vertices, _box(2).faces[:80])
     with pytest.raises(

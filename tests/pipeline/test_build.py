@@ -97,7 +97,9 @@ def test_entries_say_what_was_built(meshes: Path, tmp_path: Path) -> None:
 def test_a_density_that_was_assumed_is_reported(meshes: Path, tmp_path: Path) -> None:
     report = build(_sources(meshes), tmp_path / "lib")
     mass = 300.0 * 16 * np.sin(2 * np.pi / 32) * 0.03**2 * 0.1  # a prism with 32 sides
-    assert report.notes["can"] == (f"no mass or density given: {mass:.4g} kg from 300 kg/m^3",)
+    assert report.notes["can"] == (
+        f"no mass or density given: computed {mass:.4g} kg from 300 kg/m^3",
+    )
     assert "box" not in report.notes
 
 
@@ -277,7 +279,7 @@ def test_what_a_killed_build_left_lying_is_removed(meshes: Path, tmp_path: Path)
 def test_names_that_collide(meshes: Path, tmp_path: Path) -> None:
     _box().export(meshes / "box.ply")
     with pytest.raises(
-        InvalidInputError, match=r"2 meshes make the same object 'box': .*Box\.stl, "
+        InvalidInputError, match=r"2 meshes have the same object name 'box': .*Box.stl, "
     ):
         build([meshes / "Box.stl", meshes / "box.ply"], tmp_path / "lib")
 
@@ -308,7 +310,7 @@ def test_objects_of_before_get_a_surface_and_are_told(tmp_path: Path) -> None:
     record.write_text(json.dumps({**data, "version": 2}))
     again = build_library([source], tmp_path, confirm=False)
     assert again.built == ("ring",)
-    told = "built again: pads now touch the object's own surface"
+    told = "built again: finger pads now touch the object's own surface"
     assert told in again.notes["ring"] and told not in first.notes["ring"]
 
 

@@ -113,17 +113,29 @@ def name_a_folder(library: ObjectLibrary) -> None:
     [
         (lose_a_piece, "missing", "box/pieces/000.obj is missing; build it again"),
         (edit_a_piece, "changed", "box/pieces/000.obj was changed after it was built; build"),
-        (change_the_source, "stale", "box.stl has changed since; build it again"),
-        (forget_the_record, "stale", "box was built by another release; build it again"),
-        (age_the_record, "stale", "box was built by another release; build it again"),
+        (
+            change_the_source,
+            "stale",
+            "box.stl has changed since the object was built; build it again",
+        ),
+        (
+            forget_the_record,
+            "stale",
+            "box was built by another release of burg_drake; build it again",
+        ),
+        (age_the_record, "stale", "box was built by another release of burg_drake; build it again"),
         (
             edit_the_document,
             "changed",
-            "library.yaml says other than what was built",
+            "library.yaml was edited: its values differ from what was built",
         ),
-        (forget_the_object, "missing", "box is an object that library.yaml does not list; add"),
+        (forget_the_object, "missing", "box is an object that is not in library.yaml; add"),
         (break_the_model, "broken", "box.sdf: "),
-        (damage_the_source, "stale", "box.stl has changed since; build it again"),
+        (
+            damage_the_source,
+            "stale",
+            "box.stl has changed since the object was built; build it again",
+        ),
         (name_a_mesh_elsewhere, "missing", "lib/mesh.obj is missing; build it again"),
         (name_a_folder, "missing", "lib is missing; build it again"),
     ],
@@ -150,8 +162,11 @@ def test_pads_that_meet_pieces_are_told(tmp_path: Path) -> None:
     assert [(i.kind, i.message) for i in told] == [
         (
             "unsure",
-            "pads touch 1 convex piece, because its surface is not closed; make the mesh watertight"
-            " and smooth it, or accept the pieces by 'contact: pieces' in an objects.yaml",
+            (
+                "finger pads touch 1 convex piece, because its surface is not closed; make"
+                " the mesh watertight and smooth it, or accept that by 'contact: pieces' in"
+                " an objects.yaml"
+            ),
         )
     ]
 
@@ -170,9 +185,11 @@ def test_implausible_values(tmp_path: Path) -> None:
     kinds = [(issue.object, issue.kind) for issue in issues]
     assert ("leaden", "implausible") in kinds and ("ring", "implausible") in kinds
     messages = "\n".join(issue.message for issue in issues)
-    assert "friction 4 is not that of household materials (0.05 to 1.5)" in messages
-    assert "the convex pieces are coarse: " in messages
-    assert "mass 0.0194 kg was not given; it follows from 1000 kg/m^3" in messages
+    assert "friction 4 is unusual: household materials have 0.05 to 1.5" in messages
+    assert "the convex pieces do not fit well: " in messages
+    assert (
+        "mass 0.0194 kg was computed from a density of 1000 kg/m^3, as none was given" in messages
+    )
     assert found["leaden", "unsure"] == "its stable poses were not confirmed in simulation"
 
 
@@ -184,7 +201,7 @@ def test_missing_textures_are_told(tmp_path: Path) -> None:
     source = ObjectSource.from_file(tmp_path / "box.obj", mass=0.1, contact="pieces")
     report = build_library([source], tmp_path / "lib", confirm=False)
     assert not report.failed
-    told = "box.mtl names front.png, which is missing: the object is shown without its texture"
+    told = "box.mtl names front.png, which is missing, so the object is shown without its texture"
     assert any(note.startswith(told) for note in report.notes["box"])
     assert any(issue.message.startswith(told) for issue in check_library(report.library))
     Image.new("RGB", (4, 4)).save(tmp_path / "front.png")
@@ -216,6 +233,6 @@ def test_what_names_a_texture(name: str, text: str, tmp_path: Path) -> None:
 def test_advice_on_coarse_pieces_is_what_was_not_tried() -> None:
     """At the default threshold and below, finer cuts were tried already."""
     coarse = Fit(volume_ratio=1.6, hausdorff=0.01)
-    assert "a lower decomposition.threshold" in deviation_warning(coarse, 0.1, 0.2)
+    assert "lower decomposition.threshold" in deviation_warning(coarse, 0.1, 0.2)
     for threshold in (0.05, 0.01, None):
         assert "pieces of your own" in deviation_warning(coarse, 0.1, threshold)

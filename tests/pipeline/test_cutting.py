@@ -27,7 +27,7 @@ def test_a_finer_cut_by_itself(tmp_path: Path, ring: trimesh.Trimesh) -> None:
     assert union_mesh(pieces).volume < 1.1 * ring.volume
     assert entry.decomposition == Decomposition(threshold=0.02)
     (note,) = report.notes["ring"]
-    assert note.startswith("cut again with threshold 0.02 in place of 0.05, as the ")
+    assert note.startswith("cut again with decomposition.threshold 0.02 instead of 0.05, as the ")
     assert not [i for i in check_library(report.library) if "coarse" in i.message]
     heavier = ObjectSource(name="ring", mesh=ring, mass=0.06, contact="pieces", friction=0.3)
     again = build_library([heavier], tmp_path, confirm=False)
@@ -43,5 +43,5 @@ def test_a_threshold_that_was_asked_for_stays(tmp_path: Path, ring: trimesh.Trim
     )
     report = build_library([source], tmp_path, confirm=False)
     (note,) = report.notes["ring"]
-    assert note.startswith("the convex pieces are coarse: ")
+    assert note.startswith("the convex pieces do not fit well: ")
     assert note in [issue.message for issue in check_library(report.library)]

@@ -74,19 +74,19 @@ def test_objects_without_a_mass_are_fixed_and_all_named() -> None:
     sources = burg_sources(library, {"wall_0": 1.0})
     assert [s.name for s in sources if s.fixed] == [f"wall_{i}" for i in range(1, 10)]
     assert fixed_note(library, sources) == (
-        "object_library.yaml: fixed in BURG-Toolkit, as of mass 0, and hence background of scenes:"
-        " wall_1, wall_2, wall_3, wall_4, wall_5, wall_6, wall_7, wall_8, wall_9; what has a mass"
-        " is free"
+        "object_library.yaml: these objects have mass 0 in BURG-Toolkit and become"
+        " background, which does not move: wall_1, wall_2, wall_3, wall_4, wall_5,"
+        " wall_6, wall_7, wall_8, wall_9"
     )
     assert fixed_note(library, sources[:2]) == ""
 
 
 def test_values_for_objects_that_are_not_there() -> None:
     assert message_of(UnknownNameError, burg(MUG, TABLE), {"tabel": 1.0}) == (
-        "a mass is given for 'tabel'; did you mean 'table'? Known: mug_10f6, table"
+        "a mass is given for unknown object 'tabel'; did you mean 'table'? Known: mug_10f6, table"
     )
     assert message_of(UnknownNameError, burg(MUG, TABLE), skip=["wall"]) == (
-        "skip is given for 'wall'; known: mug_10f6, table"
+        "skip is given for unknown object 'wall'; known: mug_10f6, table"
     )
     assert message_of(InvalidInputError, burg(TABLE), {"table": 0.0}) == (
         "table: mass is 0 kg; it must be above 0 (leave it out to use a density)"
@@ -126,7 +126,10 @@ def test_a_weighed_ycb_object() -> None:
     assert (mug.mass, mug.description) == (0.12, "YCB 025 mug")
     with pytest.raises(UnknownNameError) as caught:
         ycb_sources([ycb("025_mug", 0.118)], {"mug": 0.12})
-    assert str(caught.value) == "a mass is given for 'mug'; did you mean '025_mug'? Known: 025_mug"
+    assert (
+        str(caught.value)
+        == "a mass is given for unknown object 'mug'; did you mean '025_mug'? Known: 025_mug"
+    )
 
 
 def down(direction: tuple[float, float, float], turn: float = 0.0, height: float = 0.1) -> Pose:
@@ -174,8 +177,8 @@ def test_recorded_poses_of_a_brick(tmp_path: Path) -> None:
     assert (comparison.listed, comparison.distinct, comparison.here) == (5, 3, 3)
     assert comparison.unknown == (4,)
     assert comparison.sentence("object_library.yaml") == (
-        "object_library.yaml lists 5 stable poses (3 different), 3 poses here; 1 of the listed is"
-        " none of these"
+        "object_library.yaml lists 5 stable poses (3 different), 3 poses found here; 1 of the"
+        " listed was not found"
     )
 
 
@@ -187,5 +190,6 @@ def test_recorded_poses_of_a_can(tmp_path: Path) -> None:
     comparison = compare_poses([*sides, down((0, 0, -1))], library, "a")
     assert (comparison.listed, comparison.distinct, comparison.unknown) == (10, 2, ())
     assert (
-        comparison.sentence("l.yaml") == "l.yaml lists 10 stable poses (2 different), 2 poses here"
+        comparison.sentence("l.yaml")
+        == "l.yaml lists 10 stable poses (2 different), 2 poses found here"
     )

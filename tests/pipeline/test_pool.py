@@ -61,7 +61,7 @@ def test_errors_and_a_worker_that_dies_cost_one_object_each(
     report = build_library(sources, tmp_path / "lib", confirm=False, workers=2)
     assert report.built == ("box_0", "box_1")
     assert report.failed == {
-        "fatal": "the worker process was ended from outside by SIGKILL",
+        "fatal": "the worker process was killed from outside by SIGKILL",
         "nan": f"{tmp_path / 'nan.obj'}: 1 of 3 vertices are NaN or infinite",
     }
     assert not (tmp_path / "lib" / "fatal").exists()

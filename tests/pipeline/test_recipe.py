@@ -162,10 +162,10 @@ KNOWN = (
         ("version: 1\nobjects:\n  mug: {mesh: ''}\n",
          "FILE:3: objects.mug: mesh is empty; give a mesh file"),
         ("version: 1\nobjects:\n  a: {mesh: a.obj}\n  My Mug: {mesh: b.obj}\n",
-         "FILE:4: objects: 'My Mug' is not a name for an object; use a-z, 0-9 and underscores, such"
-         " as 'my_mug'"),
+         ("FILE:4: objects: 'My Mug' is not a valid object name; use a-z, 0-9 and"
+             " underscores, such as 'my_mug'")),
         ("version: 1\nobjects:\n  '---': {mesh: a.obj}\n",
-         "FILE:3: objects: '---' is not a name for an object; use a-z, 0-9 and underscores"),
+         "FILE:3: objects: '---' is not a valid object name; use a-z, 0-9 and underscores"),
         ("version: 1\nobjects:\n  a: {mesh: a.obj}\n  a: {mesh: b.obj}\n",
          "FILE:4: objects: key 'a' is given twice"),
         (one("    freight: 0.4\n"), f"FILE:5: objects.mug: unknown key 'freight'; known: {KNOWN}"),
@@ -178,7 +178,7 @@ KNOWN = (
         (one("    wall_thickness: 0\n"),
          "FILE:4: objects.mug: wall_thickness is 0 m; it must be above 0"),
         (one("    friction: -0.1\n"),
-         "FILE:4: objects.mug: friction is -0.1; it must be 0 or more"),
+         "FILE:4: objects.mug: friction is -0.1; it must be at least 0"),
         (one("    mass: 0.1\n    density: 800\n"),
          "FILE:4: objects.mug: give mass or density, not both"),
         (one("    unit: mm\n    scale: 0.001\n"),
@@ -196,10 +196,10 @@ KNOWN = (
         (one("    inertia: [1, 1, 1]\n"),
          "FILE:5: objects.mug.inertia: has 3 entries; expected 6"),
         (one("    inertia: [1, 1, 0, 0, 0, 0]\n"),
-         "FILE:4: objects.mug: inertia is [1.0, 1.0, 0.0, 0.0, 0.0, 0.0]; its moments Ixx, Iyy, Izz"
-         " must be above 0"),
+         ("FILE:4: objects.mug: inertia is [1.0, 1.0, 0.0, 0.0, 0.0, 0.0]; its moments"
+             " Ixx, Iyy and Izz must be above 0")),
         (one("    rgba: [1, 0, 0, 255]\n"),
-         "FILE:4: objects.mug: rgba is [1.0, 0.0, 0.0, 255.0]; each must be in [0, 1]"),
+         "FILE:4: objects.mug: rgba is [1.0, 0.0, 0.0, 255.0]; each number must be from 0 to 1"),
         (one("    decomposition: {thresh: 0.1}\n"),
          "FILE:5: objects.mug.decomposition: unknown key 'thresh'; did you mean 'threshold'? Known:"
          " join, max_vertices, min_thickness, seed, threshold, timeout, tolerance"),

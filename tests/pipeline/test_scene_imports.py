@@ -76,8 +76,8 @@ def test_an_instance_is_not_called_like_something_of_every_station() -> None:
     names = [i.name for i in imported.document.background]
     assert names == [*(f"{name}_1" for name in MODEL_NAMES), "table_2"]
     assert imported.notes[0] == (
-        "an instance of 'table' is called 'table_1', as something of every station is called"
-        " 'table'"
+        "an instance of object 'table' is called 'table_1', as every station has"
+        " something called 'table' already"
     )
 
 
@@ -89,7 +89,9 @@ def test_what_has_no_mass_is_background() -> None:
     imported = import_burg_scene(scene(("mug", "box")), library)
     assert [i.object for i in imported.document.instances] == ["mug"]
     assert [i.object for i in imported.document.background] == ["box"]
-    assert imported.notes == ("there/scene.yaml:11: 'box' has no mass, and stays fixed",)
+    assert imported.notes == (
+        "there/scene.yaml:11: 'box' has no mass, so it becomes background, which does not move",
+    )
 
 
 PRINTOUT = BurgPrintout(

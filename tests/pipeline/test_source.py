@@ -28,7 +28,7 @@ def test_names_from_file_stems(text: str, name: str) -> None:
 
 
 def test_stems_without_letters() -> None:
-    with pytest.raises(InvalidInputError, match="'---' makes no object name"):
+    with pytest.raises(InvalidInputError, match="'---' gives no object name"):
         object_name("---")
 
 
@@ -40,14 +40,14 @@ def test_stems_without_letters() -> None:
         ({"mass": math.nan}, "box: mass is nan kg; it must be above 0"),
         ({"density": 0.0}, "box: density is 0 kg/m^3; it must be above 0"),
         ({"scale": -1.0}, "box: scale is -1; it must be above 0"),
-        ({"friction": -0.1}, "box: friction is -0.1; it must be 0 or more"),
-        ({"friction": math.nan}, "box: friction is nan; it must be 0 or more"),
+        ({"friction": -0.1}, "box: friction is -0.1; it must be at least 0"),
+        ({"friction": math.nan}, "box: friction is nan; it must be at least 0"),
         (
             {"rgba": (1.0, 0.0, 0.0, 2.0)},
-            "box: rgba is (1.0, 0.0, 0.0, 2.0); each must be in [0, 1]",
+            "box: rgba is (1.0, 0.0, 0.0, 2.0); each number must be from 0 to 1",
         ),
-        ({"name": "My Box"}, "'My Box' is not a name for an object; use a-z, 0-9 and underscores"),
-        ({"name": "../x"}, "'../x' is not a name for an object"),
+        ({"name": "My Box"}, "'My Box' is not a valid object name; use a-z, 0-9 and underscores"),
+        ({"name": "../x"}, "'../x' is not a valid object name; object"),
     ],
 )
 def test_numbers_that_no_object_has(change: dict, message: str) -> None:  # type: ignore[type-arg]

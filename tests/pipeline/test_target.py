@@ -42,7 +42,9 @@ def test_a_folder_of_the_users_is_not_replaced(cube: Path) -> None:
     work = cube.parent.parent
     before = _contents(work)
     for source in (cube, _source()):
-        with pytest.raises(InvalidInputError, match="work/cube exists and is no object of this"):
+        with pytest.raises(
+            InvalidInputError, match="work/cube exists and is not an object of this"
+        ):
             build_library([_source("aaa"), source], work)
         assert _contents(work) == before
 
@@ -53,7 +55,7 @@ def test_a_file_or_link_of_the_users_is_not_replaced(tmp_path: Path, cube: Path)
     (tmp_path / "lib" / "file").write_text("mine")
     before = _contents(tmp_path)
     for name in ("cube", "file"):
-        with pytest.raises(InvalidInputError, match=f"lib/{name} exists and is no object"):
+        with pytest.raises(InvalidInputError, match=f"lib/{name} exists and is not an object"):
             build_library([_source(name)], tmp_path / "lib")
     assert _contents(tmp_path) == before
     assert os.readlink(tmp_path / "lib" / "cube") == str(tmp_path / "nowhere")
@@ -67,7 +69,7 @@ def test_links_in_a_circle(tmp_path: Path, cube: Path) -> None:
     (tmp_path / "loop.obj").symlink_to("loop.obj")
     report = build_library([tmp_path / "loop.obj"], tmp_path / "lib", confirm=False)
     assert report.failed["loop"].endswith(
-        "loop.obj: a link to a file that does not exist, or to itself"
+        "loop.obj: this link points to a file that does not exist, or to itself"
     )
 
 

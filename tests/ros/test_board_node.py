@@ -81,7 +81,7 @@ def test_resolution_may_change(
     seen = [node.locate(*pair) for pair in ((message, whole), (small, whole), (small, part))]
     assert [sighting.estimate.valid for sighting in seen] == [True, False, True]
     assert seen[1].estimate.reason == (
-        "the image has 580 x 400 pixels, its camera_info says 640 x 480"
+        "the image has 580 x 400 pixels, but its camera_info says 640 x 480"
     )
     assert pytest.approx(X_SC, abs=1e-3) == seen[2].estimate.X_SC
     for sighting in seen:
@@ -93,7 +93,7 @@ def test_resolution_may_change(
 def test_without_camera_info_the_overlay_says_so(scene: Scene, message: Any) -> None:
     node = BoardNode(scene)
     sighting = node.locate(message, None)
-    assert "no camera_info yet" in sighting.estimate.reason
+    assert "no camera_info has arrived yet" in sighting.estimate.reason
     drawn = node.draw(sighting)
     assert drawn is not None
     changed = (drawn != sighting.image).any(axis=2)

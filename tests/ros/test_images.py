@@ -101,9 +101,9 @@ def test_the_image_is_the_callers_own(image_message: Callable[..., Any]) -> None
 @pytest.mark.parametrize(
     ("fields", "text"),
     [
-        ({"step": 17}, r"damaged image: 72 bytes in rows of 17 are no 6 x 4 pixels of rgb8"),
+        ({"step": 17}, "damaged image: 72 bytes in rows of 17 do not make 6 x 4 pixels of rgb8"),
         ({"data": RGB.tobytes()[:-1]}, "damaged image: 71 bytes in rows of 18"),
-        ({"height": 0}, "no 6 x 0 pixels"),
+        ({"height": 0}, "do not make 6 x 0 pixels"),
         ({"encoding": "32FC1"}, "encoding '32FC1' are not read; known: .*bgr8.*rgb8"),
     ],
 )

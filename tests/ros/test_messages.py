@@ -102,7 +102,7 @@ def test_status(ros2_classes: MessageClasses, sighting: Sighting) -> None:
     assert status_message(ros2_classes, lost).data == "no pose: too dark"
     nameless = replace(sighting, camera_frame="")
     assert status_message(ros2_classes, nameless).data == (
-        "3 markers, 0.12 px; not on tf, as the images name no frame_id"
+        "3 markers, 0.12 px; not sent to tf, as the images have no frame_id"
     )
 
 

@@ -269,7 +269,9 @@ def check_compressed_overlay(trial: Trial) -> None:
 def check_what_is_wrong_is_said_and_the_nodes_go_on(trial: Trial) -> None:
     for node in ("first", "second"):
         text = step(trial, "size")[f"{node}/status"]["text"]
-        assert text == "no pose: the image has 1280 x 960 pixels, its camera_info says 640 x 480"
+        assert (
+            text == "no pose: the image has 1280 x 960 pixels, but its camera_info says 640 x 480"
+        )
     assert step(trial, "empty")["first/status"]["text"].startswith("no pose: no marker")
     for name in LOST:
         assert step(trial, name)["first/overlay"]["frame"] == CAMERA

@@ -63,7 +63,7 @@ def test_silence_is_told_once_and_again_after_images() -> None:
     account.record_image(FOUND, 10.0 * HINT_AFTER)
     assert account.record_silence({"/image": 1}, 10.5 * HINT_AFTER) is None
     assert account.record_silence({"/image": 1}, 11.5 * HINT_AFTER) == (
-        "no images on /image, though it is published; still waiting"
+        "/image is published, but no images arrive; still waiting"
     )
 
 

@@ -68,7 +68,7 @@ def test_as_many_as_fit() -> None:
         (Markers(dictionary="ARUCO_MIP_36h21"), r"did you mean 'ARUCO_MIP_36h12'\?"),
         (
             Markers(first_id=200),
-            "54 markers from 200 on need more than the 250",
+            "54 markers with ids from 200 on need more than the 250",
         ),
     ],
 )
@@ -85,6 +85,6 @@ def test_documents_are_checked() -> None:
             Markers(side=wrong)
         with pytest.raises(InvalidInputError, match="above 0 and finite"):
             Markers(spacing=wrong)
-    with pytest.raises(InvalidInputError, match="needs a column and a row"):
+    with pytest.raises(InvalidInputError, match="must have at least one column and one row"):
         Markers(count=(0, 3))
     assert Board().layout.ids[0] == 0

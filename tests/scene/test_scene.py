@@ -57,12 +57,17 @@ def edit(path: Path, old: str, new: str) -> Path:
     ("old", "new", "error", "message"),
     [
         ("object: slab", "object: slap", UnknownNameError, "background[0]: object 'slap'"),
-        ("{object: slab}", "{name: second, object: slab}", DocumentError, "'second' is used twice"),
+        (
+            "{object: slab}",
+            "{name: second, object: slab}",
+            DocumentError,
+            "'second' is used already",
+        ),
         ("[0.3, 0.2, 0.0]", "[0.3, .nan, 0.0]", DocumentError, "'.nan' is not a finite number"),
         ("library: boxes", "library: bocks", UnknownNameError, "by_hand.yaml: library: bocks does"),
         ("name: second", "name: a/b", DocumentError, "instances[1]: name 'a/b' cannot be used in"),
         ("name: by_hand", "nam: by_hand", DocumentError, "unknown key 'nam'; did you mean 'name'?"),
-        ("instances:", "board: {size: [0, 1]}\ninstances:", DocumentError, "must be positive"),
+        ("instances:", "board: {size: [0, 1]}\ninstances:", DocumentError, "must be above 0"),
     ],
 )
 def test_mistakes_are_named(
@@ -118,5 +123,8 @@ def test_what_has_no_mass_cannot_be_free(make_scene: MakeScene, library: ObjectL
     library.objects["cube"] = dataclasses.replace(cube, mass_properties=fixed)
     library.save()
     assert list(make_scene(background=(("cube",),)).background) == ["fixed_0"]
-    with pytest.raises(DocumentError, match=r"instances\[0\]: 'cube' has no mass; list it under"):
+    with pytest.raises(
+        DocumentError,
+        match=r"instances\[0\]: 'cube' has no mass, so it cannot be a free object; list it under",
+    ):
         make_scene(("cube",))

@@ -116,8 +116,8 @@ def test_require_sound_gives_one_line(make_scene: MakeScene) -> None:
     with pytest.raises(InvalidInputError) as caught:
         require_no_errors(scene, validate_scene(scene))
     assert str(caught.value) == (
-        f"{scene.path}: 'cube_0' is out of bounds: 30.0 mm over the left edge of the board"
-        f" (600 x 400 mm) (and 1 more; burg-drake scene validate lists all)"
+        f"{scene.path}: 'cube_0' is off the board: 30.0 mm over the left edge of the board"
+        " (600 x 400 mm) (and 1 more; burg-drake scene validate lists all)"
     )
 
 
@@ -132,5 +132,5 @@ def test_read_vertices_reads_vertices_only(make_scene: MakeScene) -> None:
 def test_damaged_meshes(make_scene: MakeScene, content: bytes) -> None:
     scene = make_scene(("cube", (0.3, 0.2, 0.0)))
     scene.library.path("cube/mesh.obj").write_bytes(content)
-    with pytest.raises(InvalidInputError, match=r"cube/mesh\.obj is damaged or no mesh; build the"):
+    with pytest.raises(InvalidInputError, match=r"cube/mesh.obj is damaged or not a mesh; build"):
         validate_scene(scene)

@@ -28,7 +28,10 @@ from burg_drake.station.document.station_document import Arm, Camera, Pose
         (lambda: Engine(name="slow", time_step=1e-300), "time_step of engine 'slow' is 1e-300"),
         (lambda: replace(load_hand("panda_hand"), closing_speed=1e-9), "takes 4e\\+07 s to close"),
         (lambda: Arm(home=(0.0,), velocity=(1e-300,)), "velocity limits must be 0.001 or more"),
-        (lambda: ArmControl(kp=(1e300,)), "kp .* must be one number or one a joint, 0.001 to 1e"),
+        (
+            lambda: ArmControl(kp=(1e300,)),
+            r"kp .* must be one number, or one for each joint, from 0.001 to 1e",
+        ),
         (
             lambda: Camera(X_WC=Pose(), width=10**9),
             "width of a camera is 1e.09; it must be 1 to",

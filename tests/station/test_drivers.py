@@ -242,21 +242,27 @@ def test_an_applied_force_is_felt_in_joints_and_wrist(free: StationDiagram) -> N
     [
         (
             {"arm__position": np.zeros(7), "arm__desired_state": np.zeros(14)},
-            r"^arm.position and arm.desired_state are both connected; an arm follows one of them$",
+            "^ports arm.position and arm.desired_state are both connected; connect one of them$",
         ),
         (
             {"hand__position": [0.1], "hand__desired_state": np.zeros(4)},
-            r"^hand.position and hand.desired_state are both connected; a hand follows one",
+            "^ports hand.position and hand.desired_state are both connected; connect one",
         ),
-        ({"hand__position": [40.0]}, r"^hand.position is 40 m; the pads of 'panda_hand' are 0 to "),
+        (
+            {"hand__position": [40.0]},
+            "^hand.position is 40 m; the pads of 'panda_hand' can be 0 to ",
+        ),
         ({"hand__force_limit": [70.0]}, r"^hand.force_limit is 70 N; give more than 0 and at most"),
         ({"hand__force_limit": [0.0]}, r"^hand.force_limit is 0 N; give more than 0"),
         (
             {"arm__position": [0, 0, 0, -1, 0, 1, np.nan]},
-            r"^arm.position wants panda_joint7 at nan rad and .* rad/s; give finite numbers$",
+            r"^arm.position asks panda_joint7 for nan rad and .* rad/s; give finite numbers$",
         ),
-        ({"hand__desired_state": [0, 0, np.nan, 0]}, r"^hand.desired_state wants fingers at \[nan"),
-        ({"plan": [1, 2]}, r"^the port 'plan' got a list; it takes a burg_drake Plan$"),
+        (
+            {"hand__desired_state": [0, 0, np.nan, 0]},
+            r"^hand.desired_state asks for finger speeds of \[nan",
+        ),
+        ({"plan": [1, 2]}, "^port 'plan' got a list; give a burg_drake Plan$"),
     ],
 )
 def test_commands_that_cannot_be_followed(
@@ -295,8 +301,8 @@ def test_an_arm_with_actuators_in_another_order(empty: Scene, tmp_path: Path) ->
     document = replace(station.document, arm=arm)
     with pytest.raises(
         InvalidInputError,
-        match=r"arm.urdf has actuators for elbow, shoulder, and joints in another order .* write"
-        r" them as shoulder, elbow$",
+        match=r"arm.urdf: the actuators are in the order elbow, shoulder, which differs from"
+        r" that of the joints .* write them in the order shoulder, elbow$",
     ):
         build_station_diagram(
             empty, replace(station, document=document, arm_model=model), drivers=True

@@ -53,13 +53,25 @@ def test_hand_poses_bring_the_grasp_frame_to_the_goal(panda: Hand) -> None:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"opening": (0.08, 0.0)}, r"opening \[0.08, 0.0\] must rise from 0"),
-        ({"opening": (-0.01, 0.08)}, r"opening \[-0.01, 0.08\] must rise from 0"),
-        ({"force": 0.0}, "force is 0 N; it has to be above 0"),
-        ({"closing_speed": -0.05}, "closing_speed is -0.05 m/s; it has to be above 0"),
-        ({"fingers": (STUCK, STUCK)}, "finger 'a': closed and open are both 0.02 m"),
-        ({"fingers": (MOVING, MOVING)}, "both fingers name the body 'a'"),
-        ({"fingers": (MOVING, replace(MOVING, body="b"))}, "both fingers name the joint 'j'"),
+        (
+            {"opening": (0.08, 0.0)},
+            (
+                r"opening \[0.08, 0.0\] must be two distances in metres, the smaller one first"
+                r" and at least 0"
+            ),
+        ),
+        (
+            {"opening": (-0.01, 0.08)},
+            (
+                r"opening \[-0.01, 0.08\] must be two distances in metres, the smaller one"
+                r" first and at least 0"
+            ),
+        ),
+        ({"force": 0.0}, "force is 0 N; it must be above 0"),
+        ({"closing_speed": -0.05}, "closing_speed is -0.05 m/s; it must be above 0"),
+        ({"fingers": (STUCK, STUCK)}, "finger 'a': closed and open must differ; both are 0.02 m"),
+        ({"fingers": (MOVING, MOVING)}, "both fingers name the same body, 'a'"),
+        ({"fingers": (MOVING, replace(MOVING, body="b"))}, "both fingers name the same joint, 'j'"),
     ],
 )
 def test_bad_figures(panda: Hand, wrong: dict[str, object], message: str) -> None:
@@ -116,15 +128,15 @@ WRONG_DOCUMENTS = {
     ),
     "limits": (
         lambda h: one_finger(h, open=0.05),
-        "fingers[1].open is 0.05 m; joint 'panda_finger_joint2' goes from 0 to 0.04 m",
+        "fingers[1].open is 0.05 m, but joint 'panda_finger_joint2' goes from 0 to 0.04 m",
     ),
     "opening": (
         lambda h: replace(h, opening=(0.0, 0.1)),
-        "with both fingers open the pads are 80.0 mm apart along x of G; opening says 100.0 mm",
+        "with both fingers open the pads are 80.0 mm apart along x of G, but opening says 100.0 mm",
     ),
     "closed": (
         lambda h: one_finger(h, closed=0.002),
-        "with both fingers closed the pads are 2.0 mm apart along x of G; opening says 0.0 mm",
+        "with both fingers closed the pads are 2.0 mm apart along x of G, but opening says 0.0 mm",
     ),
     "swapped": (
         lambda h: replace(h, fingers=h.fingers[::-1]),
@@ -150,11 +162,11 @@ WRONG_DOCUMENTS = {
     ),
     "force": (
         lambda h: replace(h, force=80.0),
-        "force 80 N is more than the 70 N that joint 'panda_finger_joint1' has in",
+        "force is 80 N, but the effort limit of joint 'panda_finger_joint1' in",
     ),
     "speed": (
         lambda h: replace(h, closing_speed=0.1),
-        "closing_speed 0.1 m/s is more than the 0.05 m/s that joint 'panda_finger_joint1' has in",
+        "closing_speed is 0.1 m/s, but the velocity limit of joint 'panda_finger_joint1' in",
     ),
     "uncoupled": (
         lambda h: replace(h, coupled=False),
@@ -174,11 +186,30 @@ def test_document_that_does_not_fit_its_model(panda: Hand, wrong: str) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("force: 30.0", "force: -30", "15: force is -30 N; it has to be above 0"),
-        ("[0.0, 0.11]", "[0.11, 0.0]", "14: opening [0.11, 0.0] must rise from 0 or above [m]"),
-        ("wsg_right_joint", "wsg_left_joint", "21: both fingers name the joint 'wsg_left_joint'"),
-        ("wsg_right_finger", "wsg_left_finger", "21: both fingers name the body 'wsg_left_finger'"),
-        ("open: 0.055", "open: 0.0", "20: finger 'wsg_left_finger': closed and open are both 0 m"),
+        ("force: 30.0", "force: -30", "15: force is -30 N; it must be above 0"),
+        (
+            "[0.0, 0.11]",
+            "[0.11, 0.0]",
+            (
+                "14: opening [0.11, 0.0] must be two distances in metres, the smaller one"
+                " first and at least 0"
+            ),
+        ),
+        (
+            "wsg_right_joint",
+            "wsg_left_joint",
+            "21: both fingers name the same joint, 'wsg_left_joint'",
+        ),
+        (
+            "wsg_right_finger",
+            "wsg_left_finger",
+            "21: both fingers name the same body, 'wsg_left_finger'",
+        ),
+        (
+            "open: 0.055",
+            "open: 0.0",
+            "20: finger 'wsg_left_finger': closed and open must differ; both are 0 m",
+        ),
         ("/wsg_50.sdf", "/wsg.sdf", " model: package://burg_drake/models/wsg/wsg.sdf does not"),
         (
             "{translation: [0.0, 0.0, 0.1455]}",
@@ -189,7 +220,7 @@ def test_document_that_does_not_fit_its_model(panda: Hand, wrong: str) -> None:
         (
             "[0.0, 0.11]",
             "[0.0, 0.1]",
-            " hand 'wsg_50': with both fingers open the pads are 110.0 mm apart along x of G;",
+            " hand 'wsg_50': with both fingers open the pads are 110.0 mm apart along x of G, but",
         ),
     ],
 )
@@ -232,8 +263,8 @@ def changed_model(folder: Path, old: str, new: str) -> Path:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        (MIMIC, MIMIC.replace('"1"', '"0.5"'), "the model couples the fingers .mimic. in another"),
-        (MIMIC, MIMIC.replace('"1"', '"-1"'), "the model couples the fingers .mimic. in another"),
+        (MIMIC, MIMIC.replace('"1"', '"0.5"'), "the model moves the fingers .mimic. in another"),
+        (MIMIC, MIMIC.replace('"1"', '"-1"'), "the model moves the fingers .mimic. in another"),
         (COMPLIANT, "", r"fingers\[0\].pad 'pad' is not compliant; give it drake:compliant_hydroe"),
         (COMPLIANT, "<drake:rigid_hydroelastic/>", r"fingers\[0\].pad 'pad' is not compliant"),
         ('name="pad"', 'name="tip"', r"fingers\[0\].pad 'pad' is not in its model"),
@@ -245,7 +276,7 @@ def changed_model(folder: Path, old: str, new: str) -> Path:
         (
             "    <drake:collision_filter_group",
             LOOSE_LINK.replace("<parent>panda_hand<", "<parent>world<"),
-            "joint 'tilt' connects 'camera' to the world; remove it",
+            "joint 'tilt' fixes 'camera' to the world; remove it",
         ),
         ("<sdf ", "<sfd ", "cannot be loaded as one model"),
         (

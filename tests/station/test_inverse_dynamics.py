@@ -182,7 +182,7 @@ def test_documents(tmp_path: Path) -> None:
     assert arm is not None and arm.control == ArmControl(kind="inverse_dynamics", kp=(900.0,))
     path.write_text(text % "-1")
     with pytest.raises(
-        DocumentError, match=r"station.yaml:5: .*kp \[-1.0\] must be one number or one a jo"
+        DocumentError, match=r"station.yaml:5: .*kp \[-1.0\] must be one number, or one for each jo"
     ):
         load_document(path, StationDocument)
 
@@ -193,11 +193,14 @@ def test_documents(tmp_path: Path) -> None:
         (ArmControl(kp=(1.0, 2.0)), r"yaml: arm.control.kp has 2 numbers; give one, or one for ea"),
         (
             ArmControl(kind="inverse_dynamics", kd=(600.0,)),
-            r"arm.control.kd of 600 1/s is too stiff for steps of 2 ms; stay below 500",
+            "arm.control.kd of 600 1/s is too stiff for time steps of 2 ms; give less than",
         ),
         (
             ArmControl(kind="inverse_dynamics", kp=(9e5,), kd=(10.0,)),
-            r"arm.control.kp of 900000 1/s\^2 is too stiff for steps of 2 ms; stay below 250000",
+            (
+                r"arm.control.kp of 900000 1/s\^2 is too stiff for time steps of 2 ms; give"
+                r" less than 250000"
+            ),
         ),
     ],
 )

@@ -116,17 +116,17 @@ def test_what_no_body_has(tmp_path: Path, old: str, key: str, number: str) -> No
 @pytest.mark.parametrize(
     "old, new, message",
     [
-        ("<mass>0.2<", "<mass>0<", "4: link 'slide': mass is 0; it has to be above 0, unless"),
+        ("<mass>0.2<", "<mass>0<", "4: link 'slide': mass is 0; it must be above 0 unless"),
         ("<pose>0 0 0.1", "<pose>nan 0 0.1", "6: link 'slide', collision 'pad': pose is nan 0 0.1"),
-        (">1 0 0</xyz", ">0 0 0</xyz", "14: joint 'rail': axis is 0 0 0; it has to be a direction"),
-        ("<lower>0<", "<lower>nan<", "15: joint 'rail': lower is nan; it has to be a number, or"),
-        ("<upper>0.1<", "<upper>-0.1<", "15: joint 'rail': lower is 0, above upper, which is -0.1"),
-        ("<effort>-1<", "<effort>nan<", "15: joint 'rail': effort is nan; it has to be a number"),
+        (">1 0 0</xyz", ">0 0 0</xyz", "14: joint 'rail': axis is 0 0 0; it must be a direction"),
+        ("<lower>0<", "<lower>nan<", "15: joint 'rail': lower is nan; it must be a number, or"),
+        ("<upper>0.1<", "<upper>-0.1<", "15: joint 'rail': lower is 0, which is above upper, -0.1"),
+        ("<effort>-1<", "<effort>nan<", "15: joint 'rail': effort is nan; it must be a number"),
         (">4e-5<", ">4.1e-5<", "4: link 'slide': inertia has the principal moments 2e-05, 2e-05, "),
         (">4e-5<", ">0<", ""),  # a thin rod
         ("<ixy>0<", "<ixy>2.1e-5<", "4: link 'slide': inertia has the principal moments -1e-06, "),
         ('xyz="0 0 1"', 'xyz="0 0 0"', "14: joint 'turn': axis is 0 0 0"),
-        ('lower="-1"', 'lower="1.5"', "14: joint 'turn': lower is 1.5, above upper, which is 1"),
+        ('lower="-1"', 'lower="1.5"', "14: joint 'turn': lower is 1.5, which is above upper, 1"),
         ('ratio value="100"', 'ratio value="0"', "18: transmission 'drive': gear_ratio is 0"),
         ('type="fixed"', 'type="continuous"', "11: link 'tool': mass is 0"),
     ],
@@ -149,7 +149,7 @@ def test_a_root_link_needs_no_mass(tmp_path: Path, text: str) -> None:
     link = f'<link name="base">{MASSLESS[text]}</inertial></link>'
     assert found_wrong(tmp_path, text.replace('<link name="base"/>', link)) == ""
     alone = re.sub(r'<link name="base"/>.*(?=</model|</robot)', link, text, flags=re.DOTALL)
-    assert "link 'base': mass is 0; it has to be above 0, unless" in found_wrong(tmp_path, alone)
+    assert "link 'base': mass is 0; it must be above 0 unless" in found_wrong(tmp_path, alone)
 
 
 def test_a_hand_whose_body_has_no_mass(tmp_path: Path) -> None:
@@ -187,7 +187,7 @@ def test_what_a_model_includes_is_checked(tmp_path: Path) -> None:
         '<sdf version="1.9"><model name="o"><include><uri>m.sdf</uri></include></model></sdf>'
     )
     station = replace(load_station("panda_tabletop"), arm_model=tmp_path / "outer.sdf")
-    with pytest.raises(InvalidInputError, match=r"m\.sdf:4: link 'slide': mass is nan; it has to"):
+    with pytest.raises(InvalidInputError, match=r"m\.sdf:4: link 'slide': mass is nan; it must"):
         add_robot(RobotDiagramBuilder(time_step=0.001), station, "arm")
 
 
@@ -200,6 +200,6 @@ def test_hand_check_refuses_it(tmp_path: Path) -> None:
         check_hand(load_hand("panda_hand"), tmp_path / "hand.sdf")
     line = text[: text.index("<mass>nan<")].count("\n") + 1
     assert str(error.value) == (
-        f"{tmp_path}/hand.sdf:{line}: link 'panda_leftfinger': mass is nan; it has to be finite and"
+        f"{tmp_path}/hand.sdf:{line}: link 'panda_leftfinger': mass is nan; it must be finite and"
         " at least 0"
     )

@@ -126,9 +126,9 @@ def test_what_is_nowhere_is_said_with_what_was_searched(place: Path) -> None:
     with pytest.raises(UnknownNameError) as caught:
         load_station(station_file(place))
     assert str(caught.value).startswith(
-        f"{place}/station.yaml: hand: {place}/hands/hand.yaml: model: {place}/hands/hand.sdf names"
-        f" model://pads/wsg/body.obj: package 'pads' is not found in {place}/hands and the folders"
-        " above it, ROS_PACKAGE_PATH ("
+        f"{place}/station.yaml: hand: {place}/hands/hand.yaml: model: {place}/hands/hand.sdf"
+        f" refers to model://pads/wsg/body.obj: package 'pads' is not found in {place}/hands"
+        " and the folders above it, ROS_PACKAGE_PATH ("
     )
     assert str(caught.value).endswith(
         f"name its folder by packages: {{pads: FOLDER}} in {place}/station.yaml"

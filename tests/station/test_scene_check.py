@@ -276,9 +276,9 @@ def test_unknown_objects_foreign_scenes_and_taken_names(
 ) -> None:
     with pytest.raises(UnknownNameError, match="object 'mugg' is not in library"):
         check.issues(scene(instance("a", "mugg", 0.2, 0.2)))
-    with pytest.raises(InvalidInputError, match="instance name 'table' is taken by the station"):
+    with pytest.raises(InvalidInputError, match="something called 'table' already"):
         check.issues(scene(instance("table", "mug", 0.2, 0.2)))
-    with pytest.raises(InvalidInputError, match=r"bare\.yaml: background\.wall: the name is taken"):
+    with pytest.raises(InvalidInputError, match=r"bare.yaml: background.wall:"):
         check.issues(scene(instance("wall", "mug", 0.2, 0.2)))
     elsewhere = dataclasses.replace(scene(), library=ObjectLibrary(library.document, tmp_path))
     with pytest.raises(InvalidInputError, match="library"):

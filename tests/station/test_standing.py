@@ -110,8 +110,7 @@ def test_how_deep_it_is_goes_by_what_it_rests_with(made: ObjectLibrary, bare: St
     )
     assert issue.amount == pytest.approx(LOWERED, abs=1e-9)
     assert issue.message == (
-        "'shrunk' is in the ground: it reaches 2.0 mm below the board; z = 0.0181 would put it on"
-        " top"
+        "'shrunk' reaches 2.0 mm below the surface of the board; set z = 0.0181 to put it on top"
     )
 
 

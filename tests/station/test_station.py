@@ -140,7 +140,7 @@ def test_principal_point() -> None:
         (
             "X_WA: {translation: [0.0, 0.0, 0.0]}",
             "X_WA: {translation: [0.0, 0.0, -0.05]}",
-            r"mine\.yaml:\d+: arm\.X_WA puts the arm's base 50 mm deep into 'table'; raise it",
+            r"mine.yaml:\d+: arm.X_WA puts the base of the arm 50 mm deep into 'table'; raise it",
         ),
         ("size: [1.2, 1.4, 0.1]", "size: [1.2, 0.0, 0.1]", r"mine\.yaml:7: .*table size must be p"),
         ("size: [0.02", "size: [-0.02", r"mine\.yaml:11: background\.wall: obstacle size \[-0"),
@@ -148,7 +148,7 @@ def test_principal_point() -> None:
         (
             "[180.0, 0.0, 0.0]}}",
             "[180.0, 0.0, 0.0]}, depth_range: [1.0, 0.5]}",
-            r"cameras\.top: camera depth_range must rise",
+            r"cameras.top: camera depth_range must be two distances",
         ),
         (
             "X_WA: {translation",

@@ -188,10 +188,12 @@ def test_refusals(check: SceneCheck, scene: MakeScene) -> None:
     one = scene(can=(0.2, 0.2, 0.0))
     with pytest.raises(UnknownNameError, match="no 'cann'"):
         check.travel(one, ["cann"], DOWN, 1.0)
-    with pytest.raises(InvalidInputError, match="name those to move"):
+    with pytest.raises(InvalidInputError, match="name the instances to move"):
         check.travel(one, [], DOWN, 1.0)
     for direction in ((0.0, 0.0, 0.0), (math.nan, 0.0, 1.0), (1.0, 0.0)):
-        with pytest.raises(InvalidInputError, match="three finite numbers, not all 0"):
+        with pytest.raises(
+            InvalidInputError, match="three finite numbers, of which one at least is not 0"
+        ):
             check.travel(one, ["can"], direction, 1.0)
     for limit in (-1.0, math.nan):
         with pytest.raises(InvalidInputError, match=r"at least 0 \[m\]"):

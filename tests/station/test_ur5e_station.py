@@ -81,11 +81,11 @@ BOLTED = (
 @pytest.mark.parametrize(
     ("pattern", "replacement", "expected"),
     [
-        (ELBOW, "", "elbow_joint cannot be driven; a URDF needs a <transmission> for each"),
+        (ELBOW, "", "elbow_joint cannot be driven; in a URDF each"),
         (
             "</robot>",
             BOLTED,
-            "joint 'bolts' connects 'base' to the world; remove it, as the station says where",
+            "joint 'bolts' fixes 'base' to the world; remove it, as the station says where",
         ),
     ],
 )

@@ -77,7 +77,7 @@ def test_a_photograph_cannot_be_recorded_and_the_page_says_why(
     record = page.locator("#record")
     expect(record).to_be_disabled()
     expect(record).to_have_attribute(
-        "title", "Nothing moves any more; a snapshot (S) keeps this picture"
+        "title", "The source has ended; a snapshot (S) saves this picture"
     )
     page.keyboard.press("r")
     expect(page.locator("#events .bad")).to_have_text(

@@ -52,8 +52,8 @@ async function showStatus() {
       const reason = error instanceof Refusal ? error.message : "";
       if (online) lastEvent = 0;
       online = false;
-      say("bad", reason || "The program does not answer; has it ended?");
-      cover(reason || "The program does not answer");
+      say("bad", reason || "burg-drake does not answer; has it ended?");
+      cover(reason || "burg-drake does not answer");
     }
     await sleep(online ? 250 : 1000);
   }
@@ -69,7 +69,7 @@ async function act(path, body = {}) {
     const data = await answer.json();
     if (data.error) addEvent({ text: data.error, bad: true });
   } catch {
-    addEvent({ text: "The program does not answer", bad: true });
+    addEvent({ text: "burg-drake does not answer", bad: true });
   }
 }
 
@@ -92,7 +92,7 @@ function renderState({ source, picture, settings, frames }) {
   cover(source.state === "lost" ? source.fault : "");
   if (source.state === "lost") say("bad", source.fault);
   else if (!picture) {
-    if (source.state === "ended") say("bad", `${source.name} has no picture that can be used`);
+    if (source.state === "ended") say("bad", `${source.name} gave no usable picture`);
     else say("wait", `Waiting for the first picture of ${source.name}`);
   } else {
     const kind = !picture.valid ? "bad" : picture.doubt ? "doubt" : "good";
@@ -119,7 +119,7 @@ function renderControls({ source, settings, recording, checking, picture }) {
   $("record").setAttribute("aria-pressed", Boolean(recording));
   $("record").lastElementChild.textContent = recording ? "Stop" : "Record";
   $("record").disabled = still;
-  $("record").title = still ? "Nothing moves any more; a snapshot (S) keeps this picture"
+  $("record").title = still ? "The source has ended; a snapshot (S) saves this picture"
     : "Record a video with poses (R)";
   $("recorded").hidden = !recording;
   if (recording) $("recorded").textContent = clock(recording.seconds);
@@ -211,7 +211,7 @@ function renderFigures({ picture, source }) {
     ["Reprojection error", known(picture.reprojection_error, 2, "px")],
     ["Camera, x y z", picture.p_SC_mm ? `${picture.p_SC_mm.map((x) => x.toFixed(1)).join(" ")} mm` : "–"],
     ["Standard deviation", known(picture.position_sd_mm, 3, "mm")],
-    ["Size of the print", known(picture.scale && 100 * picture.scale, 2, "%")],
+    ["Scale of the print", known(picture.scale && 100 * picture.scale, 2, "%")],
     ["Frames a second", known(picture.rate, 1, "")],
     ...stages.map(([name, ms]) => [`Time: ${name}`, known(ms, 1, "ms")]),
   ];

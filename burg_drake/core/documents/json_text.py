@@ -64,7 +64,7 @@ def _check_extent(text: str, name: str, limits: Limits) -> None:
     """Counts values and levels before anything is built."""
     opened = text.count("[") + text.count("{")
     if opened + text.count(",") > limits.values:
-        raise DocumentError(f"{name}: more than {limits.values:,} values")
+        raise DocumentError(f"{name}: more than {limits.values:,} values; is it the right file?")
     if opened <= limits.depth:
         return
     structure = np.frombuffer(_STRING.sub(b"", text.encode()), dtype=np.uint8)

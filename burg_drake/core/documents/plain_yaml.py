@@ -71,7 +71,7 @@ def _tree(
             key = _tree(item, events, anchors, name)
             line = item.start_mark.line + 1
             if not isinstance(key, str):
-                raise DocumentError(f"{name}:{line}: a key is a structure; expected a name")
+                raise DocumentError(f"{name}:{line}: a key is a list or a mapping; expected a name")
             if key in result:
                 raise DocumentError(
                     f"{name}:{line}: {quoted(key)} appears twice in the same mapping"

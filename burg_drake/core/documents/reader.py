@@ -47,6 +47,13 @@ class Reader:
 
     def check_version(self, node: yaml.MappingNode, schema: type) -> None:
         current = next(f.default for f in dataclasses.fields(schema) if f.name == "version")
+        names = {f.name for f in dataclasses.fields(schema)}
+        required = [f.name for f in dataclasses.fields(schema) if f.default is f.default_factory]
+        keys_given = {key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)}
+        if required and not keys_given.intersection(required) and keys_given - names:
+            kind = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", schema.__name__).lower()
+            keys = ", ".join(["version", *required])
+            raise self.fail(node, "", f"not a {kind}; one has the keys {keys}")
         for key, value in node.value:
             if key.value == "version":
                 given = value.value if isinstance(value, yaml.ScalarNode) else "a structure"
@@ -54,11 +61,6 @@ class Reader:
                     what = f"{shown(given)} cannot be read; this release reads version {current}"
                     raise self.fail(value, "version", what)
                 return
-        required = [f.name for f in dataclasses.fields(schema) if f.default is f.default_factory]
-        if required and not {key.value for key, _ in node.value}.intersection(required):
-            kind = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", schema.__name__).lower()
-            keys = ", ".join(["version", *required])
-            raise self.fail(node, "", f"this is no {kind}, which has keys {keys}")
         raise self.fail(node, "version", f"missing; add 'version: {current}'")
 
     def read(self, node: yaml.Node, kind: Any, where: str) -> Any:
@@ -117,7 +119,7 @@ class Reader:
         found: dict[str, tuple[yaml.Node, yaml.Node]] = {}
         for key, value in node.value:
             if not isinstance(key, yaml.ScalarNode):
-                raise self.fail(key, where, "a key has to be a text, not a structure")
+                raise self.fail(key, where, "a key must be a text, not a list or a mapping")
             if key.value in found:
                 raise self.fail(key, where, f"key {quoted(key.value)} is given twice")
             found[key.value] = (key, value)

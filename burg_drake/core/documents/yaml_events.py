@@ -78,7 +78,7 @@ def checked_events(
         if reached and reached[-1] > limits.depth:
             raise _failure(name, event, _too_deep(limits))
         if values > limits.values:
-            what = f"more than {limits.values:,} values, each alias counted as what it stands for"
+            what = f"more than {limits.values:,} values; an alias counts as all that it refers to"
             raise _failure(name, event, what)
         if getattr(event, "tag", None) is not None and event.tag not in tags:
             raise _failure(name, event, f"tag {quoted(event.tag)} is not supported; leave it out")

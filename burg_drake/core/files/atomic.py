@@ -30,7 +30,7 @@ def open_regular(path: str | Path) -> BinaryIO:
         if stat.S_ISREG(mode):
             return open(path, "rb", opener=_open_at_once)
     except (OSError, ValueError) as error:
-        why = error.strerror if isinstance(error, OSError) else "it is not a path"  # with NUL
+        why = error.strerror if isinstance(error, OSError) else "it is not a valid path"  # with NUL
         raise InvalidInputError(f"cannot read {shown(str(path), 500)}: {why}") from error
     if stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode):
         raise InvalidInputError(f"cannot read {path}: it is a pipe; save it to a file first")

@@ -77,7 +77,7 @@ def read_bytes(path: str | Path, size: int) -> bytes:
             raise InvalidInputError(f"cannot read {path}: {error.strerror or error}") from error
     if len(data) > size:
         raise InvalidInputError(
-            f"cannot read {path}: it has more than {size // MIB} MiB, too much for such a file"
+            f"cannot read {path}: it is larger than {size // MIB} MiB; is it the right file?"
         )
     return data
 
@@ -100,7 +100,7 @@ def read_pipe(pipe: int | str, size: int = GRASP_FILE.size) -> bytes:
         raise InvalidInputError(f"cannot read {name}: {error.strerror or error}") from error
     if len(data) > size:
         raise InvalidInputError(
-            f"cannot read {name}: more than {size // MIB} MiB came; save it to a file first"
+            f"cannot read {name}: more than {size // MIB} MiB arrived; save it to a file first"
         )
     return data
 

@@ -71,7 +71,7 @@ class Hdf5File:
             KeyError: there is none.
         """
         if self._file.attrs.get_id(name).shape != ():
-            raise InvalidInputError(f"{self.path}: attribute {name} is not a single value")
+            raise InvalidInputError(f"{self.path}: attribute {name} must be a single value")
         return self._file.attrs[name]
 
     def array(self, key: str) -> StoredArray:
@@ -85,7 +85,10 @@ class Hdf5File:
         if not hasattr(data, "dtype") or not hasattr(data, "shape"):
             raise InvalidInputError(f"{where} is a group; expected a dataset")
         if data.external or data.is_virtual:
-            raise InvalidInputError(f"{where} has its data in other files; only one file is read")
+            raise InvalidInputError(
+                f"{where} keeps its data in other files, which are not read; store the data"
+                " in this file"
+            )
         if data.shape is None:
             raise InvalidInputError(f"{where} is empty")
         return self._stored(where, data)
@@ -152,7 +155,8 @@ class Hdf5File:
                 return None
             if not isinstance(link, h5py.HardLink):
                 raise InvalidInputError(
-                    f"{self.path}: {key} is a link, which is not followed; store the data itself"
+                    f"{self.path}: {key} is a link, and links are not followed; store the"
+                    " data itself"
                 )
             found = found[name]
         return found
@@ -189,7 +193,9 @@ def _chunks(where: str, data: Any, itemsize: int, above: int = 0) -> Iterator[by
         if DEFLATE in filters and not skipped >> filters.index(DEFLATE) & 1:
             packed = zlib.decompressobj().decompress(packed, size + CHECKSUM + 1)
         if len(packed) > size + CHECKSUM:
-            raise InvalidInputError(f"{where} is damaged: a part of it unpacks to too much")
+            raise InvalidInputError(
+                f"{where} is damaged: a part of it unpacks to more data than it should hold"
+            )
         yield packed
 
 
@@ -217,5 +223,7 @@ def _filters(where: str, data: Any) -> tuple[int, ...]:
     created = data.id.get_create_plist()
     filters = tuple(created.get_filter(i)[0] for i in range(created.get_nfilters()))
     if filters not in FILTERS:
-        raise InvalidInputError(f"{where} is packed with other filters than gzip; pack it anew")
+        raise InvalidInputError(
+            f"{where} is compressed with another filter than gzip; save it again with gzip"
+        )
     return filters

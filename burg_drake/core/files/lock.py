@@ -39,8 +39,9 @@ def without_locks(path: Path, error: OSError) -> InvalidInputError:
         error: of `try_lock`.
     """
     return InvalidInputError(
-        f"{path} is on a file system without locks ({error.strerror}), where two programs could"
-        " write at once and lose data; use a place on another one"
+        f"{path} is on a file system without file locks ({error.strerror}), where two"
+        " programs could overwrite each other's data; choose a folder on another file"
+        " system"
     )
 
 

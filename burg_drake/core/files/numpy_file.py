@@ -57,7 +57,10 @@ class NpzFile:
         info = self._archive.getinfo(f"{name}.npy")
         where = f"{self.path}: {name}"
         if info.compress_type not in COMPRESSIONS:
-            raise InvalidInputError(f"{where} is not compressed as numpy does; save it anew")
+            raise InvalidInputError(
+                f"{where} is compressed in a way that numpy does not use; save it again with"
+                " numpy.savez_compressed"
+            )
         with self._archive.open(info) as stream:
             shape, dtype = _header(stream, where, info.file_size)
 
@@ -114,14 +117,16 @@ def _header(stream: IO[bytes], where: str, size: int) -> tuple[ArrayShape, np.dt
     """Shape and type of an array in a stream of some bytes; refuses what does not fit."""
     shape, _, dtype = HEADERS[np.lib.format.read_magic(stream)](stream)
     if dtype.hasobject:
-        raise InvalidInputError(f"{where} holds Python objects, which are not read")
+        raise InvalidInputError(
+            f"{where} holds pickled Python objects, which are not read; save plain numbers or texts"
+        )
     if any(length < 0 for length in shape):
         raise InvalidInputError(f"{where} has shape {shape}; lengths cannot be negative")
     announced, available = dtype.itemsize * math.prod(shape), size - stream.tell()
     if announced > available:
         raise InvalidInputError(
-            f"{where} is damaged or cut off: an array of shape {shape} and type {dtype} has"
-            f" {announced} bytes, the file has {available}"
+            f"{where} is damaged or cut off: its array of shape {shape} and type {dtype}"
+            f" needs {announced} bytes, but the file has {available}"
         )
     return shape, dtype
 

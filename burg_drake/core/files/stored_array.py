@@ -55,8 +55,8 @@ class ReadBudget:
         """
         if nbytes > self.left:
             raise InvalidInputError(
-                f"{where} would take {_size(nbytes)} of memory; the arrays of a file may take"
-                f" {_size(MOST_BYTES)} together"
+                f"{where} would take {_size(nbytes)} of memory; all arrays of a file"
+                f" together may take {_size(MOST_BYTES)}"
             )
 
     def take(self, where: str, nbytes: int) -> None:
@@ -128,7 +128,7 @@ def require_grasps(where: str, n: int) -> None:
     """
     if n > MOST_GRASPS:
         raise InvalidInputError(
-            f"{where} has {n:,} grasps; a file may have {MOST_GRASPS:,}; split it"
+            f"{where} has {n:,} grasps; a file may have at most {MOST_GRASPS:,}; split it"
         )
 
 

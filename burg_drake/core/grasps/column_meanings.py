@@ -27,7 +27,9 @@ _GRASP = {
     "instance": Column(TEXT, "the object's name in the scene"),
     "object": Column(TEXT, "the object's name in its library"),
     "width": Column("m", "distance of the contacts along the closing direction"),
-    "score": Column(PLAIN, "quality, higher is better; its meaning is its source's"),
+    "score": Column(
+        PLAIN, "quality of the grasp, higher is better; what it measures depends on its source"
+    ),
     "x": Column("m", "origin of the grasp frame G in the object frame O"),
     "y": Column("m", "origin of the grasp frame G in the object frame O"),
     "z": Column("m", "origin of the grasp frame G in the object frame O"),
@@ -37,7 +39,7 @@ _GRASP = {
     "qz": Column(PLAIN, "rotation of G in O as a unit quaternion: z"),
     "X_OG": Column(
         "m",
-        "pose of G in O bit for bit, in tables the upper three rows of the matrix",
+        "pose of G in O with all digits; in tables the upper three rows of the matrix",
     ),
 }
 
@@ -53,15 +55,15 @@ _VERDICT = {**_meanings(TextField), **_meanings(NumberField)}
 _MARGINS = {
     **_meanings(MarginsField),
     "friction": Column(
-        PLAIN, ("friction coefficient of the target; empty in results: the library's")
+        PLAIN, ("friction coefficient of the target; in results empty if it is the library's")
     ),
-    "mass": Column("kg", "mass of the target; empty in results: the library's"),
+    "mass": Column("kg", "mass of the target; in results empty if it is the library's"),
     "cpu": Column("s", "CPU time of all stages"),
     **_meanings(StagesField),
 }
 
 _ORIGIN = {
-    "seed": Column(PLAIN, "seed of the sampling, in robustness tables of the perturbations"),
+    "seed": Column(PLAIN, "seed of the sampling; in robustness tables that of the perturbations"),
     "engine": Column(TEXT, "engine preset; marked if its settings were changed"),
     "run": Column(TEXT, "short hash of everything that determines the results; hash in run.yaml"),
     "scene": Column(TEXT, "path of the scene, or the name of a built-in one"),
@@ -76,7 +78,11 @@ _ORIGIN = {
 
 _ROBUSTNESS = {
     "friction_min": Column(
-        PLAIN, ("smallest friction coefficient that lifts; 0 if it is below all that were tried")
+        PLAIN,
+        (
+            "smallest friction coefficient with which the grasp lifts; 0 if it lifts with"
+            " all that were tried"
+        ),
     ),
     "repeats": Column(PLAIN, "number of perturbed repeats"),
     "lifted": Column(PLAIN, "number of perturbed repeats that lifted"),
@@ -88,24 +94,30 @@ _ROBUSTNESS = {
 }
 
 _QUALITY = {
-    "force_closure": Column(PLAIN, "1 if the contacts' line lies within both friction cones"),
-    "friction_needed": Column(PLAIN, "smallest coefficient for force closure"),
+    "force_closure": Column(
+        PLAIN, "1 if the line between the contacts lies within both friction cones"
+    ),
+    "friction_needed": Column(PLAIN, "smallest friction coefficient for force closure"),
     "antipodal_angle": Column("rad", "largest angle between closing direction and inward normal"),
-    "slide": Column("m", "distance that the object slides in the hand until held; inf if never"),
+    "slide": Column(
+        "m", "distance that the object slides in the hand until it is held; inf if it never is"
+    ),
     "epsilon": Column(PLAIN, "radius of the largest ball within the wrench space"),
     "volume": Column(PLAIN, "volume of the wrench space"),
     "load_margin": Column(
         "weights",
-        "force that the grip withstands in the worst direction; below 1 the object's weight may"
-        " turn it in the hand, which need not be a drop",
+        "force that the grip withstands in the worst direction; below 1 the object's"
+        " weight may turn it in the hand, though it need not drop",
     ),
     "gravity_margin": Column(
         "weights",
-        "force that the grip withstands along gravity; below 1 the object begins to turn in the"
-        " hand, which need not be a drop",
+        "force that the grip withstands along gravity; below 1 the object begins to turn"
+        " in the hand, though it need not drop",
     ),
-    "contact_offset": Column("m", "distance of the centre of mass from the contacts' line"),
-    "nearest": Column(TEXT, "the body that the open hand is nearest to, or overlaps"),
+    "contact_offset": Column(
+        "m", "distance of the centre of mass from the line between the contacts"
+    ),
+    "nearest": Column(TEXT, "the body that the open hand is nearest to or overlaps"),
     "screened": Column(TEXT, "clear, or the collision of the open hand"),
     "collides_with": Column(TEXT, "the body that the open hand collides with"),
 }
@@ -135,7 +147,11 @@ GROUPS: Mapping[str, Mapping[str, Column]] = {
 FAMILIES: Mapping[str, Column] = {
     **_meanings(InstancesField),
     **_meanings(JointsField),
-    "tug_AXIS_g": Column("g", "acceleration along an axis of G that the grip withstands; or inf"),
+    "tug_AXIS_g": Column(
+        "g",
+        "acceleration along an axis of G that the grip withstands; inf if it withstood all"
+        " that were tried",
+    ),
     "tug_AXIS_N": Column("N", "the same as a force on the centre of mass"),
     "shake_AXIS_g": Column(
         "g", ("amplitude of an oscillation along an axis of G that the grip withstands")

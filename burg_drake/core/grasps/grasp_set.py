@@ -88,7 +88,9 @@ class GraspSet:
         try:
             plain = json.loads(json.dumps(dict(provenance or {})))
         except (TypeError, ValueError) as error:
-            raise InvalidInputError(f"provenance has to consist of JSON values: {error}") from error
+            raise InvalidInputError(
+                f"provenance must consist of values that JSON can hold: {error}"
+            ) from error
         grasps = cls(poses, widths, ids, names, scores, plain)
         return grasps.with_columns(**columns) if columns else grasps
 
@@ -137,8 +139,8 @@ class GraspSet:
                 score = column.astype(float)
             elif name in FIXED_COLUMNS:
                 raise InvalidInputError(
-                    f"column {name!r} is part of what a grasp is; make the set anew with"
-                    " GraspSet.create"
+                    f"column {name!r} is a part of every grasp and cannot be replaced;"
+                    " make a new set with GraspSet.create"
                 )
             elif column.dtype.kind not in "fiubU":
                 raise InvalidInputError(
@@ -250,8 +252,8 @@ def require_valid(grasps: GraspSet) -> None:
     if differs.any():
         i = int(np.argmax(differs))
         raise InvalidInputError(
-            f"id[{twin[i]}] and id[{i}] are both {str(grasps.id[i])!r}, but these are different"
-            " grasps; give each an identifier of its own"
+            f"id[{twin[i]}] and id[{i}] are both {str(grasps.id[i])!r}, but the grasps"
+            " differ; give each an id of its own"
         )
 
 

@@ -46,40 +46,49 @@ class Outcome(StrEnum):
         outcome._value_, outcome.meaning = value, meaning
         return outcome
 
-    COLLISION_TARGET = "collision_target", "at the grasp the open hand is in the object itself"
-    COLLISION_TABLE = "collision_table", "at the grasp the open hand is in the table"
-    COLLISION_CLUTTER = "collision_clutter", "at the grasp the open hand is in another object"
+    COLLISION_TARGET = "collision_target", ("at the grasp the open hand overlaps the object itself")
+    COLLISION_TABLE = "collision_table", "at the grasp the open hand overlaps the table"
+    COLLISION_CLUTTER = "collision_clutter", "at the grasp the open hand overlaps another object"
     COLLISION_BACKGROUND = (
         "collision_background",
-        "at the grasp the open hand is in something fixed",
+        "at the grasp the open hand overlaps something fixed",
     )
     HAND_COLLISION_APPROACH = (
         "hand_collision_approach",
-        "on the straight approach the open hand meets something",
+        "on the straight approach the open hand hits something",
     )
     HAND_COLLISION_RETREAT = (
         "hand_collision_retreat",
-        "on the straight retreat the hand or the object in it meets something",
+        "on the straight retreat the hand or the object in it hits something",
     )
     HAND_COLLISION_LIFT = (
         "hand_collision_lift",
-        "on the lift the hand or the object in it meets something",
+        "on the lift the hand or the object in it hits something",
     )
-    NO_IK = "no_ik", "no arm configuration puts the hand there, whatever the joint limits"
-    JOINT_LIMIT = "joint_limit", "there are such configurations, but all are beyond a joint limit"
-    ARM_COLLISION = "arm_collision", "within the limits, in each that was found the arm collides"
+    NO_IK = "no_ik", "no arm configuration reaches the grasp, even without joint limits"
+    JOINT_LIMIT = (
+        "joint_limit",
+        ("all arm configurations that reach the grasp are beyond a joint limit"),
+    )
+    ARM_COLLISION = (
+        "arm_collision",
+        ("the arm collides in every configuration that was found within the joint limits"),
+    )
     APPROACH_LINE = (
         "approach_line",
-        "the arm can be at both ends of the approach, but cannot follow it",
+        "the arm reaches pregrasp and grasp, but cannot follow the straight line between them",
     )
     RETREAT_LINE = "retreat_line", "the arm cannot follow the straight retreat"
     LIFT_LINE = "lift_line", "the arm cannot follow the lift"
     NO_PATH = "no_path", "no path from the home posture to the pregrasp was found"
-    NO_CONTACT = "no_contact", "the fingers closed and never touched the object"
-    ONE_FINGER = "one_finger", "the fingers stopped with only one of them on the object"
-    CLOSED_EMPTY = "closed_empty", "the object was touched, but escaped while the fingers closed"
+    NO_CONTACT = "no_contact", "the fingers closed without touching the object"
+    ONE_FINGER = "one_finger", "the fingers stopped with only one of them at the object"
+    CLOSED_EMPTY = (
+        "closed_empty",
+        ("the object was touched, but slipped away while the fingers closed"),
+    )
     SLIPPED = "slipped", "both fingers held the object, and lost it during the lift"
-    BLOCKED = "blocked", "during its motion the hand or the arm met something fixed"
+    BLOCKED = "blocked", "during the motion the hand or the arm hit something fixed"
     DROPPED = "dropped", "the object was lifted, and lost while it was held"
     LIFTED = "lifted", "both fingers hold the object to the end, and nothing else was moved"
     LIFTED_DISTURBED = (
@@ -94,7 +103,10 @@ class Outcome(StrEnum):
         "simulation_failed",
         "the trial could not be simulated; the results have the reason",
     )
-    REACHABLE = "reachable", "the arm can execute the grasp, and no trial was asked for"
+    REACHABLE = (
+        "reachable",
+        ("the arm can execute the grasp; it was not simulated, as the mode did not ask for that"),
+    )
 
     @property
     def held(self) -> bool:

@@ -88,8 +88,9 @@ def read_arrays(path: Path) -> tuple[dict[str, Any], SetColumns, SetColumns]:
 def _check(path: Path, header: dict[str, Any]) -> None:
     if header["format"] != FORMAT or header["version"] not in READABLE:
         raise InvalidInputError(
-            f"{path} has format {header['format']!r} version {header['version']!r};"
-            f" this release reads {FORMAT!r} version {' and '.join(map(str, READABLE))}"
+            f"{path} is a file of format {header['format']!r}, version "
+            f"{header['version']!r}; this release reads {FORMAT!r} version "
+            f"{' and '.join(map(str, READABLE))}"
         )
 
 
@@ -103,7 +104,7 @@ def _read_arrays(
         further: names of arrays by names of columns.
     """
     for name in {*FIXED_COLUMNS, ""} & set(further):
-        raise ValueError(f"{name!r} is among its further columns")
+        raise ValueError(f"it has a further column {name!r}, which must not be called that")
     poses = array("X_OG")
     n = poses.rows(4, 4)
     fixed = {"X_OG": poses.read("f").astype(float)}
@@ -146,7 +147,7 @@ def _hdf5(header: dict[str, Any], fixed: SetColumns, columns: SetColumns) -> byt
         for name, values in columns.items():
             if "/" in name or name in (".", ""):
                 raise InvalidInputError(
-                    f"HDF5 has no columns that are called {name!r}; rename it, or write .npz"
+                    f"HDF5 cannot have a column called {name!r}; rename it, or write .npz"
                 )
             _write_dataset(further, name, values)
     return buffer.getvalue()

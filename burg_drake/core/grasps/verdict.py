@@ -68,16 +68,16 @@ class Margins:
     )
     patch_area: float = margin(
         "m2",
-        "contact patch of the pad with the smaller one",
+        "contact patch of the pad whose patch is the smaller one",
         title="patch",
         axis="contact patch of the weaker pad",
         digits=0,
     )
     lift: float = margin(
         "m",
-        "how far the target's centre of mass rose, or moved along the straight segments of"
-        " another motion; if the trial was decided early, including the rest of the path, which"
-        " is free by geometry",
+        "how far the target's centre of mass rose; with another motion how far it moved"
+        " along the straight segments. If the trial was decided early, the rest of the"
+        " path counts, too, as geometry shows that it is free",
         digits=0,
     )
     lift_height: float = margin(
@@ -87,7 +87,7 @@ class Margins:
     )
     others_moved: float = margin(
         "m",
-        "largest displacement of any point of another object, its farthest",
+        "largest displacement of another object, at its point that moved farthest",
         smaller_is_better=True,
         axis="movement of other objects",
     )
@@ -207,7 +207,8 @@ class TrialFindings:
     confidence: float | None = field(
         default=None,
         metadata=number(
-            PLAIN, "probability that the same grasp, slightly perturbed, is held or lost as here"
+            PLAIN,
+            "probability that the same grasp, slightly perturbed, is held again or lost again",
         ),
     )
     displacements: Mapping[str, float] = field(
@@ -238,7 +239,7 @@ class TrialFindings:
     touched: str = field(
         default="",
         metadata=text(
-            "what arm or hand touched first that was not planned, as LINK vs BODY",
+            "first unplanned contact of the arm or hand, as LINK vs BODY",
             mode="approach",
             part="measured",
         ),

@@ -76,7 +76,7 @@ class VerdictField(ABC):
 
     def from_row(self, row: Mapping[str, Any]) -> Any:
         """The value that a row tells; an empty one if it tells nothing."""
-        raise NotImplementedError(f"{self.name} is not read from rows")
+        raise NotImplementedError(f"{self.name} cannot be read from rows")
 
     def to_json(self, value: Any) -> Any:
         """The value in a journal; a number that is not finite is null."""

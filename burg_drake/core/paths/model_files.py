@@ -48,7 +48,7 @@ def named_packages(model: Path, packages: Packages) -> dict[str, Path]:
             try:
                 found[parts[1]] = packages.find(parts[1], file.parent)
             except UnknownNameError as error:
-                raise UnknownNameError(f"{file} names {reference}: {error}") from error
+                raise UnknownNameError(f"{file} refers to {reference}: {error}") from error
     return found
 
 

@@ -99,7 +99,7 @@ def package_file(reference: str, near: Path | None, packages: Packages) -> Path:
     """
     parts = PACKAGE_REFERENCE.fullmatch(reference)
     if parts is None or not parts[1]:
-        raise UnknownNameError(f"{reference} names no package; write package://NAME/FILE")
+        raise UnknownNameError(f"{reference} has no package name; write package://NAME/FILE")
     try:
         folder = packages.find(parts[1], near)
     except UnknownNameError as error:

@@ -33,7 +33,7 @@ def data_root() -> Path:
         if (root / "models").is_dir() and (root / "scenes").is_dir():
             return root
     raise InvalidInputError(
-        f"no models/ and scenes/ next to or inside {package}; reinstall burg_drake"
+        f"there are no folders models/ and scenes/ in {package} or next to it; reinstall burg_drake"
     )
 
 
@@ -97,7 +97,7 @@ def expanded(text: str) -> Path:
     except RuntimeError as error:
         user = Path(text).parts[0]
         raise UnknownNameError(
-            f"{text}: {user!r} is nobody's home folder here; write the path out"
+            f"{text}: user {user!r} has no home folder here; write the whole path"
         ) from error
 
 

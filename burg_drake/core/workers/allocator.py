@@ -192,9 +192,9 @@ def _replaces_malloc(path: Path, changed: int, environment: tuple[tuple[str, str
 def _warn(given: str) -> None:
     """One line a process."""
     path = os.path.abspath(os.path.expanduser(given))
-    why = "is not an allocator that can be preloaded here"
+    why = "is not an allocator that can be preloaded on this system"
     if not os.path.exists(path):
         why = "cannot be found"
     elif any(separator in path for separator in SEPARATORS):
-        why = "has a space or colon in its path, so that it cannot be preloaded"
-    _log.warning("%s: %s %s; workers do without", VARIABLE, given, why)
+        why = "has a space or a colon in its path and so cannot be preloaded"
+    _log.warning("%s: %s %s; workers run without it", VARIABLE, given, why)

@@ -218,7 +218,7 @@ class Dispatcher:
         if suspect is None:
             return
         if suspect.cancelled:
-            suspect.future.set_exception(TaskCancelled("this was cancelled"))
+            suspect.future.set_exception(TaskCancelled("this task was cancelled"))
         elif suspect.tries > 1 and not overdue:
             suspect.tries -= 1
             worker.suspect = suspect
@@ -261,7 +261,7 @@ class Dispatcher:
             self._bell.close()
         for task in left:
             if task.started or task.future.set_running_or_notify_cancel():
-                task.future.set_exception(TaskCancelled("the workers were ended"))
+                task.future.set_exception(TaskCancelled("the worker processes were stopped"))
 
 
 def _ready(task: PendingTask) -> Any:
@@ -271,7 +271,7 @@ def _ready(task: PendingTask) -> Any:
     task.started = True
     session = task.task.session
     if task.cancelled:
-        task.future.set_exception(TaskCancelled("this was cancelled"))
+        task.future.set_exception(TaskCancelled("this task was cancelled"))
     elif session is not None and session.error is not None:
         task.future.set_exception(session.error)
     else:

@@ -81,7 +81,7 @@ class WorkerPool(Executor):
             InvalidInputError: the tasks are of several sessions.
         """
         if len({task.session for task in tasks}) > 1:
-            raise InvalidInputError("tasks that travel together have to be of the same session")
+            raise InvalidInputError("tasks that are sent together must belong to the same session")
         with self._lock:
             if self._closed:
                 raise RuntimeError("cannot schedule new futures after shutdown")

@@ -112,7 +112,7 @@ def exit_cause(process: subprocess.Popen[bytes], reason: str = "") -> str:
     if code < 0:
         name = signal.Signals(-code).name
         outside = " from outside" if was_ended_from_outside(process) else ""
-        return f"the worker process was ended{outside} by {name}"
+        return f"the worker process was killed{outside} by {name}"
     return f"the worker process ended: {reason or f'exit code {code}'}"
 
 

@@ -80,7 +80,7 @@ class _WorkerLoop:
         while self._connection.poll():
             received = self._connection.recv()
             if isinstance(received, Interrupt) and received.number == self._number:
-                raise TaskCancelled("this was cancelled")
+                raise TaskCancelled("this task was cancelled")
         self._connection.send(ProgressMessage(self._number, message))
 
     def _open(self, opening: OpenSession) -> bool:

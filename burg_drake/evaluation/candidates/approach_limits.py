@@ -44,12 +44,14 @@ def from_arm_side(X_WO: Array, p_WM: Array, station: Station, name: str) -> Appr
     arm = station.document.arm
     if arm is None:
         raise InvalidInputError(
-            f"station {station.name!r} has no arm from whose side the hand could approach"
+            f"station {station.name!r} has no arm, so there is no side of the arm from"
+            " which the hand could approach"
         )
     x, y, _ = p_WM - arm.X_WA.matrix()[:3, 3]
     if np.hypot(x, y) < ABOVE_BASE:
         raise InvalidInputError(
-            f"{name!r} is right above the arm's base; the hand cannot approach from the arm's side"
+            f"{name!r} is right above the base of the arm, so the hand cannot approach it"
+            " from the arm's side"
         )
     return ApproachCone(_in_object(X_WO, (x, y, 0.0)), np.pi / 2)
 

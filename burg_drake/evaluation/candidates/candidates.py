@@ -93,7 +93,7 @@ class Candidates:
         """
         grasps = GraspSet.load(path)
         if INSTANCE not in grasps.columns:
-            raise InvalidInputError(f"{path} does not say which instance each grasp belongs to")
+            raise InvalidInputError(f"{path} does not say on which instance each grasp is")
         columns = {name: values for name, values in grasps.columns.items() if name != INSTANCE}
         return cls(dataclasses.replace(grasps, columns=columns), grasps.columns[INSTANCE])
 
@@ -116,8 +116,8 @@ def given_candidates(scene: Scene, grasps: Mapping[str, GraspSet]) -> Candidates
         others = set(grasp_set.object.tolist()) - {expected, ""}
         if others:
             raise InvalidInputError(
-                f"grasps given for {name!r} belong to object {min(others)!r}; the scene has"
-                f" object {expected!r} there"
+                f"the grasps given for {name!r} are of object {min(others)!r}, but "
+                f"{name!r} is object {expected!r} in the scene"
             )
     return join_candidates(
         {name: distinct(grasps[name]) for name in scene.instances if name in grasps}

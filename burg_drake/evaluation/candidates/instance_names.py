@@ -48,8 +48,8 @@ class InstanceNames:
                 raise UnknownNameError(f"{self.path} has no grasps of object {name!r}; {known}")
         if "" in self.given and len(foreign) > 1:
             raise InvalidInputError(
-                f"{self.path} has grasps of {len(foreign)} objects ({listing(names)}); say which"
-                " is which, THEIRS=OURS"
+                f"{self.path} has grasps of {len(foreign)} objects ({listing(names)});"
+                " say which of them is which of the scene, as THEIRS=OURS"
             ).about("objects")
 
     def of_object(self, foreign: str) -> list[str]:
@@ -66,11 +66,13 @@ class InstanceNames:
         if not foreign:
             how = "" if self.is_file else " (GraspSet.create(..., object=NAME))"
             raise InvalidInputError(
-                f"{self.path} does not say which object its grasps are of; name"
-                f" it{how}; scene {self.scene.name!r} has {listing(sorted(known))}"
+                f"{self.path} does not say of which object its grasps are; name it{how};"
+                f" scene {self.scene.name!r} has {listing(sorted(known))}"
             ).about("objects")
         if foreign not in known:
-            how = f"say which one it is, {foreign}=NAME; " if self.is_file else ""
+            how = (
+                f"say which of the scene's objects it is, {foreign}=NAME; " if self.is_file else ""
+            )
             raise UnknownNameError(
                 f"{self.path} has grasps of object {foreign!r}, which is not in scene"
                 f" {self.scene.name!r}; {how}{nearest(foreign, known)}"
@@ -131,7 +133,9 @@ def on_chosen(
     found = {name: by_instance[name] for name in chosen if len(by_instance.get(name, ()))}
     if not found:
         there = listing([name for name, grasps in by_instance.items() if len(grasps)])
-        raise InvalidInputError(f"no grasps are of {listing(names)}; there are some of {there}")
+        raise InvalidInputError(
+            f"there are no grasps of {listing(names)}; there are some of {there}"
+        )
     return found
 
 

@@ -88,7 +88,7 @@ def sample_on_scene(
     _check_count(n)
     names = chosen_instances(scene, only)
     objects = {instance.object for instance in scene.instances.values()}
-    _known(settings.weights, objects, "weights: the scene has no object")
+    _known(settings.weights, objects, "weights: the scene does not have object")
     return _sampled_scene(scene, station, n, seed, settings, names)
 
 
@@ -141,8 +141,8 @@ def sample_library(
     _check_count(n)
     if settings.approach_angle_deg is not None or settings.from_arm_side:
         raise InvalidInputError(
-            f"objects of library {library.name!r} lie nowhere, so that there is no straight down"
-            " and no side of the arm; limit the approach in a scene"
+            f"the objects of library {library.name!r} are in no scene, so there is no"
+            " straight down and no side of the arm; give a scene to limit the approach"
         )
     where = f"library {library.name!r} has no object"
     names = _known(objects, library.objects, where)

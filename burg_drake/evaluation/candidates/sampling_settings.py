@@ -82,5 +82,6 @@ class SamplingSettings:
             raise InvalidInputError(f"margin is {self.margin} m; give a clearance of 0 or more")
         if (self.margin or self.conservative) and self.blind:
             raise InvalidInputError(
-                "margin and conservative are for the hand, which blind sampling ignores"
+                "margin and conservative concern the hand, which blind sampling ignores;"
+                " leave them out, or do not sample blindly"
             )

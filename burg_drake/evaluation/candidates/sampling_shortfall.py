@@ -10,8 +10,8 @@ from burg_drake.evaluation.candidates.clear_test import PADS
 from burg_drake.grasping.sampling import NO_APPROACH, NO_ROOM, SLANTED, TOO_LONG
 
 LINES = {
-    TOO_LONG: "are longer than the hand opens",
-    SLANTED: "meet the surface at an angle that friction {friction:g} does not hold",
+    TOO_LONG: "are longer than the hand can open",
+    SLANTED: "meet the surface at an angle at which a friction of {friction:g} does not hold",
     NO_ROOM: "leave no room for a finger",
     NO_APPROACH: "allow no approach within the limits",
 }
@@ -43,7 +43,7 @@ def shortfall(name: str, asked: int, provenance: Mapping[str, Any], found: int) 
     """
     if found >= asked:
         return ""
-    text = f"{name}: {found:,} of {asked:,} grasps"
+    text = f"{name}: only {found:,} of {asked:,} grasps were found"
     lines, blocked = provenance.get("left_out", {}), provenance.get("blocked", {})
     parts, causes = [], {}
     tried = provenance.get("tried", 0)

@@ -206,5 +206,7 @@ class ClusterMap:
         if losses < LOSSES:
             self._open.appendleft((sent.work, losses))
             return
-        reason = f"{losses} workers of the cluster were lost at it, one after the other"
+        reason = (
+            f"{losses} workers of the cluster were lost while working on it, one after the other"
+        )
         self._outcomes.append((sent.work, SimulationError(reason)))

@@ -27,14 +27,14 @@ def unreached_reason(where: object, error: BaseException) -> str:
     except ConnectionRefusedError:
         return "nobody listens there (connection refused)"
     except socket.gaierror:
-        return f"there is no machine of the name {parts.hostname}"
+        return f"there is no machine with the name {parts.hostname}"
     except TimeoutError:
-        return "the machine does not answer; it is off, or a firewall is between"
+        return "the machine does not answer; is it off, or does a firewall block the connection?"
     except OSError as refused:
         return refused.strerror or words
     return (
-        f"something listens there, but does not answer as a scheduler with {parts.scheme}://"
-        f" does ({words})"
+        "something listens there, but does not answer like a scheduler with "
+        f"{parts.scheme}:// ({words})"
     )
 
 

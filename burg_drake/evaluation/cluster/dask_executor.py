@@ -176,8 +176,8 @@ def _client(distributed: Any, where: Any, security: Any) -> Any:
         found = TimeoutError("no answer")
     if isinstance(found, (OSError, TimeoutError, ValueError, RuntimeError, TypeError)):
         raise ClusterError(
-            f"no Dask scheduler was reached at {where} within {REACH:.0f} s:"
-            f" {unreached_reason(where, found)}"
+            f"no Dask scheduler answered at {where} within {REACH:.0f} s: "
+            f"{unreached_reason(where, found)}"
         ) from found
     if isinstance(found, BaseException):
         raise found
@@ -200,9 +200,9 @@ def _security(distributed: Any, cluster: Cluster) -> Any:
         security = distributed.Security(require_encryption=True)
         if security.tls_ca_file is None:
             raise ClusterError(
-                f"{document.address} asks for certificates: name them in a cluster.yaml by"
-                " tls: {ca: CA.pem, cert: CERT.pem, key: KEY.pem}, or in Dask's configuration by"
-                " distributed.comm.tls"
+                f"{document.address} needs certificates; name them in a cluster.yaml as"
+                " tls: {ca: CA.pem, cert: CERT.pem, key: KEY.pem}, or in Dask's"
+                " configuration as distributed.comm.tls"
             )
         return security
     return None

@@ -211,7 +211,7 @@ class Dispatch:
                     job,
                     SimulationError(
                         f"{self.limits.hopeless} grasps in a row could not be simulated;"
-                        f" the last one: {verdict.reason}"
+                        f" the reason of the last one: {verdict.reason}"
                     ),
                 )
         if answers.error is not None:

@@ -121,11 +121,11 @@ class ClusterDocument:
             raise InvalidInputError("give either address or jobqueue")
         if self.jobqueue is None:
             if self.scale is not None or self.adapt is not None:
-                raise InvalidInputError("scale and adapt are for a jobqueue")
+                raise InvalidInputError("scale and adapt belong to a jobqueue, which is missing")
             require_safe(self.address)
             if self.tls is not None and not self.address.startswith("tls://"):
                 raise FieldError(
-                    f"address is {self.address} with tls files; write tls://", "address"
+                    f"address is {self.address}, but tls files are given; write tls://", "address"
                 )
             return
         if (self.scale is None) == (self.adapt is None):
@@ -206,12 +206,12 @@ def require_safe(address: str, prefix: str = "") -> None:
         )
     if not 1 <= int(found[3]) <= MAX_PORT:
         raise InvalidInputError(
-            f"{prefix}{address}: port {found[3]} does not exist; they go from 1 to {MAX_PORT}"
+            f"{prefix}{address}: there is no port {found[3]}; ports go from 1 to {MAX_PORT}"
         )
     if found[1] == "tcp" and not _is_loopback(found[2].strip("[]")):
         raise ClusterError(
-            f"{prefix}{address} is not encrypted, and whoever reaches its port runs code as you:"
-            f" {HOW_TLS}"
+            f"{prefix}{address} is not encrypted: whoever reaches this port can run"
+            f" programs as you. {HOW_TLS}"
         )
 
 

@@ -54,8 +54,8 @@ def start_jobqueue(cluster: Cluster, security: Any) -> Any:
     submit = str(make.job_cls.submit_command).split()[0]
     if shutil.which(submit) is None:
         raise ClusterError(
-            f"{document.jobqueue.kind} is not here, as there is no {submit}: run this on a machine"
-            " from which jobs are submitted"
+            f"this machine has no {submit}, so jobs cannot be submitted to "
+            f"{document.jobqueue.kind}; run this where jobs are submitted"
         )
     try:
         started = make(security=security or True, **parameters(document.jobqueue))

@@ -126,8 +126,8 @@ def lost_scheduler(client: Any) -> ClusterError:
     """What is said when it does not answer."""
     address = client.scheduler.address if client.scheduler is not None else "the given address"
     return ClusterError(
-        f"the scheduler at {address} does not answer any more; what is done is kept; run the same"
-        " command to continue when there is a scheduler again"
+        f"the scheduler at {address} does not answer any more; the results so far are"
+        " kept: start a scheduler and run the same command to continue"
     )
 
 

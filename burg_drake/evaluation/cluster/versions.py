@@ -60,8 +60,8 @@ def require_same(workers: Mapping[str, Mapping[str, str] | BaseException]) -> No
     if refused:
         more = f", and {len(refused) - 1} more differ" if len(refused) > 1 else ""
         raise ClusterError(
-            f"{refused[0]}{more}; results are the same only with the same versions: install the"
-            " same environment on all machines"
+            f"{refused[0]}{more}; results agree only if all machines have the same"
+            " versions: install the same environment on all of them"
         )
 
 

@@ -40,6 +40,6 @@ class Waiting:
         if time.monotonic() > self._since + WORKER_TIMEOUT:
             raise ClusterError(
                 f"the scheduler at {self._client.scheduler.address} has had no worker for"
-                f" {WORKER_TIMEOUT / 60:.0f} minutes; what is done is kept; run the same command"
-                " to continue when there are workers"
+                f" {WORKER_TIMEOUT / 60:.0f} minutes; the results so far are kept: start"
+                " workers and run the same command to continue"
             )

@@ -115,8 +115,8 @@ def read_grasps(
     if frame == "object":
         if X_SF is not None or object_ids:
             raise InvalidInputError(
-                f"{path} has grasps in the frames of their objects, to which neither a pose nor"
-                " object ids apply"
+                f"the grasps of {path} are in the frames of their objects; leave out the"
+                " pose and the object ids, which do not apply"
             )
         found = _of_names(grasps, names)
         return GivenGrasps(
@@ -124,8 +124,8 @@ def read_grasps(
         )
     if frame == "camera" and X_SF is None:
         raise InvalidInputError(
-            f"{path} has grasps in the frame of a camera; give the camera's pose in the scene, or"
-            " say in which other frame they are"
+            f"the grasps of {path} are in the frame of a camera; give the pose of the"
+            " camera in the scene, or the frame that they are really in"
         ).about("X_SF", "frame")
     X_SF = np.eye(4) if X_SF is None else X_SF
     X_SG = X_SF @ grasps.X_OG
@@ -148,10 +148,10 @@ def _wide(grasps: GraspSet, path: str | Path, gripper: Gripper) -> tuple[str, ..
         beyond = None if values is None else values[values > widest + WIDTH_TOLERANCE]
         if beyond is not None and len(beyond):
             notes.append(
-                f"{name} of {len(beyond)} of {len(grasps)} grasps of {path} is beyond the"
-                f" {1e3 * widest:g} mm to which hand {gripper.name!r} opens (largest"
-                f" {1e3 * beyond.max():.4g} mm); they are judged all the same, with the hand open"
-                f" at {1e3 * widest:g} mm."
+                f"{name} of {len(beyond)} of {len(grasps)} grasps of {path} is more than"
+                f" the {1e3 * widest:g} mm to which hand {gripper.name!r} opens (the"
+                f" largest is {1e3 * beyond.max():.4g} mm); they are judged with the hand"
+                f" open at {1e3 * widest:g} mm."
             )
     return tuple(notes)
 
@@ -159,7 +159,7 @@ def _wide(grasps: GraspSet, path: str | Path, gripper: Gripper) -> tuple[str, ..
 def _repeated(by_instance: Mapping[str, GraspSet], path: str | Path) -> tuple[str, ...]:
     """A note about grasps that are there several times, which `given_candidates` leaves out."""
     count = sum(len(part) - len(np.unique(part.id)) for part in by_instance.values())
-    return (f"{count} grasps of {path} repeat others; each is judged once.",) if count else ()
+    return (f"{count} grasps of {path} are duplicates; each is judged once.",) if count else ()
 
 
 def by_names(scene: Scene, grasps: GraspSet) -> dict[str, GraspSet]:
@@ -197,7 +197,9 @@ def _of_one_scene(grasps: GraspSet, scene_id: str | None, path: str) -> GraspSet
     """The grasps of one scene of the file."""
     if SCENE_ID not in grasps.columns:
         if scene_id is not None:
-            raise NoSceneIdsError(f"{path} has no scene ids to choose by").about("scene_id")
+            raise NoSceneIdsError(f"{path} has no scene ids; leave the scene id out").about(
+                "scene_id"
+            )
         return grasps
     ids = grasps.columns[SCENE_ID].astype(str)
     known = sorted(set(ids.tolist()))
@@ -262,14 +264,14 @@ def _missed(
         return ()
     if missed == len(held):
         raise MisplacedGraspsError(
-            f"none of the {missed} grasps of {names.path} has an object of scene"
-            f" {names.scene.name!r} between its fingers; is the scene the right one, and the pose"
-            " of the camera or workspace?",
+            f"none of the {missed} grasps of {names.path} has an object of scene "
+            f"{names.scene.name!r} between its fingers; is it the right scene, and is the"
+            " pose of the camera or workspace right?",
             placed,
         ).about("X_SF", "frame")
     return (
-        f"{missed} of {len(held)} grasps have no object between their fingers; they are given to"
-        " the one with the nearest surface.",
+        f"{missed} of {len(held)} grasps have no object between their fingers; each was"
+        " assigned to the object with the nearest surface.",
     )
 
 
@@ -281,20 +283,24 @@ def _named_owners(
     if not object_ids:
         return named
     if OBJECT_ID not in grasps.columns:
-        raise InvalidInputError(f"{names.path} has no object ids to name").about("object_ids")
+        raise InvalidInputError(f"{names.path} has no object ids; leave their names out").about(
+            "object_ids"
+        )
     ids = grasps.columns[OBJECT_ID]
     unknown = sorted(set(ids.tolist()) - {*object_ids, NO_OBJECT})
     if unknown:
         raise InvalidInputError(
-            f"{names.path} has grasps of object id {unknown[0]}, for which no instance is named;"
-            f" named are {', '.join(f'{number}={name}' for number, name in object_ids.items())}"
+            f"{names.path} has grasps of object id {unknown[0]}, but no instance is named"
+            " for it; named are "
+            f"{', '.join(f'{number}={name}' for number, name in object_ids.items())}"
         ).about("object_ids")
     for number, name in object_ids.items():
         instance, *others = names.called(name)
         if others:
             raise InvalidInputError(
-                f"object id {number} is given as {name!r}, of which scene {names.scene.name!r}"
-                f" has several: {', '.join((instance, *others))}; name one of them"
+                f"object id {number} is named {name!r}, but scene {names.scene.name!r}"
+                f" has several of those: {', '.join((instance, *others))}; name one of"
+                " them"
             )
         named[ids == number] = instance
     return named

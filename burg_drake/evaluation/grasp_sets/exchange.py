@@ -79,18 +79,20 @@ def read_in_frame(
     if "object" not in (given, wanted):
         if seen.X_SF is None:
             raise InvalidInputError(
-                f"{path} has grasps measured in {IN_WORDS[given]}, which are wanted in"
-                f" {IN_WORDS[wanted]}; give the camera's pose in the scene"
+                f"{path} has grasps in {IN_WORDS[given]}, but they are wanted in "
+                f"{IN_WORDS[wanted]}; give the pose of the camera in the scene"
             ).about("X_SF")
         grasps = _moved(imported.grasps, seen.X_SF if given == "camera" else inverse(seen.X_SF))
         return ImportedGrasps(grasps, wanted, imported.notes)
     if seen.scene is None:
         raise InvalidInputError(
-            f"{path} has grasps measured in {IN_WORDS[given]}, which are wanted in"
-            f" {IN_WORDS[wanted]}; give the scene in which the objects stand"
+            f"{path} has grasps in {IN_WORDS[given]}, but they are wanted in "
+            f"{IN_WORDS[wanted]}; give the scene in which the objects stand"
         ).about("scene")
     if wanted == "camera" and seen.X_SF is None:
-        raise InvalidInputError("grasps are wanted in a camera; give its pose").about("X_SF")
+        raise InvalidInputError("grasps in the frame of a camera need its pose; give it").about(
+            "X_SF"
+        )
     placed = read_grasps(
         seen.scene,
         path,

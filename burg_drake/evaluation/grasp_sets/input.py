@@ -65,7 +65,10 @@ def read_input(
         return dataclasses.replace(imported, grasps=grasps)
     if gripper is None or hand["name"] == gripper.name:
         return imported
-    note = f"The grasps are for hand {hand['name']!r} and are taken for those of {gripper.name!r}."
+    note = (
+        f"The grasps were made for hand {hand['name']!r}; they are judged as those of hand "
+        f"{gripper.name!r}."
+    )
     return dataclasses.replace(imported, notes=(*imported.notes, note))
 
 

@@ -250,8 +250,8 @@ def half_width_note(
     if half < max(MIN_FITTING, MIN_SHARE_COMBINED * len(ratios)):
         return ""
     return (
-        f"The widths of {half} of the {len(ratios)} grasps that were looked at are half of the"
-        " distance between the contacts. They are very likely those of one finger;"
+        f"The widths of {half} of the {len(ratios)} grasps that were checked are half of"
+        " the distance between the contacts. They are very likely those of one finger;"
         f" --correction {HALF_WIDTHS} reads them that way."
     )
 

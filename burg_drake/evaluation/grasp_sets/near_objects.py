@@ -34,7 +34,7 @@ def require_near(
         nearest = np.linalg.norm(outside, axis=-1).min()
         if nearest > FARTHEST:
             raise InvalidInputError(
-                f"{source}: the nearest grasp of object {name!r} is {nearest:.3g} m away from it;"
-                " lengths have to be metres, and if the grasps are of another object, or in another"
-                " frame, say which"
+                f"{source}: the nearest grasp of object {name!r} is {nearest:.3g} m away"
+                " from it; are lengths in metres, is it the right object, and is the"
+                " frame of the grasps right?"
             ).about("objects", "frame")

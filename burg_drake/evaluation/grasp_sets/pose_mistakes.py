@@ -358,11 +358,11 @@ class MistakeFound:
         sentences = [self._found()]
         if self.reach_mm is not None and self.reach_mm[0] < self.reach_mm[1]:
             low, high = sorted(map(abs, self.reach_mm))
-            sentences.append(f"Any distance from {low:g} to {high:g} mm fits as well.")
+            sentences.append(f"Any distance from {low:g} to {high:g} mm fits equally well.")
         if self.likeness:
             sentences.append(f"Files of {listing(self.likeness)} have their grasps that way.")
         if self.alternatives:
-            sentences.append(f"As many fit {' or '.join(self.alternatives)}.")
+            sentences.append(f"Equally many fit {' or '.join(self.alternatives)}.")
         return " ".join([*sentences, self._remedy(format_option)])
 
     def options(self, format_option: str = "--grasps-format") -> list[str]:
@@ -379,17 +379,19 @@ class MistakeFound:
 
     def _found(self) -> str:
         words = self.mistake.words
-        others = f" that were looked at, of {self.total}," if self.total > self.count else ""
+        others = f" that were checked, of {self.total} in all," if self.total > self.count else ""
         grasps = f"grasps of {self.only}" if self.only else "grasps"
         return (
-            f"{self.before} of the {self.count} {grasps}{others} fit as they were read: the open"
-            " hand is clear of the object, and its pads close on it."
-            f" {words[0].upper()}{words[1:]}, {self.after} of {self.count} fit."
+            f"As they were read, {self.before} of the {self.count} {grasps}{others} fit:"
+            " the open hand is clear of the object, and its pads close on it. "
+            f"{words[0].upper()}{words[1:]}, {self.after} of {self.count} fit."
         )
 
     def _remedy(self, format_option: str) -> str:
         likely = "very likely" if self.is_likely else "perhaps"
         if self.mistake.camera is not None:
-            return f"The camera's pose is {likely} wrong; give the right one with --camera-pose."
+            return (
+                f"The pose of the camera is {likely} wrong; give the right one with --camera-pose."
+            )
         correction = " ".join(self.options(format_option))
-        return f"The file {likely} means them so; {correction} reads them that way."
+        return f"The file {likely} means that; {correction} reads it that way."

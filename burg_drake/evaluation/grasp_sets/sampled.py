@@ -65,7 +65,7 @@ def sample_grasps(
     sampled = dict(stream)
     if not sampled:
         raise InvalidInputError(
-            f"{(scene or library).name!r} has no free objects; nothing to sample on"
+            f"{(scene or library).name!r} has no free objects to sample grasps on"
         )
     return sampled_set(sampled, library, scene, station, n, seed, chosen)
 

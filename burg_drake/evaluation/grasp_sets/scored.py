@@ -75,7 +75,7 @@ def scored_set(
     scene = None if scene is None else as_scene(scene)
     check_metric(by)
     if by == "gravity_margin" and scene is None:
-        raise InvalidInputError("gravity_margin needs to know where up is; give a scene")
+        raise InvalidInputError("gravity_margin depends on where up is; give a scene")
     objects = sorted(set(grasps.object.tolist()))
     chosen = _friction(friction or {}, objects)
     jaws = jaws_of(station.hand, station.hand_model, station.packages)
@@ -121,8 +121,8 @@ def _friction(given: Mapping[str, float], objects: list[str]) -> dict[str, float
     for name in given:
         if name and name not in objects:
             raise UnknownNameError(
-                f"friction is given for {name!r}, of which there are no grasps;"
-                f" {nearest(name, objects)}"
+                f"friction is given for {name!r}, but there are no grasps of it; "
+                f"{nearest(name, objects)}"
             )
     return dict(given)
 
@@ -151,8 +151,8 @@ def _instances(grasps: GraspSet, scene: Scene) -> NDArray[np.str_]:
         own = [name for name, i in scene.instances.items() if i.object == object_name]
         if len(own) != 1:
             raise InvalidInputError(
-                f"scene {scene.name!r} has {len(own)} instances of {object_name!r}; grasps need a"
-                f" column {INSTANCE!r} to say which one they are on"
+                f"scene {scene.name!r} has {len(own)} instances of {object_name!r}; add a"
+                f" column {INSTANCE!r} that says on which one each grasp is"
             )
         found[(names == "") & (grasps.object == object_name)] = own[0]
     return found.astype(str)

@@ -63,8 +63,8 @@ def merge_campaigns(campaigns: Sequence[Campaign], staging: Path, folder: Path) 
     for other in campaigns[1:]:
         if found := campaign_differences(first.document, other.document):
             raise InvalidInputError(
-                f"{first.path} and {other.path} are not the same run ({'; '.join(found)}); only"
-                " shards and copies of one run can be merged"
+                f"{first.path} and {other.path} are different runs ({'; '.join(found)});"
+                " only shards or copies of the same run can be merged"
             )
     document = replace(
         first.document,

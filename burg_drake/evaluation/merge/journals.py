@@ -123,6 +123,6 @@ def _conflict(id: str, first: tuple[Path, int], second: tuple[Path, int]) -> Inv
     if "outcome" not in names:
         how += f", with other values of {', '.join(names)}"
     return InvalidInputError(
-        f"grasp {id} ended as {how}; the same run gives the same verdict everywhere, so that one"
-        " of them was judged otherwise: leave it out"
+        f"grasp {id} ended as {how}; the same run gives the same verdict on every"
+        " machine, so one of them was judged in another way: leave it out"
     )

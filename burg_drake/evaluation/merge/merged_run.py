@@ -85,8 +85,8 @@ def require_mergeable(first: Run, other: Run) -> None:
         return
     found = run_differences(a, b) or grasp_differences(a.grasps, b.grasps)
     raise InvalidInputError(
-        f"{first.path} and {other.path} are not the same run ({'; '.join(found)}); only shards and"
-        " copies of one run can be merged"
+        f"{first.path} and {other.path} are different runs ({'; '.join(found)}); only"
+        " shards or copies of the same run can be merged"
     )
 
 

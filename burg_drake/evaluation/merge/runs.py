@@ -53,17 +53,19 @@ class Merged:
         notes = []
         shard = self.result.document.shard
         if shard:
-            notes.append(f"only shard {shard} was given, so the merged run is only that shard")
+            notes.append(f"only shard {shard} was given, so the merged run has that shard alone")
         if not (self.missing or self.scenes):
             return tuple(notes)
         if self.missing:
-            notes.append(f"{self.missing:,} grasps are not judged")
+            notes.append(f"{self.missing:,} grasps are not judged yet")
         if self.scenes:
-            notes.append(f"{len(self.scenes):,} scenes have not been begun: {listing(self.scenes)}")
+            notes.append(f"{len(self.scenes):,} scenes are not begun yet: {listing(self.scenes)}")
         if self.shards and not shard:
             notes.append(f"shards that were not given: {listing(self.shards)}")
         how = f"shard {shard}" if shard else "no shard"
-        notes.append(f"to judge the rest, evaluate the same into {self.result.path}, with {how}")
+        notes.append(
+            f"to judge the rest, run the same evaluation into {self.result.path}, with {how}"
+        )
         return tuple(notes)
 
 
@@ -106,7 +108,7 @@ def _merge_folders(folders: Sequence[Path], folder: Path) -> MissingFromMerge:
         one = next(r.path for r in results if isinstance(r, Run))
         many = next(r.path for r in results if isinstance(r, Campaign))
         raise InvalidInputError(
-            f"{one} is a run of one scene, {many} one of many; only runs of the same can be merged"
+            f"{one} is a run of one scene, {many} one of many scenes; merge runs of one kind"
         )
     staging = _staging_folder(folder)
     try:
@@ -147,7 +149,7 @@ def _distinct(paths: Sequence[str | Path]) -> list[Path]:
 def _staging_folder(folder: Path) -> Path:
     """An empty folder beside another; those of merges that were killed go."""
     if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
-        raise InvalidInputError(f"{folder} is there already; choose another folder").about("out")
+        raise InvalidInputError(f"{folder} exists already; choose another folder").about("out")
     parent = writable_folder(folder.absolute().parent)
     left = re.compile(rf"\.{re.escape(folder.name)}\.[0-9a-f]{{16}}")
     for path in parent.iterdir():

@@ -170,7 +170,7 @@ def input_difference(
     """
     if there.path != here.path:
         return _difference(topic, there.path, here.path, sides)
-    return f"{topic} {here.path} has changed, or {behind} that it names have"
+    return f"{topic} {here.path} has changed, or {behind} that it uses have"
 
 
 def setting_differences(
@@ -258,13 +258,13 @@ def require_no_differences(folder: Path, differences: Sequence[str], there: str,
     """
     if differences:
         raise InvalidInputError(
-            f"{folder} holds another run ({'; '.join(differences)}); choose another folder, or"
-            " delete it"
+            f"{folder} already holds another run ({'; '.join(differences)}); choose"
+            " another folder, or delete it"
         ).about("out")
     if there != here:
         held = f"shard {there} of this run" if there else "all of this run"
         asked = f"shard {here}" if here else "no shard"
         raise InvalidInputError(
-            f"{folder} holds {held}, and {asked} is given; choose another folder; merge shards"
-            " with burg-drake merge"
+            f"{folder} holds {held}, but {asked} is given; choose another folder. Shards"
+            " are merged by burg-drake merge"
         ).about("out")

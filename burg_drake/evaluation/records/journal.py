@@ -63,11 +63,13 @@ class Journal:
         try:
             written = os.write(self._file, line)
             if written != len(line):
-                raise OSError(0, f"{written} of {len(line)} bytes fitted on the disk")
+                raise OSError(
+                    0, f"the disk is full: only {written} of {len(line)} bytes were written"
+                )
         except OSError as error:
             raise InvalidInputError(
-                f"cannot write {self._path}: {error.strerror}; what is in it is kept; run the"
-                " same command to continue"
+                f"cannot write {self._path}: {error.strerror}; what is in it is kept."
+                " Make room and run the same command to continue"
             ) from error
 
     def close(self) -> None:

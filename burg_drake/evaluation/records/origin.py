@@ -178,9 +178,9 @@ def _engine(label: str, settings: str, where: str) -> Engine:
         )
     if label == name and engine != ENGINES[name]:
         raise InvalidInputError(
-            f"{where}: engine {name!r} and engine_settings contradict each other: the preset of"
-            f" this release has {_other_settings(ENGINES[name], engine)}; an engine with settings"
-            f" of its own is called {quoted(name + CUSTOM)}"
+            f"{where}: engine {name!r} and engine_settings contradict each other: the"
+            f" preset of this release has {_other_settings(ENGINES[name], engine)}; call"
+            f" an engine with settings of its own {quoted(name + CUSTOM)}"
         )
     return engine
 
@@ -196,7 +196,7 @@ def _number(name: str, text: str, where: str) -> float:
         return float(text)
     except ValueError as error:
         raise InvalidInputError(
-            f"{where}: trial_settings: {name} is {quoted(text)}; it has to be a number"
+            f"{where}: trial_settings: {name} is {quoted(text)}; it must be a number"
         ) from error
 
 
@@ -229,8 +229,8 @@ def _typed(values: Mapping[str, object], schema: type[T], where: str) -> T:
     unknown = [name for name in values if name not in known]
     if unknown:
         raise InvalidInputError(
-            f"{where}: {unknown[0]!r} is not a setting of this release of burg_drake; install the"
-            " one that made the results"
+            f"{where}: this release of burg_drake has no setting {unknown[0]!r}; install"
+            " the release that made the results"
         )
     text = "\n".join(f"{name}: {_yaml(value)}" for name, value in values.items())
     found: T = _CellReader(where).read(parse_nodes(text or "{}", where), schema, "")

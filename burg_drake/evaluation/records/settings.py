@@ -156,11 +156,11 @@ class EvaluationSettings:
             self._require_no_balance()
         if not 0.0 < self.tilt_limit_deg <= 180.0:
             raise InvalidInputError(
-                f"tilt_limit_deg is {self.tilt_limit_deg:g}; give more than 0, and 180 for no limit"
+                f"tilt_limit_deg is {self.tilt_limit_deg:g}; give more than 0 (180: no limit)"
             )
         if not self.slip_limit_mm > 0.0:
             raise InvalidInputError(
-                f"slip_limit_mm is {self.slip_limit_mm:g}; give more than 0, and inf for no limit"
+                f"slip_limit_mm is {self.slip_limit_mm:g}; give more than 0 (inf: no limit)"
             )
 
     def _require_no_balance(self) -> None:
@@ -168,7 +168,7 @@ class EvaluationSettings:
         for name in ("balanced_among", "max_grasps_per_object"):
             if getattr(self, name) != getattr(EvaluationSettings, name):
                 raise InvalidInputError(
-                    f"{name} has an effect only with until_balanced; add that, or leave it out"
+                    f"{name} has no effect without until_balanced; add that, or leave it out"
                 ).about(name, "until_balanced")
 
     def _require_balance(self) -> None:
@@ -183,11 +183,12 @@ class EvaluationSettings:
             )
         if self.max_grasps_per_object < self.grasps_per_object:
             raise InvalidInputError(
-                f"grasps_per_object is {self.grasps_per_object}, and max_grasps_per_object"
-                f" {self.max_grasps_per_object}; give a larger maximum"
+                f"grasps_per_object is {self.grasps_per_object}, but"
+                f" max_grasps_per_object only {self.max_grasps_per_object}; give a larger"
+                " maximum"
             ).about("max_grasps_per_object")
         if self.shard is not None:
             raise InvalidInputError(
-                "a shard judges some of the grasps, and whether more are needed depends on all of"
-                " them; leave out until_balanced or shard"
+                "until_balanced has to know all grasps, but a shard judges only some of"
+                " them; leave out one of the two"
             ).about("until_balanced", "shard")

@@ -32,8 +32,8 @@ class Shard:
     def __post_init__(self) -> None:
         if not 1 <= self.number <= self.count <= MOST:
             raise InvalidInputError(
-                f"shard {self.number}/{self.count} does not exist; give K/N with K from 1 to N,"
-                " such as 2/8"
+                f"there is no shard {self.number}/{self.count}; give K/N with K from 1 to"
+                " N, such as 2/8"
             )
 
     @classmethod

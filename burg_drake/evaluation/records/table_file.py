@@ -76,8 +76,9 @@ def require_table(path: Path) -> None:
     """
     if path.suffix not in (".csv", ".parquet"):
         raise InvalidInputError(
-            f"{path} is not a table of a known format; give a file that ends in .csv or .parquet,"
-            f" such as {path.with_suffix('.csv') if path.name else 'table.csv'}"
+            f"{path}: the suffix does not say the format of the table; give a file that"
+            " ends in .csv or .parquet, such as "
+            f"{path.with_suffix('.csv') if path.name else 'table.csv'}"
         )
     require_writer(path.suffix.removeprefix("."))
     require_writable(path)
@@ -157,7 +158,7 @@ def _bounded(path: Path, file: Any) -> Any:
     for batch in file.iter_batches(batch_size=BATCH):
         size += batch.nbytes
         if size > TABLE.size:
-            raise InvalidInputError(f"cannot read {path}: its cells have more than 1 GiB")
+            raise InvalidInputError(f"cannot read {path}: it has cells of more than 1 GiB in all")
         batches.append(batch)
     return arrow.Table.from_batches(batches, file.schema_arrow)
 
@@ -259,4 +260,4 @@ def _read(kind: type[T], name: str, row: int, text: str, expected: str) -> T:
     try:
         return kind(text)
     except ValueError as error:
-        raise ValueError(f"row {row}: {name} is {quoted(text)}; it has to be {expected}") from error
+        raise ValueError(f"row {row}: {name} is {quoted(text)}; it must be {expected}") from error

@@ -82,14 +82,12 @@ def pose_from_text(text: str, where: str) -> Array:
         InvalidInputError: the text is something else.
     """
     words, numbers = text.split(), []
-    expected = "it has to be the 12 numbers of the upper three rows of the pose"
+    expected = "it must be the 12 numbers of the upper three rows of the pose"
     for word in words:
         try:
             numbers.append(float(word))
         except ValueError as error:
-            raise InvalidInputError(
-                f"{where}: X_OG has {quoted(word)} in it; {expected}"
-            ) from error
+            raise InvalidInputError(f"{where}: X_OG contains {quoted(word)}; {expected}") from error
     if len(words) != 12:
         raise InvalidInputError(f"{where}: X_OG has {len(words)} numbers; {expected}")
     upper = np.array(numbers).reshape(3, 4)
@@ -109,8 +107,9 @@ def read_trial(row: Mapping[str, Any], where: str) -> RecordedTrial:
     missing = [name for name in NEEDED if name not in row]
     if missing:
         raise InvalidInputError(
-            f"{where}: column {', '.join(missing)} is missing, without which a row alone cannot be"
-            " replayed (older releases did not write it); give the folder of its run"
+            f"{where}: column {', '.join(missing)} is missing (older releases did not"
+            " write it), so this row cannot be replayed by itself; give the folder of"
+            " its run"
         )
     empty = [name for name in NEEDED if row[name] == ""]
     if empty:
@@ -148,7 +147,9 @@ def _given(row: Mapping[str, Any], name: str, where: str) -> float | None:
     if math.isnan(value):
         return None
     if value < 0.0 or value > LARGEST or (name == "mass" and value == 0.0):
-        raise InvalidInputError(f"{where}: {name} is {value:g}; it must be above 0, to {LARGEST:g}")
+        raise InvalidInputError(
+            f"{where}: {name} is {value:g}; it must be above 0 and at most {LARGEST:g}"
+        )
     return value
 
 

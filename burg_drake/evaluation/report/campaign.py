@@ -115,12 +115,12 @@ def _notice(campaign: Campaign, summary: Summary) -> Html | None:
     parts = []
     if campaign.document.shard:
         number, _, whole = campaign.document.shard.partition("/")
-        parts.append(f"This is shard {number} of {whole}; merge the shards with burg-drake merge.")
+        parts.append(f"This is shard {number} of {whole}. Merge the shards with burg-drake merge.")
     if not campaign.complete:
         judged, expected = format_count(summary.total.judged), format_count(campaign.expected)
         parts.append(
-            f"This run is not complete: {judged} of {expected} grasps are judged. The same"
-            " command continues it."
+            f"This run is not complete: {judged} of {expected} grasps are judged. Run the"
+            " same command again to continue it."
         )
     return element("p", " ".join(parts), class_="notice") if parts else None
 

@@ -112,12 +112,12 @@ def _notice(run: Run) -> Html | None:
     if run.document.shard:
         number, _, whole = run.document.shard.partition("/")
         parts.append(
-            f"This is shard {number} of {whole}: of {len(run.candidates)} grasps {mine} are judged"
-            " here. Merge the shards with burg-drake merge."
+            f"This is shard {number} of {whole}: it judges {mine} of the "
+            f"{len(run.candidates)} grasps. Merge the shards with burg-drake merge."
         )
     if judged < mine:
         parts.append(
-            f"This run is not complete: {judged} of {mine} grasps are judged. The command under"
-            " “How to repeat it” continues it."
+            f"This run is not complete: {judged} of {mine} grasps are judged. Run the"
+            " command under “How to repeat it” again to continue it."
         )
     return element("p", " ".join(parts), class_="notice") if parts else None

@@ -130,11 +130,13 @@ def _counter(members: Sequence[Text], counts: NDArray[np.int64]) -> Counter[Text
 def _notes(campaign: Campaign) -> tuple[str, ...]:
     states, notes = campaign.states, [*campaign.document.hints]
     if empty := [n for n in campaign.names if n in states and states[n].state == "empty"]:
-        notes.append(f"no grasps to judge in {len(empty)} scenes: {listing(empty)}")
+        notes.append(f"{len(empty)} scenes have no grasps to judge: {listing(empty)}")
     if failed := list(campaign.failed):
         notes.append(f"{len(failed)} scenes could not be judged: {listing(failed)}")
     short = [n for n in campaign.names if n in states and states[n].missing]
     notes += [f"scene {name}: {states[name].missing}" for name in short[:SCENES_LISTED]]
     if len(short) > SCENES_LISTED:
-        notes.append(f"{len(short) - SCENES_LISTED} more scenes have fewer grasps than asked for")
+        notes.append(
+            f"{len(short) - SCENES_LISTED} more scenes have fewer grasps than were asked for"
+        )
     return tuple(notes)

@@ -149,7 +149,7 @@ class Pushes:
     target_largest: float
 
     def __str__(self) -> str:
-        text = f"The approach pushed something by more than {1e3 * PUSH:g} mm"
+        text = f"The approach moved an object by more than {1e3 * PUSH:g} mm"
         text += f" in {self.pushed} of {self.trials} trials"
         if self.pushed:
             text += f" (largest {1e3 * self.largest:.1f} mm)"

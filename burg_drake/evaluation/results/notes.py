@@ -18,16 +18,14 @@ from burg_drake.station.document import GraspMotion
 CAUSES = 3
 """So many outcomes are named."""
 HIT = {Outcome.COLLISION_TARGET: SELF, Outcome.COLLISION_TABLE: TABLE}
-REMEDY_OF_ARM = (
-    "another station, or another place on the board, may help; mode `hand` leaves the arm out"
-)
-REMEDY_OF_GIVEN = "burg-drake grasps show draws them at their object"
+REMEDY_OF_ARM = "try another station, or another place on the board; mode `hand` leaves the arm out"
+REMEDY_OF_GIVEN = "burg-drake grasps show displays them at their object"
 """What would help where grasps were given and the open hand is not clear."""
 REMEDIES = {
-    Stage.CLEAR: "sample grasps at which the hand is clear, which is the default",
+    Stage.CLEAR: "sample grasps at which the hand is clear, as is the default",
     Stage.REACHABLE: REMEDY_OF_ARM,
     Stage.PLANNED: REMEDY_OF_ARM,
-    Stage.EXECUTED: "the table of results has the reasons",
+    Stage.EXECUTED: "the table of results has the reason of each",
 }
 """What would help, by the stage that stopped most grasps."""
 NO_LIFT = (Outcome.HAND_COLLISION_LIFT, Outcome.LIFT_LINE)
@@ -51,7 +49,7 @@ def run_notes(run: Run) -> tuple[str, ...]:
 def missing_grasps_note(objects: Iterable[str], given: Iterable[str]) -> str:
     """Which of the objects have no given grasp; "" if all have some."""
     missing = sorted({*objects} - {*given})
-    return f"no grasps to judge for {listing(missing)}" if missing else ""
+    return f"there are no grasps to judge for {listing(missing)}" if missing else ""
 
 
 def shortfalls(run: Run) -> list[str]:
@@ -96,7 +94,7 @@ def _unexecuted_note(
     if other := _other_motion(Outcome(_counted(outcomes, blockers)[0][0][0]), motion):
         remedy = f"{other} may help; {remedy}"
     causes = _causes(outcomes, blockers)
-    return f"{name}: nothing executed of {_grasps(mine)}: {causes}; {remedy}"
+    return f"{name}: none of {_grasps(mine)} was executed: {causes}; {remedy}"
 
 
 def _remedy(stage: Stage, *, given: bool) -> str:
@@ -220,11 +218,11 @@ def _unbalanced(run: Run) -> list[str]:
         ]
         if parts:
             among = grasps.balanced_among
-            counted = "" if among == "all" else f" ({among} ones count)"
+            counted = "" if among == "all" else f" (only {among} grasps count)"
             notes.append(
-                f"{name}: {' and '.join(parts)} grasps asked for{counted}, after"
-                f" {grasps.objects[name]:,} grasps (max_grasps_per_object is"
-                f" {grasps.max_per_object:,})"
+                f"{name}: only {' and '.join(parts)} grasps were found{counted} among "
+                f"{grasps.objects[name]:,} grasps (max_grasps_per_object is "
+                f"{grasps.max_per_object:,})"
             )
     asked = grasps.until_balanced
     return notes or [f"every object has {asked} lifted and {asked} failing grasps, as asked for"]

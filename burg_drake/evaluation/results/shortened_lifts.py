@@ -31,13 +31,13 @@ class ShortLifts:
 
     def __str__(self) -> str:
         text = (
-            f"In {self.short} of {self.grasps} grasps there is no room for the whole lift of"
+            f"For {self.short} of {self.grasps} grasps there is no room to lift the whole"
             f" {1e3 * self.whole:g} mm: "
         )
         if self.short == 1:
-            return f"{text}it is {1e3 * self.least:.0f} mm."
-        least = f"the shortest {1e3 * self.least:.0f} mm"
-        return f"{text}the median of these is {1e3 * self.median:.0f} mm, {least}."
+            return f"{text}it is lifted {1e3 * self.least:.0f} mm."
+        least = f"the shortest lift is {1e3 * self.least:.0f} mm"
+        return f"{text}the median is {1e3 * self.median:.0f} mm, {least}."
 
 
 def short_lifts(lift_height: Array, whole: float) -> ShortLifts | None:

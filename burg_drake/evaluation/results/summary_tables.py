@@ -76,15 +76,17 @@ def _stage_table(summary: Summary) -> TextTable:
             group.name, *(format_count(group.funnel[name]) for name in names), share, interval
         )
     table.caption = (
-        "held: still in the hand at the end; lifted: held, not turned in the hand, and no other"
-        " object disturbed\n"
+        "held: still in the hand at the end; lifted: held, without turning in the hand"
+        " or disturbing another object\n"
     )
     if summary.mode != "hand":
         table.caption += (
-            "reach: the arm can be at the grasp; plan: it has a path to it without collision, and"
-            " can follow approach and lift\n"
+            "reach: the arm reaches the grasp; plan: it has a path there without"
+            " collision, and can follow approach and lift\n"
         )
-    table.caption += "success: share of executed grasps that were lifted; CI: Wilson's interval"
+    table.caption += (
+        "success: share of executed grasps that were lifted; CI: Wilson's 95 % interval"
+    )
     return table
 
 
@@ -98,8 +100,8 @@ def _certainty_table(summary: Summary) -> TextTable:
         numbers = [group.executed, group.surely_lifted, group.surely_lost, group.contested]
         table.row(group.name, *map(format_count, [*numbers, *([group.settled] * settled)]))
     table.caption = (
-        "contested: the simulation is not sure whether the object was held (confidence below"
-        f" {CONTESTED:g}); another engine can settle it"
+        "contested: the simulation is not sure whether the object was held (confidence"
+        f" below {CONTESTED:g}); judging again with another engine can settle it"
     )
     if settled:
         table.caption += "\nsettled: judged again by another engine, lifted or failed"

@@ -186,7 +186,7 @@ def _choose(
     if ids is None:
         ids = run.best(best, each=True, only=only)
         if not ids:
-            raise InvalidInputError(f"{run.path}: no grasp was lifted; there is nothing to test")
+            raise InvalidInputError(f"{run.path}: no grasp was lifted, so there is nothing to test")
     chosen = {id: run.trial(id).candidate for id in ids}
     for id in chosen:
         verdict = run.verdicts.get(id)
@@ -194,8 +194,8 @@ def _choose(
             raise InvalidInputError(f"{run.path}: grasp {id!r} is not judged yet")
         if not verdict.outcome.held:
             raise InvalidInputError(
-                f"{run.path}: grasp {id!r} was not lifted ({verdict.outcome}); robustness is tested"
-                " of lifted grasps"
+                f"{run.path}: grasp {id!r} was not lifted ({verdict.outcome}); robustness"
+                " tests need a lifted grasp"
             )
     return list(chosen.values())
 
@@ -215,9 +215,9 @@ def _tests_by_grasp(
             engine = origin.judged_by(judge).engine
             if engine.simulator != "drake" and loaded:
                 raise InvalidInputError(
-                    f"{' and '.join(loaded)} are simulated by Drake alone, and {grasp.id} was"
-                    f" judged by engine {engine.name}; give the tests"
-                    f" {','.join(test for test in TESTS if test not in LOADED_TESTS)}"
+                    f"tests {' and '.join(loaded)} need Drake, but {grasp.id} was judged"
+                    f" by engine {engine.name}; give the tests "
+                    f"{','.join(test for test in TESTS if test not in LOADED_TESTS)}"
                 ).about("tests")
             require_engine_for(engine, "hand")
             factory = ProbeJudgeFactory(scene, station, engine, trial, settings)

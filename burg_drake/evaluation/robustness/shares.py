@@ -41,16 +41,16 @@ def lifted_shares(
     columns = read_table(path)
     if "success" not in columns or "id" not in columns or columns["success"].dtype.kind != "f":
         raise InvalidInputError(
-            f"{path} is not a table of robustness: it has no columns id and success, as `burg-drake"
-            " robustness` writes them"
+            f"{path} is not a table of robustness (columns id and success are missing);"
+            " `burg-drake robustness` writes one"
         )
     grasps, shares = columns["id"].tolist(), columns["success"].tolist()
     if "run" in columns:
         of = columns["run"].tolist()
         if grasps and not set(of) & set(runs):
             raise InvalidInputError(
-                f"{path} is of run {listing(sorted(set(of)))}, not of {listing(sorted(runs))};"
-                " give the table of the run whose verdicts are compared"
+                f"{path} is of run {listing(sorted(set(of)))}, not of "
+                f"{listing(sorted(runs))}; give the table of the run that is compared"
             )
     else:
         of = [_only_run(path, runs, ids, grasps)] * len(grasps)
@@ -64,13 +64,12 @@ def _only_run(
     """The run of a table that does not say it."""
     if ids is None or len(runs) != 1:
         raise InvalidInputError(
-            f"{path} has no column run, and ids of grasps repeat between scenes; make it again with"
-            " `burg-drake robustness`, or give one of its runs alone"
+            f"{path} has no column run, but ids of grasps repeat between scenes; make it"
+            " again with `burg-drake robustness`, or give only one of the runs"
         )
     foreign = sorted(set(grasps) - set(ids))
     if foreign:
         raise InvalidInputError(
-            f"{path} is of another run than {listing(sorted(runs))}, which has no grasp"
-            f" {foreign[0]}"
+            f"{path} is of another run than {listing(sorted(runs))}: that has no grasp {foreign[0]}"
         )
     return next(iter(runs))

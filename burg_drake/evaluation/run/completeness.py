@@ -15,8 +15,8 @@ def require_judged(run: Run) -> None:
     left = [id for id in run.mine if id not in run.verdicts]
     if left:
         raise SimulationError(
-            f"{len(left)} of {len(run.mine)} grasps have come back without a verdict, such as"
-            f" {left[0]}; what was judged is kept; run the same command to continue"
+            f"{len(left)} of {len(run.mine)} grasps have no verdict yet, such as "
+            f"{left[0]}; the results so far are kept: run the same command to continue"
         )
 
 
@@ -33,6 +33,7 @@ def require_scenes_judged(campaign: Campaign) -> None:
     ]
     if left:
         raise SimulationError(
-            f"{len(left)} of {len(campaign.names)} scenes were not judged to the end"
-            f" ({listing(left)}); what was judged is kept; run the same command to continue"
+            f"{len(left)} of {len(campaign.names)} scenes are not complete ("
+            f"{listing(left)}); the results so far are kept: run the same command to"
+            " continue"
         )

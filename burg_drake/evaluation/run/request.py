@@ -90,21 +90,22 @@ class Request:
         engine, mode = as_engine(settings.engine), mode_for(station, settings.mode)
         if settings.approach and mode == "arm":
             raise InvalidInputError(
-                "the approach of the hand alone is asked for with mode arm, in which the whole arm"
-                " approaches anyway; leave approach out, or give mode hand or reach"
+                "approach is given with mode arm, in which the whole arm approaches"
+                " anyway; leave approach out, or give mode hand or reach"
             ).about("approach")
         motion = settings.motion or station.document.motion
         if settings.approach and motion.standoff <= 0.0:
             own = motion == station.document.motion
             where = f"of station {station.name!r}" if own else "asked for"
             raise InvalidInputError(
-                f"the approach of the hand is to be simulated, and the standoff {where} is 0 mm, so"
-                " that there is none; give a standoff above 0, or leave approach out"
+                f"the approach of the hand cannot be simulated, as the standoff {where}"
+                " is 0 mm; give a standoff above 0, or leave approach out"
             ).about("approach", "standoff_mm")
         if settings.balanced_among == "reachable" and mode == "hand":
             raise InvalidInputError(
-                "balanced_among is 'reachable', and mode hand does not ask what the arm can reach;"
-                " balance among executed, clear or all, or give mode reach or arm"
+                "balanced_among is 'reachable', but mode hand does not check what the"
+                " arm can reach; balance among executed, clear or all, or give mode"
+                " reach or arm"
             ).about("balanced_among", "mode")
         require_engine_for(engine, mode)
         return cls(

@@ -41,8 +41,9 @@ def require_engine_for(engine: Engine, mode: Mode) -> None:
         return
     if mode == "arm":
         raise InvalidInputError(
-            f"mode arm is simulated by Drake ({', '.join(DRAKE_ENGINES)}); use mode reach with"
-            f" engine {engine.name}, which has the hand alone execute what the arm can"
+            f"mode arm needs an engine of Drake ({', '.join(DRAKE_ENGINES)}); with engine"
+            f" {engine.name} use mode reach, in which the hand alone executes what the"
+            " arm can reach"
         ).about("mode")
     from burg_drake.simulation.mujoco import require_mujoco
 

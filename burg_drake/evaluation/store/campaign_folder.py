@@ -169,8 +169,8 @@ def load_campaign(path: str | Path) -> Campaign:
     path = Path(path)
     if not is_campaign(path):
         raise InvalidInputError(
-            f"{path} holds no run over many scenes ({CAMPAIGN_FILE} is missing);"
-            " burg-drake evaluate SCENE SCENE ... writes them"
+            f"{path} is not a run over many scenes ({CAMPAIGN_FILE} is missing);"
+            " burg-drake evaluate SCENE SCENE ... makes one"
         )
     return Campaign(path, load_document(path / CAMPAIGN_FILE, CampaignDocument))
 
@@ -199,11 +199,11 @@ def require_campaign_folder(folder: Path) -> None:
         return
     if (folder / RUN_FILE).exists():
         raise InvalidInputError(
-            f"{folder} holds a run of one scene, and several scenes are given; choose another"
-            " folder"
+            f"{folder} holds a run of one scene, but several scenes are given; choose"
+            " another folder"
         ).about("out")
     foreign = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
     if foreign:
         raise InvalidInputError(
-            f"{folder} is not empty and holds no run ({foreign[0]} is in it); choose another folder"
+            f"{folder} is not empty and not a run: it has {foreign[0]} in it; choose another folder"
         ).about("out")

@@ -114,6 +114,6 @@ class _InputSearch:
         copy = f"a copy is {kind}.yaml in the folder of run {self.origin.run}"
         go_on = f", or replay on {other.path} by force" if other is not None else ""
         return (
-            f"the {kind} with content {content} ({meant}), but {found}; give its file"
-            f" ({copy}){go_on}"
+            f"the {kind} with content {content} ({meant}), but {found}; give its file ("
+            f"{copy}){go_on}"
         )

@@ -148,8 +148,8 @@ class PlanFolder:
         begun = held == [JOURNAL_FILE] and journal.is_file() and journal.stat().st_size == 0
         if held and not begun:
             raise InvalidInputError(
-                f"folder {self.path} is not empty, it has {held[0]}, and no {DOCUMENT_FILE}; plans"
-                " go to a folder of their own: choose another one, or empty it"
+                f"folder {self.path} has {held[0]} in it, but no {DOCUMENT_FILE}; plans"
+                " need a folder of their own: choose another one, or empty it"
             )
 
     def _require_same(self, there: PlansDocument) -> None:
@@ -158,7 +158,11 @@ class PlanFolder:
         words = {
             "scene": [input_difference("scene", there.scene, here.scene, behind="objects")],
             "station": [input_difference("station", there.station, here.station)],
-            "grasps": [counts if there.grasps != here.grasps else "grasps are as many, but others"],
+            "grasps": [
+                counts
+                if there.grasps != here.grasps
+                else ("the number of grasps is the same, but not the grasps")
+            ],
             "settings of the arm": setting_differences(
                 _other_arm_settings(there), _other_arm_settings(here)
             ),
@@ -166,8 +170,8 @@ class PlanFolder:
         found = differences(_identity(there), _identity(here), words)
         if found:
             raise InvalidInputError(
-                f"folder {self.path} has plans of something else ({'; '.join(found)}); choose"
-                " another one, or delete it"
+                f"folder {self.path} has plans of another evaluation ({'; '.join(found)}"
+                "); choose another one, or delete it"
             )
 
 

@@ -224,7 +224,7 @@ class Run:
         if changed or scene.content != self.document.scene.content:
             what = f"{', '.join(changed)} in library {scene.library.root}" if changed else path
             raise InvalidInputError(
-                f"{what} changed since {self.path} was judged; restore it, or evaluate again"
+                f"{what} has changed since {self.path} was judged; restore it, or evaluate again"
             )
         return scene
 
@@ -237,8 +237,8 @@ class Run:
         station = load_station(self.path / STATION_FILE)
         if station.content != self.document.station.content:
             raise InvalidInputError(
-                f"{self.path / STATION_FILE}, its hand or a robot model changed since the run;"
-                " restore it, or evaluate again"
+                f"{self.path / STATION_FILE}, its hand or a robot model has changed since"
+                " the run; restore it, or evaluate again"
             )
         return station
 
@@ -261,8 +261,8 @@ class Run:
             with contextlib.suppress(UnknownNameError):
                 return load_library(place, base)
         raise InvalidInputError(
-            f"{self.path / SCENE_FILE}: the object library {reference} is gone, and is not at"
-            f" {recorded} either; write where it is into this file"
+            f"{self.path / SCENE_FILE}: the object library {reference} is missing, and is"
+            f" not at {recorded} either; write its place into this file"
         )
 
     def _unknown(self, id: str) -> UnknownNameError:
@@ -282,10 +282,11 @@ def load_run(path: str | Path) -> Run:
     """
     path = Path(path)
     if path.is_file():
-        raise InvalidInputError(f"{path} is a file, not the folder of a run")
+        raise InvalidInputError(f"{path} is a file; give the folder of a run")
     if not (path / RUN_FILE).exists():
         raise InvalidInputError(
-            f"{path} holds no run ({RUN_FILE} is missing); burg-drake evaluate writes runs"
+            f"{path} is not the folder of a run ({RUN_FILE} is missing); burg-drake"
+            " evaluate makes one"
         )
     return Run(path, load_document(path / RUN_FILE, RunDocument))
 
@@ -344,7 +345,7 @@ def require_run_folder(folder: Path) -> None:
     foreign = sorted(names - {JOURNAL_FILE, GRASPS_FILE} if begun else names)
     if foreign:
         raise InvalidInputError(
-            f"{folder} is not empty and holds no run ({foreign[0]} is in it); choose another folder"
+            f"{folder} is not empty and not a run: it has {foreign[0]} in it; choose another folder"
         ).about("out")
 
 

@@ -31,7 +31,9 @@ def member_codes(values: NDArray[np.str_], members: Sequence[str]) -> NDArray[np
         left -= int(np.count_nonzero(mine))
     if left:
         strange = sorted({str(value) for value in values[codes < 0]})
-        raise InvalidInputError(f"{listing(strange)}: none of {listing(list(map(str, members)))}")
+        raise InvalidInputError(
+            f"{listing(strange)}: expected one of {listing(list(map(str, members)))}"
+        )
     return codes
 
 

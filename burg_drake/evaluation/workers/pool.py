@@ -76,7 +76,7 @@ class JudgePool:
                     break
                 given = self._done.get()
                 if self.stopped:
-                    raise SimulationError("the workers were ended")
+                    raise SimulationError("the worker processes were stopped")
                 given.slot.given.remove(given)
                 if not given.job.failed:
                     yield from self.take_result(given)
@@ -155,7 +155,7 @@ class JudgePool:
     def submit(self, slot: WorkerSlot, work: list[tuple[GivenWork, Task[Any]]]) -> None:
         """Sends a worker tasks; what becomes of each comes to `run`."""
         if self.stopped or self._workers is None:
-            raise SimulationError("the workers were ended")
+            raise SimulationError("the worker processes were stopped")
         futures = self._workers.submit_tasks([task for _, task in work], slot.number)
         for (given, _), future in zip(work, futures, strict=True):
             given.future = future
@@ -207,8 +207,8 @@ class JudgePool:
             self.fail(
                 job,
                 SimulationError(
-                    f"{self.limits.hopeless} grasps in a row could not be simulated;"
-                    f" the last one: {reason}"
+                    f"{self.limits.hopeless} grasps in a row could not be simulated; the"
+                    f" reason of the last one: {reason}"
                 ),
             )
 

@@ -37,7 +37,7 @@ def agreement_tables(found: RunAgreement) -> Iterator[TextTable]:
 
 def alike_table(head: str, groups: Sequence[FactorGroup]) -> TextTable:
     """Held alike by what grasps have in common, such as their object."""
-    table = TextTable(f"Held or not held alike, by {head}").names(head)
+    table = TextTable(f"Agreement on holding, by {head}").names(head)
     table.numbers("grasps", "alike", "95 % CI", "kappa")
     for group in groups[:MOST_ROWS]:
         a = group.agreement
@@ -56,7 +56,7 @@ def alike_table(head: str, groups: Sequence[FactorGroup]) -> TextTable:
 def stage_table(apart: Mapping[str, Mapping[str, int]]) -> TextTable:
     """Grasps that only one run holds, by the stages that decided."""
     columns = stage_columns(apart)
-    table = TextTable("Where they part: stages that decided grasps which only one of them holds")
+    table = TextTable("Stages that decided the grasps which only one of the runs holds")
     table.texts("first run").numbers(*(f"{name} in the second" for name in columns))
     for stage, row in apart.items():
         table.row(stage, *(format_count(row.get(name, 0)) for name in columns))
@@ -65,7 +65,7 @@ def stage_table(apart: Mapping[str, Mapping[str, int]]) -> TextTable:
 
 def parted_table(parted: Sequence[PartedGrasp]) -> TextTable:
     """The first grasps that only one run holds, with their outcomes in both."""
-    table = TextTable("Grasps that only one of them holds")
+    table = TextTable("Grasps that only one of the runs holds")
     scenes = len({one.scene for one in parted}) > 1
     if scenes:
         table.names("scene")
@@ -86,7 +86,7 @@ def stage_columns(counts: Mapping[str, Mapping[str, int]]) -> list[str]:
 
 def bin_table(margins: Sequence[MarginCalibration]) -> TextTable:
     """Share of alike grasps along the first run's margins."""
-    table = TextTable("Held or not held alike along the first run's margins").texts("margin")
+    table = TextTable("Agreement on holding, along the margins of the first run").texts("margin")
     table.numbers("grasps").texts("from", "alike in each bin [%]", "to")
     for c in margins:
         title, unit, size = margin_title(c.name)
@@ -97,15 +97,17 @@ def bin_table(margins: Sequence[MarginCalibration]) -> TextTable:
         shares = " ".join(f"{100 * (one.share.value or 0.0):.0f}" for one in c.bins)
         table.row(title, format_count(c.trials), low, shares, high)
     table.caption = (
-        "bins of about equally many grasps, from the smallest margin to the largest; the JSON and"
-        " the page have their bounds and intervals"
+        "each bin has about equally many grasps, from the smallest margin to the"
+        " largest; the JSON and the page have bounds and intervals"
     )
     return table
 
 
 def difference_table(differences: Sequence[MarginDifference]) -> TextTable:
     """How far apart margins are where both executed."""
-    table = TextTable("Margins of grasps that both executed, second run less first").texts("margin")
+    table = TextTable("Margins of grasps that both runs executed: second run minus first").texts(
+        "margin"
+    )
     table.numbers("grasps", "median", "median size", "90 % within").texts("unit")
     for one in differences:
         title, unit, size = margin_title(one.name)

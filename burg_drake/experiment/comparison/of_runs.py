@@ -41,7 +41,7 @@ from burg_drake.experiment.pairing import (
 from burg_drake.experiment.statistics import PROBABILITY, Flags
 from burg_drake.experiment.trials import Success
 
-NOT_EXECUTED = "not executed in both runs, whose modes differ"
+NOT_EXECUTED = "not executed in both runs, which have different modes"
 """Why grasps are left out of runs that asked different questions before the grip."""
 
 
@@ -133,9 +133,9 @@ def pairs_of_runs(
 
 def _nothing_executed(sides: tuple[JudgedRuns, JudgedRuns], modes: Sequence[str]) -> str:
     return (
-        f"{sides[0].path} and {sides[1].path} were made in different modes, {modes[0]} and"
-        f" {modes[1]}, and have no grasp in common that both executed; what else they say answers"
-        " different questions"
+        f"{sides[0].path} and {sides[1].path} were made in different modes ({modes[0]}"
+        f" and {modes[1]}), and no grasp was executed in both, so there is nothing to"
+        " compare; evaluate one of them again in the mode of the other"
     )
 
 

@@ -199,7 +199,8 @@ def _notes(
         own = set(columns["run"].tolist()) & hashes
         if not own:
             notes.append(
-                f"the grasps were not chosen from {side.path}, but from another run of them"
+                f"the grasps were not chosen from {side.path}, but from another run of"
+                " the same grasps"
             )
         changed = [
             sheet.trials[k].number
@@ -208,8 +209,9 @@ def _notes(
         ]
         if changed:
             notes.append(
-                f"{side.path} has other verdicts than the trials file for {len(changed)} trials,"
-                f" such as trial {changed[0]}; those of the run count"
+                f"verdicts in {side.path} differ from those in the trials file for "
+                f"{len(changed)} trials, such as trial {changed[0]}; those of the run are"
+                " used"
             )
     if judged.not_represented:
         tried = {trial.stratum for trial in trials}
@@ -217,8 +219,9 @@ def _notes(
         kinds = listing([f"{s.object} ({s.label})" for s in without])
         every = sum(s.population for s in sheet.strata.values())
         notes.append(
-            f"figures for all grasps leave out {judged.not_represented} of the {every} grasps that"
-            f" the trials were chosen from, as no trial was compared of {kinds}"
+            f"figures for all grasps leave out {judged.not_represented} of the {every}"
+            f" grasps from which the trials were chosen, as no trial of {kinds} was"
+            " compared"
         )
     twice = len(trials) - len({(t.run, t.grasp) for t in trials})
     if twice:

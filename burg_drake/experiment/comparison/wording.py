@@ -243,7 +243,7 @@ def unpredictable_words(judged: Judgement) -> str:
     without = found.selected if weighted(judged) is None else found.all_grasps or found.selected
     return (
         f"{count:,} trial{'' if count == 1 else 's'} failed for reasons that a run of the hand"
-        f" alone does not predict ({counts_words(found.outcomes)}),"
+        f" alone cannot predict ({counts_words(found.outcomes)}),"
         f" {found.predicted_successes:,} of them after a predicted success. They count as"
         f" failures; without them precision is {brief(without.precision)}"
         f" instead of {brief(estimated(judged).precision)}."

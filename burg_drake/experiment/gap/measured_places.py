@@ -56,7 +56,7 @@ def measured_scene(
     """
     unknown = [name for name in placement if name not in (*scene.instances, *scene.background)]
     if unknown:
-        return MeasuredScene(None, (), f"the scene has no {unknown[0]!r}, which was measured")
+        return MeasuredScene(None, (), f"the scene has no {unknown[0]!r}, although it was measured")
     X_SO: dict[str, Array] = {}
     notes: list[str] = []
     for name in scene.instances:

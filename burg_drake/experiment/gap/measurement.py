@@ -180,7 +180,7 @@ def _require_same(path: Path, there: GapDocument, document: GapDocument) -> None
         old, new = getattr(there, name), getattr(document, name)
         if old != new:
             raise InvalidInputError(
-                f"{path} has steps of something else ({name} is {_short(old)} there,"
+                f"{path} has steps of another measurement ({name} is {_short(old)} there,"
                 f" {_short(new)} here); choose another folder, or delete it"
             ).about("out")
 

@@ -25,7 +25,7 @@ CAUSES: dict[TrialCause, str] = {
     "placement": "disagreed as planned, agree as measured: explained by the placement",
     "worsened": "agreed as planned, disagree as measured: worsened",
     "physics": "disagree either way: left to physics",
-    "unpredictable": "failed for reasons that a run of the hand alone does not predict",
+    "unpredictable": "failed for reasons that a run of the hand alone cannot predict",
 }
 """What a pair of verdicts says of a real one."""
 

@@ -36,7 +36,7 @@ from burg_drake.experiment.trials import (
 OPERATOR_FIELDS = ("outcome", "time", "operator", "note", "robot")
 """What people enter; photo and placement come from the camera."""
 DIGITS = 12
-DOUBTFUL = "doubtful; the file in placements/ says why"
+DOUBTFUL = "doubtful; the file in placements/ has the reason"
 """Of an offset in the trials file, which has no reasons."""
 
 
@@ -144,7 +144,7 @@ class LabBook:
         trial = self.sheet().trial(number)
         if trial.outcome is not None:
             raise InvalidInputError(
-                f"trial {number} is carried out already; photo and placement were not entered"
+                f"trial {number} already has an outcome; photo and placement were not saved"
             )
         return trial
 
@@ -173,7 +173,7 @@ class LabBook:
         if cached is None or cached[0] != key:
             sheet = self.book.sheet()
             if plan_of(sheet) != self.plan:
-                raise InvalidInputError(f"{path} holds other trials by now; start the page again")
+                raise InvalidInputError(f"{path} now holds other trials; start the page again")
             cached = (key, sheet, content_hash(*map(str, key))[:DIGITS])
             self._cached = cached
         return cached[1], cached[2]
@@ -182,7 +182,7 @@ class LabBook:
 def _conflict(trial: RealTrial) -> EntryConflict:
     what = "nothing" if trial.outcome is None else outcome_label(trial.outcome)
     who = f" by {trial.operator}" if trial.operator else ""
-    message = f"trial {trial.number} was changed meanwhile: it has {what}{who}"
+    message = f"trial {trial.number} was changed by someone else: it now has {what}{who}"
     return EntryConflict(message, trial)
 
 

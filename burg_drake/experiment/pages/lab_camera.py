@@ -148,7 +148,8 @@ class LabCamera:
             picture = picture or view.live.next_picture(stale, PICTURE_TIMEOUT)
             if picture is None or not picture.located.estimate.valid:
                 raise InvalidInputError(
-                    "a placement check needs a picture that shows where the board is"
+                    "the board is not seen in the picture; move the camera or the light,"
+                    " then check again"
                 )
             refusal = self._refusal(number) if keep else ""
             self._measuring = (number, keep and not refusal)

@@ -23,14 +23,15 @@ from burg_drake.scene.document import Scene
 from burg_drake.visualization.style import Html, element, html_document, join, page_style
 
 HOW = (
-    "Carry out the trials in the order of their numbers. Each block has one scene: set it up on its"
-    " printed board as its pictures show it, and set it up again after every trial.",
-    "Tick one box per trial when the robot has ended its motion. If none fits, write what"
-    " happened behind “other”.",
-    "Look at the picture before the trial: the hand is where the robot will close it, and the"
-    " object to be gripped has an orange rim. Do not correct the scene or the robot for it.",
-    "A trial that is invalid, because of a person or an object that fell before it, is “not"
-    " attempted”; go on, and repeat it at the end if there is time.",
+    "Carry out the trials in the order of their numbers. Each block has one scene: set"
+    " it up on its printed board as the pictures show, and again after every trial.",
+    "Tick one box for each trial when the robot has stopped. If none fits, write what"
+    " happened next to “other”.",
+    "Before a trial, compare with its picture: it shows the hand where the robot will"
+    " close it, and the object to be gripped has an orange rim. Do not correct the scene"
+    " or the robot because of it.",
+    "If a person interfered or an object fell before the trial, tick “not attempted” and"
+    " go on; repeat the trial at the end if there is time.",
 )
 
 
@@ -168,8 +169,8 @@ def _places(scene: Scene) -> Html:
 def _printout(scene: Scene, address: str | None) -> Html:
     width, height = (round(1e3 * side) for side in scene.board.size)
     board = (
-        f"The board, {width} x {height} mm, shows where everything stands; x and y are those of the"
-        " middle of each object. "
+        f"The board ({width} x {height} mm) shows where everything stands; x and y are"
+        " those of the middle of each object. "
     )
     if address:
         link = element("a", address, href=address)

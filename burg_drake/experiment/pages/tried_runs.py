@@ -55,7 +55,9 @@ class TriedRuns:
         self.path = Path(path)
         self.sheet: TrialSheet = load_trials(path)
         if not self.sheet.trials:
-            raise InvalidInputError(f"{path} has no trials; burg-drake trials plan makes some")
+            raise InvalidInputError(
+                f"{path} has no trials; burg-drake trials plan makes a file with trials"
+            )
         used = {trial.run: None for trial in self.sheet.trials}
         runs = load_sources(self.sheet, path, moved=moved, only=used)
         self._tried = {

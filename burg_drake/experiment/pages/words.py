@@ -15,11 +15,11 @@ _MEANINGS: dict[RealOutcome, str] = {
     RealOutcome.DROPPED: "lifted, and lost while it was held",
     RealOutcome.CLOSED_EMPTY: "the fingers closed without the object",
     RealOutcome.HAND_COLLISION_APPROACH: "the hand hit something before it closed",
-    RealOutcome.PROTECTIVE_STOP: "the robot stopped itself",
+    RealOutcome.PROTECTIVE_STOP: "the robot stopped by itself",
     RealOutcome.PERCEPTION_FAILED: (
-        "the scene was not seen well enough to try; says nothing of the grasp"
+        "the scene was not seen well enough to try; does not count for the grasp"
     ),
-    RealOutcome.NOT_ATTEMPTED: "nobody tried; says nothing of the grasp",
+    RealOutcome.NOT_ATTEMPTED: "nobody tried; does not count for the grasp",
 }
 SHORT_LIST: dict[RealOutcome, tuple[str, str]] = {
     outcome: (outcome_label(outcome), meaning) for outcome, meaning in _MEANINGS.items()

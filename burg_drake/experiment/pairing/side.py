@@ -179,8 +179,9 @@ def require_common_scene(first: JudgedRuns, second: JudgedRuns) -> None:
     """
     if not set(first.scenes) & set(second.scenes):
         raise InvalidInputError(
-            f"{first.path} is of scene {named(first.scenes)}, {second.path} of"
-            f" {named(second.scenes)}; runs to be compared judge the same grasps on the same scene"
+            f"{first.path} is of scene {named(first.scenes)}, but {second.path} is of"
+            f" scene {named(second.scenes)}; runs can be compared if they judge the same"
+            " grasps in the same scene"
         )
 
 

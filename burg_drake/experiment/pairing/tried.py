@@ -86,8 +86,9 @@ def _refuse_changed(trial: RealTrial, own: Sequence[_TriedTable], path: Path) ->
         content = table.content(trial.grasp)
         if content and content != trial.content:
             raise InvalidInputError(
-                f"{path}: trial {trial.number}: grasp {trial.grasp} of {table.run.path} has content"
-                f" {content}; it was {trial.content} when the trials were planned"
+                f"{path}: trial {trial.number}: grasp {trial.grasp} of {table.run.path}"
+                f" has changed: its content is {content}, but was {trial.content} when"
+                " the trials were planned"
             )
 
 
@@ -103,7 +104,10 @@ def _nothing_in_common(
     else:
         what = f"no grasp of {path} is judged in {side.path}, which is on the same scene"
     meant = listing([f"{source.path} ({source.hash})" for source in sources])
-    return f"{what}; give the run that the trials are from, {meant}, or one of the same grasps"
+    return (
+        f"{what}; give the run from which the trials were chosen, {meant}, or one of the same"
+        " grasps"
+    )
 
 
 def _columns(found: Sequence[tuple[int, _TriedTable, int]]) -> Columns:

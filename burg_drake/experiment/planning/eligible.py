@@ -64,8 +64,8 @@ def gather_runs(given: Iterable[Run | Campaign | str | Path]) -> dict[str, Run]:
             same = runs.setdefault(run.document.hash, run)
             if same.path.resolve() != run.path.resolve():
                 raise InvalidInputError(
-                    f"{same.path} and {run.path} hold the same run; give one of them, or merge them"
-                    " if they are shards"
+                    f"{same.path} and {run.path} are the same run; give one of them, or"
+                    " merge them if they are shards"
                 )
     if not runs:
         raise InvalidInputError(f"{listing(places) or 'no run is given'}: no grasp is judged yet")
@@ -103,8 +103,8 @@ def make_pools(runs: dict[str, Run], among: Among) -> tuple[list[EligibleGrasps]
             owned[world].update(own.values())
             if twice.any():
                 notes.append(
-                    f"{twice.sum()} grasps of run {key} are in another run of the same scene, too;"
-                    " each is tried once, and counts there"
+                    f"{twice.sum()} grasps of run {key} are also in another run of the"
+                    " same scene; each is tried once and counts there"
                 )
                 pool = replace(pool, rows=pool.rows[~twice])
         pools.append(pool)
@@ -131,14 +131,14 @@ def _runs(one: Run | Campaign | str | Path) -> Sequence[Run]:
 def _pool(key: str, run: Run, among: Among, notes: list[str]) -> EligibleGrasps:
     if among == "reachable" and run.document.mode == "hand":
         raise InvalidInputError(
-            f"{run.path} is of mode hand, which asks no arm what it can reach; choose among"
-            " all, clear or executed grasps"
+            f"{run.path} was judged in mode hand, which does not check what the arm can"
+            " reach; choose among all, clear or executed grasps"
         )
     results = run.results
     failed = results["outcome"] == Outcome.SIMULATION_FAILED.value
     passed = np.isin(results["stage"], [stage.value for stage in STAGES_AMONG[among]])
     if failed.any():
-        notes.append(f"{failed.sum()} grasps of run {key} could not be simulated; left out")
+        notes.append(f"{failed.sum()} grasps of run {key} could not be simulated and are left out")
     count, judged = run.document.grasps.count, len(results["id"])
     if judged < count:
         notes.append(f"run {key} is not complete: {judged} of {count} grasps are judged")

@@ -69,7 +69,7 @@ def plan_trials(
         require_unused(out)
     gathered = gather_runs(given)
     if robustness is not None and len(gathered) > 1:
-        raise InvalidInputError("a table of robustness is of one run; give that run alone")
+        raise InvalidInputError("a table of robustness belongs to one run; give that run alone")
     pools, notes = make_pools(gathered, selection.among)
     pools = drawn_scenes(pools, selection)
     table = None if robustness is None else Path(robustness)
@@ -110,8 +110,9 @@ def require_unused(path: str | Path) -> None:
     if filled or recorded:
         count = max(filled, len({entry.number for entry in recorded}))
         raise InvalidInputError(
-            f"{path} has entries for {count} {'trial' if count == 1 else 'trials'};"
-            " choose another file, or move it and its journal away"
+            f"{path} already has entries for {count} "
+            f"{'trial' if count == 1 else 'trials'}; choose another file, or move it and"
+            " its journal away"
         ).about("out")
 
 

@@ -126,15 +126,16 @@ def effective_trials(strata: Mapping[str, Stratum]) -> float:
 
 def power_table(sheet: TrialSheet) -> TextTable:
     """How wide 95 % intervals will be, a row a figure."""
-    table = TextTable("Half width of 95 % intervals, if the share turns out to be").names("share")
+    table = TextTable("Half-width of the 95 % interval if the share turns out to be").names("share")
     table.numbers("trials", *(f"{100 * share:.0f} %" for share in SHARES))
     for row in expected_figures(sheet):
         widths = [half_width(share, round(row.trials)) for share in SHARES]
         cells = [f"± {100 * width:.0f} %" for width in widths]
         table.row(row.name, f"{row.trials:.0f}", *cells)
     table.caption = (
-        "precision: of the grasps that succeed in simulation; recall: if as many succeed on the"
-        " robot; weighted: for all grasps to choose from, not only for the chosen ones"
+        "precision: of the grasps that succeed in simulation; recall: if as many succeed"
+        " on the robot; weighted: for all grasps to choose from, not only the chosen"
+        " ones"
     )
     return table
 
@@ -144,19 +145,19 @@ def difference_text(trials: int) -> str:
     found = {worse: smallest_difference(trials, worse) for worse in REVERSED_SHARES}
     if all(math.isnan(size) for size in found.values()):
         return (
-            f"{trials} trials are too few for McNemar's exact test (5 %) to tell two methods apart"
-            " with a chance of 80 %, however much they differ."
+            f"{trials} trials are too few for McNemar's exact test (5 %) to tell two"
+            " methods apart with 80 % power, however much they differ."
         )
     differences = [
         f"{100 * size:.0f} points"
-        + (f", if it is so in {100 * worse:.0f} % of the trials" if worse else "")
+        + (f", if it is right alone in {100 * worse:.0f} % of the trials" if worse else "")
         for worse, size in found.items()
         if not math.isnan(size)
     ]
     return (
-        f"Two methods on the same {trials} trials: which of them is right more often, McNemar's"
-        " exact test (5 %) finds with a chance of 80 % if the worse one is never right alone and"
-        f" they differ by {'; by '.join(differences)}."
+        f"Comparing two methods on the same {trials} trials (McNemar's exact test at 5 %,"
+        " power 80 %): if the worse one is never right alone, they must differ by "
+        f"{'; by '.join(differences)}."
     )
 
 

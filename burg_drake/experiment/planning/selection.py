@@ -41,7 +41,7 @@ def drawn_scenes(pools: list[EligibleGrasps], selection: Selection) -> list[Elig
     found = sorted({p.scene for p in pools}, key=lambda s: content_hash(selection.seed, "scene", s))
     if selection.scenes > len(found):
         raise InvalidInputError(
-            f"{selection.scenes} scenes are wanted; the runs have {len(found)} with such grasps"
+            f"{selection.scenes} scenes were asked for, but only {len(found)} have such grasps"
         )
     return [p for p in pools if not selection.scenes or p.scene in found[: selection.scenes]]
 
@@ -73,7 +73,7 @@ def choose(
             for key, stratum in found.items():
                 ranked = _ranked(pool, members[stratum.label], selection.seed)
                 chosen += [(pool, k, key) for k in ranked[: stratum.selected]]
-    notes = [f"{unknown} grasps have no {_balanced(selection)}; left out"] if unknown else []
+    notes = [f"{unknown} grasps have no {_balanced(selection)} and are left out"] if unknown else []
     return strata, chosen, notes + shortfall_notes(short) + _rare_class(chosen, selection)
 
 
@@ -86,8 +86,9 @@ def _rare_class(chosen: Chosen, selection: Selection) -> list[str]:
     for name, count in (("failures", good.count(False)), ("successes", good.count(True))):
         if good and count < RARE_CLASS_SHARE * len(good):
             return [
-                f"{count} of {len(good)} are {name} in simulation: almost nothing here measures"
-                f" how well {name} are predicted; evaluate with until_balanced=10 to get more"
+                f"only {count} of {len(good)} are {name} in simulation, so the trials"
+                f" hardly tell how well {name} are predicted; evaluate with"
+                " until_balanced=10 to get more"
             ]
     return []
 

@@ -68,8 +68,8 @@ def robustness_of(run: Run, table: Path | None = None) -> dict[str, float]:
     found = own_table(run.path) if table is None else table
     if found is None:
         raise InvalidInputError(
-            f"there is no {run.path / TABLE_FILES[0]}; `burg-drake robustness {run.path}` predicts"
-            " how often grasps are lifted"
+            f"{run.path / TABLE_FILES[0]} does not exist; run `burg-drake robustness "
+            f"{run.path}`, which predicts how often grasps are lifted"
         )
     shares = lifted_shares(found, {run.document.hash}, run.candidates.id)
     return {id: share for (of, id), share in shares.items() if of == run.document.hash}

@@ -135,7 +135,7 @@ class TrialBook:
         def change(trial: RealTrial) -> RealTrial:
             if expected is not None and trial != expected:
                 raise TrialChanged(
-                    f"{self.path}: trial {trial.number} was changed meanwhile", trial
+                    f"{self.path}: trial {trial.number} was changed by someone else", trial
                 )
             self.require_open(trial, given, correct=correct, again=again)
             base = replace(trial, **EMPTY) if again else trial
@@ -209,8 +209,8 @@ class TrialBook:
             if present != EMPTY[name] and not includes(value, present):
                 shown = f" {quoted(str(present))}" if isinstance(present, str) else ""
                 raise InvalidInputError(
-                    f"{self.path}: trial {trial.number} has {name}{shown} already; say that this"
-                    " corrects it, or that the trial was carried out once more"
+                    f"{self.path}: trial {trial.number} already has {name}{shown}; say"
+                    " whether this corrects it, or whether the trial was done again"
                 ).about("correct", "again")
 
     def _change(
@@ -242,7 +242,7 @@ class TrialBook:
             except InvalidInputError as error:
                 raise InvalidInputError(f"{self.path}: {error}") from error
         if sheet.next is None:
-            raise InvalidInputError(f"{self.path}: all trials have an outcome; there is no next")
+            raise InvalidInputError(f"{self.path}: all trials have an outcome; none is left")
         return sheet.next
 
     def _read(self) -> SheetText:

@@ -11,7 +11,7 @@ from burg_drake.core import FieldError, nearest, quoted
 def require_least(value: int, least: int, name: str) -> None:
     """Refuses a number of a document that is too small."""
     if value < least:
-        raise FieldError(f"{name} is {value}; it has to be {least} at least", name)
+        raise FieldError(f"{name} is {value}; it must be at least {least}", name)
 
 
 def require_known(name: str, known: Iterable[str], what: str, *place: str | int) -> None:

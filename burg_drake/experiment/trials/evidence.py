@@ -40,8 +40,8 @@ def require_scene(check: PlacementCheck, sheet: TrialSheet, trial: RealTrial, wh
     expected = sheet.runs[trial.run].scene
     if check.scene.content != expected.content:
         raise InvalidInputError(
-            f"{where} is of scene {check.scene.name!r} ({check.scene.content[:12]}); trial"
-            f" {trial.number} is on {expected.name!r} ({expected.content[:12]})"
+            f"{where} is of scene {check.scene.name!r} ({check.scene.content[:12]}), but"
+            f" trial {trial.number} is on {expected.name!r} ({expected.content[:12]})"
         )
 
 
@@ -54,8 +54,8 @@ def require_same_scene(scene: Scene, sheet: TrialSheet, trial: RealTrial) -> Non
     expected = sheet.runs[trial.run].scene
     if scene.content != expected.content:
         raise InvalidInputError(
-            f"{scene.path} is not the scene of trial {trial.number}, {expected.name!r}: it has"
-            f" content {scene.content[:12]}, not {expected.content[:12]}"
+            f"{scene.path} is not the scene of trial {trial.number}, {expected.name!r}:"
+            f" its content is {scene.content[:12]}, not {expected.content[:12]}"
         )
 
 
@@ -121,7 +121,7 @@ def keep_evidence(
     folder = Path(os.path.realpath(sheet_path)).parent
     content = None if photo is None else read_bytes(photo, IMAGE_SIZE)
     if content is not None and decode_image(content) is None:
-        raise InvalidInputError(f"{photo} is not an image that can be read; PNG and JPEG are")
+        raise InvalidInputError(f"{photo} is not a readable image; give a PNG or JPEG")
     copy = ""
     with exclusive(Path(sheet_path)):  # no other one takes the same name
         stem = _free_stem(folder, number)

@@ -232,8 +232,8 @@ def _require_folder(out: Path) -> None:
         held = sorted(item.name for item in out.iterdir() if not item.name.startswith("."))
         if held:
             raise InvalidInputError(
-                f"folder {out} is not empty, it has {held[0]}, and no exported trials; choose"
-                " another one, or empty it"
+                f"folder {out} is not empty and not an export of trials: it has {held[0]}"
+                " in it; choose another folder, or empty it"
             )
 
 

@@ -111,7 +111,8 @@ class Stratum:
         require_least(self.selected, 0, "selected")
         if self.population < self.selected:
             raise FieldError(
-                f"population {self.population} is less than selected {self.selected}", "population"
+                f"population {self.population} is smaller than selected, {self.selected}",
+                "population",
             )
 
 
@@ -239,8 +240,8 @@ class TrialSheet:
             first = lines.setdefault(trial.number, i)
             if first != i:
                 raise FieldError(
-                    f"number {trial.number} is given twice, to trials {first + 1} and {i + 1} of"
-                    " the list",
+                    f"number {trial.number} is used twice, by entries {first + 1} and "
+                    f"{i + 1} of the list",
                     *("trials", i, "number"),
                 )
             self._check(i, trial)

@@ -144,20 +144,20 @@ def _check_grasps(run: Run, trials: list[RealTrial], path: Path) -> None:
         content = grasp_content(instance, grasps.X_OG[i], float(grasps.width[i]))
         if (instance, content) != (trial.instance, trial.content):
             raise InvalidInputError(
-                f"{where}: grasp {trial.grasp} of {run.path} is on {instance!r} with content"
-                f" {content}; it was on {trial.instance!r} with content {trial.content} when the"
-                " trials were planned"
+                f"{where}: grasp {trial.grasp} of {run.path} has changed: it is on "
+                f"{instance!r} with content {content}, but was on {trial.instance!r} with"
+                f" content {trial.content} when the trials were planned"
             )
         verdict = run.verdicts.get(trial.grasp)
         if verdict is None:
             raise InvalidInputError(
-                f"{where}: grasp {trial.grasp} is not judged any more in {run.path}; the same"
-                " command that made the run judges what is missing"
+                f"{where}: grasp {trial.grasp} has no verdict in {run.path} any more; run"
+                " the command that made the run again"
             )
         if verdict.outcome is not trial.simulated:
             raise InvalidInputError(
-                f"{where}: simulated is {trial.simulated}, but {run.path} has {verdict.outcome} for"
-                f" grasp {trial.grasp}; restore the run, or this line"
+                f"{where}: simulated is {trial.simulated}, but {run.path} has "
+                f"{verdict.outcome} for grasp {trial.grasp}; restore the run or this line"
             )
 
 
@@ -173,7 +173,9 @@ def source_of(run: Run, folder: Path | None = None) -> SourceRun:
     """
     document = run.document
     if not document.hash:
-        raise InvalidInputError(f"{run.path / RUN_FILE} has no hash; the run was only just begun")
+        raise InvalidInputError(
+            f"{run.path / RUN_FILE} has no hash yet, as the run has only just begun"
+        )
     path = run.path.absolute()
     return SourceRun(
         path=str(path) if folder is None else os.path.relpath(path, folder.absolute()),

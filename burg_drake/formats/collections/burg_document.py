@@ -52,8 +52,8 @@ class BurgReader(Reader):
                     continue
                 place = f" {where}:" if where else ""
                 self.notes.append(
-                    f"{self.name}:{key_node.start_mark.line + 1}:{place} key {key!r} was left"
-                    f" aside; {nearest(key, known)}"
+                    f"{self.name}:{key_node.start_mark.line + 1}:{place} unknown key "
+                    f"{key!r} was ignored; {nearest(key, known)}"
                 )
             node = yaml.MappingNode(node.tag, pairs, node.start_mark, node.end_mark)
         return super().read_dataclass(node, kind, where)

@@ -32,7 +32,7 @@ from burg_drake.formats.collections.burg_document import BurgReader, Matrix, rel
 
 FILE_TYPE = "ObjectLibrary"
 FILE_VERSION = "1.0"
-HINTS = {"Scene": "give the object library that the scene names as object_library_fn"}
+HINTS = {"Scene": "give the object library that the scene names under object_library_fn"}
 """What to do about other files of BURG-Toolkit."""
 
 
@@ -109,8 +109,8 @@ class _Poses:
     def __post_init__(self) -> None:
         if len(self.probabilities) != len(self.poses):
             raise InvalidInputError(
-                f"has {len(self.probabilities)} probabilities and {len(self.poses)} poses;"
-                " expected one probability a pose"
+                f"has {len(self.probabilities)} probabilities, but {len(self.poses)}"
+                " poses; give one probability for each pose"
             )
         for i, probability in enumerate(self.probabilities):
             if probability < 0.0:
@@ -139,8 +139,8 @@ class _Object:
             raise InvalidInputError("identifier is empty; give the object a name")
         if not self.mesh_fn:
             raise InvalidInputError(
-                f"{self.identifier!r} has no mesh_fn; BURG-Toolkit had its mesh in memory only:"
-                " save the mesh to a file and name it here"
+                f"{self.identifier!r} has no mesh_fn: BURG-Toolkit had its mesh only in"
+                " memory; save the mesh to a file and name it here"
             )
         for label, value in (("mass", self.mass), ("friction_coeff", self.friction_coeff)):
             if value is not None and value < 0.0:

@@ -28,7 +28,11 @@ from burg_drake.formats.common import nearest_rigid
 
 FILE_TYPE = "Scene"
 FILE_VERSION = "1.0"
-HINTS = {"ObjectLibrary": "give the scene; for a library there is `burg-drake library import-burg`"}
+HINTS = {
+    "ObjectLibrary": (
+        "give the scene here; libraries are imported by `burg-drake library import-burg`"
+    )
+}
 """What to do about other files of BURG-Toolkit."""
 
 
@@ -167,8 +171,9 @@ def read_burg_scene(path: str | Path) -> BurgScene:
     if document.printout is not None and document.printout.size != ground_area:
         line = reader.entries(node, "")["printout"][0].start_mark.line + 1
         notes.append(
-            f"{path}:{line}: the board is the printout, {_millimetres(document.printout.size)}; the"
-            f" ground area of {_millimetres(ground_area)} was left aside"
+            f"{path}:{line}: the board gets the size of the printout, "
+            f"{_millimetres(document.printout.size)}; the ground area of "
+            f"{_millimetres(ground_area)} was ignored"
         )
     placed = {}
     for key in ("objects", "bg_objects"):

@@ -252,8 +252,8 @@ def _describe(file: Path) -> tuple[str, tuple[int | str, ...]] | None:
 
 def _nothing_found(folder: Path, archives: list[Path]) -> str:
     message = (
-        f"no YCB objects in {folder}: looked in it and its subfolders for folders such as"
-        " 003_cracker_box/google_16k with a textured.obj, and for files such as"
+        f"no YCB objects found in {folder} or its subfolders; expected folders such as"
+        " 003_cracker_box/google_16k with a textured.obj, or files such as"
         " 003_cracker_box.obj;"
     )
     if archives:

@@ -33,8 +33,8 @@ def with_objects_renamed(grasps: GraspSet, names: Mapping[str, str]) -> GraspSet
     if "" in names and "" not in known:
         if len(known) > 1:
             raise InvalidInputError(
-                f"the grasps are of {len(known)} objects ({listing(sorted(known))}); say which is"
-                f" {names['']!r}: THEIRS={names['']}"
+                f"the grasps are of {len(known)} objects ({listing(sorted(known))}); say"
+                f" which of them is {names['']!r}: THEIRS={names['']}"
             )
         names = {next(iter(known)): names[""]}
     for name in names:
@@ -87,7 +87,8 @@ def write_each_object(
         path = folder / f"{name_from(name) if name else 'grasps'}{format.suffixes[0]}"
         if path in paths:
             raise InvalidInputError(
-                f"grasps of {paths[path]!r} and of {name!r} would both go to {path}; rename one"
+                f"grasps of {paths[path]!r} and of {name!r} would both be written to "
+                f"{path}; rename one of the objects"
             )
         paths[path] = name
     return {

@@ -30,11 +30,13 @@ def only_object(grasps: GraspSet, kind: str) -> str:
     """
     names = sorted(set(grasps.object.tolist()))
     if not names:
-        raise InvalidInputError(f"there are no grasps to write; {kind} needs one at least")
+        raise InvalidInputError(
+            f"there are no grasps to write; a file of {kind} needs at least one"
+        )
     if len(names) > 1:
         raise InvalidInputError(
-            f"the grasps are of {len(names)} objects ({listing(names)}) and {kind} holds those of"
-            " one; choose one of them, or write a file for each"
+            f"the grasps are of {len(names)} objects ({listing(names)}), but a file of "
+            f"{kind} holds those of one; choose one of them, or write a file for each"
         )
     name: str = names[0]
     return name
@@ -114,15 +116,15 @@ def check_hand(given: str, gripper: Gripper, where: str) -> tuple[str, ...]:
         return ()
     if given in HANDS:
         raise InvalidInputError(
-            f"{where}: the grasps are of hand {known!r} and were to be read as those of"
-            f" {gripper.name!r}; read them with the hand that they were made for"
+            f"{where}: the grasps were made for hand {known!r}, but hand {gripper.name!r}"
+            " was given; read them with the hand that they were made for"
         ).about("hand")
-    return (f"{where}: {given!r} was taken for hand {gripper.name!r}.",)
+    return (f"{where}: the file names a hand {given!r}, which was taken to be {gripper.name!r}.",)
 
 
 def scale_note(name: str, file: str, scale: float) -> str:
     """What the scale of an object means for its grasps."""
     return (
-        f"The grasps are those of {name!r} as {file!r} scaled by {scale:g}, in metres; they fit"
-        " an object of a library only if it was built at that size."
+        f"The grasps are in metres, for {name!r} made of {file!r} scaled by {scale:g};"
+        " they fit an object of a library only if it was built at that size."
     )

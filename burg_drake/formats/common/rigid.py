@@ -33,26 +33,26 @@ def nearest_rigid(X: ArrayLike, where: str) -> tuple[Array, tuple[str, ...]]:
     try:
         poses = np.asarray(X, dtype=float)
     except (TypeError, ValueError) as error:
-        what = f"does not hold (N, 4, 4) numbers: {short_message(error)}"
+        what = f"must hold (N, 4, 4) numbers: {short_message(error)}"
         raise InvalidInputError(f"{where} {what}") from error
     if poses.ndim != 3 or poses.shape[1:] != (4, 4):
         raise InvalidInputError(f"{where} has shape {poses.shape}; expected (N, 4, 4)")
     _refuse(~np.isfinite(poses).all(axis=(1, 2)), where, "has NaN or infinite numbers")
     last = np.abs(poses[:, 3] - (0.0, 0.0, 0.0, 1.0)).max(axis=1, initial=0.0)
-    _refuse(last > NOTED, where, "has a last row other than 0 0 0 1")
+    _refuse(last > NOTED, where, "has a last row that is not 0 0 0 1")
     R = poses[:, :3, :3]
     with np.errstate(over="ignore", invalid="ignore"):  # numbers of any size
         off = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max(axis=(1, 2), initial=0.0)
         mirrored = np.linalg.det(R) < 0.0
     off = np.where(np.isnan(off), np.inf, off)
-    _refuse(mirrored, where, "is a mirror image, not a rotation")
-    _refuse(off > ROUNDING, where, "is not a rotation: not orthonormal by", off)
+    _refuse(mirrored, where, "is a reflection, not a rotation")
+    _refuse(off > ROUNDING, where, "is not a rotation: it is off from orthonormal by", off)
     U, _, Vt = np.linalg.svd(R)
     notes: tuple[str, ...] = ()
     if (off > NOTED).any():
         notes = (
-            f"{where}: {int((off > NOTED).sum())} rotations were not orthonormal by up to"
-            f" {off.max():.1g}; the nearest rotations were taken",
+            f"{where}: {int((off > NOTED).sum())} rotations were off from orthonormal by"
+            f" up to {off.max():.1g}; the nearest rotations were used",
         )
     return make_pose(U @ Vt, poses[:, :3, 3]), notes
 

@@ -98,7 +98,7 @@ def read(path: Path, gripper: Gripper) -> ImportedGrasps:
     Raises:
         InvalidInputError: no such file, or a value that cannot be used; the message says where.
     """
-    with reporting_read_errors(path, "an HDF5 file that can be read"), open_hdf5(path) as file:
+    with reporting_read_errors(path, "a readable HDF5 file"), open_hdf5(path) as file:
         return _read(path, file, gripper)
 
 
@@ -141,7 +141,7 @@ def _read(path: Path, file: Hdf5File, gripper: Gripper) -> ImportedGrasps:
 
 def _poses(file: Hdf5File) -> NDArray[Any]:
     if TRANSFORMS not in file:
-        raise InvalidInputError(f"{file.path}: {TRANSFORMS} is missing; is it a file of ACRONYM?")
+        raise InvalidInputError(f"{file.path}: {TRANSFORMS} is missing; is it an ACRONYM file?")
     stored = file.array(TRANSFORMS)
     stored.rows(4, 4)
     return stored.read("fiu")
@@ -229,13 +229,13 @@ def _notes(
     notes = []
     if "file" not in described:
         notes.append(
-            f"object/file is {name + '.obj'!r} and object/scale 1, as nothing says which mesh"
-            f" {name!r} was made of."
+            f"object/file is {name + '.obj'!r} and object/scale 1, as it is not known"
+            f" which mesh {name!r} was made of."
         )
     if np.isnan(success).any():
         notes.append(
-            f"{SUCCESS_COLUMN} is NaN for {int(np.isnan(success).sum())} grasps, as nothing says"
-            " whether they succeed."
+            f"{SUCCESS_COLUMN} is NaN for {int(np.isnan(success).sum())} grasps, as it is"
+            " not known whether they succeed."
         )
     numbers = [key for key, values in grasps.columns.items() if values.dtype.kind in "fiub"]
     carried = ("object", "width", "score", "outcome", *numbers)

@@ -89,7 +89,7 @@ def read(path: Path, gripper: Gripper) -> ImportedGrasps:
     grasps = _mapping(path, document, "grasps")
     given = grasps.get("transforms")
     if not isinstance(given, list):
-        raise InvalidInputError(f"{path}: grasps.transforms is missing or no list of matrices")
+        raise InvalidInputError(f"{path}: grasps.transforms is missing or not a list of matrices")
     where = f"{path}: grasps.transforms"
     X_OF, rounded = nearest_rigid(given if given else np.empty((0, 4, 4)), where)
     score = _success(path, grasps, len(X_OF))
@@ -107,20 +107,24 @@ def read(path: Path, gripper: Gripper) -> ImportedGrasps:
         },
     )
     further = sorted(set(grasps) - {"transforms", SUCCESS_COLUMN})
-    left = (f"Left aside: grasps.{', grasps.'.join(further)}.",) if further else ()
+    left = (f"Ignored: grasps.{', grasps.'.join(further)}.",) if further else ()
     return ImportedGrasps(set_, "object", (*notes, *rounded, *scaled, *left))
 
 
 def _load(path: Path) -> dict[str, Any]:
     document = load_json(path, GRASP_FILE)
     if not isinstance(document, dict):
-        raise InvalidInputError(f"{path}: a {type(document).__name__} instead of a mapping")
+        raise InvalidInputError(
+            f"{path}: the file holds a {type(document).__name__} instead of a mapping"
+        )
     return document
 
 
 def _mapping(path: Path, document: dict[str, Any], key: str) -> dict[str, Any]:
     if not isinstance(document.get(key), dict):
-        raise InvalidInputError(f"{path}: {key} is missing or no mapping; is it a GraspGen file?")
+        raise InvalidInputError(
+            f"{path}: {key} is missing or not a mapping; is it a GraspGen file?"
+        )
     value: dict[str, Any] = document[key]
     return value
 
@@ -133,7 +137,7 @@ def _success(path: Path, grasps: dict[str, Any], n: int) -> Array | None:
     given = grasps[SUCCESS_COLUMN]
     if not isinstance(given, list) or len(given) != n:
         shown = f"{len(given)} values" if isinstance(given, list) else quoted(given)
-        raise InvalidInputError(f"{where} has {shown}; expected {n}, one a grasp")
+        raise InvalidInputError(f"{where} has {shown}; expected {n}, one for each grasp")
     for i, value in enumerate(given):
         if not isinstance(value, (bool, int, float)) or value not in (0, 1):
             raise InvalidInputError(
@@ -145,7 +149,11 @@ def _success(path: Path, grasps: dict[str, Any], n: int) -> Array | None:
 def _object(path: Path, document: dict[str, Any]) -> tuple[str, dict[str, Any], tuple[str, ...]]:
     """Its name, what the file says of it, and a note about its scale."""
     if "object" not in document:
-        return path.stem, {}, (f"The file names no object; it is called {path.stem!r}.",)
+        return (
+            path.stem,
+            {},
+            ((f"The file names no object; the object is called {path.stem!r}, like the file."),),
+        )
     object = _mapping(path, document, "object")
     file, scale = object.get("file"), object.get("scale")
     if not isinstance(file, str) or not file:
@@ -200,19 +208,20 @@ def write(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:
     unknown = int(np.isnan(success).sum())
     if 0 < unknown < len(grasps):
         raise InvalidInputError(
-            f"of {unknown} of {len(grasps)} grasps it is not known whether they succeed, which"
-            " GraspGen wants of all or none; select those that are known"
+            f"for {unknown} of {len(grasps)} grasps it is not known whether they succeed;"
+            " GraspGen needs that for all grasps or for none: select those for which it"
+            " is known"
         )
     file, scale = str(described.get("file", f"{name}.obj")), float(described.get("scale", 1.0))
     content: dict[str, Any] = {"transforms": (grasps.X_OG @ X_GF(gripper)).tolist()}
     notes = []
     if "file" not in described:
         notes.append(
-            f"object.file is {file!r} and object.scale 1, as nothing says which mesh {name!r} was"
-            " made of."
+            f"object.file is {file!r} and object.scale 1, as it is not known which mesh "
+            f"{name!r} was made of."
         )
     if unknown:
-        notes.append(f"There is no {SUCCESS_COLUMN}, as nothing says which grasps succeed.")
+        notes.append(f"The file has no {SUCCESS_COLUMN}, as it is not known which grasps succeed.")
     else:
         content[SUCCESS_COLUMN] = (success > 0.5).tolist()
     document = {"object": {"file": file, "scale": scale}, "grasps": content}

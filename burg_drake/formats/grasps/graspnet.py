@@ -82,7 +82,7 @@ def _read(path: Path, gripper: Gripper) -> ImportedGrasps:
     if bad.any():
         i = int(np.argmax(bad))
         raise InvalidInputError(
-            f"{path}: row {i} has depth {rows[i, DEPTH]:g}; it has to be in metres"
+            f"{path}: row {i} has depth {rows[i, DEPTH]:g}; depths must be in metres"
         )
     given = make_pose(rows[:, ROTATION].reshape(-1, 3, 3), rows[:, TRANSLATION])
     X_CF, notes = nearest_rigid(given, f"{path}: columns 4 to 15")
@@ -112,7 +112,7 @@ def _write(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:
     )
     score = grasps.score
     if np.isnan(score).any():
-        notes += (f"{int(np.isnan(score).sum())} grasps without a score got 0.",)
+        notes += (f"{int(np.isnan(score).sum())} grasps without a score got score 0.",)
     depth = _numbers(grasps, "depth", DEFAULT_DEPTH)
     X_CF = grasps.X_OG @ inverse(X_FG(depth, gripper))
     rows = np.empty((n, NUMBERS))
@@ -137,8 +137,9 @@ def _openings(grasps: GraspSet, gripper: Gripper) -> tuple[Array, tuple[str, ...
     notes: tuple[str, ...] = ()
     if of_width.any():
         notes += (
-            f"width is the opening on arrival there: {int(of_width.sum())} grasps got the distance"
-            f" of their contacts and {2e3 * ARRIVAL_CLEARANCE:g} mm, at most {widest:g} m.",
+            "The width in the file is the opening when the hand arrives: "
+            f"{int(of_width.sum())} grasps got the distance of their contacts and "
+            f"{2e3 * ARRIVAL_CLEARANCE:g} mm, at most {widest:g} m.",
         )
     if unknown.any():
         count = int(unknown.sum())
@@ -153,7 +154,7 @@ def _numbers(grasps: GraspSet, name: str, default: float) -> Array:
         return np.full(len(grasps), default)
     if values.dtype.kind == "U":
         raise InvalidInputError(
-            f"column {name!r} holds text; {FORMAT.title} files have numbers there"
+            f"column {name!r} holds text, but a file of {FORMAT.title} can only have numbers"
         )
     return np.where(np.isfinite(values), values, default).astype(float)
 

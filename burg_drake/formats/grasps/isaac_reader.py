@@ -71,10 +71,10 @@ def read_yaml(dialect: Dialect, path: Path, gripper: Gripper) -> ImportedGrasps:
     if not any(key in document for key in GRIPPER_KEYS):
         axis = "xyz"[int(np.argmax(np.abs(X_FG[:3, 0])))]
         notes += (
-            f"The file names no gripper frame; fingers were taken to close along its {axis}.",
+            f"The file names no gripper frame; the fingers were taken to close along its {axis}.",
         )
     if not any(document.get(key) for key in OBJECT_KEYS):
-        notes += (f"The file names no object; it is called {object!r}.",)
+        notes += (f"The file names no object; the object is called {object!r}.",)
     if "scale" in described:
         notes += (scale_note(object, str(described["file"]), float(described["scale"])),)
     set_ = GraspSet.create(
@@ -108,9 +108,10 @@ def _check_gripper(path: Path, document: Mapping[str, Any], gripper: Gripper) ->
     link = str(document[key]) if key is not None else ""
     if key is not None and object_name(link) != gripper.body:
         raise DocumentError(
-            f"{path}: {key}: {link!r} is not {gripper.body!r}, the frame of hand {gripper.name!r};"
-            " read it with the hand that the grasps were made for, or, if the two frames are the"
-            f" same, name {object_name(link)!r} as the gripper's link"
+            f"{path}: {key}: {link!r} is not {gripper.body!r}, the frame of hand "
+            f"{gripper.name!r}; read the file with the hand that the grasps were made"
+            f" for. If the two frames are the same, name {object_name(link)!r} as the"
+            " gripper's link"
         ).about("gripper_link", "hand")
 
 
@@ -121,7 +122,7 @@ def _object(path: Path, document: Mapping[str, Any]) -> tuple[str, dict[str, Any
     if "object_file" in document and "object_scale" in document:
         scale = _numbers(path, {"object_scale": document["object_scale"]}, (), "")[0]
         if not scale > 0.0:
-            raise DocumentError(f"{path}: object_scale: {scale:g} has to be above 0")
+            raise DocumentError(f"{path}: object_scale: {scale:g} must be above 0")
         described["scale"] = float(scale)
     return object_name(file) or path.stem, described
 
@@ -142,8 +143,8 @@ def _poses(path: Path, grasps: Mapping[str, Mapping[str, Any]]) -> Array:
     if off.any():
         i = int(np.argmax(off))
         raise DocumentError(
-            f"{path}: grasps.{list(grasps)[i]}.orientation: a quaternion of length"
-            f" {length[i]:.4g}; it has to be 1"
+            f"{path}: grasps.{list(grasps)[i]}.orientation: the quaternion has length "
+            f"{length[i]:.4g}; it must be 1"
         )
     return make_pose(rotation_from_quaternion(q), p)
 
@@ -184,7 +185,7 @@ def _widths(
         stacked = np.stack(of_joints) if of_joints else np.empty((0, len(grasps)))
         count = (~np.isnan(stacked)).sum(axis=0)
         widths = np.where(count > 0, np.nansum(stacked, axis=0) / count, np.nan)
-    note = f"{key}: joints that hand {gripper.name!r} lacks were left aside"
+    note = f"{key}: joints that hand {gripper.name!r} does not have were ignored"
     return widths, (f"{note}: {listing(sorted(unknown))}.",) if unknown else ()
 
 
@@ -204,7 +205,7 @@ def _further(
             columns[key] = np.array([float(v) if v else np.nan for v in values])
         except ValueError:
             columns[key] = np.array(values, dtype=str)
-    return columns, (f"Left aside: {listing(left)} of each grasp.",) if left else ()
+    return columns, (f"Ignored: {listing(left)} of each grasp.",) if left else ()
 
 
 def _numbers(

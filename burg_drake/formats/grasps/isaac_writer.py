@@ -67,7 +67,7 @@ def _beyond(width: Array, opening: Array, gripper: Gripper) -> tuple[str, ...]:
     off = [(w < low - SLACK) | (w > high + SLACK) for w in (width, opening)]
     count = int((off[0] | off[1]).sum())
     limits = f"the opening of hand {gripper.name!r}, {low:g} to {high:g} m; so are their joints."
-    return (f"widths of {count} grasps are beyond {limits}",) if count else ()
+    return (f"widths of {count} grasps are outside {limits}",) if count else ()
 
 
 def _notes(grasps: GraspSet, dialect: Dialect) -> tuple[str, ...]:

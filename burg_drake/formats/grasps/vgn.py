@@ -76,7 +76,8 @@ def _read(path: Path, gripper: Gripper) -> ImportedGrasps:
     missing = [name for name in NEEDED if name not in cells]
     if missing:
         raise InvalidInputError(
-            f"{path} has no column {', '.join(missing)}; grasps of VGN have {','.join(COLUMNS)}"
+            f"{path} has no column {', '.join(missing)}; a file of VGN has the columns "
+            f"{','.join(COLUMNS)}"
         )
     xyzw = np.stack([_numbers(path, name, cells[name], lines) for name in QUATERNION], axis=-1)
     length = np.linalg.norm(xyzw, axis=-1)
@@ -113,7 +114,7 @@ def _of_contacts(width: Array, label: NDArray[Any] | None) -> tuple[Array, tuple
     if label is None or label.dtype.kind != "f":
         return width, ()
     left = ~np.isnan(width) & (label == 0.0)
-    note = f"width was left aside of {int(left.sum())} failures: it is the open hand's."
+    note = f"the width of {int(left.sum())} failed grasps was ignored: it is the open hand's."
     return np.where(left, np.nan, width), (note,) if left.any() else ()
 
 
@@ -121,16 +122,18 @@ def _cells(path: Path) -> tuple[dict[str, list[str]], list[int]]:
     """The texts of a CSV file by column, and the lines that they end on."""
     numbered = read_rows(path)
     if not numbered:
-        raise InvalidInputError(f"{path} is empty; grasps of VGN have {','.join(COLUMNS)}")
+        raise InvalidInputError(
+            f"{path} is empty; a file of VGN has the columns {','.join(COLUMNS)}"
+        )
     (first, names), *rows = numbered
     header = [name.strip() for name in names]
     if len(set(header)) < len(header):
         twice = next(name for name in header if header.count(name) > 1)
-        raise InvalidInputError(f"{path}:{first}: column {quoted(twice)} is there twice")
+        raise InvalidInputError(f"{path}:{first}: column {quoted(twice)} appears twice")
     for line, row in rows:
         if len(row) != len(header):
             raise InvalidInputError(
-                f"{path}:{line}: has {len(row)} cells, the first line has {len(header)}"
+                f"{path}:{line}: the row has {len(row)} cells, the header has {len(header)}"
             )
     cells = {name: [row[k].strip() for _, row in rows] for k, name in enumerate(header)}
     return cells, [line for line, _ in rows]
@@ -169,15 +172,17 @@ def _write(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:
     scene_id = grasps.columns.get("scene_id", np.full(len(grasps), path.stem))
     label = _labels(grasps)
     if label is None:
-        notes += ("No grasp has a label; these cells are empty.",)
+        notes += ("No grasp has a label; the cells for it are empty.",)
         label = [""] * len(grasps)
     failed = np.array([mark == 0 for mark in label], dtype=bool)
     if failed.any():
         widest = f"{gripper.opening[1]:g} m"
-        notes += (f"{int(failed.sum())} failures got the hand's opening of {widest} as width.",)
+        notes += (
+            (f"{int(failed.sum())} failed grasps got the hand's opening of {widest} as width."),
+        )
     widths = np.where(failed, gripper.opening[1], grasps.width)
     if np.isnan(widths).any():
-        notes += (f"{int(np.isnan(widths).sum())} grasps have no width; empty cells.",)
+        notes += (f"{int(np.isnan(widths).sum())} grasps have no width; their cells are empty.",)
     width = ["" if np.isnan(w) else w for w in widths.tolist()]
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")

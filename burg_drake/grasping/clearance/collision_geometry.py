@@ -126,6 +126,7 @@ def shape_of(inspector: SceneGraphInspector, geometry: GeometryId, X_BP: Array) 
             points = np.array([hull.vertex(i) for i in range(hull.num_vertices())])
             return Shape.hull(X_BP, points)
     raise InvalidInputError(
-        f"collision geometry {inspector.GetName(geometry)!r} is a {type(shape).__name__}; the"
-        " hand's screen knows boxes, cylinders, spheres and convex meshes"
+        f"collision geometry {inspector.GetName(geometry)!r} is a {type(shape).__name__};"
+        " the clearance check of the hand supports boxes, cylinders, spheres and convex"
+        " meshes"
     )

@@ -71,12 +71,14 @@ def rank_by(grasps: GraspSet, column: str) -> Ranking:
     if colliding is not None:
         good = good & ~colliding[:, None]
     if not judged.any():
-        raise InvalidInputError(f"column {column!r} judges none of the grasps; it has no values")
+        raise InvalidInputError(
+            f"column {column!r} has no values, so that no grasp can be ranked by it"
+        )
     grasps, good = grasps.select(judged), good[judged]
     if not np.isfinite(grasps.score).any():
         raise InvalidInputError(
-            "average precision ranks grasps by score, and none of those that are judged by"
-            f" {column!r} has one"
+            "average precision ranks grasps by score, but no grasp with a value of "
+            f"{column!r} has a score"
         )
     curves = [precision_recall(grasps.score, of_one) for of_one in good.T]
     return Ranking(
@@ -118,6 +120,6 @@ def _judge(
     elif np.isin(values[~np.isnan(values)], (0, 1)).all():
         return (name,), ~np.isnan(values), (values == 1)[:, None]
     raise InvalidInputError(
-        f"column {name!r} does not say which grasps are good; give {FRICTION_NEEDED}, a column of"
-        " outcomes, or one of truth values or 0 and 1"
+        f"column {name!r} does not say which grasps are good; give {FRICTION_NEEDED}, a"
+        " column of outcomes, or a column of true/false or 0/1"
     )

@@ -37,7 +37,10 @@ class Jaws:
         for name in ("opening", "y", "z"):
             low, high = getattr(self, name)
             if not low < high:
-                raise InvalidInputError(f"Jaws.{name} is {low:g} to {high:g} m; it must rise")
+                raise InvalidInputError(
+                    f"Jaws.{name} goes from {low:g} to {high:g} m; the second number must be"
+                    " the larger one"
+                )
         if self.opening[0] < 0.0:
             raise InvalidInputError(f"Jaws.opening starts at {self.opening[0]:g} m; give 0 or more")
         for name in ("force", "foundation"):

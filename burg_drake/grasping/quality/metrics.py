@@ -71,7 +71,9 @@ class Payload:
         if not np.isfinite(self.center_of_mass).all():
             raise InvalidInputError(f"center_of_mass is {self.center_of_mass}; give metres")
         if not 0.0 <= self.friction < np.inf:
-            raise InvalidInputError(f"friction is {self.friction:g}; give a coefficient from 0")
+            raise InvalidInputError(
+                f"friction is {self.friction:g}; give a coefficient of 0 or more"
+            )
 
     @classmethod
     def of(cls, entry: ObjectEntry, friction: float | None = None) -> Payload:
@@ -228,5 +230,5 @@ def _directions(up: ArrayLike, n: int) -> Array:
         raise InvalidInputError(f"up has shape {given.shape}; expected (3,) or ({n}, 3)")
     length = np.linalg.norm(given, axis=-1, keepdims=True)
     if not (np.isfinite(length) & (length > 0.0)).all():
-        raise InvalidInputError("up has zeros or numbers that are not finite; give directions")
+        raise InvalidInputError("up must be finite directions that are not zero")
     return np.broadcast_to(given / length, (n, 3))

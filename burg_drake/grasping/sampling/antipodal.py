@@ -125,12 +125,13 @@ class AntipodalSettings:
         for distance in self.standoffs:
             if not low <= distance <= high:
                 raise InvalidInputError(
-                    f"standoff {1e3 * distance:g} mm puts the contacts off the finger pads; give"
-                    f" {1e3 * low:g} to {1e3 * high:g} mm"
+                    f"standoff {1e3 * distance:g} mm puts the contacts outside the finger"
+                    f" pads; give {1e3 * low:g} to {1e3 * high:g} mm"
                 )
         if self.diverse < 1:
             raise InvalidInputError(
-                f"diverse is {self.diverse}; give how many times n to sample, from 1"
+                f"diverse is {self.diverse}; give a factor of 1 or more: so many times n"
+                " grasps are sampled"
             )
 
 
@@ -288,7 +289,7 @@ def _accepted(grasps: _Grasps, accept: Accept) -> _Grasps:
     passed = np.asarray(accept(grasps.X_OG), dtype=bool)
     if passed.shape != (len(grasps.X_OG),):
         raise InvalidInputError(
-            f"accept gave an array of shape {passed.shape} for {len(grasps.X_OG)} grasps; it has"
-            " to say for each grasp whether to keep it"
+            f"accept returned an array of shape {passed.shape} for {len(grasps.X_OG)}"
+            " grasps; it must return one true/false value a grasp"
         )
     return _Grasps(grasps.X_OG[passed], grasps.width[passed], grasps.score[passed])

@@ -103,8 +103,8 @@ def pieces_instead(contact: ContactGeometry, pieces: int) -> str:
     if not contact.reason:
         return ""
     return (
-        f"pads touch {_pieces(pieces)}, because {contact.reason}; {MEND}, or accept the pieces by"
-        " 'contact: pieces' in an objects.yaml"
+        f"finger pads touch {_pieces(pieces)}, because {contact.reason}; {MEND}, or"
+        " accept that by 'contact: pieces' in an objects.yaml"
     )
 
 
@@ -120,10 +120,14 @@ def touched_by_pads(library: ObjectLibrary, name: str) -> str:
     if contact.primitive is not None:
         what = f"a {contact.primitive.shape}"
     elif contact.mesh:
-        what = f"a surface of {len(library.mesh(contact.mesh).faces)} faces"
+        what = f"a surface with {len(library.mesh(contact.mesh).faces)} faces"
     else:
         return _pieces(len(entry.pieces))
-    return what if contact.fit is None else f"{what}, within {1e3 * contact.fit.hausdorff:.2g} mm"
+    return (
+        what
+        if contact.fit is None
+        else (f"{what}, at most {1e3 * contact.fit.hausdorff:.2g} mm off")
+    )
 
 
 def _pieces(count: int) -> str:
@@ -153,11 +157,11 @@ def _mesh(surface: trimesh.Trimesh, closed: bool, folder: Path) -> ContactGeomet
 
 def _refusal(surface: trimesh.Trimesh, volume: float) -> str:
     nearest = nearest_primitive(surface, volume)
-    text = "contact 'primitive': no box, cylinder or sphere has about this volume"
+    text = "contact 'primitive': no box, cylinder or sphere comes close to its volume"
     if nearest is not None:
         primitive, fit = nearest
         text = (
             f"contact 'primitive': the nearest, a {primitive.shape}, is"
             f" {1e3 * fit.hausdorff:.1f} mm off"
         )
-    return f"{text}; choose 'pieces', or leave the choice out"
+    return f"{text}; choose 'pieces', or leave contact out"

@@ -84,8 +84,8 @@ def contact_surface(
         if distance <= most_distance:
             return mesh, Fit(volume_ratio=float(mesh.volume / surface.volume), hausdorff=distance)
     raise MeshError(
-        f"its surface cannot be decimated to {MOST_FACES} faces within"
-        f" {1e3 * most_distance:g} mm and {np.rad2deg(most_angle):g} degrees"
+        f"its surface cannot be reduced to {MOST_FACES} faces without being more than "
+        f"{1e3 * most_distance:g} mm or {np.rad2deg(most_angle):g} degrees off"
     )
 
 

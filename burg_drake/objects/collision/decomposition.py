@@ -65,7 +65,7 @@ def convex_pieces(
     parts, seconds = _cut(surface, closed, parameters)
     solid = [p for p in parts if thickness(p) >= parameters.min_thickness]
     if not solid:
-        raise MeshError("convex decomposition leaves no solid piece; is the mesh a thin sheet?")
+        raise MeshError("convex decomposition found no solid piece; is the mesh a thin sheet?")
     joined = joined_parts(solid, parameters.join)
     return Pieces(tuple(_reduced(p, parameters) for p in joined), seconds)
 
@@ -146,9 +146,9 @@ def _cut(
             continue
         if parts:
             return parts, seconds
-        reason = "it found no parts"
+        reason = "it found no pieces"
     raise MeshError(
-        f"convex decomposition failed: {reason}; repair or simplify the mesh, cut it more coarsely"
-        f" (decomposition.threshold above {parameters.threshold:g}), or give convex pieces of your"
-        " own (pieces in an objects.yaml)"
+        f"convex decomposition failed: {reason}; repair or simplify the mesh, raise"
+        f" decomposition.threshold above {parameters.threshold:g}, or give convex pieces"
+        " of your own (pieces in an objects.yaml)"
     )

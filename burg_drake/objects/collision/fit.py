@@ -97,8 +97,8 @@ def deviation_warning(fit: Fit | None, diagonal: float, threshold: float | None)
         return ""
     mend = "give finer convex pieces of your own (pieces in an objects.yaml) if that matters"
     if threshold is not None and threshold > Decomposition().threshold:
-        mend = "a lower decomposition.threshold cuts finer"
-    return f"the convex pieces are coarse: {describe_fit(fit)}; {mend}"
+        mend = "lower decomposition.threshold for finer pieces"
+    return f"the convex pieces do not fit well: {describe_fit(fit)}; {mend}"
 
 
 def describe_fit(fit: Fit) -> str:

@@ -103,7 +103,7 @@ class ObjectLibrary:
         path = self.root / relative
         if not path.is_file():
             what = "is missing" if not path.exists() else "is not a file"
-            raise UnknownNameError(f"{path} {what}; build the library {self.name!r} again")
+            raise UnknownNameError(f"{path} {what}; build library {self.name!r} again")
         return path
 
     def surface(self, name: str) -> trimesh.Trimesh:
@@ -146,7 +146,7 @@ class ObjectLibrary:
 
     def damaged(self, path: Path) -> MeshError:
         """The error of a mesh file that is not as it was built."""
-        return MeshError(f"{path} is damaged or no mesh; build the library {self.name!r} again")
+        return MeshError(f"{path} is damaged or not a mesh; build library {self.name!r} again")
 
     @cached_property
     def content(self) -> dict[str, str]:
@@ -187,8 +187,8 @@ def load_library(reference: str | Path, base: Path | None = None) -> ObjectLibra
     file = path / LIBRARY_FILE if path.is_dir() else path
     if file is not path and not file.exists():
         raise DocumentError(
-            f"{path} holds no library ({LIBRARY_FILE} is missing); burg-drake library build makes"
-            " libraries of meshes"
+            f"{path} is not an object library ({LIBRARY_FILE} is missing); `burg-drake"
+            " library build` makes a library from meshes"
         )
     return ObjectLibrary(load_document(file, LibraryDocument), file.parent)
 

@@ -148,7 +148,9 @@ class Primitive:
                 f"size of a {self.shape} has {len(self.size)} entries; expected {expected}"
             )
         if min(self.size) <= 0.0:
-            raise InvalidInputError(f"size of a {self.shape} is {list(self.size)}; it must be > 0")
+            raise InvalidInputError(
+                f"size of a {self.shape} is {list(self.size)}; it must be above 0"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)

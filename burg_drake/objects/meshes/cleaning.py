@@ -153,7 +153,9 @@ def _drop_specks(result: Repaired) -> None:
         keep = np.ones(len(mesh.faces), dtype=bool)
         keep[np.concatenate(specks)] = False
         mesh.update_faces(keep)
-        result.sentences.append(f"dropped {len(specks)} specks ({int((~keep).sum())} faces)")
+        result.sentences.append(
+            f"dropped {len(specks)} tiny separate parts ({int((~keep).sum())} faces)"
+        )
 
 
 def _fill_holes(result: Repaired) -> None:

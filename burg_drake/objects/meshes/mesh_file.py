@@ -39,7 +39,7 @@ LONGEST_LINE = 65536
 TEXT_ONLY = (".obj", ".off")
 """Mesh formats that have no binary form here."""
 
-NEITHER = "its contents are neither text nor a known binary form"
+NEITHER = "its contents are neither text nor a known binary format"
 
 REFERRED = (".mtl", ".bin", *IMAGES)
 """What they refer to."""
@@ -173,8 +173,8 @@ def missing_textures(path: Path) -> list[str]:
     elif suffix == ".gltf":
         found += [(path, uri) for uri in _image_uris(path)]
     return [
-        f"{file.name} names {name}, which is missing: the object is shown without its texture;"
-        f" put it beside {file.name} and build again"
+        f"{file.name} names {name}, which is missing, so the object is shown without its"
+        f" texture; put the file beside {file.name} and build again"
         for file, name in dict.fromkeys(found)
         if not (file.parent / name.replace("\\", "/")).is_file()
     ]
@@ -221,18 +221,21 @@ def _check_file(path: Path) -> None:
     name = os.fsencode(path)
     if name.decode(errors="replace") != str(path):  # its readers could not be told the name
         shown = name.decode(errors="backslashreplace")
-        raise MeshError(f"{shown}: the name is not UTF-8; rename the file, or the folder it is in")
+        raise MeshError(f"{shown}: the path is not valid UTF-8; rename the file or its folder")
     if path.is_symlink() and not path.exists():
-        raise MeshError(f"{path}: a link to a file that does not exist, or to itself")
+        raise MeshError(f"{path}: this link points to a file that does not exist, or to itself")
     if path.is_fifo():
         raise MeshError(f"{path}: it is a pipe; save it to a file first")
     if not path.is_file():
         raise MeshError(f"{path}: the mesh file does not exist")
     if path.suffix.lower() not in FORMATS:
         raise MeshError(
-            f"{path}: {path.suffix} is not one of {', '.join(FORMATS)}"
+            (
+                f"{path}: {path.suffix} is not a mesh format that can be read; those are "
+                f"{', '.join(FORMATS)}"
+            )
             if path.suffix
-            else f"{path}: the name has no suffix; those of meshes are {', '.join(FORMATS)}"
+            else f"{path}: the file name has no suffix; give one of {', '.join(FORMATS)}"
         )
     if path.stat().st_size == 0:
         raise MeshError(f"{path}: the mesh file is empty")

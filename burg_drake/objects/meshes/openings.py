@@ -45,17 +45,17 @@ def close_openings(result: Repaired, openings: Openings, thickness: float | None
         apart = split_bodies(mesh)
         if apart is not None:
             result.mesh = apart
-            result.sentences.append("separated bodies that touch along edges")
+            result.sentences.append("separated bodies that touch along an edge")
         else:
             result.sentences.append(
-                "left open, as more than two faces meet at some edges; the volume is taken from"
-                " the convex pieces"
+                "the surface stays open, as more than two faces meet at some edges; the"
+                " volume is that of the convex pieces"
             )
         return None
     rest, sheets = _sheets(mesh)
     if len(rest.faces) and np.linalg.norm(sheets.extents) < HOLE * np.linalg.norm(mesh.extents):
         result.mesh = rest
-        result.sentences.append(f"dropped {len(sheets.faces)} faces of fins without thickness")
+        result.sentences.append(f"dropped {len(sheets.faces)} faces without thickness")
         return None
     width = max(_width(mesh.vertices[loop]) for loop in loops or [rims(mesh).flatten().tolist()])
     opening = f"largest opening {1e3 * width:.3g} mm wide"
@@ -71,7 +71,7 @@ def close_openings(result: Repaired, openings: Openings, thickness: float | None
         if not mesh.is_winding_consistent:
             why = "it has only one side (a Moebius strip)"
     result.sentences.append(
-        f"left open ({opening}), as {why}; the volume is taken from the convex pieces"
+        f"the surface stays open ({opening}), as {why}; the volume is that of the convex pieces"
     )
     return None
 
@@ -85,8 +85,8 @@ def _thicken(
     parts = [p for p in (rest, walled) if len(p.faces)]
     result.mesh, repairs = united(trimesh.util.concatenate(parts))
     result.sentences += [
-        f"made the open surface ({opening}) a wall {1e3 * thickness:.3g} mm thick; wall_thickness"
-        " sets it, openings='close' caps it instead",
+        f"made the open surface ({opening}) a wall of {1e3 * thickness:.3g} mm; set the"
+        " thickness with wall_thickness, or close it with caps by openings='close'",
         *repairs,
     ]
     return True
@@ -103,8 +103,8 @@ def _close(result: Repaired, count: int, opening: str) -> bool:
         result.inverted = not result.inverted
     result.mesh = capped
     result.sentences.append(
-        f"closed {count} openings with flat caps ({opening}); openings='wall'"
-        " makes a wall of the surface instead"
+        f"closed {count} openings with flat caps ({opening}); openings='wall' makes the"
+        " surface a wall instead"
     )
     return True
 

@@ -56,8 +56,8 @@ def check_bytes(path: Path) -> None:
     size = path.stat().st_size
     if size > MOST_BYTES:
         raise MeshError(
-            f"{path}: the file has {size / 2**20:.0f} MB; at most {MOST_BYTES / 2**20:.0f} MB are"
-            " read: decimate the mesh first"
+            f"{path}: the file has {size / 2**20:.0f} MB; at most "
+            f"{MOST_BYTES / 2**20:.0f} MB are read: reduce the number of faces first"
         )
 
 
@@ -76,8 +76,8 @@ def check_triangles(count: int, name: str, *, wall: bool = False) -> None:
     if count > most:
         what = "an open surface that becomes a wall" if wall else "a mesh"
         raise MeshError(
-            f"{name}: {count:,} triangles; {what} may have {most:,}: decimate it first (100,000"
-            " are more than contact, mass and resting poses can use)"
+            f"{name}: {count:,} triangles; {what} may have {most:,}: reduce the number of"
+            " faces first (100,000 are enough for contact, mass and stable poses)"
         )
 
 
@@ -122,7 +122,9 @@ def _check_picture(picture: Any, name: str) -> None:
             with Image.open(picture) as image:  # its header alone
                 width, height = image.size
     except Image.DecompressionBombError as error:
-        raise MeshError(f"{name}: more pixels than a texture may have, {_most()}") from error
+        raise MeshError(
+            f"{name}: the image is too large for a texture: at most {_most()}"
+        ) from error
     except (OSError, ValueError, SyntaxError):
         return  # no picture that anybody could read
     if width * height > MOST_PIXELS:

@@ -90,8 +90,8 @@ def united(surface: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
     if not is_closed(result):
         return surface, []
     return result, [
-        f"united {len(solid)} bodies that overlap ({100.0 * twice:.2g} % of their volume would"
-        " have counted twice)"
+        f"united {len(solid)} bodies that overlap (they share {100.0 * twice:.2g} % of"
+        " their volume, which now counts once)"
     ]
 
 
@@ -129,12 +129,14 @@ def decimated(surface: trimesh.Trimesh, max_faces: int) -> tuple[trimesh.Trimesh
         if len(best.faces) <= max_faces:
             break
     if len(best.faces) > max(max_faces, USEFUL * len(surface.faces)):
-        return surface, [f"left at {len(surface.faces)} faces, as it is too rough to decimate"]
+        return surface, [
+            (f"kept all {len(surface.faces)} faces, as the surface is too rough to reduce")
+        ]
     step = max(1, len(surface.vertices) // MEASURED)
     away = one_sided_hausdorff(surface.vertices[::step], best)
     return best, [
-        f"decimated from {len(surface.faces)} to {len(best.faces)} faces,"
-        f" at most {1e3 * max(away, RESOLVED):.2g} mm away"
+        f"reduced from {len(surface.faces)} to {len(best.faces)} faces, at most "
+        f"{1e3 * max(away, RESOLVED):.2g} mm off"
     ]
 
 

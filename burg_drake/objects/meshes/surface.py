@@ -126,7 +126,9 @@ def load_mesh(
     """
     name = mesh_name(mesh)
     if not (np.isfinite(scale) and scale > 0.0):
-        raise MeshError(f"{name}: scale is {scale:g}; give the unit in metres, such as 0.001")
+        raise MeshError(
+            f"{name}: scale is {scale:g}; give the size of the mesh's unit in metres, such as 0.001"
+        )
     sentences: list[str] = []
     if isinstance(mesh, trimesh.Trimesh):
         raw = mesh.copy()
@@ -137,8 +139,8 @@ def load_mesh(
     _check_numbers(raw, name)
     if (alpha := make_opaque(raw)) is not None:
         sentences.append(
-            f"colours made opaque, some had an alpha of {alpha:.2g};"
-            " rgba in an objects.yaml makes an object translucent"
+            f"made colours opaque, as some had an alpha of {alpha:.2g}; set rgba in an"
+            " objects.yaml for a translucent object"
         )
     if scale != 1.0:
         raw.apply_scale(scale)
@@ -215,8 +217,9 @@ def _solid(
         return repaired, wall
     if abs(signed_volume(surface)) <= FLAT * surface.extents.max() ** 3:
         raise MeshError(
-            f"{name}: the closed surface encloses no volume (a sheet without thickness?);"
-            " give one side of it as an open surface, which becomes a wall"
+            f"{name}: the closed surface encloses no volume (is it a sheet without"
+            " thickness?); give only one side of it, as an open surface, and it becomes"
+            " a wall"
         )
     surface, joined = united(surface)
     surface, coarser = decimated(surface, preparation.max_faces * (1 if wall is None else 2))
@@ -225,8 +228,9 @@ def _solid(
     twice = self_overlap(surface)
     if twice > SELF_OVERLAP:
         repaired.sentences.append(
-            f"passes through itself: about {100.0 * twice:.2g} % of its inside counts twice or is"
-            " inside out; its mass properties are that much in doubt"
+            f"the surface passes through itself: about {100.0 * twice:.2g} % of its"
+            " volume counts twice or is inside out, so mass properties may be that far"
+            " off"
         )
     return repaired, wall
 
@@ -253,10 +257,12 @@ def _check_hull(surface: trimesh.Trimesh, name: str) -> None:
     # the few points farthest out tell most often, and at once
     if _hull_volume(_extremes(points)) <= limit and _hull_volume(points) <= limit:
         size = " x ".join(f"{1000 * e:.3g}" for e in extent)
-        cure = "wall_thickness makes a wall of it"
+        cure = "wall_thickness makes it a wall"
         if is_closed(surface):
-            cure = "give one of its two sides as an open surface, with wall_thickness"
-        raise MeshError(f"{name}: the mesh is flat ({size} mm); an object needs a volume: {cure}")
+            cure = "give only one of its two sides, as an open surface, with wall_thickness"
+        raise MeshError(
+            f"{name}: the mesh is flat ({size} mm), but an object needs a volume: {cure}"
+        )
 
 
 def _extremes(points: Array) -> Array:

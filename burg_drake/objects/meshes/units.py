@@ -56,8 +56,8 @@ def check_extent(extent: float, name: str, scale: float) -> None:
     if not MIN_EXTENT <= extent <= MAX_EXTENT:
         units = _fitting_units(extent / scale)
         error = MeshError(
-            f"{name}: largest extent is {length(extent)}, but lengths are in metres;"
-            f" {_hint(extent / scale, units)}"
+            f"{name}: taken as metres, the mesh is {length(extent)} long; "
+            f"{_hint(extent / scale, units)}"
         )
         error.units = tuple(units)
         raise error

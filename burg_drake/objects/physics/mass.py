@@ -100,7 +100,9 @@ def mass_properties(
     """
     for name, value, unit in (("mass", mass, "kg"), ("density", density, "kg/m^3")):
         if value is not None and not (np.isfinite(value) and value > 0.0):
-            raise InvalidInputError(f"{name} is {value:g} {unit}; a free object needs one above 0")
+            raise InvalidInputError(
+                f"{name} is {value:g} {unit}; for a free object it must be above 0"
+            )
     source: Literal["given", "density"] = "density" if mass is None else "given"
     if mass is None:
         mass = (DEFAULT_DENSITY if density is None else density) * solid.volume
@@ -147,20 +149,26 @@ def implausible(properties: MassProperties, lower: Vector3, upper: Vector3) -> t
     if not LIGHTEST <= density <= DENSEST:
         rare = "lighter than foam" if density < LIGHTEST else "denser than copper"
         found.append(
-            f"density is {density:.3g} kg/m^3 ({mass:.3g} kg in"
-            f" {1e6 * properties.volume:.3g} cm^3), {rare}: things have {LIGHTEST:g} to"
-            f" {DENSEST:g}; check mass and unit of length"
+            f"density is {density:.3g} kg/m^3 ({mass:.3g} kg in "
+            f"{1e6 * properties.volume:.3g} cm^3), {rare}: usual are {LIGHTEST:g} to "
+            f"{DENSEST:g}; check the mass and the unit of length"
         )
     if mass < AIR * box:
-        found.append(f"mass is {mass:.3g} kg, less than the air in its bounding box")
+        found.append(
+            f"mass is {mass:.3g} kg, less than that of the air in its bounding box; check the"
+            " mass and the unit of length"
+        )
     if mass > DENSEST * box:
-        found.append(f"mass is {mass:.3g} kg, more than its bounding box full of copper")
+        found.append(
+            f"mass is {mass:.3g} kg, more than a bounding box full of copper has; check the"
+            " mass and the unit of length"
+        )
     gyration = np.sqrt(np.linalg.eigvalsh(inertia_matrix(properties.inertia))[-1] / mass)
     if not GYRATION * half_diagonal <= gyration <= half_diagonal:
         found.append(
-            f"inertia gives a radius of gyration of {1e3 * gyration:.3g} mm, but half the diagonal"
-            f" of its bounding box is {1e3 * half_diagonal:.3g} mm; inertia is in kg m^2 about the"
-            " centre of mass"
+            f"inertia is too large: its radius of gyration is {1e3 * gyration:.3g} mm,"
+            f" but half the diagonal of the bounding box is {1e3 * half_diagonal:.3g} mm;"
+            " give kg m^2 about the centre of mass"
         )
     centre = np.asarray(properties.center_of_mass)
     if (centre < low).any() or (centre > high).any():
@@ -190,11 +198,13 @@ def _check_inertia(inertia: Inertia) -> None:
     a, b, c = np.linalg.eigvalsh(inertia_matrix(inertia)).tolist()
     principal = f"its principal moments are {a:.3g}, {b:.3g} and {c:.3g} kg m^2"
     if a <= 0.0:
-        raise InvalidInputError(f"inertia is not positive definite: {principal}; all must be > 0")
+        raise InvalidInputError(
+            f"inertia is not positive definite: {principal}; all must be above 0"
+        )
     if c > (a + b) + TRIANGLE * c:
         raise InvalidInputError(
-            f"inertia is that of no body: {principal}; the largest must not exceed the sum of the"
-            " others"
+            f"no body has this inertia: {principal}; the largest must be at most the sum"
+            " of the others"
         )
 
 

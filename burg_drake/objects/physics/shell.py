@@ -42,8 +42,8 @@ def solid_of_shell(surface: trimesh.Trimesh, thickness: float) -> Solid:
     if 2.0 * thickness > room or not fits:
         most = min(0.5 * room, thickness)
         raise InvalidInputError(
-            f"wall_thickness is {1e3 * thickness:.3g} mm, but the body has no room for it:"
-            f" give less than {1e3 * most:.2g} mm, or leave it out for a solid body"
+            f"wall_thickness is {1e3 * thickness:.3g} mm, which is too much for this"
+            f" body; give less than {1e3 * most:.2g} mm, or leave it out for a solid body"
         )
     return solid_of_surface(trimesh.util.concatenate([surface.copy(), inner]))
 

@@ -65,15 +65,15 @@ def choose(
     for name in only:
         if name not in usable:
             raise UnknownNameError(
-                f"object {name!r} is not in library {library.root}, or has no mass or no stable"
-                f" pose; {nearest(name, usable)}"
+                f"object {name!r} cannot be arranged: library {library.root} does not"
+                f" have it, or it has no mass or no stable pose; {nearest(name, usable)}"
             )
     names = sorted(set(only) or usable)
     if not names or (not repeat and count > len(names)):
         raise InvalidInputError(
-            f"{count} different objects are asked for, and there are {len(names)}"
-            f" {'in ' + str(library.root) if not only else 'to choose from'};"
-            " ask for fewer, or let objects repeat"
+            f"{count} different objects were asked for, but there are only {len(names)} "
+            f"{'in ' + str(library.root) if not only else 'to choose from'}; ask for"
+            " fewer, or allow objects to repeat"
         )
     drawn = [names[i] for i in rng.choice(len(names), count, replace=repeat)]
     wanted: list[ObjectRequest] = []

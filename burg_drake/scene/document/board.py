@@ -29,7 +29,7 @@ class Board:
         require_finite(self)
         if not 0.0 < min(self.size) <= max(self.size) <= LARGEST:
             raise InvalidInputError(
-                f"board size {list(self.size)} must be positive [m], and at most {LARGEST:g} m;"
+                f"board size {list(self.size)} must be above 0 and at most {LARGEST:g} m;"
                 " A2 is [0.594, 0.42]"
             )
 

@@ -35,7 +35,7 @@ def scene_references(references: Iterable[str]) -> list[str]:
         elif any(sign in reference for sign in "*?[") and not path.exists():
             files = sorted(glob.glob(reference))
             if not files:
-                raise InvalidInputError(f"no file fits {reference}; give scene files")
+                raise InvalidInputError(f"no file matches {reference}; give scene files")
             found += files
         else:
             found.append(reference)
@@ -46,5 +46,5 @@ def _in_folder(folder: Path) -> list[Path]:
     sampled = sorted(folder.glob(SAMPLED), key=lambda path: (len(path.name), path.name))
     others = [path for path in sorted(folder.glob("*.yaml")) if path.name not in NO_SCENE]
     if not (sampled or others):
-        raise InvalidInputError(f"{folder} is a folder without scenes (*.yaml); give scene files")
+        raise InvalidInputError(f"folder {folder} has no scenes (*.yaml); give scene files")
     return sampled or others

@@ -42,7 +42,9 @@ class Markers:
         if not (0.0 < self.side < np.inf and 0.0 < self.spacing < np.inf):
             raise InvalidInputError("side and spacing of markers must be above 0 and finite [m]")
         if self.count is not None and min(self.count) < 1:
-            raise FieldError(f"count {list(self.count)} needs a column and a row at least", "count")
+            raise FieldError(
+                f"count {list(self.count)} must have at least one column and one row", "count"
+            )
         if self.first_id < 0:
             raise FieldError(f"first_id {self.first_id} must be at least 0", "first_id")
 
@@ -120,8 +122,9 @@ def marker_layout(size: tuple[float, float], markers: Markers) -> MarkerLayout:
     total, available = columns * rows, len(dictionary.bytesList)
     if markers.first_id + total > available:
         raise InvalidInputError(
-            f"{total} markers from {markers.first_id} on need more than the {available} of"
-            f" {markers.dictionary}; give larger markers, a smaller first_id or another dictionary"
+            f"{total} markers with ids from {markers.first_id} on need more than the "
+            f"{available} ids of {markers.dictionary}; give larger markers, a smaller"
+            " first_id or another dictionary"
         )
     left, bottom = (np.array(size) - extent) / 2
     x = left + pitch * np.arange(columns)

@@ -190,14 +190,14 @@ def load_scene(
                 raise UnknownNameError(f"{where}: {error}") from error
             if entry.is_fixed and key == "instances":
                 raise DocumentError(
-                    f"{where}: {instance.object!r} has no mass; list it under background, or build"
-                    " it with a mass"
+                    f"{where}: {instance.object!r} has no mass, so it cannot be a free"
+                    " object; list it under background, or build it with a mass"
                 )
             name = instance.name or instance.object
             if name in seen:
                 raise DocumentError(
-                    f"{where}: name {name!r} is used twice, first by {seen[name]}; give this one"
-                    f" another, such as name: {name}_2"
+                    f"{where}: the name {name!r} is used already, by {seen[name]}; give"
+                    f" this instance another one, such as name: {name}_2"
                 )
             seen[name] = f"{key}[{i}]"
     return Scene(document, objects, path)

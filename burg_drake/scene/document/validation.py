@@ -202,7 +202,7 @@ def _vertices_of(mesh: Path, changed: int, size: int) -> Array:
     rows = [line.split()[1:4] for line in mesh.read_text().splitlines() if line.startswith("v ")]
     p_OV = np.array(rows, dtype=float).reshape(-1, 3)
     if not len(p_OV) or not np.isfinite(p_OV).all():
-        raise ValueError(f"{mesh} has no vertices that are numbers")
+        raise ValueError(f"{mesh} has no vertices, or only ones that are not finite")
     p_OV.flags.writeable = False
     return p_OV
 
@@ -223,12 +223,12 @@ def _bounds_issue(scene: Scene, name: str, extent: Extent) -> SceneIssue | None:
     board = f"{size[0] * 1e3:g} x {size[1] * 1e3:g} mm"
     hint = ""
     if np.abs(scene.instance(name).X_SO.translation).max() >= MILLIMETRES_SUSPECTED:
-        hint = "; translations are in metres"
+        hint = "; check that translations are in metres"
     return SceneIssue(
         instance=name,
         kind="out_of_bounds",
         amount=beyond[sides[0]],
-        message=f"{name!r} is out of bounds: {where} of the board ({board}){hint}",
+        message=f"{name!r} is off the board: {where} of the board ({board}){hint}",
     )
 
 
@@ -240,8 +240,8 @@ def _ground_issue(scene: Scene, name: str, extent: Extent) -> SceneIssue | None:
             instance=name,
             kind="in_ground",
             amount=-support,
-            message=f"{name!r} is in the ground: it reaches {length_text(-support)} below the"
-            f" board; z = {height:.4f} would put it on top",
+            message=f"{name!r} reaches {length_text(-support)} below the surface of the board;"
+            f" set z = {height:.4f} to put it on top",
         )
     return None
 

@@ -169,14 +169,15 @@ class SceneCheck:
         scene = as_scene(scene)
         chosen = list(dict.fromkeys(names))
         if not chosen:
-            raise InvalidInputError("no instance is named; name those to move")
+            raise InvalidInputError("no instance is named; name the instances to move")
         for name in chosen:
             scene.instance(name)
         direction = np.asarray(direction_S, dtype=float)
         length = float(np.linalg.norm(direction))
         if direction.shape != (3,) or not (np.isfinite(length) and length > 0.0):
             raise InvalidInputError(
-                f"direction {direction.tolist()} must be three finite numbers, not all 0"
+                f"direction {direction.tolist()} must be three finite numbers, of which"
+                " one at least is not 0"
             )
         if not limit >= 0.0:
             raise InvalidInputError(f"limit {limit} must be a distance of at least 0 [m]")
@@ -231,8 +232,8 @@ class SceneCheck:
         """Takes over where the instances of a scene stand."""
         if scene.library is not self._library and scene.library != self._library:
             raise InvalidInputError(
-                f"{scene.path}: the scene's library is {scene.library.root}; it is checked with"
-                f" {self._library.root}"
+                f"{scene.path}: the scene's library is {scene.library.root}, but the"
+                f" check was made for {self._library.root}"
             )
         self._require_free_names(scene)
         instances = {**scene.instances, **scene.background}
@@ -298,8 +299,8 @@ class SceneCheck:
             kind="sunken",
             amount=depth,
             message=(
-                f"{name!r} stands {length_text(depth)} deep in the table, which yields to it;"
-                f" lift it by {length_text(depth)}"
+                f"{name!r} reaches {length_text(depth)} into the table; raise it by "
+                f"{length_text(depth)}"
             ),
         )
 

@@ -69,8 +69,8 @@ def surface_issues(scene: Scene, known: Iterable[SceneIssue] = ()) -> tuple[Scen
         depth = surface_overlap(surfaces[a], surfaces[b], TOUCH_TOLERANCE)
         if depth > 0.0:
             message = (
-                f"the surfaces of {a!r} and {b!r} overlap by {length_text(depth)}, though what"
-                " they touch others with in simulation does not; move them apart"
+                f"the visible surfaces of {a!r} and {b!r} overlap by {length_text(depth)}"
+                ", although their collision shapes do not; move them apart"
             )
             issues.append(
                 SceneIssue(

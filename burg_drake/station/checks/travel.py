@@ -155,5 +155,5 @@ def _convex_shape(shape: Shape) -> ConvexShapes:
             [np.array([hull.vertex(i) for i in range(hull.num_vertices())])], [flat]
         )
     raise InvalidInputError(
-        f"how far something can be moved is not known of shapes of kind {type(shape).__name__}"
+        f"a shape of kind {type(shape).__name__} cannot be checked for how far it can move"
     )

@@ -69,8 +69,9 @@ class ArmDriver(LeafSystem):
         worst = int(np.abs(jump).argmax())
         if abs(jump[worst]) > JUMP:
             raise InvalidInputError(
-                f"the plan wants {self._joints[worst]} {abs(jump[worst]):.2g} rad from where it"
-                " is now; bring the arm to where the plan begins, or set plan.start_time"
+                f"the plan starts with {self._joints[worst]} at an angle "
+                f"{abs(jump[worst]):.2g} rad away from the present one; bring the arm to"
+                " the start of the plan, or set plan.start_time"
             )
 
     def _calc(self, context: Context, output: BasicVector) -> None:
@@ -81,7 +82,7 @@ class ArmDriver(LeafSystem):
         )
         if position and desired_state:
             raise InvalidInputError(
-                "arm.position and arm.desired_state are both connected; an arm follows one of them"
+                "ports arm.position and arm.desired_state are both connected; connect one of them"
             )
         planned = self._planned(context)
         if planned is not None:
@@ -95,8 +96,8 @@ class ArmDriver(LeafSystem):
         if not np.isfinite([q, v]).all():
             joint = int(np.argmin(np.isfinite(q) & np.isfinite(v)))
             raise InvalidInputError(
-                f"{source} wants {self._joints[joint]} at {q[joint]:g} rad and {v[joint]:g} rad/s;"
-                " give finite numbers"
+                f"{source} asks {self._joints[joint]} for {q[joint]:g} rad and "
+                f"{v[joint]:g} rad/s; give finite numbers"
             )
         output.SetFromVector(np.concatenate([q, v]))
 

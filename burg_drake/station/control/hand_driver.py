@@ -167,8 +167,7 @@ class HandDriver(LeafSystem):
         )
         if position and desired_state:
             raise InvalidInputError(
-                "hand.position and hand.desired_state are both connected; a hand follows one of"
-                " them"
+                "ports hand.position and hand.desired_state are both connected; connect one of them"
             )
         fingers, fastest = self._fingers, self._fingers.hand.closing_speed
         q, planned = self._state.Eval(context)[self._fingers.q], self._planned(context)
@@ -178,8 +177,8 @@ class HandDriver(LeafSystem):
             speeds = self._desired_state.Eval(context)[2:]
             if not np.isfinite(speeds).all():
                 raise InvalidInputError(
-                    f"hand.desired_state wants fingers at {speeds.tolist()} m/s; give finite"
-                    " numbers"
+                    f"hand.desired_state asks for finger speeds of {speeds.tolist()} m/s;"
+                    " give finite numbers"
                 )
             return _FingerCommand(q, speeds)
         goal = context.get_discrete_state(self._held).value()
@@ -201,7 +200,7 @@ class HandDriver(LeafSystem):
         low, high = self._fingers.hand.opening
         if not low - SLACK <= wanted <= high + SLACK:
             raise InvalidInputError(
-                f"{source} is {wanted:g} m; the pads of {self._fingers.hand.name!r} are"
-                f" {low:g} to {high:g} m apart"
+                f"{source} is {wanted:g} m; the pads of {self._fingers.hand.name!r} can"
+                f" be {low:g} to {high:g} m apart"
             )
         return float(np.clip(wanted, low, high))

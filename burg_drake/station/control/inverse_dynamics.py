@@ -80,13 +80,14 @@ def make_inverse_dynamics(
     kp, kd = arm.control.gains(len(actuators), where)
     if max(kd) * step >= 1.0:
         raise InvalidInputError(
-            f"{where}.kd of {max(kd):g} 1/s is too stiff for steps of {1e3 * step:g} ms; stay below"
-            f" {1.0 / step:g}, which is twice the root of kp if it is not given"
+            f"{where}.kd of {max(kd):g} 1/s is too stiff for time steps of {1e3 * step:g}"
+            f" ms; give less than {1.0 / step:g}. If kd is not given, it is twice the"
+            " square root of kp"
         )
     if max(kp) * step**2 >= 1.0:
         raise InvalidInputError(
-            f"{where}.kp of {max(kp):g} 1/s^2 is too stiff for steps of {1e3 * step:g} ms; stay"
-            f" below {1.0 / step**2:g}"
+            f"{where}.kp of {max(kp):g} 1/s^2 is too stiff for time steps of "
+            f"{1e3 * step:g} ms; give less than {1.0 / step**2:g}"
         )
     limits = np.array([actuator.effort_limit() for actuator in actuators])
     return InverseDynamicsControl(controller_plant(plant, station, models), kp, kd, limits)

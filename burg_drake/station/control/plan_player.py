@@ -111,7 +111,9 @@ class PlanPlayer:
         if self._samples is None or plan is not self._plan:
             self._samples, self._plan = self._checked(plan), plan
         if np.isnan(time):
-            raise InvalidInputError("plan.start_time is nan s; give the time at which it begins")
+            raise InvalidInputError(
+                "plan.start_time is nan; give the time in seconds at which the plan begins"
+            )
         if time < 0.0:
             return None
         samples = self._samples
@@ -126,7 +128,7 @@ class PlanPlayer:
             got = type(plan).__name__
             if hasattr(plan, "outcome"):  # a planner's answer where it found no plan
                 got += f" ({plan.outcome})"
-            raise InvalidInputError(f"the port 'plan' got a {got}; it takes a burg_drake Plan")
+            raise InvalidInputError(f"port 'plan' got a {got}; give a burg_drake Plan")
         if plan.origin is not None:
             self._check_joints(plan.origin.joints)
             plan.require_for(self._scene, self._station)

@@ -130,8 +130,9 @@ def _arm_joints(
     measured = [joint.name() for joint in sorted(commanded, key=lambda j: j.position_start())]
     if names != measured:
         raise InvalidInputError(
-            f"{station.arm_model} has actuators for {', '.join(names)}, and joints in another order"
-            f" from base to hand; write them as {', '.join(measured)}"
+            f"{station.arm_model}: the actuators are in the order {', '.join(names)},"
+            " which differs from that of the joints from base to hand; write them in the"
+            f" order {', '.join(measured)}"
         )
     return tuple(names)
 

@@ -122,9 +122,9 @@ def build_station_diagram(
     """
     scene, station, engine = as_scene(scene), as_station(station), as_drake_engine(engine)
     if drivers and (robot != "arm" or weld_objects):
-        raise InvalidInputError("drivers need robot='arm', and objects that are not welded")
+        raise InvalidInputError("drivers need robot='arm' and objects that are free (not welded)")
     if for_trials and weld_objects:
-        raise InvalidInputError("welded objects are not simulated; leave for_trials out")
+        raise InvalidInputError("welded objects are not simulated; leave out for_trials")
     if robot not in get_args(Robot):
         raise UnknownNameError(f"robot {robot!r} does not exist; {nearest(robot, get_args(Robot))}")
     builder = RobotDiagramBuilder(time_step=engine.time_step)

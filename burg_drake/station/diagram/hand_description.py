@@ -174,9 +174,15 @@ class _Reader:
         if left or chained:
             names = ", ".join(sorted(self.plant.get_body(i).name() for i in left))
             raise self._error(
-                f"links {names} move by joints of their own; two fingers alone may move"
+                (
+                    f"links {names} have joints of their own besides the two fingers; only"
+                    " two fingers may move"
+                )
                 if left
-                else "one finger carries the other; both have to be on the hand's body"
+                else (
+                    "one finger is mounted on the other; both must be mounted on the body of"
+                    " the hand"
+                )
             )
 
     def _link(
@@ -220,8 +226,8 @@ class _Reader:
                 points = np.array([hull.vertex(i) for i in range(hull.num_vertices())])
                 return HandShape(name, "mesh", X_BC, (), points, friction)
         raise self._error(
-            f"collision geometry {name!r} is a {type(shape).__name__}; only boxes, spheres,"
-            " cylinders and meshes, by their convex hulls, are known"
+            f"collision geometry {name!r} is a {type(shape).__name__}; supported are"
+            " boxes, spheres, cylinders and meshes (as their convex hulls)"
         )
 
     def _axis(self, index: int, lead: RigidBody) -> Array:

@@ -61,7 +61,7 @@ def pad_front(
     p_BV = transform_points(X_BC, np.array([volume.vertex(i) for i in range(_count(volume))]))
     hull = ConvexHull(p_BV)
     if hull.volume > CONVEX * volume.CalcVolume():
-        raise ValueError("cannot be made of springs, as the pad is not convex")
+        raise ValueError("cannot be modelled by springs, as the pad is not convex")
     heights = p_BV @ closing_B
     other_B = np.cross(closing_B, side_B)
     flat = p_BV @ np.stack([side_B, other_B], axis=1)
@@ -70,8 +70,8 @@ def pad_front(
     area, whole = (0.0 if o is None else _area(o) for o in (outline, _hull_of(flat)))
     if outline is None or area < SMALLEST_SHARE * whole:
         raise ValueError(
-            f"in the closing direction has {1e6 * area:.0f} mm2 of the pad's {1e6 * whole:.0f};"
-            " a flat one is needed, of a box or a convex mesh"
+            f"has only {1e6 * area:.0f} mm2 of the pad's {1e6 * whole:.0f} mm2 facing the"
+            " closing direction; the pad needs a flat front: use a box or a convex mesh"
         )
     R, low, high = _smallest_rectangle(outline)
     middle = (low + high) / 2 @ R
@@ -86,7 +86,7 @@ def pad_front(
     inside = -(p_BV @ planes[:, :3].T + planes[:, 3]).max(axis=1)
     within = inside > FLAT
     if not within.any():
-        raise ValueError("has no vertex of the elastic volume behind it")
+        raise ValueError("has no inner vertex of the pad's volume mesh behind it")
     depth = heights.max() - heights
     first = np.flatnonzero(within)[np.argmin(depth[within])]
     corners = p_BV[hull.vertices]

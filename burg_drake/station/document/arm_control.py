@@ -52,7 +52,8 @@ class ArmControl:
             low, high = GAINS
             if values is not None and not (values and low <= min(values) <= max(values) <= high):
                 raise FieldError(
-                    f"{name} {list(values)} must be one number or one a joint, {low:g} to {high:g}",
+                    f"{name} {list(values)} must be one number, or one for each joint,"
+                    f" from {low:g} to {high:g}",
                     name,
                 )
 

@@ -90,8 +90,9 @@ def as_drake_engine(engine: Engine | str) -> Engine:
     found = as_engine(engine)
     if found.simulator != "drake":
         raise InvalidInputError(
-            f"engine {quoted(found.name)} is {found.simulator}, which only evaluates grasps with"
-            f" the hand alone; what is asked for needs Drake: {', '.join(DRAKE_ENGINES)}"
+            f"engine {quoted(found.name)} is {found.simulator}, which simulates the hand"
+            " alone and nothing else; this needs an engine of Drake: "
+            f"{', '.join(DRAKE_ENGINES)}"
         )
     return found
 

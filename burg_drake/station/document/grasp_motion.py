@@ -78,21 +78,21 @@ class GraspMotion:
         require_ranges(self)
         if self.least_lift is not None and self.least_lift > self.lift_height:
             raise FieldError(
-                f"least_lift is {self.least_lift:g} m, more than lift_height, {self.lift_height:g}"
-                " m; the hand rises by no more than lift_height",
+                f"least_lift is {self.least_lift:g} m, more than lift_height ("
+                f"{self.lift_height:g} m); give at most lift_height",
                 "least_lift",
             )
         if not math.hypot(*self.lift_direction) > 1e-9:
             raise FieldError(
-                f"lift_direction {list(self.lift_direction)} has no length; give a direction in the"
-                " world, such as [0, 0, 1] for up",
+                f"lift_direction {list(self.lift_direction)} has length 0; give a"
+                " direction in the world, such as [0, 0, 1] for up",
                 "lift_direction",
             )
         shortest = self.retreat + self.shortest
         if shortest < SHORTEST:
             raise FieldError(
-                f"retreat and lift together may be only {1e3 * shortest:g} mm; the hand has to"
-                f" go {1e3 * SHORTEST:g} mm at least with the object",
+                f"retreat and lift together may be as short as {1e3 * shortest:g} mm; the"
+                f" hand must move at least {1e3 * SHORTEST:g} mm with the object",
                 "least_lift" if self.least_lift is not None else "lift_height",
             )
 

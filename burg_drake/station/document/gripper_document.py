@@ -74,28 +74,33 @@ class Hand:
         low, high = self.opening
         if not 0.0 <= low < high:
             raise FieldError(
-                f"opening {list(self.opening)} must rise from 0 or above [m]", "opening"
+                f"opening {list(self.opening)} must be two distances in metres, the"
+                " smaller one first and at least 0",
+                "opening",
             )
         for name, unit in (("force", "N"), ("closing_speed", "m/s")):
             if not (value := getattr(self, name)) > 0.0:
-                raise FieldError(f"{name} is {value:g} {unit}; it has to be above 0", name)
+                raise FieldError(f"{name} is {value:g} {unit}; it must be above 0", name)
         if self.closing_time > LONGEST_CLOSING:
             raise FieldError(
-                f"closing_speed is {self.closing_speed:g} m/s, with which the open hand takes"
-                f" {self.closing_time:.3g} s to close; at most {LONGEST_CLOSING:g} s can be"
-                " simulated",
+                f"closing_speed is {self.closing_speed:g} m/s, so the hand takes "
+                f"{self.closing_time:.3g} s to close; at most {LONGEST_CLOSING:g} s can"
+                " be simulated",
                 "closing_speed",
             )
         for i, finger in enumerate(self.fingers):
             if finger.closed == finger.open:
                 raise FieldError(
-                    f"finger {finger.body!r}: closed and open are both {finger.open:g} m",
+                    f"finger {finger.body!r}: closed and open must differ; both are "
+                    f"{finger.open:g} m",
                     *("fingers", i, "closed"),
                 )
         one, other = self.fingers
         for name in ("body", "joint"):
             if (shared := getattr(other, name)) == getattr(one, name):
-                raise FieldError(f"both fingers name the {name} {shared!r}", "fingers", 1, name)
+                raise FieldError(
+                    f"both fingers name the same {name}, {shared!r}", "fingers", 1, name
+                )
 
     @property
     def closing_time(self) -> float:

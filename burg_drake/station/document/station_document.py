@@ -57,7 +57,7 @@ def require_image_size(width: int, height: int) -> None:
     """
     if max(width, height) > MAX_SIDE:
         raise FieldError(
-            f"image of {width} x {height} pixels; a side has at most {MAX_SIDE:,}",
+            f"image of {width} x {height} pixels; a side may have at most {MAX_SIDE:,}",
             "width" if width > MAX_SIDE else "height",
         )
 
@@ -153,7 +153,9 @@ class Camera:
     def __post_init__(self) -> None:
         require_ranges(self, "a camera")
         if not 0.0 < self.depth_range[0] < self.depth_range[1]:
-            raise InvalidInputError("camera depth_range must rise from above 0 [m]")
+            raise InvalidInputError(
+                "camera depth_range must be two distances above 0 in metres, the smaller one first"
+            )
 
     @property
     def principal_point(self) -> tuple[float, float]:
@@ -219,7 +221,8 @@ class StationDocument:
         for i, name in enumerate(self.arm.stands_in):
             if name not in known:
                 raise FieldError(
-                    f"{name!r} is neither the table nor in background; {nearest(name, known)}",
+                    f"{name!r} is neither the table nor an entry of background; "
+                    f"{nearest(name, known)}",
                     *("arm", "stands_in", i),
                 )
         x, y, z = self.arm.X_WA.translation
@@ -227,9 +230,9 @@ class StationDocument:
         over_table = abs(x - cx) < sx / 2 and abs(y - cy) < sy / 2
         if z < 0.0 and over_table and "table" not in self.arm.stands_in:
             raise FieldError(
-                f"arm.X_WA puts the arm's base {-1e3 * z:.0f} mm deep into 'table'; raise it"
-                f" (translation: [{x:g}, {y:g}, 0]) or move it off the table, or write"
-                " arm.stands_in: [table] if it is let in",
+                f"arm.X_WA puts the base of the arm {-1e3 * z:.0f} mm deep into 'table';"
+                f" raise it (translation: [{x:g}, {y:g}, 0]) or move it off the table. If"
+                " the base is really sunk into the table, write arm.stands_in: [table]",
                 *("arm", "X_WA"),
             )
 
@@ -338,8 +341,8 @@ def _stated(document: StationDocument, path: Path) -> dict[str, Path]:
             found[name] = resolve(reference, base=path.parent)
         if not found[name].is_dir():
             raise InvalidInputError(
-                f"{path}: packages.{name}: {reference} is not a folder; give the one that"
-                f" package://{name}/... is relative to"
+                f"{path}: packages.{name}: {reference} is not a folder; give the folder"
+                f" to which package://{name}/... is relative"
             )
     return found
 

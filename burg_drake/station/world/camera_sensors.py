@@ -49,8 +49,9 @@ def render_cameras(camera: Camera) -> tuple[ColorRenderCamera, DepthRenderCamera
     (fx, fy), (cx, cy) = camera.focal, camera.principal_point
     if not 0 < cx + HALF_PIXEL < camera.width or not 0 < cy + HALF_PIXEL < camera.height:
         raise InvalidInputError(
-            f"center {cx:g}, {cy:g} of a camera is outside of the image, which has {camera.width} x"
-            f" {camera.height} pixels; give center, focal, width and height of the same images"
+            f"center {cx:g}, {cy:g} of a camera is outside the image of {camera.width} x "
+            f"{camera.height} pixels; take center, focal, width and height from the same"
+            " calibration"
         )
     info = CameraInfo(camera.width, camera.height, fx, fy, cx + HALF_PIXEL, cy + HALF_PIXEL)
     near, far = camera.depth_range
@@ -133,8 +134,8 @@ def add_renderer(scene_graph: SceneGraph, name: str, parameters: RenderEngineVtk
         scene_graph.AddRenderer(name, MakeRenderEngineVtk(parameters))
     except RuntimeError as error:
         raise InvalidInputError(
-            f"what is to be rendered cannot be read ({' '.join(str(error).split())}); build the"
-            " library that has it again"
+            f"a mesh to be rendered cannot be read ({' '.join(str(error).split())});"
+            " build its library again"
         ) from error
 
 

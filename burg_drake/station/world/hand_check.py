@@ -125,8 +125,8 @@ class _Bench:
                 q = getattr(finger, key)
                 if not low - TOLERANCE <= q <= high + TOLERANCE:
                     raise self._error(
-                        f"fingers[{i}].{key} is {q:g} m; joint {finger.joint!r} goes from {low:g}"
-                        f" to {high:g} m"
+                        f"fingers[{i}].{key} is {q:g} m, but joint {finger.joint!r} goes"
+                        f" from {low:g} to {high:g} m"
                     )
 
     def check_pads(self) -> None:
@@ -168,13 +168,13 @@ class _Bench:
         distance, middle = one[0, 0] - other[1, 0], (one[0, 0] + other[1, 0]) / 2
         if abs(distance - opening) > TOLERANCE:
             raise self._error(
-                f"with both fingers {end} the pads are {_mm(distance)} apart along x of G; opening"
-                f" says {_mm(opening)}"
+                f"with both fingers {end} the pads are {_mm(distance)} apart along x of"
+                f" G, but opening says {_mm(opening)}"
             )
         if abs(middle) > TOLERANCE:
             raise self._error(
-                f"with both fingers {end} the middle between the pads is at x = {_mm(middle)} of G;"
-                " it has to be at 0"
+                f"with both fingers {end} the middle between the pads is at x = "
+                f"{_mm(middle)} of G; it must be at 0"
             )
         for i, bounds in enumerate((one, other)):
             for name, (low, high) in zip("yz", bounds.T[1:], strict=True):
@@ -202,14 +202,20 @@ class _Bench:
         aside = one + ASIDE * np.sign(self._hand.fingers[0].open - self._hand.fingers[0].closed)
         follows = self._moves((aside, other))
         if follows and not self._hand.coupled:
-            raise self._error("coupled is false, but in the model one finger follows the other")
+            raise self._error(
+                "coupled is false, but in the model one finger follows the other; write"
+                " coupled: true"
+            )
         if not follows and self._hand.coupled:
-            raise self._error("coupled is true, but no constraint of the model couples the fingers")
+            raise self._error(
+                "coupled is true, but no constraint of the model couples the fingers; write"
+                " coupled: false"
+            )
         for closed in (0.25, 0.75):
             if self._moves(self._at(closed)):
                 raise self._error(
-                    "the model couples the fingers (mimic) in another proportion than closed and"
-                    " open of the two fingers do"
+                    "the mimic joint of the model moves the fingers in another"
+                    " proportion than closed and open of the two fingers say"
                 )
 
     def bounds(self, index: int) -> Array:

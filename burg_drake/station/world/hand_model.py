@@ -89,8 +89,9 @@ def add_hand(
     driven = [a.joint().name() for a in _actuators(plant) if a.model_instance() == instance]
     if len(driven) != 2:
         raise InvalidInputError(
-            f"hand {hand.name!r}: {hand.model} has actuators for {', '.join(sorted(driven))}; only"
-            " the two fingers may have one"
+            f"hand {hand.name!r}: {hand.model} has actuators for "
+            f"{', '.join(sorted(driven))}; only the joints of the two fingers may have"
+            " one"
         )
     if hand.coupled and plant.num_constraints() == constraints:
         first, second = hand.fingers
@@ -158,14 +159,15 @@ def _add_servo(plant: MultibodyPlant, hand: Hand, finger: Finger, joint: Prismat
     actuator = _actuator(plant, joint)
     if hand.force > actuator.effort_limit():
         raise InvalidInputError(
-            f"hand {hand.name!r}: force {hand.force:g} N is more than the"
-            f" {actuator.effort_limit():g} N that joint {finger.joint!r} has in {hand.model}"
+            f"hand {hand.name!r}: force is {hand.force:g} N, but the effort limit of"
+            f" joint {finger.joint!r} in {hand.model} is {actuator.effort_limit():g} N"
         )
     fastest = float(joint.velocity_upper_limits()[0])
     if hand.closing_speed > fastest:
         raise InvalidInputError(
-            f"hand {hand.name!r}: closing_speed {hand.closing_speed:g} m/s is more than the"
-            f" {fastest:g} m/s that joint {finger.joint!r} has in {hand.model}"
+            f"hand {hand.name!r}: closing_speed is {hand.closing_speed:g} m/s, but the"
+            f" velocity limit of joint {finger.joint!r} in {hand.model} is {fastest:g}"
+            " m/s"
         )
     gain = STALL * hand.force / hand.closing_speed
     actuator.set_controller_gains(PdControllerGains(p=0.0, d=gain))

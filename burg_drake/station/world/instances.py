@@ -81,7 +81,7 @@ def add_instance(
 def name_taken_error(scene: Scene, name: str) -> InvalidInputError:
     """The error of an instance whose name is one of the station's."""
     return InvalidInputError(
-        f"{scene.path}: instance name {name!r} is taken by the station; choose another"
+        f"{scene.path}: the station has something called {name!r} already; rename this instance"
     )
 
 
@@ -96,9 +96,9 @@ def _require_inertia(body: RigidBody, listed: MassProperties) -> None:
     about_com = inertia.Shift(inertia.get_com()).CalcRotationalInertia()
     moments = [*about_com.get_moments(), *about_com.get_products()]
     if abs(inertia.get_mass() - listed.mass) > SAME_INERTIA * listed.mass:
-        raise ValueError(f"its mass is not {listed.mass:g} kg, as library.yaml says")
+        raise ValueError(f"its mass differs from the {listed.mass:g} kg in library.yaml")
     if not np.allclose(moments, listed.inertia, rtol=0.0, atol=SAME_INERTIA * max(moments)):
-        raise ValueError("its inertia is not what library.yaml says")
+        raise ValueError("its inertia differs from that in library.yaml")
 
 
 def add_vertical_joint(plant: MultibodyPlant, body: RigidBody, X_WO: RigidTransform) -> None:

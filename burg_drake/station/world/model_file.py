@@ -118,8 +118,8 @@ def require_loose(plant: MultibodyPlant, model: ModelInstanceIndex, path: Path) 
     for joint in map(plant.get_joint, plant.GetJointIndices(model)):
         if joint.parent_body().index() == plant.world_body().index():
             raise InvalidInputError(
-                f"{path}: joint {joint.name()!r} connects {joint.child_body().name()!r} to the"
-                " world; remove it, as the station says where the robot stands"
+                f"{path}: joint {joint.name()!r} fixes {joint.child_body().name()!r} to"
+                " the world; remove it, as the station says where the robot stands"
             )
 
 

@@ -174,7 +174,7 @@ def _require(key: str, text: str, rule: str) -> None:
         try:
             value = float(word)
         except ValueError:
-            raise ValueError(f"{key} is {quoted(text)}; it has to be {rule}") from None
+            raise ValueError(f"{key} is {quoted(text)}; it must be {rule}") from None
         finite = math.isfinite(value)
         sound = {
             FINITE: finite,
@@ -184,19 +184,19 @@ def _require(key: str, text: str, rule: str) -> None:
             LIMIT: not math.isnan(value),
         }
         if not sound[rule]:
-            raise ValueError(f"{key} is {text}; it has to be {rule}")
+            raise ValueError(f"{key} is {text}; it must be {rule}")
 
 
 def _require_direction(axis: dict[str, str]) -> None:
     direction = axis.get("xyz", "1 0 0")
     if not any(map(float, direction.split())):
-        raise ValueError(f"axis is {direction}; it has to be a direction")
+        raise ValueError(f"axis is {direction}; it must be a direction that is not zero")
 
 
 def _require_order(limit: dict[str, str]) -> None:
     lower, upper = float(limit.get("lower", "-inf")), float(limit.get("upper", "inf"))
     if "upper" in limit and lower > upper:
-        raise ValueError(f"lower is {lower:g}, above upper, which is {upper:g}; exchange them")
+        raise ValueError(f"lower is {lower:g}, which is above upper, {upper:g}; exchange them")
 
 
 def _require_inertia(inertial: _Element, massless: bool) -> None:
@@ -217,11 +217,11 @@ def _require_inertia(inertial: _Element, massless: bool) -> None:
         return
     if mass == 0.0:
         raise ValueError(
-            "mass is 0; it has to be above 0, unless a fixed joint or the station holds the link"
+            "mass is 0; it must be above 0 unless a fixed joint or the station holds the link"
         )
     if not inertia.CouldBePhysicallyValid() or principal.max() == 0.0:
         moments = ", ".join(f"{moment:g}" for moment in principal)
         raise ValueError(
-            f"inertia has the principal moments {moments} kg m^2; they have to be above 0, and none"
-            " above the sum of the other two"
+            f"inertia has the principal moments {moments} kg m^2, which no body has: each"
+            " must be above 0 and at most the sum of the other two"
         )

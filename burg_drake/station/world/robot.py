@@ -142,8 +142,8 @@ def _add_arm(
     ]
     if idle:
         raise InvalidInputError(
-            f"{station.arm_model}: {', '.join(idle)} cannot be driven; a URDF needs a"
-            " <transmission> for each joint of the arm, an SDF an effort limit"
+            f"{station.arm_model}: {', '.join(idle)} cannot be driven; in a URDF each"
+            " joint of the arm needs a <transmission>, in an SDF an effort limit"
         )
     if len(arm.home) != len(actuators):
         raise InvalidInputError(

@@ -128,8 +128,8 @@ def add_obstacles(plant: MultibodyPlant, station: Station) -> dict[str, RigidBod
 def obstacle_name_error(station: Station, name: str) -> InvalidInputError:
     """The error of an obstacle whose name the scene or the robot has, too."""
     return InvalidInputError(
-        f"{station.path}: background.{name}: the name is taken by the scene or the robot;"
-        " choose another"
+        f"{station.path}: background.{name}: the scene or the robot has something called"
+        " that already; choose another name"
     )
 
 

@@ -34,7 +34,7 @@ FIRST_ASPECT = 0.9
 """Width over height of the scene before a new page has told it."""
 PHONE_ASPECT, PHONE_HEIGHT = 0.6, 0.55
 """Width over height below which a page is taken for a phone's; share of the page's height left free
-above a phone's panel."""
+above a phone's open panel. The board lies at the lower end of that, as the panel begins folded."""
 TOP_VIEW_TILT = 1e-3
 """Off the vertical, for the camera to know which way is up [rad]."""
 VIEW_TOLERANCE = 1e-3
@@ -65,11 +65,15 @@ def viewpoint(board: Board, back: Array, fov: float, aspect: float) -> tuple[Arr
     width, depth = float(size @ np.abs(ahead[::-1])), float(size @ np.abs(ahead))
     tall = 0.0 if level <= TOP_VIEW_TILT else OBJECT_HEIGHT * level
     share = PHONE_HEIGHT if aspect < PHONE_ASPECT else 1.0
-    half = VIEW_MARGIN_FACTOR * max((depth * back[2] + tall) / 2.0 / share, width / 2.0 / aspect)
+    half_height = VIEW_MARGIN_FACTOR * (depth * back[2] + tall) / 2.0
+    half = max(half_height / share, VIEW_MARGIN_FACTOR * width / 2.0 / aspect)
+    middle = min(
+        0.5, share - half_height / half / 2.0
+    )  # from the page's upper edge, in its heights
     distance = half / np.tan(fov / 2.0) + depth / 2.0 * level
     up = np.array([*ahead * back[2], level])
     target = np.array([*size / 2.0, 0.0])
-    target -= (1.0 - share) * distance * np.tan(fov / 2.0) * up
+    target -= (1.0 - 2.0 * middle) * distance * np.tan(fov / 2.0) * up
     return target + distance * back, target
 
 

@@ -114,7 +114,9 @@ def test_the_page_and_the_figures_tell_the_same(
 
 
 def test_other_steps_are_refused(run: Run, ladder: GapSteps) -> None:
-    with pytest.raises(InvalidInputError, match=r"steps of something else \(source is '.*' there"):
+    with pytest.raises(
+        InvalidInputError, match=r"steps of another measurement \(source is '.*' there"
+    ):
         measure_gap("tabletop_six", ladder.path, settings=steps("reach", 5), **ASKED)
     with pytest.raises(InvalidInputError, match="place_mm is 0 there, 2 here"):
         measure_gap(run, ladder.path, settings=GapSettings(last="reach"), progress=False)
@@ -149,7 +151,7 @@ def test_nothing_of_another_gap_gets_into_a_journal(run: Run, tmp_path: Path) ->
     assert before.count(b"\n") == 1
     document = replace(run.document, engine=ENGINES["standard"], hash="")
     other = Run(run.path, replace(document, hash=run_hash(document)))
-    with pytest.raises(InvalidInputError, match="steps of something else"):
+    with pytest.raises(InvalidInputError, match="steps of another measurement"):
         measure_gap(
             other,
             tmp_path,

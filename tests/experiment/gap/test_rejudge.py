@@ -190,7 +190,7 @@ def test_what_the_hand_alone_cannot_predict_is_left_to_nothing(
     assert told.precision(measured=False, every=True) == (0, 3)
     assert told.precision(measured=False) == (0, 1) and told.precision(measured=True) == (0, 1)
     words = " ".join(rejudged_words(told))
-    assert "2 trials failed for reasons that a run of the hand alone does not predict (" in words
+    assert "2 trials failed for reasons that a run of the hand alone cannot predict (" in words
     assert "(1 no path, 1" in words
     assert re.search(r"as planned 0 of 3 \(0\S* %\) with them, 0 of 1 \(0\S* %\) without", words)
     assert "Of the 1 that disagrees as planned" in words and "1 is left to physics" in words
@@ -373,5 +373,5 @@ def test_what_overlaps_a_little_is_moved_apart(run: Run, check: SceneCheck) -> N
     deep = {"bottle": place(shifted(scene, "bottle", -near - 0.03))}
     assert "overlap by" in measured_scene(scene, deep, check.issues).reason
     nowhere = {"bottle": place(shifted(scene, "bottle", 120.0))}
-    assert "out of bounds" in measured_scene(scene, nowhere, check.issues).reason
+    assert "off the board" in measured_scene(scene, nowhere, check.issues).reason
     assert "no 'cup'" in measured_scene(scene, {"cup": unseen()}, check.issues).reason

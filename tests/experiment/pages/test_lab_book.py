@@ -73,7 +73,9 @@ def test_a_late_copy_does_not_undo_a_correction(lab: LabBook, trials: Path) -> N
 def test_two_browsers_that_disagree(lab: LabBook, trials: Path) -> None:
     mine, theirs = entry(lab, 1, "lifted"), entry(lab, 1, "slipped", operator="CD")
     lab.enter(theirs)
-    with pytest.raises(EntryConflict, match="trial 1 was changed meanwhile: it has slipped by CD"):
+    with pytest.raises(
+        EntryConflict, match="trial 1 was changed by someone else: it now has slipped by CD"
+    ):
         lab.enter(mine)
     assert load_trials(trials).trial(1).outcome is RealOutcome.SLIPPED
     lab.enter(replace(mine, replaces=state_of(load_trials(trials).trial(1))))
@@ -95,7 +97,7 @@ def test_what_another_program_enters_in_between_is_not_replaced(
 
     mine = entry(lab, 1, "lifted")
     monkeypatch.setattr(lab_book, "state_of", seen)
-    with pytest.raises(EntryConflict, match="changed meanwhile: it has dropped"):
+    with pytest.raises(EntryConflict, match="changed by someone else: it now has dropped"):
         lab.enter(mine)
     trial = load_trials(trials).trial(1)
     assert (trial.outcome, trial.photo) == (RealOutcome.DROPPED, "photos/001.png")
@@ -141,7 +143,7 @@ def test_a_file_that_is_being_edited(lab: LabBook, trials: Path) -> None:
     with pytest.raises(InvalidInputError, match="outcom"):
         lab.enter(waiting)
     trials.write_text(text.replace("grasp: blue_mug", "grasp: other_mug"))
-    assert "other trials by now" in states(lab)["problem"]
+    assert "holds other trials" in states(lab)["problem"]
     trials.write_text(text)
     assert lab.enter(waiting).outcome is RealOutcome.LIFTED
     with pytest.raises(InvalidInputError):
@@ -188,7 +190,7 @@ def test_a_photo_and_the_placement_are_kept_before_a_trial(
     over.check(5, keep=True)  # of what is there after the trial
     over.wait_for_check()
     told = over.status()["check"]
-    assert not told["kept"] and "carried out already" in told["problem"] and told["objects"]
+    assert not told["kept"] and "already has an outcome" in told["problem"] and told["objects"]
     assert load_trials(trials).trial(5).photo == trial.photo
 
 

@@ -51,14 +51,14 @@ function renderCamera() {
   const { check, checking, measuring } = camera;
   if (view === "camera") {
     $("line").hidden = false;
-    const drawn = camera.drawn && camera.drawn !== current ? `; offsets of trial ${camera.drawn}` : "";
+    const drawn = camera.drawn && camera.drawn !== current ? `; offsets shown are those of trial ${camera.drawn}` : "";
     $("line").textContent = (camera.fault || camera.line) + drawn;
   }
   $("check").disabled = checking || !camera.scene;
   $("check").textContent = !checking ? "Check placement"
     : measuring && measuring.number !== current ? `Measuring for trial ${measuring.number} …` : "Measuring …";
   const mine = check && check.number === current;
-  $("checked").textContent = refused || (!mine ? [otherText(check), keptText()].filter(Boolean).join(" ") : check.problem || (check.kept ? "Kept with this trial." : "Not kept; press the button to keep it."));
+  $("checked").textContent = refused || (!mine ? [otherText(check), keptText()].filter(Boolean).join(" ") : check.problem || (check.kept ? "Saved with this trial." : "Not saved; press “Check placement” to save it."));
   const rows = mine ? Object.entries(check.objects) : Object.entries((entries.get(current) || {}).placement || {});
   $("objects").replaceChildren(...rows.flatMap(([name, placed]) => placeRow(name, placed)));
   const slow = check && check.seconds > QUICK;
@@ -70,14 +70,14 @@ function renderCamera() {
 // Of a check that was begun while another trial was shown.
 function otherText(check) {
   if (!check) return "";
-  if (check.kept) return `Measurement kept with trial ${check.number}.`;
+  if (check.kept) return `Measurement saved with trial ${check.number}.`;
   const { problem, number } = check;
   return !problem || problem.includes(`trial ${number} `) ? problem : `Trial ${number}: ${problem}.`;
 }
 
 function keptText() {
   const entry = entries.get(current);
-  return entry && entry.photo ? `Kept with this trial: ${entry.photo}` : "";
+  return entry && entry.photo ? `Saved with this trial: ${entry.photo}` : "";
 }
 
 function placeRow(name, { status, within, mm, deg, reason }) {

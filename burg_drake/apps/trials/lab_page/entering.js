@@ -22,8 +22,8 @@ function renderWidth() {
   $("width").setAttribute("aria-invalid", bad);
   $("widthnote").hidden = !bad && !(width > opening);
   $("widthnote").classList.toggle("bad", bad);
-  $("widthnote").textContent = bad ? "Not a width in mm; nothing is entered until it is corrected or empty."
-    : `The hand opens ${opening} mm; is ${width} right?`;
+  $("widthnote").textContent = bad ? "This is not a width in mm. Correct or clear it; nothing is saved until then."
+    : `The hand opens only ${opening} mm. Is ${width} mm right?`;
 }
 
 function requireWidth() {

@@ -26,10 +26,11 @@ function buildList() {
 function kindOf(entry) {
   if (!entry || !entry.outcome) return "open";
   if (["not_attempted", "perception_failed"].includes(entry.outcome)) return "untried";
-  return entry.outcome.startsWith("lifted") ? "held" : "failed";
+  if (entry.outcome === "lifted") return "held";
+  return entry.outcome.startsWith("lifted") ? "partly" : "failed";
 }
 
-const MARKS = { open: "", held: "✓", failed: "✗", untried: "–" };
+const MARKS = { open: "", held: "✓", partly: "(✓)", failed: "✗", untried: "–" };
 
 function renderList() {
   let total = 0;
@@ -46,5 +47,5 @@ function renderList() {
     count.textContent = ` ${done} of ${trials.length}`;
     total += done;
   }
-  $("progress").textContent = `${total} of ${plan.trials.length} carried out`;
+  $("progress").textContent = `${total} of ${plan.trials.length} trials done`;
 }

@@ -101,7 +101,7 @@ class Outbox {
       }
       let pause = 0;
       try { pause = await this.attempt(item); }
-      catch { this.problem = "the program does not answer"; pause = 1000; }
+      catch { this.problem = "burg-drake does not answer"; pause = 1000; }
       this.changed();
       if (pause) await sleep(pause);
     }

@@ -33,7 +33,7 @@ async function begin() {
       const answer = await fetch("plan");
       if (answer.ok) plan = await answer.json();
       else say("bad", (await answer.json()).error);
-    } catch { say("bad", "The program does not answer"); }
+    } catch { say("bad", "burg-drake does not answer"); }
     if (!plan) await sleep(1000);
   }
   document.title = `${plan.file} · trials`;
@@ -193,7 +193,7 @@ function renderSaved() {
   else if (problem) say("bad", problem);
   else if (waiting && outbox.problem) say("bad", `Not saved yet: ${outbox.problem}`);
   else if (waiting) say("wait", "Saving …");
-  else if (outbox.troubled.length) say("bad", "Not all is saved");
+  else if (outbox.troubled.length) say("bad", "Not everything is saved");
   else if (camera && camera.measuring && camera.measuring.keep) {
     say("wait", `Measuring for trial ${camera.measuring.number} …`);
   }
@@ -259,7 +259,7 @@ function renderEntry() {
   $("last").hidden = !last;
   if (last) {
     const after = entryOf(last.number);
-    $("last").firstElementChild.textContent = `Trial ${last.number}: ${after.label || "taken back"}`;
+    $("last").firstElementChild.textContent = `Trial ${last.number}: ${after.label || "entry deleted"}`;
   }
 }
 

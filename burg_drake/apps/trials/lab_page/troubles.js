@@ -14,9 +14,9 @@ function renderTroubles() {
 function troubleOf(item) {
   const { entry, trouble } = item, mine = wordOf(entry);
   const line = make("li", "", `Trial ${entry.number}, ${mine}, is not saved: ${trouble.text}. `);
-  line.append(dropButton(item, trouble.state ? "Keep theirs" : "Drop it"));
+  line.append(dropButton(item, trouble.state ? "Keep theirs" : "Discard"));
   if (trouble.state) {
-    const insist = make("button", "", `Replace by ${mine}`);
+    const insist = make("button", "", `Save ${mine} instead`);
     insist.addEventListener("click", () => outbox.insist(item));
     line.append(insist);
   }
@@ -25,12 +25,12 @@ function troubleOf(item) {
 
 function stuckOf(item) {
   const { entry, refused } = item;
-  const line = make("li", "", `Trial ${entry.number}, ${wordOf(entry)}, is refused: ${refused.text}. It is sent again until it is saved. `);
-  line.append(dropButton(item, "Drop it"));
+  const line = make("li", "", `Trial ${entry.number}, ${wordOf(entry)}, cannot be saved yet: ${refused.text}. It is sent again until it is saved. `);
+  line.append(dropButton(item, "Discard"));
   return line;
 }
 
-function wordOf(entry) { return entry.outcome ? labelOf(entry.outcome) : "taken back"; }
+function wordOf(entry) { return entry.outcome ? labelOf(entry.outcome) : "entry deleted"; }
 
 function dropButton(item, text) {
   const drop = make("button", "", text);

@@ -141,10 +141,11 @@ def require_content(bundle: Bundle, scene: Scene, station: Station) -> None:
     ):
         if there != here:
             raise InvalidInputError(
-                f"the {kind} of {scene.name!r} on {station.name!r} changed on the way to a"
-                f" worker: content {there[:12]} was sent, {here[:12]} has arrived; a model names"
-                " files by a path that is not valid there, such as a link to another folder or"
-                " an absolute path, or the worker has another release of burg_drake"
+                f"the {kind} of {scene.name!r} on {station.name!r} changed on the way to"
+                f" a worker: content {there[:12]} was sent, {here[:12]} arrived; either a"
+                " model names files by a path that exists only here (a link to another"
+                " folder or an absolute path), or the worker has another release of"
+                " burg_drake"
             )
 
 

@@ -63,8 +63,8 @@ def unpack(data: bytes, place: Path, name: str) -> Path:
                     raise
     except OSError as error:
         raise InvalidInputError(
-            f"cannot unpack the scene into {folder}: {error.strerror}; give Dask's workers another"
-            " local directory"
+            f"cannot unpack the scene into {folder}: {error.strerror}; give Dask's"
+            " workers another local directory"
         ) from error
     finally:
         shutil.rmtree(unfinished, ignore_errors=True)

@@ -43,9 +43,9 @@ def arm_section(summary: Summary, columns: Columns) -> Html | None:
             rows.append(element("tr", name, *cells, element("td", outcome.meaning), blockers))
     share = f" ({format_percent(planned / clear)})" if clear else ""
     text = (
-        f"Of {clear} grasps at which the open hand is clear, the arm can execute"
-        f" {planned}{share}: along a collision-free path from home to the pregrasp, straight to"
-        " the grasp, and straight up with the object, or as the motion says. The others end at"
+        f"The open hand is clear at {clear} grasps. The arm can execute {planned} of them"
+        f"{share}: it has a collision-free path from home to the pregrasp, and can follow"
+        " the straight approach and the lift. Each of the other grasps is listed under"
         " the first thing that fails."
     )
     head = ["outcome", "grasps", "of clear", "what it means", "main obstacles"]
@@ -77,10 +77,13 @@ def execution_section(summary: Summary, columns: Columns) -> Html | None:
             numbers = [element("td", cell, class_="number") for cell in cells]
             rows.append(element("tr", element("th", label, scope="row"), *numbers))
     touches = Counter(t for t in columns["touched"].tolist() if t)
-    text = "How well the simulated arm followed its plans within its torque limits."
+    text = "How closely the simulated arm followed its plans within its torque limits."
     text += f" {summary.pushes}" if summary.pushes else ""
     if touches:
         found = ", ".join(f"{name} ({count})" for name, count in touches.most_common(BLOCKERS))
-        text += f" {sum(touches.values())} trials touched something against the plan: {found}."
+        text += (
+            f" In {sum(touches.values())} trials the robot touched something that was not"
+            f" planned: {found}."
+        )
     head = ["", "trials", "median", "95 %", "most"]
     return section("Execution by the arm", text, table(head, rows, numbers=(1, 2, 3, 4)))

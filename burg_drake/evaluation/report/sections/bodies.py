@@ -40,8 +40,9 @@ def collision_section(columns: Columns) -> Html | None:
     head = ["body", "grasps", "as target", "as obstacle", "median depth", "deepest"]
     return folded(
         "Start collisions",
-        "What the open hand overlaps at the grasp, and how far it would have to move back. A"
-        " grasp counts for one body, even if the hand overlaps several.",
+        "Bodies that the open hand overlaps at the grasp, and how far the hand would"
+        " have to move back. Each grasp counts for one body, even if the hand overlaps"
+        " several.",
         table(head, rows, numbers=(1, 2, 3, 4, 5)),
     )
 
@@ -92,10 +93,9 @@ def disturbed_section(columns: Columns, disturbance: float) -> Html | None:
         rows.append(element("tr", element("th", name, scope="row"), *numbers, cause))
     return folded(
         "What was disturbed",
-        f"Objects that trials on other objects moved by {MIN_DISPLACEMENT * 1e3:g} mm or more,"
-        " whatever the outcome: in how many of the executed trials, and how far at most in each, at"
-        " the point of the object that moved farthest. Toppled ones stood before and lie at the"
-        " end.",
+        f"Objects that were moved by {MIN_DISPLACEMENT * 1e3:g} mm or more in trials on"
+        " other objects, whatever the outcome. Displacement is that of the point that"
+        " moved farthest. An object toppled if it stood before and lies at the end.",
         table(head, rows, numbers=(1, 2, 3, 4, 5, 6, 7)),
     )
 

@@ -61,15 +61,15 @@ def object_pictures(
         if library is not None:
             figures.append(_figure(library, names[k], stored, groups, rows, chosen))
             drawn += len(chosen)
-    text = "Each object with its grasps in all scenes: on the left those that lifted it, on the"
-    text += " right all others. Forks are the fingers, with their stem toward the arm."
+    text = "Each object with its grasps from all scenes: on the left those that lifted it, on the"
+    text += " right all others. Each fork shows the two fingers; its stem points toward the arm."
     total = int(numbers[shown].sum())
     if drawn < total:
         text += (
-            f" Drawn are {format_count(drawn)} of {format_count(total)}, evenly from all outcomes."
+            f" Shown are {format_count(drawn)} of {format_count(total)} grasps, from all outcomes."
         )
     if len(shown) < len(ranked):
-        text += f" Of {len(ranked)} objects the {len(shown)} with most grasps are shown."
+        text += f" The {len(shown)} of {len(ranked)} objects with the most grasps are shown."
     legend = group_legend(present(groups))
     return section("The grasps", text, legend, element("div", *figures, class_="pictures"))
 

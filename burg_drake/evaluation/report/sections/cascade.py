@@ -12,10 +12,10 @@ MEANING = {
     "candidates": "grasps that were judged",
     "clear": "the open hand overlaps nothing",
     "reachable": "hand and arm reach the grasp",
-    "planned": "the arm has a path there and for the lift",
+    "planned": "the arm has a path there and can follow the lift",
     "executed": "the trial was simulated to its end",
     "held": "both fingers hold the object to the end",
-    "lifted": "as it was gripped, and nothing else was disturbed",
+    "lifted": "not turned in the hand, and nothing else was disturbed",
 }
 
 
@@ -28,8 +28,8 @@ def cascade_section(summary: Summary) -> Html:
         for step, before in zip(steps, [None, *steps[:-1]], strict=True)
     ]
     return section(
-        "From candidates to lifted",
-        "Grasps that pass each stage, and what stopped the others there.",
+        "From candidates to lifts",
+        "How many grasps pass each stage, and what stopped the others.",
         element("ol", *rows, class_="cascade"),
     )
 

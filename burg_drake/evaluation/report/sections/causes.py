@@ -122,8 +122,8 @@ def causes_section(rows: CauseRows) -> Html | None:
     entries = (_entry(cause, len(rows.outcomes), rows.replay(cause.typical)) for cause in causes)
     return section(
         "Why grasps fail",
-        "By cause, the most frequent one first. The command shows a typical case: the median one,"
-        " with as many milder as worse ones.",
+        "The most frequent cause comes first. The command shows a typical case: half of"
+        " the others are milder, half are worse.",
         element("div", *entries, class_="causes"),
     )
 

@@ -42,13 +42,13 @@ def certainty_section(summary: Summary, contested: Sequence[str] = ()) -> Html |
     if len(tried) > 1:
         rows.append(_row(summary.total, bool(settled), "total"))
     text = (
-        "Of the executed grasps, those are contested whose object is said to be held, or lost, with"
-        f" a confidence below {CONTESTED:g}: with friction, place, shape or speed of the lift"
-        " slightly other, some of them end the other way. How near the others are to a limit of"
-        " turning or disturbing is among the margins."
+        f"A verdict is contested if its confidence is below {CONTESTED:g}: with slightly"
+        " different friction, pose, shape or lifting speed, the object may be held"
+        " instead of lost, or lost instead of held. The margins below show how close"
+        " other verdicts are to a limit."
     )
     if settled:
-        text += f" Settled by {', '.join(summary.settled_by)}, whose verdict counts:"
+        text += f" Judged again by {', '.join(summary.settled_by)}, whose verdicts count:"
         text += f" {number(settled)}."
     keys = [(LIFTED, "lifted"), (OPEN, "contested"), (LOST, "failed")]
     return section(

@@ -71,9 +71,10 @@ def margin_section(
         return None
     return section(
         "Margins",
-        "Of all executed grasps, with those that lifted their object above the axis and the others"
-        " below it, each half on its own scale. A dashed line is the median. Slip and tilt are of"
-        " those that both fingers held once, since the grip.",
+        "Margins of all executed grasps: above the axis those that lifted their object,"
+        " below it all others, each half on its own scale. Dashed lines are medians."
+        " Slip and tilt are measured from the grip on, for grasps that both fingers"
+        " held.",
         element("div", *charts, class_="charts"),
         group_legend(present(groups)),
     )
@@ -84,7 +85,10 @@ def further_margins(columns: Mapping[str, Array], groups: NDArray[np.int8]) -> H
     charts = _charts(FURTHER, columns, groups, {})
     if not charts:
         return None
-    text = "As above. Forces and patches are those of the moment when the outcome was decided."
+    text = (
+        "Read these like the margins above. Forces and contact patches are those at the"
+        " moment when the outcome was decided."
+    )
     return folded("Further margins", text, element("div", *charts, class_="charts"))
 
 

@@ -14,14 +14,14 @@ from burg_drake.evaluation.report.sections.outcomes import STOPPED
 from burg_drake.evaluation.results import OutcomeCounts, Summary
 
 ALIKE = (
-    "Intervals hold 95 % (Wilson's), and take grasps as independent draws; grasps on one object are"
-    " alike, so that for other objects the range is wider."
+    "Intervals are Wilson's 95 % intervals for independent grasps. Grasps on one object"
+    " are alike, so the range for other objects is wider."
 )
 MANY = 8
 """From so many scenes on, quartiles tell more than the worst and the best."""
 BY_SCENE = (
-    "Intervals hold 95 %, for other scenes of the same kind: they follow from how much scenes"
-    " differ (never narrower than Wilson's)."
+    "Intervals are 95 % intervals for other scenes of the same kind. They follow from"
+    " how much the scenes differ, and are never narrower than Wilson's."
 )
 """What the intervals stand for, in a run and in one over many scenes."""
 
@@ -69,7 +69,7 @@ def _success(summary: Summary) -> str:
     if not total.lifted:
         return f"None of {grasps(total.judged)} lifted its object."
     interval = interval_text(summary, executed=False)
-    share = f"{format_percent(total.lifted / total.judged)}, interval {interval}"
+    share = f"{format_percent(total.lifted / total.judged)}, 95 % interval {interval}"
     return f"{format_count(total.lifted)} of {grasps(total.judged)} lifted their object ({share})."
 
 
@@ -93,8 +93,8 @@ def _losses(summary: Summary) -> str:
     """What was lost before the trial, by stage."""
     words = {
         "clear": "the open hand collides",
-        "reachable": "hand or arm cannot reach it",
-        "planned": "the arm finds no path",
+        "reachable": "hand or arm cannot reach the grasp",
+        "planned": "the arm has no path",
         "executed": "the simulation failed",
     }
     counts = [

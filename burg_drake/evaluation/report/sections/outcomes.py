@@ -53,14 +53,14 @@ def objects_section(summary: Summary) -> Html:
     more = ""
     if len(objects) > OBJECTS:
         objects = worst_first(objects)[:OBJECTS]
-        more = f" Of {len(summary.objects)} objects the {OBJECTS} worst are shown."
+        more = f" The {OBJECTS} of {len(summary.objects)} objects with the lowest shares are shown."
     rows = [group_row(group) for group in objects]
     if len(objects) > 1:
         rows.append(group_row(summary.total, "total"))
     present = [g for g in GROUPS if any(summary.total.outcomes[o] for o in g.outcomes)]
     return section(
         "Outcomes by object",
-        f"What became of all grasps. The share counts only grasps whose trial was executed.{more}",
+        f"How all grasps ended. Shares count only executed grasps.{more}",
         table(head, rows, numbers=(1, 3), style="stacking"),
         legend([(STYLES[g.name], g.name) for g in present]),
         *(element("p", note, class_="notice") for note in summary.notes),
@@ -144,9 +144,9 @@ def cost_section(summary: Summary) -> Html:
         rows.append(element("tr", element("th", cost.name, scope="row"), *numbers))
     text = "CPU time of the worker processes, without their start."
     if summary.mode != "hand":
-        text += " That of reachable includes the search for the arm's motions."
+        text += " The time for reachable includes the search for motions of the arm."
     if summary.mode == "arm":
-        text += " That of planned is their timing."
+        text += " The time for planned is that of timing them."
     return folded("Cost", text, table(head, rows, numbers=(1, 2, 3, 4)))
 
 

@@ -81,7 +81,10 @@ def scene_picture(pictures: Pictures | None) -> Html | None:
         mine = instances == name
         notes[name] = f"{int((mine & lifted).sum())} of {int(mine.sum())}" if mine.any() else ""
     drawing = scene_drawing(pictures.scene, pictures.solids, pictures.fixed, notes)
-    text = "The scene from the near edge of the board, with how many grasps lifted each object."
+    text = (
+        "The scene, seen from the near edge of the board, with the number of grasps that"
+        " lifted each object."
+    )
     return element("figure", drawing, element("figcaption", text))
 
 
@@ -101,12 +104,15 @@ def grasp_section(pictures: Pictures | None) -> Html | None:
         figures.append(_figure(pictures, name, rows, chosen))
         drawn += len(chosen)
     total = int(np.isin(instances, shown).sum())
-    text = "Each object as it stands in the scene, on the left with the grasps that lifted it, on"
-    text += " the right with all others. Forks are the fingers, with their stem toward the arm; a"
-    text += " grasp's id shows where the pointer rests."
+    text = "Each object as it stands in the scene: on the left with the grasps that lifted it, on"
+    text += (
+        " the right with all others. Each fork shows the two fingers; its stem points toward"
+        " the arm. Point at"
+    )
+    text += " a grasp to see its id."
     if drawn < total:
         text += (
-            f" Drawn are {format_count(drawn)} of {format_count(total)}, evenly from all outcomes."
+            f" Shown are {format_count(drawn)} of {format_count(total)} grasps, from all outcomes."
         )
     if len(shown) < len(with_grasps):
         text += f" The first {len(shown)} of {len(with_grasps)} objects are shown."

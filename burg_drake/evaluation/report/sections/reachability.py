@@ -42,10 +42,10 @@ def reachability_section(run: Run) -> Html | None:
     steepest = max(SETTINGS.tilts_deg)
     return section(
         "Reach of the arm",
-        f"Which share of {count} hand orientations, straight down and tilted by up to"
-        f" {steepest:g} degrees to all sides, the arm reaches over the board without colliding"
-        " with itself and the station. Outlines show where the objects stand, which are not"
-        " obstacles here; paths to these poses are not searched for.",
+        f"Share of {count} hand orientations (straight down, and tilted by up to "
+        f"{steepest:g}° to all sides) in which the arm reaches each place over the board"
+        " without colliding with itself or the station. Outlines show where the objects"
+        " stand; they are not obstacles here. Paths to these poses are not checked.",
         element("div", *charts, class_="charts"),
         reachability_key(),
     )

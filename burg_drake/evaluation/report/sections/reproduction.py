@@ -31,8 +31,8 @@ from burg_drake.station.document import ENGINES, Engine
 
 ASKED = {
     "hand": "the hand alone executes each grasp in simulation",
-    "reach": "the hand executes those that the arm can execute, too",
-    "arm": "the whole arm executes them, from the pregrasp on",
+    "reach": "the hand alone executes the grasps that the arm can execute",
+    "arm": "the whole arm executes the grasps, from the pregrasp on",
 }
 """What a mode asks of each grasp."""
 DECIDING = ("burg_drake", "drake", "python")
@@ -45,7 +45,7 @@ def repeat_section(run: Run) -> Html:
     facts = [
         ("scene", f"{document.scene.path}, content {document.scene.content[:HASH_DIGITS]}"),
         *_common(document),
-        ("run", f"{document.hash} (hash of all of that; column run of the table)"),
+        ("run", f"{document.hash} (hash of all of the above; column run of the table)"),
     ]
     return section(
         "How to repeat it", _text(document), command(reproduce_command(run)), _list(facts)
@@ -59,10 +59,7 @@ def provenance(run: Run) -> Html:
         f"{run.table_path.name} (the table), {RUN_FILE} (this section in full),"
         f" {GRASPS_FILE} (poses), {JOURNAL_FILE} (the record)"
     )
-    text = (
-        "All inputs of the results, the sessions in which they were judged, and the files of the"
-        " folder."
-    )
+    text = "All inputs, the sessions in which the grasps were judged, and the files of the folder."
     return folded("All settings and versions", text, _list([*facts, ("files", files)]))
 
 
@@ -71,8 +68,9 @@ def repeat_campaign(campaign: Campaign) -> Html:
     document = campaign.document
     scenes = [entry.path for entry in document.scenes]
     text = (
-        "Results follow from the inputs, the seed and the versions below; not from the number of"
-        " workers, machines or shares, or the order of their work."
+        "The results depend on the inputs, the seed and the versions below. They do not"
+        " depend on the number of workers, machines or shards, or the order of their"
+        " work."
     )
     facts = [
         ("scenes", f"{len(scenes)}, their contents in campaign.yaml"),
@@ -95,9 +93,7 @@ def campaign_facts(campaign: Campaign) -> Html:
         *_settings(document),
         *_sessions(document),
     ]
-    text = (
-        "All inputs of the results except the scenes, and the sessions in which they were judged."
-    )
+    text = "All inputs except the scenes, and the sessions in which the grasps were judged."
     return folded("All settings and versions", text, _list(facts))
 
 
@@ -122,13 +118,13 @@ def _list(facts: list[tuple[str, str]]) -> Html:
 
 def _text(document: RunDocument) -> str:
     preset = document.engine in ENGINES.values()
-    by_hand = "" if preset else " The engine is not a preset: give it to `evaluate` in Python."
+    by_hand = "" if preset else " The engine is not a preset; pass it to `evaluate` in Python."
     return (
-        "Results follow from the inputs, the seed and the versions below; not from the number of"
-        " workers or the order of their work. In a folder that is complete the command returns"
-        f" at once; give another -o to judge again.{by_hand} In the table of results x, y, z and"
-        " qw to qz are the grasp frame G in the object frame O; the file next to it describes"
-        " each column."
+        "The results depend on the inputs, the seed and the versions below, and not on"
+        " the number of workers or the order of their work. In a complete folder the"
+        f" command returns at once; give another -o to judge again.{by_hand} In the table"
+        " of results x, y, z and qw to qz are the pose of the grasp frame G in the"
+        " object frame O; the file next to it describes every column."
     )
 
 

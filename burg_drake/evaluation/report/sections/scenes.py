@@ -44,11 +44,11 @@ def scenes_section(
     rows = [group_row(group, name=_name(group.name, link)) for group in shown]
     how: list[Child] = []
     if any(link(group.name) is None for group in ranked):
-        how = [element("p", "The report of one scene is made by:", class_="note")]
+        how = [element("p", "This command writes the report of one scene:", class_="note")]
         how.append(command(drill_down(ranked[0].name)))
     text = (
-        "Success when executed of each scene, worst first, with its 95 % interval; scenes in which"
-        " nothing was executed come first and have no dot."
+        "Success when executed in each scene with its 95 % interval, worst scene first."
+        " Scenes in which nothing was executed come first and have no dot."
     )
     more = f" Below are the {WORST} worst." if len(ranked) > WORST else ""
     return section(

@@ -43,11 +43,11 @@ def best_section(run: Run) -> Html | None:
     line = shlex.join(["burg-drake", "replay", str(run.path), "--grasp", best[0]])
     return folded(
         "Best grasps",
-        f"Of each object the {BEST} best. Best means: lifted, with the most room around the open"
-        " hand (clearance), and so most likely lifted again when pose, mass and friction are not"
-        " quite what they are taken for; among equal ones, to 0.5 mm, those that slipped, tilted"
-        " and pushed others least, then those with the larger contact patch. Any grasp can be"
-        " watched by its id, from here or from its row of the table alone:",
+        f"The {BEST} best grasps of each object: lifted, with the most room around the"
+        " open hand (clearance), and so most likely to succeed when pose, mass and"
+        " friction differ from the model. Among grasps with the same clearance (to 0.5"
+        " mm) those with less slip, tilt and movement of other objects come first, then"
+        " those with the larger contact patch. To watch a grasp, give its id:",
         command(line),
         table(head, rows, numbers=range(2, len(head))),
     )

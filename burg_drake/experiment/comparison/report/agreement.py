@@ -37,7 +37,7 @@ def agreement_sections(comparison: Comparison) -> list[Html | None]:
     if found is None:
         return []
     return [
-        section("Held or not held alike", alike_words(comparison), _alike("object", found.objects)),
+        section("Agreement on holding", alike_words(comparison), _alike("object", found.objects)),
         _stages(found.stages, found.apart),
         _parted(found.parted),
         _confidence(found.confidence),
@@ -84,11 +84,11 @@ def _stages(
             cells.append(element("td", text, class_="number" if count else "number zero"))
         rows.append(element("tr", element("th", stage, scope="row"), *cells))
     text = (
-        "Rows: the stage that decided in the first run. Columns: in the second. In brackets:"
-        " grasps that only one of them holds."
+        "Rows: the stage that decided in the first run. Columns: in the second run. In"
+        " brackets: grasps that only one of the runs holds."
     )
     head = ["first run", *(f"{name} in the second" for name in columns)]
-    return section("At which stage they part", text, table(head, rows, numbers=range(1, len(head))))
+    return section("Where the runs disagree", text, table(head, rows, numbers=range(1, len(head))))
 
 
 def _parted(parted: Sequence[PartedGrasp]) -> Html | None:
@@ -108,35 +108,40 @@ def _parted(parted: Sequence[PartedGrasp]) -> Html | None:
         cases = (element("td", c, data_label=h) for h, c in zip(head, cells, strict=True))
         rows.append(element("tr", *cases))
     text = (
-        f"{format_count(len(parted))} grasps; the commands show them in the first and the second."
+        f"{format_count(len(parted))} grasps. The commands show each one in the first and"
+        " in the second run."
     )
     if len(parted) > MOST_PARTED:
         text += f" The first {MOST_PARTED}; the JSON has all."
-    return section("Grasps that only one of them holds", text, table(head, rows, style="cases"))
+    return section("Grasps that only one of the runs holds", text, table(head, rows, style="cases"))
 
 
 def _confidence(groups: Sequence[FactorGroup]) -> Html | None:
     if not groups:
         return None
     text = (
-        f"Share of grasps that both hold, or both do not, by the confidence of the first run's"
-        f" verdict, of those that have one; below {CONTESTED:g} it is contested."
+        "Share of grasps on which the runs agree (both hold the object, or neither"
+        f" does), by the confidence of the first run's verdict. Below {CONTESTED:g} a"
+        " verdict is contested."
     )
-    return section("Do contested grasps part?", text, _alike(CONFIDENCE, groups))
+    return section("Do the runs disagree on contested grasps?", text, _alike(CONFIDENCE, groups))
 
 
 def _margins(margins: Sequence[MarginCalibration]) -> Html | None:
     if not margins:
         return None
     text = (
-        "Share of grasps that both hold, or both do not, in bins of about equally many grasps by"
-        " the first run's margin, with Wilson's intervals; of grasps of which both runs measured"
-        " it. Where it falls, verdicts hang on the engine. Line: the monotone curve that fits best;"
-        " dashes: all of them."
+        "Share of grasps on which the runs agree, in bins of about equally many grasps"
+        " along the first run's margin, with Wilson's intervals. Only grasps whose"
+        " margin both runs measured count. Where the share falls, the verdict depends on"
+        " the engine. Line: the monotone curve that fits best; dashes: the share of all"
+        " grasps."
     )
-    plots = (reliability_plot(c, "held or not held alike") for c in margins)
+    plots = (reliability_plot(c, "share on which the runs agree") for c in margins)
     return section(
-        "Do they part at small margins?", text, element("div", *plots, class_="charts plots")
+        "Do the runs disagree at small margins?",
+        text,
+        element("div", *plots, class_="charts plots"),
     )
 
 
@@ -158,7 +163,8 @@ def _differences(differences: Sequence[MarginDifference]) -> Html | None:
         )
     head = ["margin", "grasps", "median difference", "median size", "90 % within"]
     return section(
-        "How far apart margins are",
-        "Second run less first, of grasps that both executed; sizes are without sign.",
+        "How much margins differ",
+        "Second run minus first run, for grasps that both executed; sizes are absolute"
+        " differences.",
         table(head, rows, numbers=range(1, len(head)), style="figures"),
     )

@@ -50,7 +50,7 @@ def case_section(comparison: Comparison, judged: Judgement, photos: Path | None)
             round(judged.selected.fp) - predicted_successes,
         ),
         (
-            "success predicted, failed for reasons that the hand alone does not predict",
+            "success predicted, failed for reasons that the hand alone cannot predict",
             [d for d in of if d.ended in beyond],
             predicted_successes,
         ),
@@ -125,12 +125,15 @@ def stopped_section(comparison: Comparison, judged: Judgement, of: str) -> Html:
     if len(judged.stopped) > MOST_STOPPED:
         more = f" The first {MOST_STOPPED} of {len(judged.stopped)}."
     head = ["simulated", "body in the way", "stage", "trials", "succeeded, 95 % interval"]
-    text = f"By what the simulation said: how many of these grasps succeeded.{more}"
+    text = f"For each simulated outcome: how many of these grasps succeeded.{more}"
     if comparison.kind == "runs":
         head[0], head[-1] = "first run", "success in the second, 95 % interval"
-        text = f"By what the first run said: how many of these succeed in the second run.{more}"
+        text = (
+            "For each outcome in the first run: how many of these grasps succeeded in the"
+            f" second run.{more}"
+        )
     return section(
-        f"What became of each verdict{of}",
+        f"How each verdict turned out{of}",
         text,
         table(head, rows, numbers=(3,), style="groups"),
     )

@@ -52,7 +52,7 @@ def matrix_section(comparison: Comparison, judged: Named) -> Html:
         text = "Rows: the first run. Columns: the second run."
     if any(j.all_grasps is not None for _, j in judged):
         text += (
-            " Selected trials are counted as they are; for all grasps each trial counts for the"
+            " Each selected trial counts once; for all grasps it counts for all the"
             " grasps that it was chosen from."
         )
     return section(title, text, element("div", *blocks, class_="beside"))
@@ -161,29 +161,38 @@ def standing_out_section(judged: Judgement) -> Html:
                 *(element("td", c) for c in cells),
             )
         )
-    apart = " Failures that the hand alone does not predict are left out."
+    apart = " Failures that the hand alone cannot predict are left out."
     if judged.unpredictable is None:
         apart = ""
-    names = ["", "what", "predicted", "wrong", "others wrong", "how the wrong ones ended", "p"]
+    names = [
+        "",
+        "what",
+        "predicted",
+        "wrong",
+        "others wrong",
+        ("how the wrongly predicted ones ended"),
+        "p",
+    ]
     return section(
         "What stands out",
-        "Objects, verdicts and bodies in the way whose trials ended otherwise than predicted more"
-        " often than others with the same prediction. p: one-sided mid-p of Fisher's exact test,"
-        f" corrected by Holm's method for the {judged.tested_groups} tested groups, so that"
-        f" nothing is named in 19 of 20 experiments in which nothing differs.{apart}",
+        "Objects, verdicts and bodies in the way for which predictions were wrong more"
+        " often than for others with the same prediction. p: one-sided mid-p of Fisher's"
+        f" exact test with Holm's correction for the {judged.tested_groups} tested"
+        f" groups: if nothing differs, nothing is named in 19 of 20 experiments.{apart}",
         table(names, rows),
     )
 
 
 def _how(judged: Named) -> str:
     weighted = any(j.all_grasps is not None for _, j in judged)
-    text = "With 95 % intervals: Wilson's for shares, all others come from a Bayesian bootstrap."
+    text = "Intervals are 95 % intervals: Wilson's for shares, a Bayesian bootstrap for all others."
     if weighted:
         text = (
-            "The grasps were chosen from strata. Figures of the selected trials describe the"
-            " experiment; figures for all grasps, in which each trial stands for its share of a"
-            " stratum, describe what a user of the simulator meets. 95 % intervals: Wilson's for"
-            " shares of the selected trials; a Bayesian bootstrap within strata for all others."
+            "The grasps were chosen from strata. Figures of the selected trials describe"
+            " this experiment. In figures for all grasps each trial stands for its share"
+            " of a stratum; they describe what a user of the simulator can expect. 95 %"
+            " intervals: Wilson's for shares of the selected trials; a Bayesian"
+            " bootstrap within strata for all others."
         )
     return text
 

@@ -33,10 +33,11 @@ def margin_section(comparison: Comparison, judged: Judgement) -> Html | None:
     plots = [reliability_plot(c, success_of(comparison)) for c in found[:MOST_PLOTS]]
     trials = "grasps, each trial standing for its share," if weighted else "trials"
     text = (
-        "AUROC: of a grasp that succeeded and one that failed, how often the first has the"
-        " better margin (↑ the larger, ↓ the smaller); one half means no information. Dots:"
-        f" share of successes among {trials} in bins of about equally many trials, with Wilson's"
-        " intervals; line: the monotone curve that fits best; dashes: all of them."
+        "AUROC: how often, of a grasp that succeeded and one that failed, the one that"
+        " succeeded has the better margin (↑ larger, ↓ smaller); 0.5 means that the"
+        f" margin tells nothing. Dots: share of successes among {trials} in bins of about"
+        " equally many trials, with Wilson's intervals. Line: the monotone curve that"
+        " fits best; dashes: the share of all."
     )
     return section(
         f"Do margins predict {success_of(comparison)}?",
@@ -77,8 +78,9 @@ def placement_section(judged: Judgement, of: str) -> Html | None:
         FactorGroup(name="not all measured", agreement=p.unmeasured),
     ]
     text = (
-        "Where objects stood off their targets, the simulation judged another scene than the robot"
-        " met. Agreement that is much better in the first row points at placement, not physics."
+        "Where objects were off their planned places, the simulation judged another"
+        " scene than the robot had. If agreement is much better in the first row, the"
+        " cause is placement and not physics."
     )
     plots = [reliability_plot(c, "right verdicts") for c in (p.largest, p.target) if c.trials]
     whole = group_section(f"By placement of the objects{of}", text, "placement", groups)

@@ -136,8 +136,8 @@ def _lead(c: Comparison) -> Html:
         tiles(entries),
         element(
             "p",
-            f"Figures {whose}, with 95 % intervals that take {what} as independent; {what} on one"
-            " object are alike, so that for other objects the range is wider.",
+            f"Figures {whose}, with 95 % intervals that assume independent {what}. Those"
+            " on one object are alike, so the range for other objects is wider.",
             class_="note",
         ),
     )
@@ -179,7 +179,7 @@ def _sections(c: Comparison, photos: Path | None) -> list[Html | None]:
 
 
 def _of_one(c: Comparison, judgement: Judgement, photos: Path | None) -> list[Html | None]:
-    right = "verdicts that are the same in both runs" if c.kind == "runs" else "right verdicts"
+    right = "same verdict in both runs" if c.kind == "runs" else "right verdicts"
     text = f"Share of {right}, precision and recall, with 95 % intervals."
     of = of_selected(c)
     parts = [

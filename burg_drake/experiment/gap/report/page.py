@@ -112,7 +112,10 @@ def _reproduction(steps: GapSteps, command_line: str) -> Html:
     ]
     if document.samples:
         noise = f"{document.place_mm:g} mm, {document.turn_deg:g} degrees, seed {document.seed}"
-        redrawn = f"{sum(document.redrawn)} places were drawn again, as something stood there"
+        redrawn = (
+            f"{sum(document.redrawn)} displaced positions were drawn again, as something was"
+            " there already"
+        )
         facts.append(("displaced by", f"{noise}; {redrawn}"))
         for scene, names in document.kept.items():
             facts.append((f"scene {scene}", f"{', '.join(names)} as planned: no other place found"))
@@ -120,8 +123,8 @@ def _reproduction(steps: GapSteps, command_line: str) -> Html:
     listed = [join(element("dt", name), element("dd", fact)) for name, fact in facts]
     return section(
         "How to repeat",
-        "Every step is an ordinary run that burg-drake report, replay and robustness open. The"
-        " same command continues where it was interrupted.",
+        "Every step is an ordinary run, which burg-drake report, replay and robustness"
+        " can open. If interrupted, the same command continues it.",
         command(command_line),
         element("dl", *listed, class_="facts"),
     )

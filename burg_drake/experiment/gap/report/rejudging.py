@@ -54,12 +54,14 @@ def rejudged_words(found: Rejudging) -> list[str]:
             f" {'is' if of['physics'] == 1 else 'are'} left to physics."
         )
     if of["worsened"]:
-        sentences.append(f"Worsened: {of['worsened']} that agreed as planned.")
+        sentences.append(
+            f"{of['worsened']} agreed with the objects as planned, but not where they stood."
+        )
     within = sum(t.outcome is not None and t.outcome.stage is Stage.CLEAR for t in found.judged)
     if within:
         sentences.append(
-            f"In {within} the open hand would be within a displaced object, which counts as a"
-            " collision, though a robot may push it aside."
+            f"In {within} trials the open hand would overlap a displaced object, which"
+            " counts as a collision, although a robot may push it aside."
         )
     not_judged = [trial for trial in found.trials if trial not in found.judged]
     if not_judged:
@@ -81,9 +83,9 @@ def _unpredictable(found: Rejudging) -> list[str]:
         for name, m in (("as planned", False), ("as measured", True))
     )
     return [
-        f"{len(apart)} trial{plural} failed for reasons that a run of the hand alone does not"
-        f" predict ({texts}). They are counted separately, as caused neither by placement nor by"
-        f" physics. Precision {precision}."
+        f"{len(apart)} trial{plural} failed for reasons that a run of the hand alone"
+        f" cannot predict ({texts}). They are counted separately, as neither placement"
+        f" nor physics caused them. Precision {precision}."
     ]
 
 

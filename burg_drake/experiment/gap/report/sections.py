@@ -38,13 +38,14 @@ from burg_drake.experiment.trials import Success
 ROWS = 40
 """Grasps that a step's table lists."""
 ABOUT = {
-    "reach": "The same trials of the hand, of grasps that the arm can execute: a posture within"
-    " its limits, a straight approach, a straight lift and a path, all free of collisions.",
-    "arm": "The whole arm executes what it can reach, from the pregrasp on, with servos that yield:"
-    " now the hand may push objects before it closes.",
-    "placed": "The hand goes where it was planned to go, and the objects stand a little elsewhere."
-    " A hand that is open within a displaced object counts as a collision; the arm knows where"
-    " things stand and plans its way anew. Each grasp is counted once a scene.",
+    "reach": "The same simulation of the hand, but only of grasps that the arm can execute: with"
+    " a posture within its limits, a straight approach, a straight lift and a path, all"
+    " free of collisions.",
+    "arm": "The whole arm executes the grasps that it can reach, from the pregrasp on, with"
+    " controllers that yield; here the hand may push objects before it closes.",
+    "placed": "The hand goes where it was planned to go, but the objects stand a little off. It"
+    " counts as a collision if the open hand overlaps a displaced object. The arm knows"
+    " where things stand and plans its path anew. Each grasp counts once a scene.",
 }
 
 
@@ -61,8 +62,9 @@ def flow_section(steps: GapSteps, found: Sequence[Change]) -> Html | None:
         scale.append(1.0 / max(len(step.runs), 1))
     return section(
         "From step to step",
-        "What becomes of the grasps, in the colours of what they become next. In displaced scenes"
-        " only successes of the step before are tried, each once a scene.",
+        "How grasps end in each step; the colour of a band is that of the outcome in the"
+        " next step. In displaced scenes only grasps that succeeded in the step before"
+        " are tried, each once a scene.",
         element("div", flow_chart(columns, [c.flow for c in found], scale), class_="scroll"),
     )
 
@@ -83,7 +85,7 @@ def objects_section(steps: GapSteps, success: Success) -> Html:
         rows.append(element("tr", element("th", name, scope="row"), *numbers))
     return section(
         "By object",
-        "Grasps of each object that succeed in each step; in displaced scenes, of the trials.",
+        "Grasps of each object that succeed in each step; in displaced scenes, successful trials.",
         table(head, rows, numbers=tuple(range(1, len(head)))),
     )
 
@@ -153,11 +155,11 @@ def _listing(change: Change) -> Html:
     first = shlex.join(replay_command(moves[0].run, moves[0].grasp))
     more = f", the first {ROWS} of {len(moves)}" if len(moves) > ROWS else ""
     inside = join(
-        element("p", "Any of them can be watched; replay repeats what was in the way:"),
+        element("p", "To watch one of them (replay also shows what was in the way):"),
         command(first),
         table(["grasp", "before", "after", "in the way", "command"], rows),
     )
-    return element("details", element("summary", f"The grasps that change{more}"), inside)
+    return element("details", element("summary", f"Grasps that change{more}"), inside)
 
 
 def _listed(move: OutcomeChange) -> Html:
@@ -209,7 +211,7 @@ def push_section(steps: GapSteps) -> Html | None:
     head += ["held if pushed", "held if not"]
     return section(
         "Pushed before the hand closes",
-        f"{sentence} The table is about the object to be grasped.",
+        f"{sentence} The table counts only the object to be grasped.",
         table(head, rows, numbers=(1, 2, 3, 4, 5, 6)),
     )
 
@@ -232,12 +234,13 @@ def reality_section(agreement: Sequence[StepAgreement]) -> Html | None:
     names = ["step", "trials", "TP", "FP", "FN", "TN", NOT_PREDICTABLE]
     names += ["precision", "recall", "accuracy"]
     return section(
-        "Beside the robot",
-        "Real trials beside each step's verdicts on the same grasps, with 95 % intervals. Positive"
-        " means that success is predicted; in displaced scenes, in more than half of them. Here"
-        f" {reality_words(agreement)}. {NOT_PREDICTABLE.capitalize()} are trials, among them,"
-        " with a failure that the step does not predict: if it judges the hand alone, for example"
-        " that the arm has no path.",
+        "Compared with the robot",
+        "Real trials compared with each step's verdicts on the same grasps, with 95 %"
+        " intervals. Positive means: success is predicted (in displaced scenes: in more"
+        f" than half of them). Here {reality_words(agreement)}. "
+        f"{NOT_PREDICTABLE.capitalize()} are trials with a failure that the step cannot"
+        " predict, for example that the arm has no path if the step judges the hand"
+        " alone.",
         table(names, rows, numbers=(1, 2, 3, 4, 5, 6)),
     )
 

@@ -45,7 +45,7 @@ def left_out(change: Change) -> str:
 
 def _sentence(change: Change, document: GapDocument) -> str:
     if change.successes == 0:
-        return f"{TITLES[change.step].capitalize()}: there is no success left to lose."
+        return f"{TITLES[change.step].capitalize()}: no success is left that could be lost."
     lost, whole = len(change.lost), change.successes
     share = f" ({format_percent(lost / whole)})"
     left = whole - lost + len(change.won)
@@ -91,8 +91,8 @@ def reality_words(agreement: Sequence[StepAgreement]) -> str:
         return "counts and shares are of the tried grasps, each counted once"
     grasps = round(max(sum(one.estimated.cells) for one in agreement))
     return (
-        "counts are of the tried grasps; precision, recall and accuracy are estimated for the"
-        f" {grasps:,} grasps that they were chosen from"
+        "counts are those of the tried grasps; precision, recall and accuracy are"
+        f" estimated for the {grasps:,} grasps from which they were chosen"
     )
 
 

@@ -63,7 +63,8 @@ def _caption(steps: GapSteps) -> str:
 def reality_view(agreement: Sequence[StepAgreement]) -> TextTable:
     """What each step does to the agreement with the robot."""
     table = TextTable(
-        "Beside the robot", caption=f"{reality_words(agreement)}; positive: success predicted"
+        "Compared with the robot",
+        caption=f"{reality_words(agreement)}; positive: success predicted",
     )
     table.names("step").numbers("trials", "TP", "FP", "FN", "TN", NOT_PREDICTABLE, *FIGURES)
     for one in agreement:
