@@ -28,7 +28,8 @@ exclude_patterns = ["**.ipynb"]
 # Words of types in docstrings need not name one object only.
 suppress_warnings = ["ref.python"]
 
-myst_enable_extensions = ["colon_fence", "deflist", "attrs_block"]
+myst_enable_extensions = ["colon_fence", "deflist", "attrs_inline"]
+smartquotes = False  # two hyphens begin an option
 myst_heading_anchors = 4
 
 default_role = "code"

@@ -274,20 +274,25 @@ def _verb_text(parser: Any, level: str) -> str:
             lines.append(f"**{str(group.title).capitalize()}**\n")
             if group.description:
                 lines.append(f"{group.description}\n")
-            lines += [_option_text(formatter, action) for action in actions]
+            verb = parser.prog.partition(" ")[2].replace(" ", "-")
+            lines += [_option_text(formatter, action, verb) for action in actions]
     if parser.epilog:
         lines.append(_epilog(parser.epilog))
     lines += [_verb_text(verb, level + "#") for verb in _verbs(parser).values()]
     return "\n".join(lines)
 
 
-def _option_text(formatter: argparse.HelpFormatter, action: argparse.Action) -> str:
+def _option_text(formatter: argparse.HelpFormatter, action: argparse.Action, verb: str) -> str:
+    """An option with its help, which links reach as `#VERB-OPTION`."""
     text = formatter._expand_help(action) if action.help else ""
-    return f"`{formatter._format_action_invocation(action)}`\n: {_escaped(text)}\n"
+    name = (action.option_strings or [action.dest])[-1].lstrip("-").replace("_", "-")
+    invocation = formatter._format_action_invocation(action)
+    return f"`{invocation}`{{#{verb}-{name}}}\n: {_escaped(text)}\n"
 
 
 def _escaped(text: str) -> str:
-    """Text in which Markdown sees no mark-up but code."""
+    """Text in which Markdown sees no mark-up but code, and options are code."""
+    text = re.sub(r"(?<![\w`-])--[a-z][\w-]*(?!\w*`)", r"`\g<0>`", text)
     return re.sub(r"([*_<>\[\]])(?=(?:[^`]*`[^`]*`)*[^`]*$)", r"\\\1", text)
 
 

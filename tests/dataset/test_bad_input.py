@@ -91,7 +91,7 @@ def test_an_object_without_its_visual_mesh(
             render(scenes[0], STATION, kinds=["depth"])
         assert str(refused.value) == found.failed[0]
         if not missing_render_libraries():
-            with pytest.raises(InvalidInputError, match=r"mesh\.obj.*; build the library .*again"):
+            with pytest.raises(InvalidInputError, match=r"mesh\.obj.*; build (its|the) library"):
                 render(scenes[0], STATION, kinds=["color"])
     finally:
         mesh.write_bytes(content)
@@ -221,7 +221,7 @@ def test_intrinsics_that_do_not_fit_the_image(tmp_path: Path) -> None:
         render("tabletop_six", station, replace(view, intrinsics=other), ["color"])
     wrong = replace(station.document.cameras["board"], center=(959.5, 539.5))
     document = replace(station.document, cameras={"board": wrong})
-    with pytest.raises(InvalidInputError, match=r"959\.5, 539\.5 .*is outside of the image"):
+    with pytest.raises(InvalidInputError, match=r"959\.5, 539\.5 .*is outside the image"):
         burg.build_station_diagram(
             "tabletop_six", replace(station, document=document), robot="none", cameras=True
         )
@@ -235,7 +235,7 @@ def test_sizes_that_a_sensor_does_not_have(tmp_path: Path) -> None:
     for size, said in (
         ("[640, 100]", "d435 has no depth images of 640 x 100 pixels; they have the aspect of 640"),
         ("[640, 0]", "d435 has no depth images of 640 x 0 pixels"),
-        ("[32000, 24000]", "image of 32000 x 24000 pixels; a side has at most 16,384"),
+        ("[32000, 24000]", "image of 32000 x 24000 pixels; a side may have at most 16,384"),
     ):
         path.write_text(f"version: 1\nsensor: d435\nsize: {size}\n")
         with pytest.raises(InvalidInputError) as refused:

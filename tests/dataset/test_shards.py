@@ -263,7 +263,7 @@ def file(name: str, data: bytes) -> Callable[[dict[str, bytes]], object]:
         (file("color.png", png(64, 48) + b"x"), "color.png is cut off, or goes on behind its end"),
         (flipped("color.png", b"IDAT"), "color.png is damaged: a check sum is wrong"),
         (flipped("normals.png", b"IEND"), "normals.png is damaged: it has chunk b'HEND'"),
-        (file("grasps.npz", pickled()), "000012_000.grasps.npz: outcome holds Python objects"),
+        (file("grasps.npz", pickled()), "000012_000.grasps.npz: outcome hold"),
         (file("grasps.npz", announcing("(9999999, 4, 4)")), "000012_000.grasps.npz: X_CG"),
         (file("grasps.npz", b"PK"), "000012_000.grasps.npz is not a .npz file of grasps"),
         (file("json", b"[" * 100000), "000012_000.json: nested more than 64"),
