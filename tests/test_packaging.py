@@ -101,7 +101,7 @@ def test_metadata() -> None:
     assert (PACKAGE / "py.typed").exists()
 
 
-@installed_only
+@wheel_only
 def test_links_of_the_readme_lead_somewhere_from_pypi_too() -> None:
     text = importlib.metadata.metadata("burg-drake").get_payload()
     links = re.findall(r"\]\(([^)]+)\)", text)
