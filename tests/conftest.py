@@ -66,7 +66,8 @@ PHYSICS = tuple(
         *("experiment/test_trial_export.py", "export", "fuzzing", "generation"),
         *("grasping/test_clearance.py", "grasping/test_signed_clearance.py", "motion", "pipeline"),
         *("printout/test_board_printout.py", "ros", "simulation", "station", "ui"),
-        *("visualization", "test_document_code.py", "test_packaging.py", "test_typed_use.py"),
+        *("visualization", "test_document_code.py", "test_notebooks.py"),
+        *("test_packaging.py", "test_typed_use.py"),
     )
 )
 """Folders and files of tests that build or step diagrams of Drake, render, or start programs."""

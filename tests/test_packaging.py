@@ -101,6 +101,18 @@ def test_metadata() -> None:
     assert (PACKAGE / "py.typed").exists()
 
 
+@wheel_only
+def test_links_of_the_readme_lead_somewhere_from_pypi_too() -> None:
+    text = importlib.metadata.metadata("burg-drake").get_payload()
+    links = re.findall(r"\]\(([^)]+)\)", text)
+    assert links and all(link.startswith("https://") for link in links)
+
+
+def test_citation_and_changelog_name_the_version() -> None:
+    assert f"\nversion: {burg_drake.__version__}\n" in (CHECKOUT / "CITATION.cff").read_text()
+    assert f"\n## [{burg_drake.__version__}] - " in (CHECKOUT / "CHANGELOG.md").read_text()
+
+
 FROM_ROS = {"rospy", "rclpy"}
 """Come with an installation of ROS, not from PyPI; imported by the node alone."""
 
