@@ -142,6 +142,17 @@ def looked_up(node: ast.expr, names: dict[str, Any]) -> Any:
     return None
 
 
+SCRIPTS = [path for room in ("tools", "benchmarks") for path in (ROOT / room).glob("*.py")]
+
+
+def test_a_script_makes_each_picture() -> None:
+    """Those of the setup page are named without the ending."""
+    code = "\n".join(path.read_text("utf-8") for path in SCRIPTS if path.stem != "site")
+    pictures = sorted((ROOT / "docs" / "images").iterdir())
+    made = {path for path in pictures if path.name in code or f'"{path.stem}": ' in code}
+    assert [path.name for path in pictures if path not in made] == []
+
+
 PARSER = build_parser()
 COMMANDS = [b for page in PAGES for b in BLOCKS[page] if any(b.commands())]
 
