@@ -71,6 +71,8 @@ def lab_page(trials: Path, path: Path) -> None:
     """The page of `burg-drake trials serve` at a trial."""
     words = f"trials serve {trials} --camera sim:panda_tabletop/board"
     with served(words.split(), (1180, 840)) as tab:
+        tab.locator("#outcomes button").first.wait_for()
+        tab.wait_for_timeout(2000)
         tab.locator("#operator").fill("Ada")
         tab.locator("#making").wait_for(state="hidden")
         tab.wait_for_timeout(5000)

@@ -166,7 +166,7 @@ def report() -> None:
         photograph(Path(run) / "report.html", "report.png", (985, 1010))
 
 
-ERROR = 0.006
+ERROR = 0.002
 """Standard deviation of what stands for a robot's errors, along each axis [m]."""
 
 
@@ -179,9 +179,10 @@ def trials() -> None:
         grasps = burg.sample_grasps("tabletop_six", "panda_tabletop", 12)
         X_OG = grasps.X_OG.copy()
         X_OG[:, :3, 3] += np.random.default_rng(0).normal(0.0, ERROR, (len(X_OG), 3))
-        columns = {"instance": grasps.column("instance")}
-        missed = burg.GraspSet.create(X_OG, object=grasps.object, columns=columns)
-        names = dict(zip(grasps.id, missed.id, strict=True))
+        instances = grasps.column("instance")
+        missed = burg.GraspSet.create(X_OG, object=grasps.object, columns={"instance": instances})
+        ids = zip(instances, grasps.id, missed.id, strict=True)
+        names = {f"{instance}-{id}": f"{instance}-{off}" for instance, id, off in ids}
         settings = burg.EvaluationSettings(engine="screening", mode="hand")
         for out, given in ((simulated, grasps), (tried, missed)):
             burg.evaluate("tabletop_six", "panda_tabletop", out, grasps=given, settings=settings)
