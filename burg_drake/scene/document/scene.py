@@ -167,7 +167,7 @@ def load_scene(
 
     Example::
 
-        scene = burg.load_scene("tabletop_six")  # built in; or a path such as "breakfast.yaml"
+        scene = burg.load_scene("tabletop_six")  # built in; or a path
         print(list(scene.instances), scene.X_SO("mug")[:3, 3])
 
     Args:
@@ -222,7 +222,7 @@ def as_scene(scene: SceneLike) -> Scene:
 
 
 def save_scene(document: SceneDocument, path: str | Path) -> None:
-    """Writes a scene file; see `core.documents.schema.save_document`.
+    """Writes a scene file.
 
     Example::
 

@@ -299,7 +299,7 @@ def load_station(reference: str | Path) -> Station:
 
     Example::
 
-        station = burg.load_station("panda_tabletop")  # built in; or a path such as "my_lab.yaml"
+        station = burg.load_station("panda_tabletop")  # built in; or a path
         print(station.hand.opening, list(station.document.cameras))
 
     Args:
