@@ -1,7 +1,7 @@
 """Calibrates the confidence of verdicts, and says how far it can be trusted.
 
     python benchmarks/confidence.py [-o FOLDER] [--scans FOLDER] [--each N] [--workers N]
-        [--engine NAME ...] [--fit] [--plot FILE]
+        [--engine NAME ...] [--fit] [--plot docs/images/reliability.svg]
 
 Objects are those of the oracle (`oracle.catalogue`), of the built-in library, and scans; of each in
 its resting poses so many grasps with the friction and mass of ordinary things, and as many with

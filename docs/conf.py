@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -69,11 +70,18 @@ pygments_dark_style = "a11y-dark"
 
 def setup(app: Any) -> None:
     """Called by Sphinx."""
-    # After napoleon: a name that ends with an underscore is a link in reStructuredText.
-    app.connect("autodoc-process-docstring", _without_trailing_underscores, priority=900)
+    app.connect("autodoc-process-docstring", _as_written, priority=900)  # after napoleon
 
 
-def _without_trailing_underscores(
-    app: Any, what: str, name: str, value: Any, options: Any, lines: list[str]
-) -> None:
-    lines[:] = [line.replace("numpy.str_", "str") for line in lines]
+def _as_written(app: Any, what: str, name: str, value: Any, options: Any, lines: list[str]) -> None:
+    """Takes back what napoleon makes of colons in properties, and of attributes told together."""
+    text = "\n".join(lines).replace("numpy.str_", "str")
+    if what in ("property", "attribute"):
+        text = re.sub(r"\A(.*?)\n+:type: (.*?)\n*\Z", r"\2: \1\n", text, flags=re.DOTALL)
+    text = re.sub(
+        r"^:ivar ((?:\w+, )+\w+):((?:.*\n)(?:[ ]+.*\n)*)",
+        lambda found: "".join(f":ivar {one}:{found[2]}" for one in found[1].split(", ")),
+        text,
+        flags=re.MULTILINE,
+    )
+    lines[:] = text.split("\n")

@@ -10,6 +10,7 @@ import importlib
 import inspect
 import pkgutil
 import re
+import textwrap
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ from burg_drake.scene.document.scene import SceneDocument
 from burg_drake.station.document.gripper_document import Hand
 from burg_drake.station.document.station_document import StationDocument
 from tests.pages import PAGES, ROOT, Block, blocks
+from tests.test_faces import public_names
 from tools.site import generated_pages
 
 SCHEMAS = {
@@ -99,15 +101,40 @@ NOT_RUN = [b for page in PAGES for b in BLOCKS[page] if b.language == "python" a
 
 @pytest.mark.parametrize("block", NOT_RUN, ids=ids)
 def test_what_does_not_run_is_about_what_there_is(block: Block) -> None:
+    require_existing(block.module)
+
+
+EXAMPLES = {
+    ".".join(filter(None, ("burg", face, name))): textwrap.dedent(found[1])
+    for face, names in public_names().items()
+    for name, value in names.items()
+    if (found := re.search(r"^Example::\n\n((?: .*\n|\n)+)", f"{inspect.getdoc(value)}\n", re.M))
+}
+"""Code in docstrings, by public name."""
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_examples_of_docstrings_are_about_what_there_is(name: str) -> None:
+    assert f"{name}(" in EXAMPLES[name] or f"{name}." in EXAMPLES[name]
+    require_existing(ast.parse(EXAMPLES[name], name))
+
+
+def test_functions_of_the_main_road_have_examples() -> None:
+    functions = {n for n, value in public_names()[""].items() if inspect.isfunction(value)}
+    assert {f"burg.{name}" for name in functions} <= EXAMPLES.keys()
+
+
+def require_existing(module: ast.Module) -> None:
+    """What code takes from packages exists, and its calls fit the signatures."""
     names: dict[str, Any] = {"burg": importlib.import_module("burg_drake")}
-    for node in ast.walk(block.module):
+    for node in ast.walk(module):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 names[alias.asname or alias.name] = importlib.import_module(alias.name)
         elif isinstance(node, ast.ImportFrom):
-            module = importlib.import_module(str(node.module))
-            names |= {a.asname or a.name: getattr(module, a.name) for a in node.names}
-    for node in ast.walk(block.module):
+            package = importlib.import_module(str(node.module))
+            names |= {a.asname or a.name: getattr(package, a.name) for a in node.names}
+    for node in ast.walk(module):
         if isinstance(node, ast.Attribute):
             looked_up(node, names)
         elif isinstance(node, ast.Call) and (called := looked_up(node.func, names)):
@@ -123,6 +150,17 @@ def looked_up(node: ast.expr, names: dict[str, Any]) -> Any:
         owner = looked_up(node.value, names)
         return None if owner is None else getattr(owner, node.attr)
     return None
+
+
+SCRIPTS = [path for room in ("tools", "benchmarks") for path in (ROOT / room).glob("*.py")]
+
+
+def test_a_script_makes_each_picture() -> None:
+    """Those of the setup page are named without the ending."""
+    code = "\n".join(path.read_text("utf-8") for path in SCRIPTS if path.stem != "site")
+    pictures = sorted((ROOT / "docs" / "images").iterdir())
+    made = {path for path in pictures if path.name in code or f'"{path.stem}": ' in code}
+    assert [path.name for path in pictures if path not in made] == []
 
 
 PARSER = build_parser()

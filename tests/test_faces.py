@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from functools import cache
+from inspect import isclass, isroutine
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -15,6 +16,7 @@ import burg_drake as burg
 from burg_drake.scene.arrangement import ObjectShapes
 from tests.pages import PAGES, ROOT, blocks
 from tests.public_types import project_types
+from tools import site
 
 PACKAGE = Path(burg.__file__).parent
 FACES = sorted(name for name in burg.__all__ if isinstance(getattr(burg, name), ModuleType))
@@ -77,17 +79,16 @@ def test_all_that_a_class_says_is_seen(value: type, where: str, found: str) -> N
     assert (where, found) in {(place, one.__name__) for place, one in project_types(value)}
 
 
-def test_one_page_lists_all_public_names() -> None:
-    text = (ROOT / "docs" / "python.md").read_text("utf-8")
-    listed: dict[str, list[str]] = {}
-    for heading, section in re.findall(r"^## (.+?)\n(.*?)(?=^## |\Z)", text, re.M | re.S):
-        names = re.findall(r"^\|.*", section, re.M)
-        face = heading.strip("`").removeprefix("burg").removeprefix(".")
-        if names:
-            listed[face] = re.findall(r"`(\w+)`", "\n".join(names))
-    assert {face: sorted(names) for face, names in listed.items()} == {
-        face: sorted(names) for face, names in public_names().items()
-    }
+def test_the_site_groups_all_names_of_the_main_road() -> None:
+    listed = [name for names in site.MAIN_NAMES.values() for name in names.split()]
+    assert sorted(listed) == sorted(public_names()[""])
+
+
+@pytest.mark.parametrize("face", ["", *FACES])
+def test_docstrings_begin_with_a_sentence(face: str) -> None:
+    values = {n: v for n, v in public_names()[face].items() if isroutine(v) or isclass(v)}
+    begins = {name: (value.__doc__ or "").partition("\n")[0] for name, value in values.items()}
+    assert {n: line for n, line in begins.items() if not re.fullmatch(r"[A-Z0-9`].*\.", line)} == {}
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)

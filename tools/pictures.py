@@ -1,11 +1,15 @@
 """Pictures for the docs: `python -m tools.pictures [KIND ...]`.
 
 `station` renders those of stations and the built-in objects by Drake, `board` what a camera over
-the board sees, with the overlay, `overlay` the latter after a placement check. `pages` takes those
-of grasps by outcome and by a column, of a replay, of frames and of a reachability map from the
-pages that the commands write with --html, by a Chromium that runs without a display; `report` that
-of a run; `ports` what the example of the ports shows in Meshcat; `sampled` renders a scene of each
-layout; `setup` takes those of the setup page. The others are screenshots by hand.
+the board sees, with the overlay, `overlay` the latter after a placement check, and its live page.
+`pages` takes those of grasps by outcome and by a column, of a replay, of frames and of a
+reachability map from the pages that the commands write with --html, by a Chromium that runs without
+a display; `report` that of a run; `trials` the page for the lab, and simulation beside what stands
+for a robot; `library` the sheet of the built-in objects; `calibration` that of a camera; `dataset`
+samples on a sheet; `printout` the board on one page; `ports` what the example of the ports shows in
+Meshcat; `sampled` renders a scene of each layout, `renderers` one by Drake and by Blender; `setup`
+takes those of the setup page. What is served live needs playwright. Graphs are drawn by
+benchmarks/confidence.py and benchmarks/convergence.py, the film by tools/film.py.
 """
 
 from __future__ import annotations
@@ -24,8 +28,10 @@ from PIL import Image
 if __package__ in (None, ""):
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+import burg_drake as burg
 from burg_drake import build_station_diagram, load_library, load_scene, load_station
 from burg_drake.apps.cli import main as burg_drake
+from burg_drake.cameras.optics.intrinsics_file import save_intrinsics
 from burg_drake.cameras.overlay.renderer import Overlay
 from burg_drake.cameras.placement.check import check_placement
 from burg_drake.cameras.systems.board_loop import build_board_loop
@@ -160,6 +166,98 @@ def report() -> None:
         photograph(Path(run) / "report.html", "report.png", (985, 1010))
 
 
+ERROR = 0.002
+"""Standard deviation of what stands for a robot's errors, along each axis [m]."""
+
+
+def trials() -> None:
+    """Writes the pictures of trials; grasps that are off by some millimetres stand for a robot."""
+    from tools.live_pictures import lab_page
+
+    with tempfile.TemporaryDirectory() as folder:
+        simulated, tried, sheet = (Path(folder, name) for name in ("run", "tried", "trials.yaml"))
+        grasps = burg.sample_grasps("tabletop_six", "panda_tabletop", 12)
+        X_OG = grasps.X_OG.copy()
+        X_OG[:, :3, 3] += np.random.default_rng(0).normal(0.0, ERROR, (len(X_OG), 3))
+        instances = grasps.column("instance")
+        missed = burg.GraspSet.create(X_OG, object=grasps.object, columns={"instance": instances})
+        ids = zip(instances, grasps.id, missed.id, strict=True)
+        names = {f"{instance}-{id}": f"{instance}-{off}" for instance, id, off in ids}
+        settings = burg.EvaluationSettings(engine="screening", mode="hand")
+        for out, given in ((simulated, grasps), (tried, missed)):
+            burg.evaluate("tabletop_six", "panda_tabletop", out, grasps=given, settings=settings)
+        chosen = burg.trials.SelectionSettings(per_object=6)
+        planned = burg.trials.plan_trials(simulated, settings=chosen, out=sheet).trials
+        book, robot = burg.trials.TrialBook(sheet), load_run(tried)
+        ends = [robot.row(names[trial.grasp])["outcome"] for trial in planned]
+        for end in ends[:4]:
+            book.record("next", outcome=end, operator="Ada")
+        lab_page(sheet, IMAGES / "trials_serve.png")
+        for end in ends[4:]:
+            book.record("next", outcome=end, operator="Ada")
+        page = Path(folder, "page.html")
+        burg_drake(f"compare {simulated} {sheet} --html {page}".split())
+        photograph(page, "compare.png", (985, 1010))
+
+
+def library() -> None:
+    """Writes the picture of the sheet of the built-in objects."""
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder, "page.html")
+        html = Path(folder, "3d.html")
+        burg_drake(f"library show household --sheet {page} --html {html}".split())
+        photograph(page, "library.png", (1425, 1370))
+
+
+def calibration() -> None:
+    """Writes the picture of the page of a calibration, from photos that are made by formula."""
+    sys.path.insert(0, str(IMAGES.parents[1] / "benchmarks"))
+    from room.lens import Camera as Lens
+    from room.rows import WEBCAM
+    from room.target import target_picture, view_at
+
+    rng = np.random.default_rng(0)
+    lens = Lens((640, 480), (600.0, 602.0), (322.0, 236.0), (-0.25, 0.08, 1e-3, -5e-4, 0.0))
+    with tempfile.TemporaryDirectory() as folder:
+        photos, page = Path(folder, "photos"), Path(folder, "page.html")
+        photos.mkdir()
+        for number in range(20):
+            photo = target_picture(lens, view_at(lens, 1.0, rng), WEBCAM, rng, 0.0)
+            Image.fromarray(photo).save(photos / f"{number:02}.png")
+        burg_drake(f"camera calibrate {photos} -o {folder}/K.yaml --report {page}".split())
+        photograph(page, "calibration.png", (1010, 1010))
+
+
+def dataset() -> None:
+    """Writes the picture of samples of two scenes."""
+    with tempfile.TemporaryDirectory() as folder:
+        data, sheet = f"{folder}/data", f"{folder}/sheet.png"
+        burg_drake(f"dataset generate --sample household:2 --views 1 --quiet -o {data}".split())
+        burg_drake(f"dataset show {data} --rows 2 -o {sheet}".split())
+        save(np.asarray(Image.open(sheet).convert("RGB")), "dataset.png")
+
+
+def printout() -> None:
+    """Writes the picture of the printed board, on one page; pdftoppm (poppler) has to be there."""
+    with tempfile.TemporaryDirectory() as folder:
+        board = f"{folder}/board"
+        only = "--page A2 --no-instructions"
+        burg_drake(f"printout tabletop_six {only} -o {board}.pdf".split())
+        to_png = ["pdftoppm", "-png", "-singlefile", "-r", "55", f"{board}.pdf", board]
+        subprocess.run(to_png, check=True)
+        save(np.asarray(Image.open(f"{board}.png").convert("RGB")), "board.png")
+
+
+def renderers() -> None:
+    """Writes the same scene by Drake's renderer and by Blender, side by side."""
+    pictures = [
+        burg.render("tabletop_six", "panda_tabletop", "board", ["color"], renderer=renderer).color
+        for renderer in ("drake", "blender")
+    ]
+    image = Image.fromarray(np.hstack([each for each in pictures if each is not None]))
+    image.save(IMAGES / "renderers.jpg", quality=85)
+
+
 def ports() -> None:
     """Runs the example of the ports, and looks at the end of its plan."""
     meshcat = runpy.run_path(str(IMAGES.parents[1] / "examples" / "10_ports.py"))["meshcat"]
@@ -180,8 +278,6 @@ def station() -> None:
     render(load_scene("tabletop_six"), panda, portrait, "arm", "station.png")
     nearer = dataclasses.replace(portrait, focal=(1350.0, 1350.0))
     render(load_scene("tabletop_six"), load_station("panda_wsg"), nearer, "arm", "wsg.png")
-    ur5e = load_station("ur5e_tabletop")
-    render(load_scene("tabletop_six"), ur5e, portrait, "arm", "ur5e.png")
     # seen from the front of the board, 40 degrees from above
     X_WC = Pose((-0.31, 0.0, 0.82), rpy_deg=(-134.0, 0.0, -90.0))
     close = Camera(X_WC=X_WC, width=960, height=720, focal=(1150.0, 1150.0))
@@ -214,6 +310,8 @@ MOVED = {
 
 def overlay() -> None:
     """Writes what the overlay shows after a placement check of a scene that is nearly built."""
+    from tools.live_pictures import overlay_page
+
     scene, panda = load_scene("tabletop_six"), load_station("panda_tabletop")
     X_WC = Pose((-0.03, -0.42, 0.66), rpy_deg=(-137.0, 0.0, -47.0))
     camera = Camera(X_WC=X_WC, width=960, height=640, focal=(1000.0, 1000.0))
@@ -231,6 +329,11 @@ def overlay() -> None:
     assert check.camera is not None, check.reason
     X_SC = check.camera.X_SC.matrix()
     save(Overlay(scene, loop.intrinsics).draw(photo, X_SC, placement=check), "overlay.png")
+    with tempfile.TemporaryDirectory() as folder:
+        file, intrinsics = Path(folder, "photo.png"), Path(folder, "K.yaml")
+        Image.fromarray(photo).save(file)
+        save_intrinsics(loop.intrinsics, intrinsics)
+        overlay_page(file, intrinsics, IMAGES / "ar.png")
 
 
 def sampled() -> None:
@@ -263,8 +366,11 @@ def setup() -> None:
 def main() -> None:
     """Makes the kinds of pictures that are named, or all."""
     kinds = {
-        **{"station": station, "board": board, "overlay": overlay},
-        **{"pages": pages, "report": report, "ports": ports, "sampled": sampled, "setup": setup},
+        kind.__name__: kind
+        for kind in (
+            *(station, board, overlay, pages, report, trials, library, calibration, dataset),
+            *(printout, ports, sampled, renderers, setup),
+        )
     }
     for name in sys.argv[1:] or kinds:
         if name not in kinds:

@@ -147,34 +147,6 @@ def settling(path: Path) -> None:
         open.photograph(path)
 
 
-def reach(path: Path) -> None:
-    """Where the arm grasps from above."""
-    with opened("tabletop_six", "panda_shelf") as open:
-        open.show("View")
-        open.check("Arm's reach")
-        open.until(lambda: open.tab.get_by_text("turn of the hand").count())
-        open.press("From the front")
-        open.photograph(path)
-
-
-def grasps(path: Path) -> None:
-    """How many grasps are clear and reachable, and what is in the way."""
-    with opened("tabletop_six", "panda_tabletop") as open:
-        place(open, {"bottle": (-0.08, 0.04, 0.0), "box": (0.02, 0.05, 20.0)})
-        open.session.select([])
-        open.show("Check")
-        open.check("Count grasps")
-        view = open.session.view
-        open.until(
-            lambda: (
-                open.session.view.grasps_revision == view.revision
-                and len(open.session.view.grasps) == len(view.instances)
-                and all(c.reachable is not None for c in open.session.view.grasps.values())
-            )
-        )
-        open.photograph(path)
-
-
 def backdrop(path: Path) -> None:
     """A photo of the real board under the objects that are already composed."""
     scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")
@@ -213,8 +185,6 @@ def setup(folder: Path, names: tuple[str, ...] = ()) -> None:
         "setup": whole_page,
         "setup_status": status,
         "setup_settle": settling,
-        "setup_grasps": grasps,
-        "setup_reach": reach,
         "setup_backdrop": backdrop,
     }
     for name in names or pictures:

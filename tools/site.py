@@ -32,6 +32,7 @@ from burg_drake.core.grasps.outcome import Outcome, Stage
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 BLOB = "https://github.com/burg-drake/burg_drake/blob/main/"
+TREE = "https://github.com/burg-drake/burg_drake/tree/main/"
 
 MAIN_NAMES = {
     "Load and save": "load_scene save_scene load_station load_library load_run load_campaign"
@@ -53,12 +54,12 @@ MAIN_NAMES = {
 PICTURES = {
     "01_library": "library.png",
     "02_scene": "station.png",
-    "03_trial": "lift_room.png",
+    "03_trial": "replay.png",
     "04_evaluate": "report.png",
     "05_own_diagram": "wsg.png",
     "06_grasps": "grasp_quality.png",
     "07_reach": "reachability.png",
-    "08_arm": "replay.png",
+    "08_arm": "film.webp",
     "09_board": "board_loop.png",
     "10_ports": "ports.png",
     "11_scenes": "sampled.png",
@@ -69,7 +70,7 @@ PICTURES = {
 COMMAND_PICTURES = {
     "burg-drake grasps show runs/first": ("grasps.png", "Grasps of a scene by outcome"),
     "burg-drake setup breakfast.yaml": ("setup.png", "A scene composed in the browser"),
-    "burg-drake printout tabletop_six --page A4 -o board.pdf": ("board.png", "The printed board"),
+    "burg-drake printout tabletop_six --page A2 -o board.pdf": ("board.png", "The printed board"),
     "burg-drake ar tabletop_six --camera sim:panda_tabletop/board": ("ar.png", "Live overlay"),
     "burg-drake compare runs/first trials.yaml --html compare.html": (
         "compare.png",
@@ -355,6 +356,7 @@ def _gallery_pages() -> Iterator[tuple[str, str]]:
         "# Gallery\n\n## Programs\n\nEach picture opens the program in `examples/` that it belongs"
         f" to.\n\n{_grid(cards)}\n## In 3D\n\n{_grid(live)}\n## Commands\n\n"
         + "\n".join(commands)
+        + f"\nAll pictures are made by the scripts in [tools/]({TREE}tools).\n"
         + f"\n```{{toctree}}\n:hidden:\n\n{toctree}\n```\n",
     )
 

@@ -103,6 +103,14 @@ def evaluate(
     nothing is left to do. It tries those grasps again whose worker process was ended from outside,
     for example because the memory ran out.
 
+    Example::
+
+        run = burg.evaluate("tabletop_six", "panda_tabletop", "runs/first")
+        for id in run.best(3):
+            print(id, run.row(id)["outcome"], run.row(id)["pad_force"])
+        mine = burg.GraspSet.load("grasps.h5")  # instead of sampled ones
+        burg.evaluate("tabletop_six", "panda_tabletop", "runs/mine", grasps=mine)
+
     Args:
         scene: as loaded, or a reference for `load_scene`; or several of them. Each is judged as it
             is on its own, in a folder of its own, and all by the same workers.

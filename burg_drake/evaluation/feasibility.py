@@ -77,6 +77,12 @@ def reach(
     straight retreat and lift; the arm can follow them; and it finds a way from home to where they
     begin.
 
+    Example::
+
+        grasps = burg.sample_grasps("tabletop_six", "panda_tabletop", 50)
+        judged = burg.reach("tabletop_six", "panda_tabletop", grasps)
+        good = judged.select(judged.column("outcome") == "reachable")
+
     Args:
         scene, station: as loaded, or references for `load_scene` and `load_station`.
         grasps: in the frames of their objects. A set goes to the instances that its column

@@ -94,6 +94,11 @@ def judge_again(
     is. A grasp that was judged again is not contested any more. An interrupted call goes on where
     it was.
 
+    Example::
+
+        run = burg.runs.judge_again("runs/first", engine="reference")
+        changed = run.results["outcome"] != run.results["outcome_before"]
+
     Args:
         run: of one scene or of many, complete; or its folder. Scenes of a run over many that could
             not be judged are left out.

@@ -106,6 +106,10 @@ def export_scene(
 ) -> Exported:
     """Writes a scene for another program: a folder that can be moved or zipped as it is.
 
+    Example::
+
+        burg.export_scene("tabletop_six", "for_mujoco", "mjcf", "panda_tabletop")
+
     Args:
         scene: what stands on the board. The board itself, which is paper, is left out.
         folder: new, empty, or an earlier export, which is replaced as a whole when the new one is

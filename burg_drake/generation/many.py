@@ -76,6 +76,12 @@ def sample_scenes(
 ) -> SampledFolder:
     """Samples scenes 0 to `count` - 1 of a recipe, but for those that the folder has.
 
+    Example::
+
+        library, station = burg.load_library("household"), burg.load_station("panda_tabletop")
+        recipe = burg.SceneRecipe(library="household", count=5, layout="packed")
+        burg.sample_scenes(recipe, library, station, "scenes", 100, workers=4)
+
     Args:
         recipe: how scenes are drawn; what it refers to is relative to the folder.
         library, station: those of the recipe.

@@ -217,6 +217,13 @@ def sample_scene(
 ) -> SampledScene:
     """Samples one scene of a recipe.
 
+    Example::
+
+        recipe = burg.SceneRecipe(library="household", count=5, layout="close", seed=3)
+        sampled = burg.sample_scene(recipe)
+        if sampled.accepted:
+            burg.save_scene(sampled.scene.document, "close.yaml")
+
     Args:
         recipe: how scenes are drawn.
         library: the object library; that of the recipe, from the current folder, if None.

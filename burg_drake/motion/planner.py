@@ -24,6 +24,13 @@ GRIP_TIME = 0.2
 class Planner:
     """Plans grasps of one scene.
 
+    Example::
+
+        planner = burg.Planner(burg.ArmReach("tabletop_six", "panda_tabletop"))
+        grasps = burg.sample_grasps("tabletop_six", "panda_tabletop", 20, only=["box"])
+        found = [planner.plan("box", X_OG) for X_OG in grasps.X_OG]
+        plans = [plan for plan in found if isinstance(plan, burg.Plan)]
+
     Attributes:
         reach: finds the paths.
         limits: of the arm.
@@ -147,6 +154,14 @@ def plan(
     timing: TimingSettings | None = None,
 ) -> Plan | Reach:
     """Plans a single grasp; `Planner` is for many of one scene.
+
+    Example::
+
+        found = burg.plan("tabletop_six", "panda_tabletop", "box", X_OG)  # in the box's frame
+        if isinstance(found, burg.Plan):
+            found.to_json("plan.json")
+        else:
+            print(found.outcome, found.blocker)
 
     Args:
         scene: where the target stands.

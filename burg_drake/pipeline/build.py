@@ -74,6 +74,12 @@ def build_library(
 ) -> BuildReport:
     """Builds or updates a library.
 
+    Example::
+
+        can = burg.ObjectSource.from_file("can.stl", scale=0.001, mass=0.35)  # millimetres
+        report = burg.build_library([can, "cup.obj"], "my_library")
+        print(report.built, report.failed)
+
     Args:
         sources: objects; a path stands for `ObjectSource.from_file(path)`.
         out: the library's folder; objects in it that are not among the sources stay.

@@ -22,6 +22,12 @@ NAME_PATTERN = re.compile(r"[a-z0-9][a-z0-9_]*")
 class ObjectSource:
     """An object to build.
 
+    Example::
+
+        mug = burg.ObjectSource.from_file("mug.obj", mass=0.3, friction=0.5)
+        crate = burg.ObjectSource.from_file("crate.stl", scale=0.001, fixed=True)  # millimetres
+        burg.build_library([mug, crate], "my_library")
+
     Attributes:
         name: of the library entry: lower-case letters, digits and underscores.
         mesh: mesh file, or a mesh in memory.

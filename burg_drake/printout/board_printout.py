@@ -120,6 +120,10 @@ class Printout:
 def print_board(scene: SceneLike, settings: PrintSettings | None = None) -> Printout:
     """Prints the board of a scene.
 
+    Example::
+
+        burg.print_board("tabletop_six").save("board.pdf")
+
     Args:
         scene: what reaches beyond the board is cut off, and an arrow points to it.
         settings: page and printer; A4 by default.

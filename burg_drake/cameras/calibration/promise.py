@@ -27,8 +27,7 @@ FARTHEST = np.radians(85.0)
 
 @dataclass(frozen=True, eq=False)
 class Promise:
-    """How far apart the true camera and the calibrated one show the same, at most, in 19 of 20
-    cases.
+    """How far apart the true and the calibrated camera show the same, in 19 of 20 cases at most.
 
     Attributes:
         parts: that bound by part of the image [pixels]; without parts that look farther than 85

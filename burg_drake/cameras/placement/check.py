@@ -60,6 +60,13 @@ def check_placement(
 ) -> PlacementCheck:
     """Measures how far the objects of a real scene stand from their targets.
 
+    Example::
+
+        camera = burg.cameras.load_intrinsics("K.yaml")
+        check = burg.cameras.check_placement("breakfast.yaml", photo, camera)  # (H, W, 3) RGB
+        for name, placed in check.instances.items():
+            print(name, placed.status, placed.displacement)
+
     Args:
         scene: the targets.
         image: (H, W, 3) RGB photo of the scene on its board.

@@ -74,8 +74,10 @@ class CameraPlace:
 
 @dataclass(frozen=True, kw_only=True)
 class Placement:
-    """Where one object is, compared with where it should be. The displacement is that of a
-    reference point on the object: the middle of its outline from above, or its axis of symmetry.
+    """Where one object is, compared with where it should be.
+
+    The displacement is that of a reference point on the object: the middle of its outline from
+    above, or its axis of symmetry.
 
     Attributes:
         object: name of the object in the library.

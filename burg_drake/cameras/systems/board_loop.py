@@ -126,6 +126,13 @@ def build_board_loop(
 ) -> BoardLoop:
     """Builds the diagram of a station whose camera looks at the board.
 
+    Example::
+
+        loop = burg.cameras.build_board_loop("tabletop_six", "panda_tabletop", camera="board")
+        context = loop.diagram.CreateDefaultContext()
+        estimate = loop.diagram.GetOutputPort("board.estimate").Eval(context)
+        overlay = loop.diagram.GetOutputPort("overlay_image").Eval(context).data
+
     Args:
         scene: what stands on the board, and is drawn over the image at its place.
         station: has the camera.

@@ -49,8 +49,9 @@ class SnapToContact:
 
 @dataclass(frozen=True)
 class PutDown:
-    """Lowers objects until they stand on the board or on what is below; what is in the board is
-    lifted out of it.
+    """Lowers objects until they stand on the board or on what is below.
+
+    What is in the board is lifted out of it.
 
     Attributes:
         names: instances; each goes down on its own, the lowest one first.

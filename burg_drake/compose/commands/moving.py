@@ -53,8 +53,10 @@ class MoveObjects:
 
 @dataclass(frozen=True)
 class SetPose:
-    """Puts objects into a stable pose. Each keeps where its centre of mass is above the board, its
-    yaw, and the height that it stands at.
+    """Puts objects into a stable pose.
+
+    Each keeps where its centre of mass is above the board, its yaw, and the height that it stands
+    at.
 
     Attributes:
         names: instances.

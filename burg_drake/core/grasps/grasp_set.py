@@ -23,6 +23,12 @@ from burg_drake.core.grasps.storage import FIXED, FIXED_COLUMNS, read_arrays, wr
 class GraspSet:
     """N grasps, possibly of several objects.
 
+    Example::
+
+        grasps = burg.GraspSet.create(X_OG, object="mug", score=scores)  # (N, 4, 4) and (N,)
+        grasps = grasps.select(grasps.score > 0.5)
+        grasps.save("grasps.h5")
+
     Attributes:
         X_OG: (N, 4, 4) grasp poses in the object frame.
         width: (N,) distance between the contacts along the closing direction [m]; NaN if unknown.

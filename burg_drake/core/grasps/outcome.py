@@ -148,8 +148,10 @@ UNTRIED = ("", Outcome.REACHABLE.value)
 
 
 class RealOutcome(StrEnum):
-    """How a trial on the robot ended: the simulator's vocabulary, as far as a person or a robot can
-    see it, and what only reality has.
+    """How a trial on the robot ended.
+
+    The words are the simulator's, as far as a person or a robot can see what they mean, and those
+    for what only reality has.
 
     Those that an operator tells apart at a glance come first: messages begin with them.
     """

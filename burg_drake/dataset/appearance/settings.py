@@ -16,8 +16,9 @@ MOST_DISTRACTORS = 50
 
 @dataclass(frozen=True, kw_only=True)
 class AppearanceSettings:
-    """Ranges from which the looks of scenes are drawn. Pairs are the smallest and the largest
-    value.
+    """Ranges from which the looks of scenes are drawn.
+
+    Pairs are the smallest and the largest value.
 
     Attributes:
         lights: number of lights, besides a weak one at the camera; the usual lights if null.

@@ -31,8 +31,9 @@ def write_card(
     facts: Mapping[str, str] | None = None,
     licences: Mapping[str, str] | None = None,
 ) -> None:
-    """Writes `README.md` and the folder `card` with its pictures, beside a data set; an earlier
-    card is replaced.
+    """Writes the card of a data set: `README.md`, and the folder `card` with its pictures.
+
+    An earlier card is replaced.
 
     Args:
         samples: the data set.

@@ -100,8 +100,9 @@ def write_graspnet(
     opening: float | None = None,
     sensor_depth: bool = False,
 ) -> tuple[str, ...]:
-    """Writes a data set in the layout of GraspNet-1Billion. Object ids are positions in
-    `samples.objects`, from 0; views are counted from 0 in each scene.
+    """Writes a data set in the layout of GraspNet-1Billion.
+
+    Object ids are positions in `samples.objects`, from 0; views are counted from 0 in each scene.
 
     Args:
         samples: with colour, depth and labels.

@@ -76,6 +76,11 @@ def generate_dataset(
 ) -> GeneratedDataset:
     """Makes the samples of many scenes, but for those that the folder has.
 
+    Example::
+
+        recipe = burg.dataset.DatasetRecipe(views=20)
+        burg.generate_dataset(["tabletop_six"], "panda_tabletop", "my_dataset", recipe)
+
     Args:
         scenes: given ones, with files, all of one library; or the library that scenes are sampled
             from, as `recipe.sampled` says.

@@ -20,8 +20,10 @@ from burg_drake.station.document import MAX_SIDE
 
 @dataclass(frozen=True, kw_only=True)
 class DatasetRecipe:
-    """How a data set is made from scenes. Each sample follows from the numbers of its scene and
-    view; it is the same on any number of workers.
+    """How a data set is made from scenes.
+
+    Each sample follows from the numbers of its scene and view; it is the same on any number of
+    workers.
 
     Attributes:
         seed: seed of all random choices; another one gives other views and looks.

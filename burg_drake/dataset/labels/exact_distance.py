@@ -45,8 +45,10 @@ def exact_tsdf(
     voxels: int = VOXELS,
     truncation: float | None = None,
 ) -> Tsdf:
-    """Signed distances to the nearest surface of all instances, background included, and of a
-    station's obstacles: all that depth images show but for the arm and distractors.
+    """Signed distances to the nearest surface of a scene.
+
+    Surfaces are those of all instances, background included, and of a station's obstacles: all that
+    depth images show but for the arm and distractors.
 
     Args:
         scene: has the instances at their places.

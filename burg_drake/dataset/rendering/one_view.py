@@ -25,6 +25,11 @@ def render(
 ) -> Images:
     """What a camera sees of a scene on a station.
 
+    Example::
+
+        images = burg.render("tabletop_six", "panda_tabletop", "board", ["depth", "labels"])
+        print(images.depth.max(), images.labels.max())
+
     Args:
         scene: what stands on the board.
         station: what is around it.

@@ -245,8 +245,16 @@ class Dataset(Sequence[Sample]):
 
 
 def load_dataset(folder: str | Path) -> Dataset:
-    """Opens a data set for reading. No shard is looked at yet: one that is damaged is named when a
-    sample of it is read, and all others can be.
+    """Opens a data set for reading.
+
+    No shard is looked at yet: one that is damaged is named when a sample of it is read, and all
+    others can be.
+
+    Example::
+
+        samples = burg.load_dataset("my_dataset")
+        images = samples.read(0, images=("color", "depth", "labels")).images
+        print(len(samples), images.color.shape)
 
     Args:
         folder: of the data set.

@@ -19,8 +19,9 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True, kw_only=True)
 class ViewpointSettings:
-    """How views of a scene are drawn. A view looks at a point near the mean of the objects'
-    centres.
+    """How views of a scene are drawn.
+
+    A view looks at a point near the mean of the objects' centres.
 
     Attributes:
         cameras: cameras, each with the same probability: `sphere` (around the scene), `wrist` (on

@@ -89,6 +89,11 @@ def read_grasps(
     in one frame for all, a camera's or a world's, go to the instance that they hold; see
     `candidates.scene_frame.held_instances`.
 
+    Example::
+
+        given = burg.grasps.read_grasps("tabletop_six", "graspnet.npy", X_SF=X_SC)  # of the camera
+        burg.evaluate("tabletop_six", "panda_tabletop", "runs/network", grasps=given.by_instance)
+
     Args:
         scene: the scene.
         path: a file of any format in `formats.grasp_files`, or the folder of a run.

@@ -33,6 +33,12 @@ def sample_grasps(
 ) -> GraspSet:
     """Samples antipodal grasps on the free objects of a scene, or on those of a library.
 
+    Example::
+
+        settings = burg.SamplingSettings(from_arm_side=True)
+        grasps = burg.sample_grasps("tabletop_six", "panda_tabletop", 200, settings=settings)
+        grasps.save("grasps.h5")
+
     Args:
         source: the scene, or the library, in which objects lie nowhere.
         station: gives the hand and, in a scene, the place of the arm.

@@ -48,6 +48,12 @@ def scored_set(
 ) -> GraspSet:
     """Adds the metrics of `grasping.quality`, and in a scene the clearance of the open hand.
 
+    Example::
+
+        library, grasps = burg.load_library("household"), burg.GraspSet.load("grasps.h5")
+        scored = burg.grasps.scored_set(grasps, library, "panda_tabletop", by="epsilon")
+        best = scored.select(scored.score.argsort()[::-1][:10])
+
     Args:
         grasps: in the frames of their objects.
         library: has the objects.

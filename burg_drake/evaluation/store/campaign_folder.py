@@ -162,6 +162,12 @@ class Campaign:
 def load_campaign(path: str | Path) -> Campaign:
     """Reads a run over many scenes, complete or not.
 
+    Example::
+
+        campaign = burg.load_campaign("runs/many")
+        for run in campaign.runs:
+            print(run.path.name, run.best(3))
+
     Raises:
         InvalidInputError: there is none.
         DocumentError: its campaign.yaml does not fit the schema.

@@ -35,8 +35,14 @@ def load_runs(path: str | Path) -> list[Run]:
 
 
 def read_results(path: str | Path, names: Sequence[str] | None = None) -> Columns:
-    """Columns of all judged grasps in a folder, see `evaluation.records.table`; `run` and `id`
-    together name a row.
+    """Reads columns of all judged grasps in a folder.
+
+    `run` and `id` together name a row.
+
+    Example::
+
+        columns = burg.read_results("runs/first", ["object", "outcome", "clearance"])
+        lifted = columns["object"][columns["outcome"] == "lifted"]
 
     Args:
         path: folder of a run, of one scene or of many.

@@ -273,6 +273,11 @@ class Run:
 def load_run(path: str | Path) -> Run:
     """Reads a run, complete or not.
 
+    Example::
+
+        run = burg.load_run("runs/first")
+        print(len(run.verdicts), run.results["outcome"])
+
     Args:
         path: its folder.
 

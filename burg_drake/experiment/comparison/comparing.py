@@ -29,6 +29,11 @@ def compare(
 ) -> Comparison:
     """Compares a run with trials on the robot or with another run, or two runs with trials.
 
+    Example::
+
+        found = burg.trials.compare("runs/first", "trials.yaml").judgement
+        print(found.selected.precision.value, found.selected.precision.low)
+
     Args:
         first: run whose verdicts are taken as predictions, or its folder.
         second: a trials file, or a run of the same grasps, which then counts as what happened.

@@ -60,8 +60,9 @@ class SecondVerdicts:
 
 @dataclass(frozen=True, kw_only=True)
 class MarginDifference:
-    """How far apart two runs measure a margin of grasps that both executed; in the unit of its
-    column.
+    """How far apart two runs measure a margin of grasps that both executed.
+
+    All is in the unit of its column.
 
     Attributes:
         name: of the margin.
@@ -80,8 +81,9 @@ class MarginDifference:
 
 @dataclass(frozen=True, kw_only=True)
 class RunAgreement:
-    """Agreement of two runs on what is held: `lifted`, `lifted_disturbed` and `lifted_turned` are,
-    whatever counts as success elsewhere.
+    """Agreement of two runs on what is held.
+
+    `lifted`, `lifted_disturbed` and `lifted_turned` are, whatever counts as success elsewhere.
 
     Attributes:
         alike: share of the grasps that both hold, or both do not, with Wilson's interval.

@@ -48,6 +48,11 @@ def plan_trials(
 ) -> TrialSheet:
     """Chooses grasps for trials on the robot.
 
+    Example::
+
+        few = burg.trials.SelectionSettings(per_object=4)
+        sheet = burg.trials.plan_trials("runs/first", settings=few, out="trials.yaml")
+
     Args:
         runs: one or several, of one scene or of many, or their folders. A grasp that several have
             judged on the same scene and station is tried once.

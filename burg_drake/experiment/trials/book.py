@@ -53,6 +53,12 @@ class TrialChanged(InvalidInputError):
 class TrialBook:
     """A trials file on disk.
 
+    Example::
+
+        book = burg.trials.TrialBook("trials.yaml")
+        print(book.trial("next").grasp)
+        book.record("next", outcome="lifted", operator="Ada")
+
     Attributes:
         path: the file.
     """

@@ -33,6 +33,12 @@ def load_plan(
 ) -> Plan:
     """Reads what `Plan.to_json` or `Plan.to_csv` has written.
 
+    Example::
+
+        plan = burg.load_plan("plan.json", station="panda_tabletop")
+        for name, phase in plan.phases.items():
+            print(name, phase.duration, phase.q[-1])
+
     Args:
         path: the file; a name that ends in .csv is that of a table.
         scene, station: what the plan has to be for, if given.

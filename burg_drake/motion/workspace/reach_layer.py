@@ -86,8 +86,9 @@ def reach_from_above(
     spacing: float = 0.02,
     yaws: int = 4,
 ) -> ReachLayer:
-    """Asks where over an empty board the arm grasps straight from above; an answer that was given
-    before comes from the user's cache.
+    """Asks where over an empty board the arm grasps straight from above.
+
+    An answer that was given before comes from the user's cache.
 
     Args:
         station: arm, hand, obstacles, and the hand's ways to a grasp and away from it.

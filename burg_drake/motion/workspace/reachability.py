@@ -153,8 +153,9 @@ class ReachabilityMap:
 def map_reachability(
     scene: SceneLike, station: StationLike, *, settings: ReachabilitySettings | None = None
 ) -> ReachabilityMap:
-    """Maps what an arm reaches over the board of a scene, in between the scene's objects; what was
-    mapped before comes from the user's cache.
+    """Maps what an arm reaches over the board of a scene, in between the scene's objects.
+
+    What was mapped before comes from the user's cache.
 
     Args:
         scene: its board, and all that stands on it as the document places it; `cleared` takes the

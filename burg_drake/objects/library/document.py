@@ -174,6 +174,12 @@ class ObjectLibrary:
 def load_library(reference: str | Path, base: Path | None = None) -> ObjectLibrary:
     """Loads a library.
 
+    Example::
+
+        library = burg.load_library("household")
+        mug = library.entry("mug")
+        print(mug.mass, [pose.probability for pose in mug.stable_poses])
+
     Args:
         reference: the library's folder or its `library.yaml`; a bare name such as `household` for
             a built-in one; or `package://burg_drake/models/...`.

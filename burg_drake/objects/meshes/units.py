@@ -24,6 +24,11 @@ USUAL_EXTENT = (0.01, 1.0)
 def unit_scale(name: str) -> float:
     """Factor from a unit to metres.
 
+    Example::
+
+        scale = burg.objects.unit_scale("mm")
+        can = burg.ObjectSource.from_file("can.stl", scale=scale, mass=0.35)
+
     Args:
         name: a key of `UNITS`, such as `mm`.
 

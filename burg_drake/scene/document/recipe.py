@@ -16,8 +16,9 @@ ATTEMPTS = 100
 
 @dataclass(frozen=True, kw_only=True)
 class SceneRecipe:
-    """How scenes are drawn. Files have all of its values, because defaults may change between
-    versions.
+    """How scenes are drawn.
+
+    Files have all of its values, because defaults may change between versions.
 
     Attributes:
         library: object library: its folder, relative to this file, or the name of a built-in one.

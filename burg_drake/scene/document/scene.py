@@ -165,6 +165,11 @@ def load_scene(
 ) -> Scene:
     """Loads a scene and its library.
 
+    Example::
+
+        scene = burg.load_scene("tabletop_six")  # built in; or a path
+        print(list(scene.instances), scene.X_SO("mug")[:3, 3])
+
     Args:
         reference: path of a scene file, or the bare name of a built-in scene.
         library: loads a library, by its reference and the folder that this is relative to.
@@ -217,5 +222,11 @@ def as_scene(scene: SceneLike) -> Scene:
 
 
 def save_scene(document: SceneDocument, path: str | Path) -> None:
-    """Writes a scene file; see `core.documents.schema.save_document`."""
+    """Writes a scene file.
+
+    Example::
+
+        scene = burg.sample_scene(burg.SceneRecipe(library="household", count=4)).scene
+        burg.save_scene(scene.document, "sampled.yaml")
+    """
     save_document(document, path)

@@ -88,6 +88,11 @@ def settle_scene(
     has fallen below the table's top is taken out of the simulation. Turning is braked a little, see
     `BRAKING_TIME`; what is at rest does not notice.
 
+    Example::
+
+        settled = burg.settle_scene("breakfast.yaml", "panda_tabletop")
+        burg.save_scene(settled.scene.document, "settled.yaml")
+
     Args:
         scene: the scene; objects may be in the air, but not in one another.
         station: table and pose of the board.

@@ -42,6 +42,14 @@ APART = 1e-6
 class ArmTrial(DrakeTrial):
     """Executes plans in one scene with the whole robot.
 
+    Example::
+
+        scene, station = burg.load_scene("tabletop_six"), burg.load_station("panda_tabletop")
+        X_OG = burg.sample_grasps(scene, station, 1, only=["box"]).X_OG[0]
+        plan = burg.plan(scene, station, "box", X_OG)
+        if isinstance(plan, burg.Plan):
+            print(burg.ArmTrial(scene, station).run("box", X_OG, plan).outcome)
+
     Args:
         scene: the scene.
         station: a station with an arm.

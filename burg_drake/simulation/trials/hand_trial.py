@@ -84,6 +84,13 @@ class HandTrial(HandAloneTrial[TrialWorld], DrakeTrial):
     the approach, and goes straight in with open fingers, as fast as it lifts. What it meets on the
     way is pushed, or stops it, as in the trial of the whole arm.
 
+    Example::
+
+        trial = burg.HandTrial("tabletop_six", "panda_tabletop")
+        grasps = burg.sample_grasps("tabletop_six", "panda_tabletop", 10, only=["mug"])
+        for X_OG in grasps.X_OG:
+            print(trial.run("mug", X_OG).outcome)
+
     Args:
         scene: the scene.
         station: table, board pose and hand.

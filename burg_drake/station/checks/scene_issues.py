@@ -22,8 +22,15 @@ from burg_drake.station.document import StationLike, as_station
 
 
 def check_scene(scene: SceneLike, station: StationLike) -> tuple[SceneIssue, ...]:
-    """All that `validate_scene` checks, overlaps with other objects and with the station, and
-    overlaps of the objects' true surfaces.
+    """Finds what is wrong with a scene on a station.
+
+    That is what `burg.scenes.validate_scene` checks, overlaps with other objects and with the
+    station, and overlaps of the objects' true surfaces.
+
+    Example::
+
+        for issue in burg.check_scene("breakfast.yaml", "panda_tabletop"):
+            print(issue.message)
 
     Args:
         scene: the scene.

@@ -86,6 +86,12 @@ def build_station_diagram(
 
     Objects are rigid, but those that touch other objects are compliant (see `diagram.leaning`).
 
+    Example::
+
+        built = burg.build_station_diagram("tabletop_six", "panda_tabletop", robot="none")
+        simulator = Simulator(built.diagram)  # of pydrake.systems.analysis
+        simulator.AdvanceTo(0.5)
+
     Args:
         scene: what stands on the board.
         station: robot, table, board pose and cameras.

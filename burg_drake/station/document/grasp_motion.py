@@ -33,8 +33,9 @@ def _length(default: float | None, field: str, help: str, name: str = "") -> Any
 
 @dataclass(frozen=True, kw_only=True)
 class GraspMotion:
-    """Straight segments of the hand: from the pregrasp to the grasp, back by the retreat, and up by
-    the lift.
+    """How the hand goes straight to a grasp and away from it.
+
+    From the pregrasp to the grasp, back by the retreat, and up by the lift.
 
     The defaults are those of Rudorfer et al., "BURG-Toolkit" (2022). MoveIt calls `least_lift` the
     minimum and `lift_height` the desired distance of the post-grasp retreat.

@@ -121,8 +121,9 @@ class Table:
 
 @dataclass(frozen=True, kw_only=True)
 class Camera:
-    """A camera fixed in the world, with pinhole intrinsics as in OpenCV (pixel centres at
-    integers).
+    """A camera fixed in the world, with pinhole intrinsics.
+
+    As in OpenCV, pixel centres are at integers.
 
     Attributes:
         X_WC: pose of the optical frame in the world: z forward, x right, y down.
@@ -298,6 +299,11 @@ class Station:
 
 def load_station(reference: str | Path) -> Station:
     """Loads a station and its hand.
+
+    Example::
+
+        station = burg.load_station("panda_tabletop")  # built in; or a path
+        print(station.hand.opening, list(station.document.cameras))
 
     Args:
         reference: path of a station file, or the bare name of a built-in station.
