@@ -57,7 +57,7 @@ def test_formats_of_one_object_are_told_beforehand(name: str) -> None:
         output.require_fits(["a", "b"])
         format.write(of("a", "b"), Path(path), PANDA)
         return
-    with pytest.raises(InvalidInputError, match=r"of 2 objects \(a, b\).* name a folder.*: x/"):
+    with pytest.raises(InvalidInputError, match=r"of 2 \(a, b\).* folder .*: x/"):
         output.require_fits(["a", "b"])
     with pytest.raises(InvalidInputError, match="of 2 objects"):
         format.write(of("a", "b"), Path(path), PANDA)

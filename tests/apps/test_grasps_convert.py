@@ -135,7 +135,7 @@ def test_the_hand_is_that_of_the_set(mug: str, capsys: pytest.CaptureFixture[str
     lost = GraspSet.create(np.eye(4), object="a", provenance={"hand": {"name": "gone_hand"}})
     lost.save("lost.h5")
     assert convert("lost.h5", "l.yaml", "--to", "isaac_grasp") == 2
-    assert "lost.h5 has grasps for a hand that cannot be used" in capsys.readouterr().err
+    assert "the hand that lost.h5 names cannot be used" in capsys.readouterr().err
 
 
 def test_formats_are_listed(capsys: pytest.CaptureFixture[str]) -> None:

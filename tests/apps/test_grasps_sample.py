@@ -165,7 +165,7 @@ def test_nothing_is_sampled_in_vain(
     monkeypatch.delattr(sampling, "sample_on_scene")
     (tmp_path / "file").write_text("")
     for out, message in (
-        (("x.h5", "--to", "acronym"), "the grasps are of 2 objects (bottle, mug)"),
+        (("x.h5", "--to", "acronym"), "grasps of one object, and these are of 2 (bottle, mug)"),
         ((tmp_path / "file" / "x.h5",), "cannot write"),
         ((tmp_path,), "is a folder; say in which format to write (--to)"),
     ):

@@ -65,7 +65,7 @@ def test_robustness_as_far_as_it_needs_no_drake(
     shutil.copytree(mujoco_run.path, folder)
     options = ["robustness", str(folder), "--workers", "1", "--quiet", "--repeats", "2"]
     assert main(options) == 2
-    message = "tug and shake are simulated by Drake alone, and "
+    message = "tug and shake need Drake, but "
     err = capsys.readouterr().err
     assert message in err and "was judged by engine mujoco; give the tests friction,noise" in err
     assert main([*options, "--tests", "friction,noise"]) == 0
@@ -75,7 +75,7 @@ def test_robustness_as_far_as_it_needs_no_drake(
 def test_the_arm_is_drakes(tmp_path: Path, capsys: Capture) -> None:
     arguments = ["evaluate", "tabletop_six", "-o", str(tmp_path / "run"), "--engine", "mujoco"]
     assert main([*arguments, "--mode", "arm"]) == 2
-    message = "mode arm is simulated by Drake (reference, standard, screening); use mode reach"
+    message = "mode arm needs an engine of Drake (reference, standard, screening)"
     assert message in capsys.readouterr().err
     assert not (tmp_path / "run").exists()
 

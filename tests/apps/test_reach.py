@@ -46,7 +46,7 @@ def test_a_table_and_plans(grasps: Path, tmp_path: Path, capsys: Capture) -> Non
     out = capsys.readouterr().out
     rows = [line.split() for line in out.splitlines() if line.strip()]
     assert ["box", "2", "1", "1", "100", "%"] in rows and ["mug", "0", "0", "0", "-"] in rows
-    assert "note: no grasps to judge for mug" in out
+    assert "note: there are no grasps to judge for mug" in out
     assert ["reachable", "·", "1", "1", "50.0", "%"] in rows
     assert ["collision_target", "·", "1", "1", "50.0", "%", "box", "(1)"] in rows
     assert "clear grasps per CPU second" in out and f"1 plans are in {plans}" in out
@@ -97,8 +97,8 @@ def test_plans_of_an_earlier_call_are_left_alone(
     (tmp_path / "plans" / "box-1.csv").write_text("")
     assert reach(grasps, "--plans", str(tmp_path / "plans")) == 2
     assert capsys.readouterr().err == (
-        f"burg-drake: error: folder {tmp_path / 'plans'} is not empty, it has box-1.csv, and"
-        " no plans.yaml; plans go to a folder of their own: choose another one, or empty it\n"
+        f"burg-drake: error: folder {tmp_path / 'plans'} has box-1.csv in it, but"
+        " no plans.yaml; plans need a folder of their own: choose another one, or empty it\n"
     )
 
 

@@ -205,7 +205,7 @@ def test_what_mujoco_judged_again_is_not_tugged(run: Run, tmp_path: Path) -> Non
     (id,) = run.best()
     with Journal(tmp_path / "run" / "journal.jsonl") as journal:
         journal.append(id, dataclasses.replace(run.verdicts[id], judged_again="mujoco"))
-    with pytest.raises(InvalidInputError, match=f"Drake alone, and {id} was judged by engine muj"):
+    with pytest.raises(InvalidInputError, match=f"need Drake, but {id} was judged by engine muj"):
         assess_robustness(tmp_path / "run", workers=1, progress=False)
 
 
@@ -213,12 +213,12 @@ def test_what_mujoco_judged_again_is_not_tugged(run: Run, tmp_path: Path) -> Non
     ("options", "message"),
     [
         (["--grasp", "box-nothing"], "has no judged grasp 'box-nothing'"),
-        (["--grasp", "COLLIDING"], "was not lifted (collision_target); robustness is tested of"),
+        (["--grasp", "COLLIDING"], "was not lifted (collision_target); robustness tests need"),
         (["--tests", "tug,pull"], "'pull' is none of tug, shake, friction, noise"),
         (["--repeats", "0"], "'0' is not a whole number from 1"),
         (["--translation-mm", "-1"], "-1 is below 0"),
         (["--best", "2", "--grasp", "a"], "not allowed with argument --best"),
-        (["-o", "rob"], "rob is not a table of a known format; give a file that ends in .csv or"),
+        (["-o", "rob"], "rob: the suffix does not say the format of the table; give a file that ends in .csv or"),
         (
             ["-o", "RUN/results.csv"],
             "results.csv belongs to the run itself; choose another file (--output)",

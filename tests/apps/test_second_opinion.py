@@ -74,7 +74,7 @@ def test_nothing_is_judged_where_the_request_contradicts_itself(
     assert "merge the shards first" in capsys.readouterr().err
     arm = ["--rejudge", "contested", "--engine", "mujoco", "--mode", "arm"]
     assert main([*command, *arm]) == 2
-    assert "mode arm is simulated by Drake" in capsys.readouterr().err
+    assert "mode arm needs an engine of Drake" in capsys.readouterr().err
     assert not (tmp_path / "run").exists()
 
 

@@ -96,7 +96,7 @@ def test_a_taken_port(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         assert main(["setup", "--port", str(port)]) == 2
-    assert f"port {port} of 127.0.0.1 is in use; give another" in capsys.readouterr().err
+    assert f"port {port} of 127.0.0.1 is in use; choose another" in capsys.readouterr().err
 
 
 def test_without_viser(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -216,7 +216,7 @@ def test_objects_without_a_clear_grasp_have_a_line(capsys: pytest.CaptureFixture
         assert row.split() in rows
     assert [line for line in out.splitlines() if line.startswith("note: ")] == [
         "note: mug: none of 3 grasps is clear: the open hand hits the table in 2, the open hand"
-        " hits the object itself in 1; sample grasps at which the hand is clear, which is the"
+        " hits the object itself in 1; sample grasps at which the hand is clear, as is the"
         " default",
         "note: can: none of 1 grasp is reachable: lift line in 1; a shorter lift (least_lift)"
         " may help",

@@ -107,7 +107,7 @@ def test_the_report_tells_how_the_arm_did(run: Run) -> None:
     page = run.report_path.read_text()
     for text in (
         "What stopped the arm",
-        "Of 1 grasps at which the open hand is clear, the arm can execute 1 (100 %)",
+        "The open hand is clear at 1 grasps. The arm can execute 1 of them",
         "Execution by the arm",
         "by the whole arm",
     ):

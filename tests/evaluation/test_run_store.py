@@ -136,7 +136,7 @@ def test_what_is_no_run_is_said(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError, match=r"results.csv is a file; give the folder of a run"):
         load_run(tmp_path / "results.csv")
     (tmp_path / "run.yaml").write_text("version: 1\nsceen: {}\n")
-    with pytest.raises(DocumentError, match=r"run.yaml:2: sceen: unknown key|unknown key 'sceen'"):
+    with pytest.raises(DocumentError, match=r"run.yaml:1: not a run document"):
         load_run(tmp_path)
 
 

@@ -47,7 +47,7 @@ def test_stems_without_letters() -> None:
             "box: rgba is (1.0, 0.0, 0.0, 2.0); each number must be from 0 to 1",
         ),
         ({"name": "My Box"}, "'My Box' is not a valid object name; use a-z, 0-9 and underscores"),
-        ({"name": "../x"}, "'../x' is not a valid object name; object"),
+        ({"name": "../x"}, "'../x' is not a valid object name; use a-z"),
     ],
 )
 def test_numbers_that_no_object_has(change: dict, message: str) -> None:  # type: ignore[type-arg]

@@ -267,7 +267,7 @@ def test_what_is_beyond_the_board() -> None:
     fixed = changed(scene, instances=(away, over), background=(shelf,))
     printout = print_board(fixed, PrintSettings(page="A2"))
     stray, bowl, rest = printout.warnings
-    assert "'stray' is out of bounds: 2.44 m over the right edge" in stray
+    assert "'stray' is off the board: 2.44 m over the right edge" in stray
     assert "'over' is out of bounds: 70.0 mm over the upper edge" in bowl
     assert "of 'shelf' lie in the margin of the page; larger pages have room" in rest
     (text,) = words(printout.pdf)

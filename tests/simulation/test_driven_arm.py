@@ -210,7 +210,7 @@ def test_plans_that_cannot_be_played(built: StationDiagram, plan: Plan) -> None:
     assert "the plan is for station as it was before a change (content 1), not for" in message(
         replace(plan, origin=other)
     )
-    assert "the port 'plan' got a Trajectory; it takes a burg_drake Plan" in message(plan.lift)
+    assert "port 'plan' got a Trajectory; give a burg_drake Plan" in message(plan.lift)
     no = Reach(Outcome.NO_IK)
     assert "the port 'plan' got a Reach (no_ik); it takes a burg_drake Plan" in message(no)
     six = replace(plan.transfer, q=plan.transfer.q[:, :6], v=plan.transfer.v[:, :6])
