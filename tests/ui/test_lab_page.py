@@ -33,7 +33,7 @@ def test_clicks_survive_the_death_of_the_server(page: Page, trials: Path) -> Non
     expect(page.locator("#width")).to_have_value("abc")
     expect(number).to_have_text("1")
     page.fill("#width", "500")
-    expect(page.locator("#widthnote")).to_have_text("The hand opens 80 mm; is 500 right?")
+    expect(page.locator("#widthnote")).to_have_text("The hand opens only 80 mm. Is 500 mm right?")
     page.click('[data-outcome="slipped"]')
     expect(number).to_have_text("2")
     expect(saved).to_have_text("All saved")

@@ -137,7 +137,7 @@ def test_a_random_configuration_is_one_step(session: ComposeSession, client: Pag
     client.give(FILL, "Objects", 60)
     client.click(FILL, "Shuffle")
     until(lambda: client.told, "a word")
-    assert "That cannot be done: 60 different objects are asked for" in client.told[0]
+    assert "That cannot be done: 60 different objects were asked for" in client.told[0]
     assert not session.view.instances
 
 
