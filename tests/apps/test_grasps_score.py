@@ -58,7 +58,10 @@ def test_other_formats(grasp_file: Path, tmp_path: Path, capsys: Capture) -> Non
     capsys.readouterr()
     for options, message in (
         ((tmp_path / "x.yaml",), "give the format (--to)"),
-        ((tmp_path / "x.yaml", "--to", "isaac_grasp"), "grasps of one object, and these are of 2 (box, can)"),
+        (
+            (tmp_path / "x.yaml", "--to", "isaac_grasp"),
+            "grasps of one object, and these are of 2 (box, can)",
+        ),
         ((tmp_path / "x.csv",), "VGN and GIGA has grasps in the world frame"),
         ((grasp_file / "x.h5",), "cannot write"),
     ):

@@ -218,7 +218,10 @@ def test_what_mujoco_judged_again_is_not_tugged(run: Run, tmp_path: Path) -> Non
         (["--repeats", "0"], "'0' is not a whole number from 1"),
         (["--translation-mm", "-1"], "-1 is below 0"),
         (["--best", "2", "--grasp", "a"], "not allowed with argument --best"),
-        (["-o", "rob"], "rob: the suffix does not say the format of the table; give a file that ends in .csv or"),
+        (
+            ["-o", "rob"],
+            "rob: the suffix does not say the format of the table; give a file that ends in .csv",
+        ),
         (
             ["-o", "RUN/results.csv"],
             "results.csv belongs to the run itself; choose another file (--output)",

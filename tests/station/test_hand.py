@@ -263,8 +263,16 @@ def changed_model(folder: Path, old: str, new: str) -> Path:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        (MIMIC, MIMIC.replace('"1"', '"0.5"'), "the mimic joint of the model moves the fingers in another"),
-        (MIMIC, MIMIC.replace('"1"', '"-1"'), "the mimic joint of the model moves the fingers in another"),
+        (
+            MIMIC,
+            MIMIC.replace('"1"', '"0.5"'),
+            "the mimic joint of the model moves the fingers in another",
+        ),
+        (
+            MIMIC,
+            MIMIC.replace('"1"', '"-1"'),
+            "the mimic joint of the model moves the fingers in another",
+        ),
         (COMPLIANT, "", r"fingers\[0\].pad 'pad' is not compliant; give it drake:compliant_hydroe"),
         (COMPLIANT, "<drake:rigid_hydroelastic/>", r"fingers\[0\].pad 'pad' is not compliant"),
         ('name="pad"', 'name="tip"', r"fingers\[0\].pad 'pad' is not in its model"),
