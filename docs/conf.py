@@ -40,7 +40,6 @@ autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True
 autodoc_class_signature = "mixed"
 python_use_unqualified_type_names = True
-python_maximum_signature_line_length = 88
 napoleon_use_rtype = False
 napoleon_custom_sections = [
     (f"{way} port{s}", "params_style") for way in ("Input", "Output") for s in ("", "s")
@@ -55,6 +54,7 @@ html_title = f"burg_drake {version}"
 html_baseurl = "https://burg-drake.github.io/burg_drake/"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_js_files = ["site.js"]
 html_show_sphinx = False
 html_copy_source = False
 html_theme_options = {
