@@ -103,7 +103,7 @@ def test_metadata() -> None:
 
 @wheel_only
 def test_links_of_the_readme_lead_somewhere_from_pypi_too() -> None:
-    text = importlib.metadata.metadata("burg-drake").get_payload()
+    text = importlib.metadata.metadata("burg-drake")["Description"]
     links = re.findall(r"\]\(([^)]+)\)", text)
     assert links and all(link.startswith("https://") for link in links)
 

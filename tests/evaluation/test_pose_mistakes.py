@@ -26,6 +26,7 @@ from burg_drake.formats.common.grasp_format import PANDA
 from burg_drake.formats.grasp_files import FORMATS, write_grasp_file
 from burg_drake.scene.document.scene import Scene, load_scene
 from burg_drake.station.document.station_document import Station, load_station
+from tests.thorough import thorough
 
 
 def pose(euler_deg: tuple[float, float, float] = (0, 0, 0), p: tuple[float, ...] = (0, 0, 0)):
@@ -196,7 +197,13 @@ def test_turns_of_a_ball_are_no_mistake(panda: Station) -> None:
     assert find_mistake({"marble": turned}, panda, library) is None
 
 
-@pytest.mark.parametrize("name", FORMATS)
+OBJECT_WORLD_CAMERA = ("isaac_grasp", "burg", "graspnet")
+"""A format of each frame in which files have their poses."""
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in OBJECT_WORLD_CAMERA else thorough(name) for name in FORMATS]
+)
 def test_files_of_every_format(
     name: str, right: GraspSet, six: Scene, panda: Station, tmp_path: Path
 ) -> None:

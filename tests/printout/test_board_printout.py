@@ -268,7 +268,7 @@ def test_what_is_beyond_the_board() -> None:
     printout = print_board(fixed, PrintSettings(page="A2"))
     stray, bowl, rest = printout.warnings
     assert "'stray' is off the board: 2.44 m over the right edge" in stray
-    assert "'over' is out of bounds: 70.0 mm over the upper edge" in bowl
+    assert "'over' is off the board: 70.0 mm over the upper edge" in bowl
     assert "of 'shelf' lie in the margin of the page; larger pages have room" in rest
     (text,) = words(printout.pdf)
     for said in ("stray: 2.44 m beyond the edge", "over: 70 mm beyond the edge", "shelf (fixed)"):

@@ -212,7 +212,7 @@ def test_plans_that_cannot_be_played(built: StationDiagram, plan: Plan) -> None:
     )
     assert "port 'plan' got a Trajectory; give a burg_drake Plan" in message(plan.lift)
     no = Reach(Outcome.NO_IK)
-    assert "the port 'plan' got a Reach (no_ik); it takes a burg_drake Plan" in message(no)
+    assert "port 'plan' got a Reach (no_ik); give a burg_drake Plan" in message(no)
     six = replace(plan.transfer, q=plan.transfer.q[:, :6], v=plan.transfer.v[:, :6])
     assert "the plan's transfer moves 6 joints; the arm has 7" in message(
         replace(plan, transfer=six, origin=None)
@@ -221,7 +221,7 @@ def test_plans_that_cannot_be_played(built: StationDiagram, plan: Plan) -> None:
     assert "the plan's lift begins 0.01 rad from where its close ends" in message(
         replace(plan, lift=away)
     )
-    assert "rad from where it is now; bring the arm to where the plan begins" in message(
+    assert "rad away from the present one; bring the arm to the start of the plan" in message(
         plan, start=-1.0
     )
     assert message(plan, start=np.nan).startswith("plan.start_time is nan s; give the time at")
