@@ -225,7 +225,7 @@ def test_plans_that_cannot_be_played(built: StationDiagram, plan: Plan) -> None:
         plan, start=-1.0
     )
     assert message(plan, start=np.nan).startswith("plan.start_time is nan; give the time")
-    assert "the plan's opening is 0.2 m; the pads of 'panda_hand' are 0 to 0.08 m" in message(
+    assert "the plan's opening is 0.2 m; the pads of 'panda_hand' can be 0 to 0.08 m" in message(
         replace(plan, opening=0.2)
     )
 
