@@ -15,6 +15,7 @@ from burg_drake.apps.cli import main
 from burg_drake.objects.library.document import load_library
 from burg_drake.pipeline import stages
 from burg_drake.pipeline.source import ObjectSource
+from burg_drake.system_libraries import GLIB
 
 Capture = pytest.CaptureFixture[str]
 QUICK = "--no-confirm"
@@ -292,6 +293,15 @@ def test_folder_without_meshes(tmp_path: Path, capsys: Capture) -> None:
     (tmp_path / "empty").mkdir()
     assert build(tmp_path / "empty", "-o", tmp_path / "library") == 2
     assert "holds no mesh (.obj, .ply, .stl, .off, .glb, .gltf)" in capsys.readouterr().err
+
+
+def test_a_missing_system_library_is_named_before_anything_is_built(
+    capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("burg_drake.apps.library.building.missing_import_libraries", lambda: [GLIB])
+    trimesh.creation.box((0.05, 0.05, 0.05)).export(tmp_path / "box.stl")
+    assert build(str(tmp_path / "box.stl"), "-o", str(tmp_path / "library")) == 2
+    assert "cannot be imported without libglib-2.0.so.0" in capsys.readouterr().err
 
 
 def test_the_help_describes_masses_files(capsys: Capture) -> None:

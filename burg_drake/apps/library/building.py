@@ -16,6 +16,7 @@ from burg_drake.apps.library.object_values import (
     with_frictions,
 )
 from burg_drake.core import InvalidInputError, MeshError, listing
+from burg_drake.system_libraries import describe_missing, missing_import_libraries
 
 if TYPE_CHECKING:
     from burg_drake.pipeline import BuildReport, ObjectSource
@@ -112,6 +113,8 @@ def _build(
     from burg_drake.core.workers import default_workers
     from burg_drake.pipeline import build_library
 
+    if missing := missing_import_libraries():
+        raise InvalidInputError(describe_missing(missing))
     with Reporter(not arguments.quiet) as reporter:
         pace = ProgressMeter(
             reporter.show, Progress("building", total=len(sources), unit="objects")
