@@ -182,7 +182,7 @@ def test_who_listens_and_stays_silent_is_no_scheduler(monkeypatch: pytest.Monkey
     with socket.create_server(("127.0.0.1", 0)) as silent:
         address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
         with (
-            pytest.raises(ClusterError, match="does not answer as a scheduler"),
+            pytest.raises(ClusterError, match="does not answer like a scheduler"),
             connect_cluster(address),
         ):
             pass

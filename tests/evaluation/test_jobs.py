@@ -79,8 +79,8 @@ def test_a_job_that_cannot_be_done_does_not_end_the_others() -> None:
     assert {failure.job.key: str(failure.error) for failure in failed} == {
         "bad": "no such model",
         "deadly": "cannot build the simulation: the worker process was killed by SIGSEGV",
-        "worse": "2 grasps in a row could not be simulated; the last one: the worker process was"
-        " killed by SIGSEGV",
+        "worse": "2 grasps in a row could not be simulated; the reason of the last one:"
+        " the worker process was killed by SIGSEGV",
     }
     with pytest.raises(InvalidInputError, match="no such model"):
         list(LocalExecutor(1).judge(jobs[1:2]))

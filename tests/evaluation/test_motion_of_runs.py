@@ -98,7 +98,9 @@ def test_the_lift_for_which_the_arm_has_room_is_executed_and_repeated(tmp_path: 
     assert row["mode"] == "reach" and row["outcome"] == Outcome.LIFTED
     assert 0.02 <= row["lift_height"] < 0.3
     assert row["lift"] == pytest.approx(row["lift_height"], abs=0.005)
-    assert str(summarize(run).lifts).startswith("In 1 of 1 grasps there is no room for the whole")
+    assert str(summarize(run).lifts).startswith(
+        "For 1 of 1 grasps there is no room to lift the whole"
+    )
     trial, origin = read_trial(row, "row"), read_origin(row, "row")
     verdict, _ = rerun(scene, station, trial, origin)
     assert trial.verdict is not None and not differences(trial.verdict, verdict)

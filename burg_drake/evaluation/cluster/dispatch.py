@@ -234,7 +234,7 @@ class Dispatch:
         self,
         chunk: SentChunk,
         grasps: Sequence[Candidate] | None = None,
-        what: str = "were lost at it",
+        what: str = "were lost while working on it",
     ) -> Iterator[Answer]:
         """Deals with grasps at which a worker was lost, or which it has not answered.
 
