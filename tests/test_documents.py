@@ -201,3 +201,12 @@ def test_yaml_fits_its_schema(block: Block) -> None:
     if not code.startswith("version: "):
         code = PARTS[schema] + code
     parse_document(code, schema, block.page.name)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=ids)
+def test_pages_read_plainly(page: Path) -> None:
+    """Phrases that readers of earlier pages had to read twice."""
+    if "contributing" not in page.parts:
+        phrases = r"\bof which\b|\bsuch an? [a-z]|\banew\b|\b(?:is|are) none of\b|\bwhat there is\b"
+        text = re.sub(r"```.*?```", "", page.read_text("utf-8"), flags=re.DOTALL)
+        assert re.findall(phrases, text) == []
