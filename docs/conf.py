@@ -30,7 +30,6 @@ exclude_patterns = ["**.ipynb"]
 suppress_warnings = ["ref.python"]
 
 myst_enable_extensions = ["colon_fence", "deflist", "attrs_inline"]
-smartquotes = False  # two hyphens begin an option
 myst_heading_anchors = 4
 
 default_role = "code"
