@@ -272,7 +272,7 @@ def _verb_text(parser: Any, level: str) -> str:
             and not isinstance(action, argparse._SubParsersAction)
         ]
         if actions:
-            lines.append(f"**{str(group.title).capitalize()}**\n")
+            lines.append(f"**{_escaped(str(group.title).capitalize())}**\n")
             if group.description:
                 lines.append(f"{group.description}\n")
             verb = parser.prog.partition(" ")[2].replace(" ", "-")
