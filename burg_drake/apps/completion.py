@@ -14,8 +14,8 @@ from typing import Any
 
 from burg_drake.apps.options import Parser, add_verb
 
-SHELLS = ("bash", "zsh", "fish")
-PROGRAM = "burg-drake"
+SUPPORTED_SHELLS = ("bash", "zsh", "fish")
+COMMAND_NAME = "burg-drake"
 ASKED_VARIABLE = "_ARGCOMPLETE"
 """Set by the shell's script when it asks for completions."""
 NAMES_OF = {
@@ -43,14 +43,16 @@ def add_to(verbs: Any) -> None:
         "",
         "Put the line of your shell into ~/.bashrc, ~/.zshrc or ~/.config/fish/config.fish.",
     )
-    parser.add_argument("shell", choices=SHELLS, metavar="SHELL", help="bash, zsh or fish")
+    parser.add_argument(
+        "shell", choices=SUPPORTED_SHELLS, metavar="SHELL", help="bash, zsh or fish"
+    )
 
 
 def run_completion(arguments: argparse.Namespace) -> int:
     """Prints the script."""
     from argcomplete.shell_integration import shellcode
 
-    print(shellcode([PROGRAM], shell=arguments.shell))
+    print(shellcode([COMMAND_NAME], shell=arguments.shell))
     return 0
 
 

@@ -14,7 +14,7 @@ def add_to(verbs: Any) -> None:
         verbs,
         "schema",
         run_schema,
-        "list kinds of YAML files; write their JSON Schemas and check them",
+        "list kinds of YAML files; write their JSON Schemas",
         "burg-drake schema",
         "burg-drake schema scene -o scene.json",
         "burg-drake schema -o schemas",

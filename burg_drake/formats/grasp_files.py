@@ -45,7 +45,7 @@ class _Formats(Mapping[str, GraspFormat]):
 FORMATS: Mapping[str, GraspFormat] = _Formats()
 """Formats by name."""
 
-ADVICE = {
+ARRAY_FILE_HINTS = {
     ".npz": " GraspSet.create(X_OG, object=NAME).save(FILE) writes an .npz that can be read;",
     ".npy": " an .npy of bare poses has shape (N, 4, 4);",
 }
@@ -93,8 +93,8 @@ def format_of(path: str | Path) -> GraspFormat:
         load_json(path, GRASP_FILE)
     raise InvalidInputError(
         f"{path} is not a file of grasps in a known format ({', '.join(FORMATS)});"
-        f"{ADVICE.get(path.suffix.lower(), '')} if it should be in one of them, name the format to"
-        " see what is wrong"
+        f"{ARRAY_FILE_HINTS.get(path.suffix.lower(), '')} if it should be in one of them,"
+        " name the format to see what is wrong"
     ).about("format")
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from burg_drake.apps.cli import main
-from burg_drake.apps.doctor import checks, machine, packages
+from burg_drake.apps.doctor import checks, packages
 from burg_drake.apps.doctor.checks import Check
 
 Capture = pytest.CaptureFixture[str]
@@ -106,15 +106,15 @@ def test_each_installer_has_its_command(
 
 def test_limits_of_a_container(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     limit, cpu = tmp_path / "memory.max", tmp_path / "cpu.max"
-    monkeypatch.setattr(machine, "CGROUP_LIMITS", (str(limit),))
-    monkeypatch.setattr(machine, "CGROUP_CPU", cpu)
-    whole, cores = machine.usable_memory(), machine.usable_cores()
+    monkeypatch.setattr(checks, "CGROUP_LIMITS", (str(limit),))
+    monkeypatch.setattr(checks, "CGROUP_CPU", cpu)
+    whole, cores = checks.usable_memory(), checks.usable_cores()
     limit.write_text("max\n")
     cpu.write_text("max 100000\n")
-    assert (machine.usable_memory(), machine.usable_cores()) == (whole, cores)
+    assert (checks.usable_memory(), checks.usable_cores()) == (whole, cores)
     limit.write_text("1048576\n")
     cpu.write_text("50000 100000\n")
-    assert (machine.usable_memory(), machine.usable_cores()) == (1 << 20, 0.5)
+    assert (checks.usable_memory(), checks.usable_cores()) == (1 << 20, 0.5)
     assert checks._cores_and_memory().state == "low"
 
 

@@ -1,6 +1,6 @@
 """`burg-drake doctor`: what is installed, what is missing for which feature, how to get it.
 
-`verb` has the options and the table; `checks` and `machine` look; `packages` tries imports and
+`verb` has the options and the table; `checks` looks; `packages` tries imports and
 knows how this copy of burg_drake gets more.
 """
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from burg_drake.apps.doctor import machine
 from burg_drake.apps.doctor.packages import (
     how_to_install,
     import_error,
@@ -37,6 +36,17 @@ ALWAYS_NEEDED_MODULES = "numpy, cv2, coacd, embreex, manifold3d, h5py"
 """Those that are compiled; the others hardly break."""
 MIN_MEMORY = 2.0  # GiB; a worker takes 0.3 to 0.5
 MIN_DISK = 1.0  # GiB
+BYTES_PER_GIB = 1 << 30
+CGROUP_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
+CGROUP_CPU = Path("/sys/fs/cgroup/cpu.max")
+BROWSER_PROGRAMS = (
+    "chromium",
+    "chromium-browser",
+    "google-chrome",
+    "firefox",
+    "microsoft-edge",
+    "safari",
+)
 RECIPE_FOR_LIBRARIES = "install with the package manager of this system"
 
 
@@ -81,7 +91,7 @@ class Extra:
     modules: str
 
 
-EXTRAS = (
+OPTIONAL_PARTS = (
     Extra("mujoco", "second opinion by MuJoCo", "mujoco", "mujoco"),
     Extra("ui", "scene editor (burg-drake setup)", "viser", "msgspec"),
     Extra("parquet", "tables in Parquet", "pyarrow", "pyarrow.lib"),
@@ -90,7 +100,7 @@ EXTRAS = (
     Extra("jobqueue", "batch systems (SLURM, PBS)", "dask-jobqueue", "cryptography"),
     Extra("usd", "export to USD", "usd-core", "pxr.Usd"),
 )
-BLENDER = Extra("blender", "photorealistic images (Blender)", "bpy", "bpy")
+BLENDER_PART = Extra("blender", "photorealistic images (Blender)", "bpy", "bpy")
 BLENDER_VARIABLE = "BURG_DRAKE_BLENDER"
 BLENDER_PYTHONS = ((3, 11), (3, 13))
 """Versions of Python that bpy has wheels for."""
@@ -98,13 +108,13 @@ BLENDER_PYTHONS = ((3, 11), (3, 13))
 
 def all_checks() -> list[Check]:
     """Everything, in the order in which it is shown."""
-    installed = [extra for extra in EXTRAS if version(extra.package)]
+    installed = [extra for extra in OPTIONAL_PARTS if version(extra.package)]
     tried = [DRAKE_MODULES, ALWAYS_NEEDED_MODULES, *(extra.modules for extra in installed)]
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # of processes; answers are kept
         list(pool.map(import_error, tried))
     names = [extra.name for extra in installed]
     checks = [_python(), _drake(), _packages(), _cores_and_memory(), _disk(), _cache()]
-    checks += [_renderer(), _allocator(), *(_extra(extra, names) for extra in EXTRAS)]
+    checks += [_renderer(), _allocator(), *(_extra(extra, names) for extra in OPTIONAL_PARTS)]
     return [*checks, _blender(names), _ros(), _cameras(), _browser(), _gpu()]
 
 
@@ -143,8 +153,8 @@ def _packages() -> Check:
 
 
 def _cores_and_memory() -> Check:
-    memory = machine.usable_memory() / machine.GIB
-    found = f"{machine.usable_cores():g} cores, {memory:.1f} GiB of memory"
+    memory = usable_memory() / BYTES_PER_GIB
+    found = f"{usable_cores():g} cores, {memory:.1f} GiB of memory"
     if memory < MIN_MEMORY:
         return Check("processor", "low", found, "use --workers 1")
     return Check("processor", "ok", found)
@@ -152,9 +162,9 @@ def _cores_and_memory() -> Check:
 
 def _disk() -> Check:
     here = Path.cwd()
-    free = machine.free_bytes(here) / machine.GIB
+    free = free_bytes(here) / BYTES_PER_GIB
     found = f"{free:.0f} GiB free here"
-    if not machine.can_write_in(here):
+    if not can_write_in(here):
         return Check("disk", "broken", f"{here} cannot be written to", "work in another folder")
     if free < MIN_DISK:
         return Check("disk", "low", f"{free:.1f} GiB free here", "free some space")
@@ -172,11 +182,11 @@ def _cache() -> Check:
         return Check("cache", "broken", str(error), "set BURG_DRAKE_CACHE to a folder")
     if folder is None:
         return Check("cache", "ok", "off, by BURG_DRAKE_CACHE")
-    if not machine.can_write_in(folder):
+    if not can_write_in(folder):
         return Check(
             "cache", "broken", f"{folder} cannot be written to", "set BURG_DRAKE_CACHE to a folder"
         )
-    return Check("cache", "ok", f"{machine.folder_bytes(folder) / 1e6:.0f} MB in {folder}")
+    return Check("cache", "ok", f"{folder_bytes(folder) / 1e6:.0f} MB in {folder}")
 
 
 def _libraries(missing: list[str]) -> str:
@@ -223,20 +233,20 @@ def _blender(installed: list[str]) -> Check:
         program = shutil.which(given)
         if program is None:
             return Check(
-                BLENDER.feature,
+                BLENDER_PART.feature,
                 "broken",
                 f"{BLENDER_VARIABLE}={given} is not a program",
                 f"set {BLENDER_VARIABLE} to a Blender, or to a Python that has bpy",
             )
-        return Check(BLENDER.feature, "ok", program)
+        return Check(BLENDER_PART.feature, "ok", program)
     if importlib.util.find_spec("bpy") is None and sys.version_info[:2] not in BLENDER_PYTHONS:
         return Check(
-            BLENDER.feature,
+            BLENDER_PART.feature,
             "missing",
             f"bpy has no wheel for Python {sys.version_info[0]}.{sys.version_info[1]}",
             f"install Blender and set {BLENDER_VARIABLE} to it",
         )
-    return _extra(BLENDER, installed)
+    return _extra(BLENDER_PART, installed)
 
 
 def _ros() -> Check:
@@ -257,7 +267,7 @@ def _cameras() -> Check:
     feature = "cameras"
     if sys.platform != "linux":
         return Check(feature, "ok", "burg-drake camera list finds them")
-    found = machine.camera_devices()
+    found = camera_devices()
     if not found:
         return Check(feature, "missing", "", "plug one in; photos and videos need none")
     closed = [path for path in found if not os.access(path, os.R_OK | os.W_OK)]
@@ -268,7 +278,7 @@ def _cameras() -> Check:
 
 
 def _browser() -> Check:
-    found = machine.browser()
+    found = browser()
     if found is None:
         return Check(
             "browser", "missing", "", "open pages on another computer; --html writes files"
@@ -291,3 +301,59 @@ def summary_lines(checks: list[Check]) -> Iterator[str]:
         yield "burg-drake evaluate has all that it needs. Try: burg-drake demo"
     if missing:
         yield "Install the rest only if you want the feature."
+
+
+def usable_cores() -> float:
+    """Processors that this process may use: of the machine, its affinity, its control group."""
+    cores = float(len(os.sched_getaffinity(0))) if sys.platform == "linux" else os.cpu_count() or 1
+    try:
+        quota, period = CGROUP_CPU.read_text().split()
+        return min(cores, int(quota) / int(period))
+    except (OSError, ValueError):  # none, or `max`
+        return cores
+
+
+def usable_memory() -> int:
+    """Memory that this process may use [bytes]: of the machine, or of its control group."""
+    found = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    for path in CGROUP_LIMITS:
+        try:
+            found = min(found, int(Path(path).read_text()))
+        except (OSError, ValueError):  # none, or `max`
+            continue
+    return found
+
+
+def can_write_in(folder: Path) -> bool:
+    """Whether files can be made in a folder, or the folder in the nearest one that there is."""
+    while not folder.exists() and folder != folder.parent:
+        folder = folder.parent
+    return folder.is_dir() and os.access(folder, os.W_OK | os.X_OK)
+
+
+def free_bytes(folder: Path) -> int:
+    """Free space of the disk that a folder is on."""
+    return shutil.disk_usage(folder).free
+
+
+def folder_bytes(folder: Path) -> int:
+    """Size of the files that lie directly in a folder."""
+    total = 0
+    for entry in folder.iterdir() if folder.is_dir() else ():
+        try:
+            total += entry.stat().st_size
+        except OSError:  # removed meanwhile, by another process
+            continue
+    return total
+
+
+def camera_devices() -> list[str]:
+    """Video devices of this machine; Linux names them, other systems do not."""
+    return sorted(str(path) for path in Path("/dev").glob("video*"))
+
+
+def browser() -> str | None:
+    """A browser that is installed here."""
+    if sys.platform == "darwin":
+        return "the system's"
+    return next((found for name in BROWSER_PROGRAMS if (found := shutil.which(name))), None)

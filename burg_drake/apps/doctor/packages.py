@@ -14,7 +14,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-OWN = "burg-drake"
+OWN_PACKAGE = "burg-drake"
 IMPORT_TIMEOUT = 60.0  # seconds
 
 
@@ -71,7 +71,7 @@ def unmet_requirements(extra: str = "") -> list[str]:
 def _requirements(extra: str) -> list[str]:
     """What is declared for an extra, or for all if it is empty; none in a checkout on the path."""
     try:
-        declared = importlib.metadata.requires(OWN) or []
+        declared = importlib.metadata.requires(OWN_PACKAGE) or []
     except importlib.metadata.PackageNotFoundError:
         return []
     found = []
@@ -102,16 +102,16 @@ def how_to_install(extra: str, installed: list[str]) -> str:
         installed: extras that are there, and that uv would remove.
     """
     if _made_by_pipx():
-        return f"pipx inject {OWN} {' '.join(map(_quoted, _requirements(extra)))}"
+        return f"pipx inject {OWN_PACKAGE} {' '.join(map(_quoted, _requirements(extra)))}"
     if _made_by_uv_tool():
-        return f"uv tool install '{OWN}[{','.join([*installed, extra])}]'"
-    return f"{pip_install()} '{OWN}[{extra}]'"
+        return f"uv tool install '{OWN_PACKAGE}[{','.join([*installed, extra])}]'"
+    return f"{pip_install()} '{OWN_PACKAGE}[{extra}]'"
 
 
 def pip_install() -> str:
     """The command that installs packages into the environment that this process runs in."""
     if _made_by_pipx():
-        return f"pipx runpip {OWN} install"
+        return f"pipx runpip {OWN_PACKAGE} install"
     if _made_by_uv_tool():
         return f"uv pip install --python {sys.prefix}"
     return "pip install" if importlib.util.find_spec("pip") else "uv pip install"

@@ -38,8 +38,9 @@ def run_doctor(arguments: argparse.Namespace) -> int:
         width = max(len(check.feature) for check in checks)
         print(f"burg_drake {__version__}\n")
         for check in checks:
-            print(f"{check.state:<7}  {check.feature:<{width}}  {check.found}".rstrip())
+            state = "optional" if check.state == "missing" and not check.required else check.state
+            print(f"{state:<8}  {check.feature:<{width}}  {check.found}".rstrip())
             if check.remedy:
-                print(f"{'':<7}  {'':<{width}}  -> {check.remedy}")
+                print(f"{'':<8}  {'':<{width}}  -> {check.remedy}")
         print("", *summary_lines(checks), sep="\n")
     return 1 if any(check.prevents_evaluation for check in checks) else 0

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from burg_drake.station.document import Station
 
 DEFAULT_HAND = "panda_hand"
-CORRECTIONS = (
+OTHER_CORRECTIONS = (
     " (degrees about x, y or z), forward:103.4 (mm along the approach), inverse, transposed, wxyz,"
     " xyzw, y_up, z_up, millimetres, half_widths"
 )
@@ -45,7 +45,7 @@ def add_reading(parser: Any, *, in_full: bool = False) -> None:
         type=lambda text: tuple(text.split(",")),
         default=(),
         help="correct poses, such as turn:z90"
-        + (CORRECTIONS if in_full else " (see burg-drake grasps convert --help)"),
+        + (OTHER_CORRECTIONS if in_full else " (see burg-drake grasps convert --help)"),
     )
 
 

@@ -17,13 +17,13 @@ from burg_drake.apps.options import (
 )
 from burg_drake.apps.runs import evaluate, replay
 
-SCENE = "tabletop_six"
+DEMO_SCENE = "tabletop_six"
 DEFAULT_GRASPS = 100
 DEFAULT_OUTPUT = "runs/demo"
-REPLAY = "replay.html"
-FILES = {
+REPLAY_FILE = "replay.html"
+FILE_DESCRIPTIONS = {
     "report.html": "the report: what became of the grasps, for each object",
-    REPLAY: "the best grasp in 3D, as it was simulated",
+    REPLAY_FILE: "the best grasp in 3D, as it was simulated",
     "results.csv": "the table: one row for each grasp",
 }
 """What the demo leaves for people, by the names of files in the run's folder."""
@@ -68,15 +68,17 @@ def run_demo(arguments: argparse.Namespace) -> int:
     count = arguments.grasps_per_object
     ending = "" if count == DEFAULT_GRASPS else f"_{count}"
     folder = Path(arguments.output or f"{DEFAULT_OUTPUT}{ending}")
-    words = [SCENE, "--station", DEFAULT_STATION, "-n", str(count), "-o", str(folder)]
+    words = [DEMO_SCENE, "--station", DEFAULT_STATION, "-n", str(count), "-o", str(folder)]
     words += ["--quiet"] * arguments.quiet
     words += [] if arguments.workers is None else ["--workers", str(arguments.workers)]
     code = evaluate.run_evaluate(_parsed(evaluate.add_options_to, words))
     print("\nThe best grasp:")
-    words = [str(folder), "--best", "--html", str(folder / REPLAY)]
+    words = [str(folder), "--best", "--html", str(folder / REPLAY_FILE)]
     code = max(code, replay.run_replay(_parsed(replay.add_options_to, words)))
     print("\nFiles to open:")
-    paths = {folder / name: what for name, what in FILES.items() if (folder / name).exists()}
+    paths = {
+        folder / name: what for name, what in FILE_DESCRIPTIONS.items() if (folder / name).exists()
+    }
     width = max(len(str(path)) for path in paths)
     for path, what in paths.items():
         print(f"  {path!s:<{width}}  {what}")

@@ -22,7 +22,7 @@ from burg_drake.core.documents.kinds import DOCUMENT_KINDS, SCHEMA_FOLDER, docum
 from burg_drake.core.documents.schema import plain_data
 from burg_drake.core.files import atomic_write_all
 
-DRAFT = "http://json-schema.org/draft-07/schema#"
+SCHEMA_DIALECT = "http://json-schema.org/draft-07/schema#"
 """The newest draft that the YAML servers of all common editors complete and check by."""
 
 _PLAIN: dict[Any, Any] = {
@@ -54,7 +54,7 @@ def json_schema(kind: str) -> dict[str, Any]:
     body = _mapping(document, parts)
     if "version" in body["properties"]:
         body["required"] = ["version", *body.get("required", [])]
-    head = {"$schema": DRAFT, "$id": f"{SCHEMA_FOLDER}/{kind}.json", "title": kind}
+    head = {"$schema": SCHEMA_DIALECT, "$id": f"{SCHEMA_FOLDER}/{kind}.json", "title": kind}
     return head | body | ({"definitions": parts} if parts else {})
 
 

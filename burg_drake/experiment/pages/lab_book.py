@@ -36,7 +36,7 @@ from burg_drake.experiment.trials import (
 OPERATOR_FIELDS = ("outcome", "time", "operator", "note", "robot")
 """What people enter; photo and placement come from the camera."""
 DIGITS = 12
-DOUBTFUL = "doubtful; the file in placements/ has the reason"
+DOUBTFUL_CHECK_NOTE = "doubtful; the file in placements/ has the reason"
 """Of an offset in the trials file, which has no reasons."""
 
 
@@ -268,7 +268,7 @@ def entry_data(trial: RealTrial) -> dict[str, Any]:
 
 def _place_data(place: ObjectPlace) -> dict[str, Any]:
     off = None if place.offset_mm is None else sum(d * d for d in place.offset_mm) ** 0.5
-    reason = DOUBTFUL if place.status == "uncertain" else ""
+    reason = DOUBTFUL_CHECK_NOTE if place.status == "uncertain" else ""
     return {"status": place.status, "mm": off, "deg": place.turn_deg, "reason": reason}
 
 

@@ -32,7 +32,7 @@ from burg_drake.formats.collections.burg_document import BurgReader, Matrix, rel
 
 FILE_TYPE = "ObjectLibrary"
 FILE_VERSION = "1.0"
-HINTS = {"Scene": "give the object library that the scene names under object_library_fn"}
+OTHER_FILE_HINTS = {"Scene": "give the object library that the scene names under object_library_fn"}
 """What to do about other files of BURG-Toolkit."""
 
 
@@ -182,7 +182,7 @@ def read_burg_library(path: str | Path) -> BurgLibrary:
         path = path / "object_library.yaml"
     node = load_nodes(path)
     reader = BurgReader(str(path))
-    reader.check_kind(node, FILE_TYPE, FILE_VERSION, "an object library", HINTS)
+    reader.check_kind(node, FILE_TYPE, FILE_VERSION, "an object library", OTHER_FILE_HINTS)
     document = cast(_BurgLibraryDocument, reader.read(node, _BurgLibraryDocument, ""))
     lines = reader.item_lines(node, "objects")
     first: dict[str, int] = {}

@@ -28,7 +28,7 @@ from burg_drake.formats.common import nearest_rigid
 
 FILE_TYPE = "Scene"
 FILE_VERSION = "1.0"
-HINTS = {
+OTHER_FILE_HINTS = {
     "ObjectLibrary": (
         "give the scene here; libraries are imported by `burg-drake library import-burg`"
     )
@@ -164,7 +164,7 @@ def read_burg_scene(path: str | Path) -> BurgScene:
     path = Path(path)
     node = load_nodes(path)
     reader = BurgReader(str(path))
-    reader.check_kind(node, FILE_TYPE, FILE_VERSION, "a scene", HINTS)
+    reader.check_kind(node, FILE_TYPE, FILE_VERSION, "a scene", OTHER_FILE_HINTS)
     document = cast(_BurgSceneDocument, reader.read(node, _BurgSceneDocument, ""))
     notes = reader.notes
     ground_area = (document.ground_area_x, document.ground_area_y)

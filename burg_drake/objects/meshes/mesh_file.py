@@ -39,7 +39,7 @@ LONGEST_LINE = 65536
 TEXT_ONLY = (".obj", ".off")
 """Mesh formats that have no binary form here."""
 
-NEITHER = "its contents are neither text nor a known binary format"
+UNKNOWN_CONTENT_MESSAGE = "its contents are neither text nor a known binary format"
 
 REFERRED = (".mtl", ".bin", *IMAGES)
 """What they refer to."""
@@ -262,7 +262,7 @@ def read_mesh(path: Path) -> trimesh.Trimesh:
     except Exception as error:  # the readers raise whatever their parsing stumbles over
         reason = one_line(error)
         if isinstance(error, ImportError):  # of a package that guesses the encoding of a text
-            reason = NEITHER
+            reason = UNKNOWN_CONTENT_MESSAGE
         raise _unreadable(path, _missing_bytes(path) or reason) from error
     if mesh is None:
         # Where a package that guesses encodings is installed, trimesh takes any bytes for a text.
@@ -280,7 +280,7 @@ def _unreadable(path: Path, reason: str) -> MeshError:
 def _not_text(path: Path) -> str:
     """What is wrong with a file of a text format that holds something else, or nothing."""
     binary = path.suffix.lower() in TEXT_ONLY and b"\0" in path.read_bytes()
-    return NEITHER if binary else ""
+    return UNKNOWN_CONTENT_MESSAGE if binary else ""
 
 
 def _missing_bytes(path: Path) -> str:

@@ -13,7 +13,7 @@ from burg_drake.core.documents import Ranges, Vector3, require_ranges
 if TYPE_CHECKING:
     from burg_drake.core import Array
 
-LENGTHS = {
+LENGTH_RANGES = {
     "standoff": (0.0, 1.0),
     "retreat": (0.0, 1.0),
     "lift_height": (0.0, 2.0),
@@ -27,7 +27,7 @@ tell a grasp that holds from one that does not."""
 
 def _length(default: float | None, field: str, help: str, name: str = "") -> Any:
     """The declaration of a length in its range."""
-    low, high = (1000.0 * bound for bound in LENGTHS[field])
+    low, high = (1000.0 * bound for bound in LENGTH_RANGES[field])
     return setting(default, help, name=name, unit=THOUSANDTHS, low=low, high=high, noun="a length")
 
 
@@ -49,7 +49,7 @@ class GraspMotion:
         lift_direction: direction of the lift in the world, of any length.
     """
 
-    RANGES: ClassVar[Ranges] = LENGTHS
+    RANGES: ClassVar[Ranges] = LENGTH_RANGES
 
     standoff: float = _length(
         0.10,
