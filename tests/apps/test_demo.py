@@ -14,7 +14,7 @@ from tests.apps.conftest import TWO
 
 
 def test_what_it_runs_is_there() -> None:
-    assert demo.SCENE in builtin_names("scenes")
+    assert demo.DEMO_SCENE in builtin_names("scenes")
 
 
 @pytest.mark.thorough
@@ -22,7 +22,7 @@ def test_the_demo(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "two.yaml").write_text(TWO)
-    monkeypatch.setattr(demo, "SCENE", str(tmp_path / "two.yaml"))
+    monkeypatch.setattr(demo, "DEMO_SCENE", str(tmp_path / "two.yaml"))
     monkeypatch.chdir(tmp_path)
     opened: list[str] = []
     monkeypatch.setattr(webbrowser, "open", opened.append)
