@@ -17,7 +17,7 @@ LOWEST_TESTS := tests/core/test_hdf5.py tests/core/test_lazy.py tests/core/test_
 EXAMPLES := $(sort $(wildcard examples/[0-9][0-9]_*.py))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all test-fast test-lowest lint rules format types spelling examples docs docs-serve clean distclean
+.PHONY: help setup demo test test-all test-fast test-lowest lint rules format types spelling dockerfile examples docs docs-serve clean distclean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -46,7 +46,7 @@ test-lowest:  ## a part of the tests with the oldest versions that pyproject.tom
 	@$(MAKE) --no-print-directory setup VENV=$(VENV)-lowest LOWEST=1
 	$(VENV)-lowest/bin/python -m pytest -m "not thorough" $(LOWEST_TESTS)
 
-lint: rules format types spelling  ## ruff, mypy and codespell
+lint: rules format types spelling dockerfile  ## ruff, mypy, codespell and hadolint
 
 rules: $(STAMP)
 	$(BIN)/ruff check
@@ -59,6 +59,9 @@ types: $(STAMP)
 
 spelling: $(STAMP)
 	$(BIN)/codespell burg_drake docs examples tools .github *.md *.cff Makefile Dockerfile
+
+dockerfile: $(STAMP)
+	$(BIN)/hadolint Dockerfile
 
 docs: $(STAMP)  ## build the documentation into build/docs
 	$(BIN)/python -m tools.site
