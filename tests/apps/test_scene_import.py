@@ -99,7 +99,7 @@ def test_a_scene_with_furniture(tmp_path: Path, capsys: Capture) -> None:
     assert main(["scene", "import-burg", str(burg_scene), *options]) == 0
     said = capsys.readouterr()
     assert said.err == ""
-    assert "an instance of 'table' is called 'table_1'" in said.out
+    assert "instance of object 'table' is called 'table_1'" in said.out
     misfits = [line for line in said.out.splitlines() if "does not fit: " in line]
     assert len(misfits) == len(builtin_names("stations"))
     assert "its table is 1.2 x 1.4 m, and the board would reach 1340 mm beyond" in misfits[0]

@@ -14,7 +14,6 @@ axe = pytest.importorskip("axe_playwright_python.sync_playwright")
 pytest.importorskip("furo")
 pytestmark = pytest.mark.thorough
 
-from tests.ui.conftest import browser, chromium, playwright  # noqa: E402, F401
 from tools.site import build_site  # noqa: E402
 
 PAGES = (
@@ -52,7 +51,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 @pytest.mark.parametrize("width", [1280, 390])
 def test_pages_are_accessible(
     site: str,
-    browser: sync_api.Browser,  # noqa: F811
+    browser: sync_api.Browser,
     width: int,
     scheme: str,
 ) -> None:
@@ -69,13 +68,13 @@ def test_pages_are_accessible(
     assert {name: violations for name, violations in found.items() if violations} == {}
 
 
-def test_search_finds_a_question(site: str, browser: sync_api.Browser) -> None:  # noqa: F811
+def test_search_finds_a_question(site: str, browser: sync_api.Browser) -> None:
     with browser.new_page() as page:
         page.goto(f"{site}/search.html?q=watertight")
         page.get_by_role("link", name="My mesh is not watertight").first.wait_for()
 
 
-def test_schemas_and_3d_pages_are_published(site: str, browser: sync_api.Browser) -> None:  # noqa: F811
+def test_schemas_and_3d_pages_are_published(site: str, browser: sync_api.Browser) -> None:
     with browser.new_page() as page:
         for name in ("schema/scene.json", "live/frames.html"):
             answer = page.goto(f"{site}/{name}")
