@@ -77,8 +77,10 @@ def generated() -> set[Path]:
 
 
 def anchors(page: Path) -> set[str]:
-    """Of the headings, as GitHub makes them."""
+    """Of the headings, as GitHub makes them; the site adds one for each kind of document."""
     titles = re.findall(r"^#+ (.*)$", page.read_text("utf-8"), re.MULTILINE)
+    if page.name == "documents.md":
+        titles += DOCUMENT_KINDS
     return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
 
 
