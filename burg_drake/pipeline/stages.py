@@ -138,7 +138,7 @@ def _notes(source: ObjectSource, geometry: Geometry, properties: MassProperties)
     if source.mass is None and not source.fixed:
         used = DEFAULT_DENSITY if source.density is None else source.density
         why = "no mass or density given" if source.density is None else "no mass given"
-        notes.append(f"{why}: computed {properties.mass:.4g} kg from {used:g} kg/m^3")
+        notes.append(f"{why}: computed {properties.mass:.4g} kg from volume and {used:g} kg/m^3")
     if not geometry.closed:
         notes.append("the mesh is not closed; its volume is that of the convex pieces")
     if not isinstance(source.mesh, trimesh.Trimesh):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import re
 import webbrowser
 from pathlib import Path
 
@@ -33,6 +35,14 @@ def test_the_demo(
         assert f"runs/demo_2/{name}  " in told
         assert (folder / name).stat().st_size > 0
     assert "\nall " in told and "as recorded" in told and opened == []
+    with (folder / "results.csv").open(newline="") as table:
+        lifted = [row for row in csv.DictReader(table) if row["outcome"] == "lifted"]
+    (listed,) = re.findall(r"^best    ((?:.*\n {8})*.*)\ntable ", told, re.MULTILINE)
+    best = [next(row for row in lifted if row["id"] == id) for id in listed.split()]
+    assert best and [row["object"] for row in best] == list(
+        dict.fromkeys(r["object"] for r in lifted)
+    )
+    assert "burg-drake replay runs/demo_2 --grasp ID\n" in told
     journal = (folder / "journal.jsonl").read_bytes()
     assert main(["demo", "-n", "2", "--workers", "1", "--quiet", "--open"]) == 0
     assert (folder / "journal.jsonl").read_bytes() == journal  # nothing was evaluated again

@@ -138,7 +138,7 @@ def test_the_list_tells_what_is_coloured_highest_first(
     assert [label.split()[0] for label in labels[1:]] == [*"9873-", *"4321"]
     assert labels[1] == f"9 {grasps.id[5]}" and chosen == labels[4] == f"3 {grasps.id[3]}"
     text = page.read_text()
-    assert "<p>margin and identifier, highest first</p>" in text
+    assert "<p>margin and identifier, object by object, highest first</p>" in text
     assert "the best 4 of each object by score" in text
 
 

@@ -36,7 +36,8 @@ def test_evaluate_given_grasps(tmp_path: Path, capsys: Capture) -> None:
     assert main([*arguments, "--workers", "1", "--seed", "3"]) == 0
     out = capsys.readouterr().out
     assert f"table   {tmp_path / 'run' / 'results.csv'}" in out
-    assert "no_contact" in out
+    assert "no_contact: the fingers closed without touching the object" in out
+    assert "best " not in out and "--grasp ID" not in out
     run = load_run(tmp_path / "run")
     asked = (run.document.engine.name, run.document.seed, run.document.mode)
     assert asked == ("screening", 3, "hand")

@@ -9,7 +9,15 @@ import pytest
 
 from burg_drake.core.errors import UnknownNameError
 from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.results.best_grasps import best_of_each, index_of, ranked_set, shown_ids
+from burg_drake.evaluation.grasp_sets.run_set import run_grasps
+from burg_drake.evaluation.results.best_grasps import (
+    best_of_each,
+    index_of,
+    ranked_run,
+    ranked_set,
+    shown_ids,
+)
+from burg_drake.evaluation.store.run_folder import Run
 
 HOLDER = np.array(["mug", "box", "mug", "mug", "box", "mug"])
 ALL = np.ones(6, dtype=bool)
@@ -27,6 +35,18 @@ def test_by_score_with_unknown_ones_last() -> None:
     assert best_of_each(HOLDER, ALL, ranking, None) == [2, 5, 0, 3, 4, 1]
     assert best_of_each(HOLDER, ALL, ranking, 1) == [2, 4]
     assert best_of_each(HOLDER, np.arange(6) != 2, ranking, 1) == [5, 4]
+
+
+def test_of_a_run_held_ones_come_before_lost_ones(own_run: Run) -> None:
+    run = own_run
+    (first,) = [run.candidates.id.index(id) for id in run.best()]
+    others = [k for k in range(len(run.candidates.id)) if run.results["outcome"][k] != "lifted"]
+    outcomes = run.results["outcome"].astype(object)
+    outcomes[others] = np.resize(["no_ik", "slipped", "", "lifted_turned"], len(others))
+    ranking = ranked_run(run, run_grasps(run).with_columns(outcome=outcomes.astype(str)))
+    assert ranking.order[0] == first
+    texts = [text for text in outcomes[ranking.order] if text != "lifted"]
+    assert list(dict.fromkeys(texts)) == ["lifted_turned", "slipped", "no_ik", ""]
 
 
 def test_what_the_score_is_made_of() -> None:

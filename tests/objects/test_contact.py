@@ -58,7 +58,9 @@ def test_what_pads_touch_is_told(tmp_path: Path) -> None:
     faces = sum(line.startswith("f ") for line in lines)
     fit = household.entry("mug").contact.fit
     assert fit is not None
-    expected = f"a surface with {faces} faces, at most {1000.0 * fit.hausdorff:.2g} mm off"
+    expected = (
+        f"a surface with {faces} faces, at most {1000.0 * fit.hausdorff:.2g} mm from the mesh"
+    )
     assert touched_by_pads(household, "mug") == expected
     assert touched_by_pads(household, "can").startswith("a cylinder, at most 1.")
     entry = replace(household.entry("mug"), contact=ContactGeometry())

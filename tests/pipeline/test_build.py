@@ -98,7 +98,7 @@ def test_a_density_that_was_assumed_is_reported(meshes: Path, tmp_path: Path) ->
     report = build(_sources(meshes), tmp_path / "lib")
     mass = 300.0 * 16 * np.sin(2 * np.pi / 32) * 0.03**2 * 0.1  # a prism with 32 sides
     assert report.notes["can"] == (
-        f"no mass or density given: computed {mass:.4g} kg from 300 kg/m^3",
+        f"no mass or density given: computed {mass:.4g} kg from volume and 300 kg/m^3",
     )
     assert "box" not in report.notes
 

@@ -242,6 +242,8 @@ def _labels(grasps: GraspSet, column: str | None, by: str) -> tuple[list[str], s
         truths = values.dtype.kind == "b"
         texts = [str(v) for v in (np.where(values, "yes", "no") if truths else values).tolist()]
     title = f"{with_unit(column)} and identifier"
+    if len(set(holders(grasps))) > 1:
+        title += ", object by object"
     if values.dtype.kind in "fiu":
         title += ", highest first"
     elif by:

@@ -160,7 +160,8 @@ def _print_notes(report: BuildReport) -> None:
     for name in report.built:
         print_contact(report.library, [name])
         repairs = report.library.objects[name].source.repairs
-        for note in dict.fromkeys([*repairs, *report.notes.get(name, ())]):
+        notes = [note for note in report.notes.get(name, ()) if note not in repairs]
+        for note in dict.fromkeys([*(f"mesh: {repair}" for repair in repairs), *notes]):
             print(f"{name}: {note}")
 
 

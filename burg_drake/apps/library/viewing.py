@@ -75,8 +75,10 @@ def print_library(library: ObjectLibrary, only: Iterable[str] | None = None) -> 
     chosen = set(library.objects if only is None else only)
     shown = {name: entry for name, entry in library.objects.items() if name in chosen}
     library_table(shown).show()
+    print("mu: friction coefficient; pieces: convex pieces for collisions")
+    print("poses: stable poses, in which the object can rest on a table")
     if any(entry.mass_properties.source == "density" for entry in shown.values()):
-        print("~ mass from volume and density; give the true one with --mass NAME=KG")
+        print("~: mass from volume and density; give the true one with --mass NAME=KG")
 
 
 def print_contact(library: ObjectLibrary, names: Iterable[str]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -184,8 +185,13 @@ def _print_run(run: Run, motion: GraspMotion, *, rejudged: bool) -> None:
         print(settled_line({name: run.results[name] for name in SETTLED_COLUMNS}))
     if contested := run.contested:
         print(f"contested: {listing(contested)}; --rejudge contested settles them")
+    best = run.best(each=True)
+    if best:
+        print("best    " + "\n        ".join(best))
     print(f"table   {run.table_path}")
     print(f"report  {run.report_path}")
+    if best:
+        print(_where_lifted(str(run.path)))
     if run.failures:
         print(
             f"burg-drake: {len(run.failures)} of {len(run.candidates)} grasps could not be"
@@ -193,6 +199,16 @@ def _print_run(run: Run, motion: GraspMotion, *, rejudged: bool) -> None:
             f" {how_to_retry(len(run.interrupted), len(run.failures))}",
             file=sys.stderr,
         )
+
+
+def _where_lifted(folder: str) -> str:
+    """How to look at the best grasps, and at all that lifted."""
+    replay = shlex.join(["burg-drake", "replay", folder, "--grasp"])
+    show = shlex.join(["burg-drake", "grasps", "show", folder, "--outcome", "lifted"])
+    return (
+        "best: of each object the lifted grasp with the most room around the open hand; see one by"
+        f"\n    {replay} ID\nthe table has all lifted grasps; see them by\n    {show} --all"
+    )
 
 
 def print_summary(run: Run) -> None:

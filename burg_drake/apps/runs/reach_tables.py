@@ -67,6 +67,10 @@ def reach_table(by_object: Mapping[str, Counter[Outcome]], total: Counter[Outcom
         table.row(
             name, format_count(counts.total()), format_count(clear), format_count(good), share
         )
+    table.caption = (
+        "clear: the open hand collides with nothing at the grasp\n"
+        f"reachable: {Outcome.REACHABLE.meaning.partition(';')[0]}"
+    )
     return table
 
 
@@ -92,4 +96,6 @@ def outcome_table(
         share = format_percent(total[outcome] / len(grasps))
         in_the_way = ", ".join(f"{name} ({format_count(n)})" for name, n in blockers)
         table.row(outcome.value, *counts, format_count(total[outcome]), share, in_the_way)
+    failed = [one for one in Outcome if one in total and one is not Outcome.REACHABLE]
+    table.caption = "\n".join(f"{outcome}: {outcome.meaning}" for outcome in failed)
     return table

@@ -55,9 +55,13 @@ _VERDICT = {**_meanings(TextField), **_meanings(NumberField)}
 _MARGINS = {
     **_meanings(MarginsField),
     "friction": Column(
-        PLAIN, ("friction coefficient of the target; in results empty if it is the library's")
+        PLAIN,
+        "friction coefficient of the target; empty in results of `evaluate`, which takes the"
+        " library's",
     ),
-    "mass": Column("kg", "mass of the target; in results empty if it is the library's"),
+    "mass": Column(
+        "kg", "mass of the target; empty in results of `evaluate`, which takes the library's"
+    ),
     "cpu": Column("s", "CPU time of all stages"),
     **_meanings(StagesField),
 }

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import UnknownNameError, nearest
-from burg_drake.core.grasps import GraspSet, Stage
+from burg_drake.core.grasps import GraspSet, Outcome
 from burg_drake.evaluation.store import Run
+from burg_drake.visualization.style import GROUPS, group_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +27,8 @@ class RankedGrasps:
 
 
 def ranked_run(run: Run, grasps: GraspSet) -> RankedGrasps:
-    """Those of a run: lifted ones as `Run.best` has them, then by the stage that they came to.
+    """Those of a run: lifted ones as `Run.best` has them, then by the groups of their outcomes, as
+    legends list them: held ones before lost ones, and those before what was not executed.
 
     Args:
         run: the run.
@@ -34,11 +36,12 @@ def ranked_run(run: Run, grasps: GraspSet) -> RankedGrasps:
     """
     row = {id: i for i, id in enumerate(run.candidates.id)}
     best = [row[id] for id in run.best(len(row))]
-    stages = list(Stage)
-    reached = [stages.index(Stage(s)) if s else -1 for s in grasps.column("stage").tolist()]
-    rest = np.argsort(-np.array(reached), kind="stable")
+    outcomes = grasps.column("outcome").tolist()
+    groups = [group_of(Outcome(text) if text else None) for text in outcomes]
+    places = [GROUPS.index(group) if group in GROUPS else len(GROUPS) for group in groups]
+    rest = np.argsort(places, kind="stable")
     order = np.concatenate([np.array(best, dtype=np.int64), rest[~np.isin(rest, best)]])
-    return RankedGrasps(order, "outcome, lifted ones as the run ranks them")
+    return RankedGrasps(order, "outcome, lifted ones by the room around the hand")
 
 
 def ranked_set(grasps: GraspSet) -> RankedGrasps:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from burg_drake.core.grasps import CONTESTED, Outcome
+from burg_drake.core.grasps import CONTESTED, Mode, Outcome
 from burg_drake.core.terminal import (
     TextTable,
     format_count,
@@ -75,19 +75,30 @@ def _stage_table(summary: Summary) -> TextTable:
         table.row(
             group.name, *(format_count(group.funnel[name]) for name in names), share, interval
         )
-    table.caption = (
-        "held: still in the hand at the end; lifted: held, without turning in the hand"
-        " or disturbing another object\n"
+    table.caption = "\n".join(
+        f"{SHORT.get(name, name)}: {meaning}"
+        for name, meaning in _step_meanings(summary.mode).items()
+        if name in names
     )
-    if summary.mode != "hand":
-        table.caption += (
-            "reach: the arm reaches the grasp; plan: it has a path there without"
-            " collision, and can follow approach and lift\n"
-        )
     table.caption += (
-        "success: share of executed grasps that were lifted; CI: Wilson's 95 % interval"
+        "\nsuccess: share of executed grasps that were lifted; CI: Wilson's 95 % interval"
     )
     return table
+
+
+def _step_meanings(mode: Mode) -> dict[str, str]:
+    """What grasps that are counted in a column of the stage table have passed."""
+    reach = "the hand comes in and out without a collision"
+    if mode != "hand":
+        reach += ", and the arm has a posture for the grasp that collides with nothing"
+    return {
+        "clear": "the open hand collides with nothing at the grasp",
+        "reachable": reach,
+        "planned": "the arm has a path there without collision, and can follow approach and lift",
+        "executed": "the grasp was simulated",
+        "held": "the object is still in the hand at the end",
+        "lifted": "held, without turning in the hand or disturbing another object",
+    }
 
 
 def _certainty_table(summary: Summary) -> TextTable:
@@ -100,6 +111,7 @@ def _certainty_table(summary: Summary) -> TextTable:
         numbers = [group.executed, group.surely_lifted, group.surely_lost, group.contested]
         table.row(group.name, *map(format_count, [*numbers, *([group.settled] * settled)]))
     table.caption = (
+        "lifted, failed: the simulation is sure of it\n"
         "contested: the simulation is not sure whether the object was held (confidence"
         f" below {CONTESTED:g}); judging again with another engine can settle it"
     )
@@ -114,6 +126,7 @@ def _outcome_matrix(summary: Summary) -> TextTable:
     for outcome in _seen(summary):
         counts = [format_count(n) if (n := group.outcomes[outcome]) else "·" for group in groups]
         table.row(outcome.value, *counts, bold=outcome is Outcome.LIFTED)
+    table.caption = _outcome_meanings(summary)
     return table
 
 
@@ -124,7 +137,14 @@ def _outcome_list(summary: Summary) -> TextTable:
             f"{format_count(group.outcomes[o])} {o}" for o in _seen(summary) if group.outcomes[o]
         ]
         table.row(group.name, ", ".join(found))
+    table.caption = _outcome_meanings(summary)
     return table
+
+
+def _outcome_meanings(summary: Summary) -> str:
+    """A line for each outcome that occurs; what lifted means is told below the stages."""
+    seen = [outcome for outcome in _seen(summary) if outcome is not Outcome.LIFTED]
+    return "\n".join(f"{outcome}: {outcome.meaning}" for outcome in seen)
 
 
 def _seen(summary: Summary) -> list[Outcome]:
@@ -141,6 +161,7 @@ def _cost_table(summary: Summary) -> TextTable:
             format_number(cost.rate),
         )
         table.row(cost.name, format_count(cost.grasps), *spent)
+    table.caption = "CPU time: of all these grasps; median: of one grasp"
     return table
 
 

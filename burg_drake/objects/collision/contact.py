@@ -109,7 +109,7 @@ def pieces_instead(contact: ContactGeometry, pieces: int) -> str:
 
 
 def touched_by_pads(library: ObjectLibrary, name: str) -> str:
-    """What of an object gripper pads touch, such as `a surface of 412 faces, within 0.2 mm`.
+    """What of an object gripper pads touch, such as `a cylinder, at most 0.2 mm from the mesh`.
 
     Raises:
         UnknownNameError: no such object, or the file of its surface is missing.
@@ -126,7 +126,7 @@ def touched_by_pads(library: ObjectLibrary, name: str) -> str:
     return (
         what
         if contact.fit is None
-        else (f"{what}, at most {1e3 * contact.fit.hausdorff:.2g} mm off")
+        else (f"{what}, at most {1e3 * contact.fit.hausdorff:.2g} mm from the mesh")
     )
 
 
