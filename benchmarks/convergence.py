@@ -11,7 +11,7 @@ Measures what statics gives in closed form, as ratio to that form:
     patch     contact area of a ball, to that of an elastic foundation
     creep     how fast the bar turns in the hand at 1.3 times that friction [deg/s]; 0 is right
 
-and prints a table for each of: time step, squares of the pads' front, faces of the object.
+and prints a table for each of: time step, triangles of the pads' front, faces of the object.
 """
 
 from __future__ import annotations
@@ -57,6 +57,9 @@ STEEP = TrialSettings(motion=burg.GraspMotion(lift_height=0.02), lift_time=5.42,
 
 TIME_STEPS = (0.0005, 0.001, 0.002, 0.005, 0.01)
 SQUARES = (1, 2, 4, 8)
+"""Of pads that are divided evenly, along each side."""
+PACKAGE_TRIANGLES = 14
+"""Of the front of a pad in the package."""
 SUBDIVISIONS = (0, 1, 2, 3)
 QUANTITIES = ("payload", "sliding", "torsion", "patch")
 
@@ -82,10 +85,11 @@ def run(scratch: Path) -> list[Panel]:
     steps = [Engine(name="swept", time_step=time_step) for time_step in TIME_STEPS]
     by_step = [measure(shapes, default, engine) for engine in steps]
     show("time step [ms]", [f"{1e3 * time_step:g}" for time_step in TIME_STEPS], by_step)
-    stations = [make_station(pad_model(scratch / f"pad_{n}", n)) for n in SQUARES]
-    by_pad = [measure(shapes, station, standard) for station in stations]
-    labels = [f"{n} x {n}" for n in SQUARES]
-    show("squares of a pad", [*labels, "as it is"], [*by_pad, measure(shapes, default, standard)])
+    pads = {2 * n * n: make_station(pad_model(scratch / f"pad_{n}", n)) for n in SQUARES}
+    pads = dict(sorted({**pads, PACKAGE_TRIANGLES: default}.items()))
+    by_pad = [measure(shapes, station, standard) for station in pads.values()]
+    labels = [str(count) for count in pads]
+    show("triangles of a pad", labels, by_pad)
     by_mesh, faces = [], []
     for n in SUBDIVISIONS:
         meshes = make_shapes(scratch / f"mesh_{n}", subdivisions=n)
@@ -94,7 +98,9 @@ def run(scratch: Path) -> list[Panel]:
     show("faces of box, ball", [f"{box}, {ball}" for box, ball in faces], by_mesh)
     return [
         Panel("Time step [ms]", [f"{1e3 * t:g}" for t in TIME_STEPS], series(by_step), 2),
-        Panel("Pad front [squares]", labels, series(by_pad), 1),
+        Panel(
+            "Triangles of a pad's front", labels, series(by_pad), [*pads].index(PACKAGE_TRIANGLES)
+        ),
         Panel(
             "Faces of box, ball", [f"{box}/{ball}" for box, ball in faces], series(by_mesh), None
         ),

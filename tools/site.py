@@ -331,7 +331,20 @@ def _outcomes_page() -> str:
 def _gallery_pages() -> Iterator[tuple[str, str]]:
     """The gallery, and a page for each example."""
     cards = []
-    for path in sorted((ROOT / "examples").glob("[0-9]*.py")):
+    examples = sorted((ROOT / "examples").glob("[0-9]*.py"))
+    printed = printed_by_examples()
+    names = {path.stem for path in examples}
+    if wrong := sorted(names ^ set(PICTURES)):
+        raise SystemExit(
+            f"tools/site.py: PICTURES lacks or has too many: {', '.join(wrong)}; it names for each"
+            " program in examples/ the file in docs/images that is shown beside it"
+        )
+    if wrong := sorted(names ^ set(printed)):
+        raise SystemExit(
+            f"examples/README.md lacks or has too many: {', '.join(wrong)}; it shows what each"
+            " program prints"
+        )
+    for path in examples:
         code = path.read_text("utf-8")
         summary, _, rest = (ast.get_docstring(ast.parse(code)) or "").partition("\n\n")
         title = path.stem.partition("_")[2].replace("_", " ").capitalize()
@@ -339,7 +352,8 @@ def _gallery_pages() -> Iterator[tuple[str, str]]:
         yield (
             f"{page}.md",
             f"# {title}\n\n{summary}\n\n{rest}\n\n![{title}](../images/{PICTURES[path.stem]})\n\n"
-            f"[examples/{path.name}]({BLOB}examples/{path.name}):\n\n```python\n{code}```\n",
+            f"[examples/{path.name}]({BLOB}examples/{path.name}):\n\n```python\n{code}```\n\n"
+            f"It prints:\n\n```text\n{printed[path.stem]}```\n",
         )
         cards.append(_card(title, summary, PICTURES[path.stem], page, "doc"))
     toctree = "\n".join(f"gallery/{name}" for name in PICTURES)
@@ -358,6 +372,14 @@ def _gallery_pages() -> Iterator[tuple[str, str]]:
         + "\n".join(commands)
         + f"\nAll pictures are made by the scripts in [tools/]({TREE}tools).\n"
         + f"\n```{{toctree}}\n:hidden:\n\n{toctree}\n```\n",
+    )
+
+
+def printed_by_examples() -> dict[str, str]:
+    """What each program in examples/ prints, as its README shows it."""
+    text = (ROOT / "examples" / "README.md").read_text("utf-8")
+    return dict(
+        re.findall(r"^## \[(\w+)\.py\].*?```text\n(.*?)```", text, re.DOTALL | re.MULTILINE)
     )
 
 

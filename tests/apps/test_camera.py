@@ -82,8 +82,8 @@ def test_photos_of_the_target_give_the_intrinsics(
     assert found.known_to is not None and 0.0 < found.known_to < 1.0
     assert len(found.except_at) == 8  # the target was in the middle
     known = f"in the middle only, to {found.known_to:.2f} pixels there"
-    assert f"# In 19 of 20 cases known {known}" in (tmp_path / "K.yaml").read_text()
-    assert f"In 19 of 20 cases known {known}" in page
+    assert f"# In 19 of 20 cases the camera is known {known}" in (tmp_path / "K.yaml").read_text()
+    assert f"In 19 of 20 cases the camera is known {known}" in page
     assert f"known            {known}" in out
     assert "upper left corner " in out
 

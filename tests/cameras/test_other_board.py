@@ -41,6 +41,21 @@ def test_another_first_id(poses: BoardPose, X_SC: np.ndarray, first_id: int, ids
     )
 
 
+@pytest.mark.parametrize("X_SC", [VIEW, STEEP], ids=["view", "steep"])
+@pytest.mark.parametrize(("first_id", "fit"), [(2, "6 of 10"), (3, "6 of 9")])
+def test_another_first_id_is_no_second_print(
+    poses: BoardPose, X_SC: np.ndarray, first_id: int, fit: str
+) -> None:
+    """Ids that go on in the next row make groups of markers that each fit the document."""
+    other = replace(BOARD, markers=Markers(first_id=first_id))
+    estimate = poses.estimate(board_image(other, SMALL, X_SC))
+    assert not estimate.valid
+    assert estimate.reason == (
+        f"another board: only {fit} markers in sight stand where this one has them; are columns,"
+        " rows and first_id right?"
+    )
+
+
 def test_more_rows_than_the_document_has() -> None:
     board = replace(BOARD, markers=Markers(count=(4, 2)))
     estimate = BoardPose(board, SMALL).estimate(board_image(BOARD, SMALL, VIEW))

@@ -127,7 +127,7 @@ def _save(calibration: Calibration, arguments: argparse.Namespace) -> None:
     intrinsics = dataclasses.replace(calibration.intrinsics, camera=arguments.name)
     header = (
         f"burg-drake camera calibrate: {len(calibration.views)} views, lens model"
-        f" {calibration.model}\nIn 19 of 20 cases {calibration.promise}."
+        f" {calibration.model}\nIn 19 of 20 cases the camera is {calibration.promise}."
     )
     save_intrinsics(intrinsics, arguments.output, header)
     print(f"wrote {arguments.output}")

@@ -28,8 +28,8 @@ def add_to(group: Any) -> None:
         "burg-drake scene sample household -n 5 --seed 7 -o scene.yaml",
         "burg-drake scene sample household -n 6 --spacing close --count 1000 --workers 2 -o close/",
         "burg-drake scene sample household -n 10 --heap --station panda_bin -o heap.yaml",
-        "burg-drake scene sample household --within-reach --clear-grasps 5 --visible-from board"
-        " -o scene.yaml",
+        "burg-drake scene sample household -n 3 --within-reach --clear-grasps 5 --visible-from"
+        " board -o scene.yaml",
         "burg-drake scene sample --again close/scene_0007.yaml -o same.yaml",
         "",
         "A scene is sampled again until it meets all rules, and is settled in simulation. The"

@@ -65,6 +65,8 @@ board is not flat [pixels]."""
 
 MIN_COPY_MARKERS = 3
 """Markers beside the board that stand to each other as on another print of it."""
+ON_GRID = 0.2
+"""Distance along both axes up to which a marker stands on the grid [pitches]."""
 
 
 class BoardPose:
@@ -276,7 +278,8 @@ class BoardPose:
         )
 
     def _copy_reason(self, seen: Detection, coarse: CoarsePose) -> str:
-        """That markers beside the board stand as on another print of it; empty if none do."""
+        """That markers beside the board stand as on another print of it, or on a board with
+        another first id; empty if none do."""
         rest = ~coarse.inliers
         if not coarse.X_SC or rest.sum() < MIN_COPY_MARKERS:
             return ""
@@ -290,7 +293,25 @@ class BoardPose:
         low, high = self._p_SQ.min(axis=(0, 1))[:2], self._p_SQ.max(axis=(0, 1))[:2]
         if ((at > low) & (at < high)).all(axis=1).any():
             return ""
+        if self._continue_rows(seen.index[rest][copy.inliers], at):
+            return _misplaced(len(seen.index), int(coarse.inliers.sum()))
         return _two_copies(f"{_markers(len(at))} stand as on another print beside it")
+
+    def _continue_rows(self, index: NDArray[np.intp], at: Array) -> bool:
+        """Whether markers stand where the board's rows would have them if they went on past its
+        columns, as on a board with another first id.
+
+        Args:
+            index: (N,) of the markers.
+            at: (N, 2) where they are on the sheet [m].
+        """
+        middles = self._p_SQ.mean(axis=1)[:, :2]
+        columns = len(np.unique(np.round(middles[:, 0], 9)))
+        pitch = (self._layout.side + self.board.markers.spacing) * np.array(self.scale)
+        column, row = ((at - middles[0]) / pitch * [1.0, -1.0]).T
+        off = np.abs(column - np.round(column)) + np.abs(row - np.round(row))
+        follows = np.round(row) * columns + np.round(column) == index
+        return bool(follows.all() and off.max() < ON_GRID)
 
     def _other_board_reason(self, seen: Detection, coarse: CoarsePose) -> str:
         """Why the markers that were found are not this board; empty if they are."""
@@ -300,10 +321,7 @@ class BoardPose:
             return self._other_size_reason(coarse.marker_scale)
         n, fit = len(seen.index), int(coarse.inliers.sum())
         if not coarse.X_SC or fit < max(1, n / 2) or (n > 1 and fit < 2):
-            return (
-                f"another board: only {fit} of {_markers(n)} in sight stand where this one has"
-                " them; are columns, rows and first_id right?"
-            )
+            return _misplaced(n, fit)
         return ""
 
     def _wrong_print_reason(self, refined: RefinedPose) -> str:
@@ -398,6 +416,14 @@ def _residual_doubt(error: float) -> str:
             " board is flat"
         )
     return ""
+
+
+def _misplaced(count: int, fit: int) -> str:
+    """That markers stand as another board has them."""
+    return (
+        f"another board: only {fit} of {_markers(count)} in sight stand where this one has them;"
+        " are columns, rows and first_id right?"
+    )
 
 
 def _two_copies(seen: str) -> str:

@@ -197,15 +197,14 @@ def bias_words(comparison: Comparison, judged: Judgement | None = None) -> str:
     if b.difference.value is None:
         return "no trials"
     parted = (
-        f"{b.only_first:,} that it expected to succeed failed, {b.only_second:,} that it expected"
-        " to fail succeeded"
+        f"{b.only_first:,} failed that it expected to succeed, {b.only_second:,} succeeded that it"
+        " expected to fail"
     )
     who, other = "simulator promises", "the robot achieved"
     if comparison.kind == "runs":
         who, other = "first run sees", "the second"
         parted = (
-            f"{b.only_first:,} are a success in the first alone, {b.only_second:,} in the second"
-            " alone"
+            f"{b.only_first:,} succeeded in the first alone, {b.only_second:,} in the second alone"
         )
     elif comparison.other is not None:
         which = "second" if judged is comparison.other else "first"

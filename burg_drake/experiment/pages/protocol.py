@@ -174,6 +174,6 @@ def _printout(scene: Scene, address: str | None) -> Html:
     )
     if address:
         link = element("a", address, href=address)
-        return element("p", board, "Print it at 100 %: ", link, ".", class_="print")
+        return element("p", board, "Print it at 100\u00a0%: ", link, ".", class_="print")
     code = element("code", "burg-drake printout RUN/scene.yaml -o board.pdf")
     return element("p", board, "To print it: ", code, class_="print")

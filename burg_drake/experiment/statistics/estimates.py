@@ -131,7 +131,7 @@ MEASURES: Final[Mapping[str, Measure]] = {
     "kappa": Measure("Cohen's kappa", _kappa, "all verdicts and outcomes are alike", low=-1.0),
     "predicted": _share("predicted success", (0, 1), (0, 1, 2, 3), "no trials"),
     "actual": _share("actual success", (0, 2), (0, 1, 2, 3), "no trials"),
-    "excess": Measure("predicted less actual success", _excess, "no trials", low=-1.0),
+    "excess": Measure("predicted minus actual success", _excess, "no trials", low=-1.0),
 }
 """All measures by the name of their field in `confusion.Agreement`.
 

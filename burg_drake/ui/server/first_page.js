@@ -117,18 +117,14 @@
     setTimeout(() => document.activeElement?.blur(), 0);
   });
 
-  // Where the window is narrow, panels begin folded: the library, and on still narrower ones both;
-  // on phones they are a sheet, whose head folds it.
+  // Where the window is narrow, panels begin folded: the library, and on still narrower ones both.
+  // On phones they are a sheet below the scene, which stays open.
   const FOLDED_AT = { left: 1100, right: 800 }; // width of the window [pixel]
   const PHONE = 576;
   const PANEL_POLL_INTERVAL = 200; // between checks for panels that are not there yet [ms]
-  const toFold = Object.keys(FOLDED_AT).filter((side) => innerWidth < FOLDED_AT[side]);
+  const isNarrow = (side) => PHONE < innerWidth && innerWidth < FOLDED_AT[side];
+  const toFold = Object.keys(FOLDED_AT).filter(isNarrow);
   const fold = setInterval(() => {
-    const sheet = document.querySelector(".mantine-Paper-root[style*='position: fixed']");
-    if (innerWidth <= PHONE && sheet !== null) {
-      sheet.querySelector("[style*='cursor: pointer'][style*='3.5em']")?.click();
-      toFold.length = 0;
-    }
     for (const side of [...toFold]) {
       const handle = document.querySelector(`[data-dock-region-collapse=${side}]`);
       if (handle === null) continue;

@@ -34,7 +34,7 @@ FIRST_ASPECT = 0.9
 """Width over height of the scene before a new page has told it."""
 PHONE_ASPECT, PHONE_HEIGHT = 0.6, 0.55
 """Width over height below which a page is taken for a phone's; share of the page's height left free
-above a phone's open panel. The board lies at the lower end of that, as the panel begins folded."""
+above a phone's panel. The board lies at the lower end of that, in reach of a thumb."""
 TOP_VIEW_TILT = 1e-3
 """Off the vertical, for the camera to know which way is up [rad]."""
 VIEW_TOLERANCE = 1e-3

@@ -34,6 +34,8 @@ figure {{ display: inline-block; margin: 0 1.5rem 1rem 0; vertical-align: top; }
 figcaption {{ font-size: .85rem; max-width: {WIDTH:.0f}px; }}
 .advice {{ color: {ACCENT}; }}
 svg {{ max-width: 100%; height: auto; }}
+@media (max-width: 30rem) {{ td, th {{ padding-right: .5rem; font-size: .85rem; }}
+  td > svg {{ display: none; }} }}
 """
 
 
@@ -57,7 +59,7 @@ def write_report(calibration: Calibration, advice: list[str], path: str) -> None
             f" {calibration.model}; residual {calibration.rms:.3f} pixels (root mean square);"
             f" the target bulges by {1e3 * calibration.bulge:.2f} mm",
         ),
-        element("p", f"In 19 of 20 cases {calibration.promise}."),
+        element("p", f"In 19 of 20 cases the camera is {calibration.promise}."),
         *(element("p", line, class_="advice") for line in advice),
         element("h2", "Camera"),
         _parameters(calibration),
@@ -202,9 +204,10 @@ def _uncertainty(calibration: Calibration) -> tuple[Html, str]:
     words = [f"{value:.2f}" if value < SHADED else f">{SHADED:g}" for value in bounds.tolist()]
     drawn = _cells(calibration, shades, words, ACCENT)
     return drawn, (
-        "How far the camera model may be off, in 19 of 20 cases [pixels]: by the scatter of the"
-        " residuals, by how far the views disagree, and by how far all lens models that fit the"
-        " corners differ. Where no corners were seen that is the most; bring the target there."
+        "How far the camera model may be off in the middle of each part, in 19 of 20 cases"
+        " [pixels]; towards the corners of the image it is more. It counts the scatter of the"
+        " residuals, how far the views disagree, and how far lens models differ that fit as well."
+        " Where it is large, show more of the target."
     )
 
 
