@@ -18,12 +18,13 @@ from burg_drake.cameras.calibration.image_parts import part_of
 from burg_drake.cameras.calibration.lens_fit import fit_lens
 from burg_drake.cameras.calibration.target import find_target
 from burg_drake.cameras.optics.known_parts import PARTS
+from tests.thorough import thorough
 
 RATIONAL = Camera((640, 480), (500.0, 502.0), (322.0, 236.0), (0.4, 0.1, 1e-3, -1e-3, 0.0, 0.6))
 EQUIDISTANT = Fisheye((1280, 960), (520.0, 521.0), (635.0, 485.0), projection="equidistant")
 
 
-@pytest.mark.parametrize("seed", [7, 8])
+@pytest.mark.parametrize("seed", [7, thorough(8)])
 @pytest.mark.parametrize(
     ("name", "where"),
     [*((name, "middle") for name in calibration.LENSES), ("barrel k3", "all over")],
