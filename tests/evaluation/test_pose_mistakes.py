@@ -183,7 +183,9 @@ def test_right_grasps_and_exchanged_fingers_are_no_mistake(
 
 def test_poor_grasps_are_no_mistake(six: Scene, panda: Station) -> None:
     """Of grasps sampled by points alone, a few in a hundred can be executed."""
-    blind = sample_grasps(six, panda, 24, settings=SamplingSettings(blind=True))
+    blind = sample_grasps(
+        six, panda, 24, settings=SamplingSettings(blind=True), only=["mug", "banana", "box"]
+    )
     for name, part in by_names(six, blind).items():
         assert find_mistake({name: part}, panda, six) is None, name
         in_library = {six.instance(name).object: part}

@@ -91,6 +91,7 @@ def test_a_ball_stays_on_slopes_up_to_the_coefficient() -> None:
     )
 
 
+@pytest.mark.thorough  # `test_marble_in_mug` has it without settling a scene
 def test_a_marble_in_a_mug_comes_to_rest() -> None:
     """On the inner floor, 6 mm high, within the wall, 36.5 mm from the axis."""
     scene = pair(
