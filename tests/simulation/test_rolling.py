@@ -106,6 +106,7 @@ def test_a_marble_in_a_mug_comes_to_rest() -> None:
     assert is_still(stillness(settled.scene, make_station(), duration=0.3))
 
 
+@pytest.mark.thorough  # `test_stillness` has what rocks until it rests
 def test_a_ring_over_a_peg_comes_to_rest(tmp_path: Path) -> None:
     """In long steps, the peg's foot of few faces starts to rock by itself, ever farther."""
     base = trimesh.creation.box((0.08, 0.08, 0.012))
