@@ -16,6 +16,7 @@ import gc
 import hashlib
 import math
 import os
+import pickle
 import shutil
 import signal
 import sys
@@ -35,6 +36,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 if "BURG_DRAKE_CACHE" not in os.environ:
     os.environ["BURG_DRAKE_CACHE"] = tempfile.mkdtemp(prefix="burg_drake_cache_")
     atexit.register(shutil.rmtree, os.environ["BURG_DRAKE_CACHE"], ignore_errors=True)
+
+# Tests write thousands of small files, and no power supply ends: they need not wait for the disk.
+os.fsync = lambda file: None
 
 # What a script starts in the background ignores Ctrl-C, and so do all its children; the tests of
 # interrupts need it as it is at a terminal.
@@ -113,37 +117,66 @@ def pytest_collection() -> Generator[None, Any, Any]:
 
 @pytest.fixture(scope="session")
 def measured_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """How far pieces are from the mesh that they stand for is most of the work of building an
-    object, and tests build the same few ones: all workers of a run share what was measured."""
-    from burg_drake.objects.collision import fit
+    """The convex pieces of a mesh, how far they are from it, its symmetries and the surface that
+    pads touch are most of the work of building an object, and tests build the same few ones: all
+    workers of a run share what was found."""
+    import numpy as np
+
+    from burg_drake.objects.collision import contact, decomposition, fit
+    from burg_drake.objects.physics.symmetry import SymmetrySearch
 
     folder = tmp_path_factory.getbasetemp()
-    known = (folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder) / "distances"
+    known = (folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder) / "measured"
     known.mkdir(exist_ok=True)
-    measure = fit._farthest
 
-    def farthest(points: Any, surface: Any, enough: float = math.inf) -> float:
-        digest = hashlib.blake2b(repr(enough).encode(), digest_size=16)
-        for array in (points, surface.vertices, surface.faces):
-            digest.update(repr((array.shape, array.dtype)).encode() + array.tobytes())
+    def once(measure: Any, *key: Any) -> Any:
+        digest = hashlib.blake2b(digest_size=16)
+        for part in key:
+            is_array = isinstance(part, np.ndarray)
+            digest.update(repr((part.shape, part.dtype) if is_array else part).encode())
+            digest.update(part.tobytes() if is_array else b"")
         path = known / digest.hexdigest()
         if not path.exists():
             made = path.with_name(f"{path.name}.{os.getpid()}")
-            made.write_text(repr(measure(points, surface, enough)))
+            made.write_bytes(pickle.dumps(measure()))
             made.replace(path)
-        return float(path.read_text())
+        return pickle.loads(path.read_bytes())
+
+    farthest, find, surface_of = fit._farthest, SymmetrySearch.find, contact.contact_surface
+    cut = decomposition.run_coacd
+
+    def find_once(search: SymmetrySearch) -> Any:
+        key = (search._triangles, search.tolerance, search._covered)
+        return once(lambda: find(search), "symmetries", *key)
+
+    def farthest_once(points: Any, surface: Any, enough: float = math.inf) -> Any:
+        key = (points, surface.vertices, surface.faces, enough)
+        return once(lambda: farthest(points, surface, enough), "distance", *key)
+
+    def surface_once(surface: Any, closed: bool) -> Any:
+        key = (surface.vertices, surface.faces, closed)
+        return once(lambda: surface_of(surface, closed), "surface", *key)
+
+    def cut_once(*arguments: Any) -> Any:
+        return once(lambda: cut(*arguments), "pieces", *arguments)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fit, "_farthest", farthest)
+        patch.setattr(fit, "_farthest", farthest_once)
+        patch.setattr(SymmetrySearch, "find", find_once)
+        patch.setattr(contact, "contact_surface", surface_once)
+        patch.setattr(decomposition, "run_coacd", cut_once)
         yield
 
 
 @pytest.fixture(scope="module")
 def judged_here() -> Iterator[None]:
-    """What asks for one worker gets this process in its place."""
+    """What asks for one worker gets this process in its place, for the work beside judging too."""
+    from burg_drake.evaluation.run import scene_processes
     from burg_drake.evaluation.workers import JudgePool
 
+    preparers = scene_processes.preparers
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(scene_processes, "preparers", lambda n: 0 if n == 1 else preparers(n))
         patch.setattr(
             "burg_drake.evaluation.workers.executor.JudgePool", _pool_or_this_process(JudgePool)
         )

@@ -198,6 +198,7 @@ def test_a_trial_with_another_friction_is_replayed_with_it(
     assert replay(tmp_path / "slippery.csv") == 1
 
 
+@pytest.mark.thorough  # as `evaluation/test_arm_mode` and `visualization/test_arm_replay`
 def test_a_row_of_an_arm_trial_is_replayed_with_the_arm(tmp_path: Path, capsys: Capture) -> None:
     above = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
     (tmp_path / "box.yaml").write_text(SCENE.partition("  - object: can")[0])

@@ -14,6 +14,7 @@ from burg_drake.apps.cli import main
 from burg_drake.core.paths.resources import builtin_names, resolve
 from burg_drake.scene.document.scene import load_scene
 from tests.hang_guard import HANG_GUARD
+from tests.thorough import thorough
 
 Capture = pytest.CaptureFixture[str]
 
@@ -71,7 +72,9 @@ def edit_scene(scene_file: Path, edit: tuple[str, str]) -> Path:
     return scene_file
 
 
-@pytest.mark.parametrize("name", builtin_names("scenes"))
+@pytest.mark.parametrize(  # tests/station checks all of them
+    "name", [n if n == "tabletop_six" else thorough(n) for n in builtin_names("scenes")]
+)
 def test_built_in_scenes_are_sound(name: str, capsys: Capture) -> None:
     assert main(["scene", "validate", name]) == 0
     path = resolve(name, "scenes")
@@ -139,6 +142,7 @@ def test_hovering_is_only_a_warning(
     assert capsys.readouterr().out == warning
     for name in ("computed", "cached"):
         words = ["evaluate", str(scene_file), "--mode", "hand", "--blind", "-n", "1"]
+        words += ["--engine", "screening", "--workers", "1"]
         assert main([*words, "-o", str(tmp_path / name), "--quiet"]) == 0
         assert f"burg-drake: {warning}" in capsys.readouterr().err
 

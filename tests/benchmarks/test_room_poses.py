@@ -5,20 +5,20 @@ from __future__ import annotations
 import pytest
 from room_board import MOST_ERROR, negative, view
 
-from tests.thorough import thorough
+pytestmark = pytest.mark.thorough  # another board is found in the room by `test_room`
 
 
 @pytest.mark.parametrize(
     ("row", "mm"),
     [
         ("overexposed 2", 1.0),
-        thorough("room", 1.5),
-        thorough("motion 4 px", 1.0),
-        thorough("bulge 2 mm", 1.0),
-        thorough("55 % covered", 1.0),
-        thorough("glued 2 mm", 12.0),
-        thorough("99 % along x", 8.0),
-        thorough("principal point", 1.0),
+        ("room", 1.5),
+        ("motion 4 px", 1.0),
+        ("bulge 2 mm", 1.0),
+        ("55 % covered", 1.0),
+        ("glued 2 mm", 12.0),
+        ("99 % along x", 8.0),
+        ("principal point", 1.0),
     ],
 )
 def test_poses_are_found_and_errors_are_what_the_covariance_says(row: str, mm: float) -> None:
@@ -29,7 +29,6 @@ def test_poses_are_found_and_errors_are_what_the_covariance_says(row: str, mm: f
         assert ours.most < MOST_ERROR
 
 
-@pytest.mark.thorough
 def test_another_board_gives_no_pose() -> None:
     other = negative("ids shifted by 20", "640x480", 3, 0)
     assert not other.valid

@@ -136,7 +136,7 @@ def test_paper_that_is_overexposed_is_no_other_board(
     assert near(estimate, VIEW, mm, 0.05)
 
 
-@pytest.mark.parametrize("direction", [0.0, 30.0, 90.0])
+@pytest.mark.parametrize("direction", [0.0, 30.0, thorough(90.0)])
 def test_motion_while_the_camera_exposes(poses: BoardPose, direction: float) -> None:
     light = light_of(board_image(BOARD, CAMERA, VIEW))
     along = np.array([np.cos(np.deg2rad(direction)), np.sin(np.deg2rad(direction))])

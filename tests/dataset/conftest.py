@@ -8,6 +8,11 @@ from burg_drake.objects.library import ObjectLibrary
 from tests.dataset.polyhedra import InMemory, scene_of, some_grasps, write_library
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _measured_once(measured_once: None) -> None:
+    """Exports look for the symmetries of the same built-in objects again and again."""
+
+
 @pytest.fixture(scope="session")
 def bodies(tmp_path_factory: pytest.TempPathFactory) -> ObjectLibrary:
     """The library of both bodies."""

@@ -64,9 +64,11 @@ def files(folder: Path) -> dict[str, bytes]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
 
 
-def test_all_files_are_those_of_this_machine(folder: Path, tmp_path: Path) -> None:
+def test_all_files_are_those_of_this_machine(
+    folder: Path, nodes: LocalNodes, tmp_path: Path
+) -> None:
     there = tmp_path / "set"
-    found = burg.generate_dataset(SCENES, STATION, there, RECIPE, cluster="local:2")
+    found = burg.generate_dataset(SCENES, STATION, there, RECIPE, cluster=nodes.address)
     assert found.new == (0, 1, 2) and not found.failed
     assert files(there) == files(folder)
 

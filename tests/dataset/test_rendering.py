@@ -22,6 +22,7 @@ from burg_drake.scene.document.scene import Scene
 from burg_drake.station.diagram import StationDiagram, build_station_diagram
 from burg_drake.station.document.station_document import Station
 from burg_drake.station.world.camera_sensors import render_cameras
+from tests.thorough import thorough
 
 
 @pytest.fixture(scope="module")
@@ -191,7 +192,7 @@ def test_a_lens_moves_depth_and_labels_as_opencv_says(renderer: SceneRenderer) -
     )
 
 
-@pytest.mark.parametrize("camera", ["board", "overview"])
+@pytest.mark.parametrize("camera", ["board", thorough("overview")])
 def test_labels_of_instances(
     scene: Scene, station: Station, renderer: SceneRenderer, camera: str
 ) -> None:

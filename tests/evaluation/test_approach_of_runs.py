@@ -27,6 +27,7 @@ from burg_drake.evaluation.store.run_folder import Run
 from burg_drake.station.document.grasp_motion import GraspMotion
 from burg_drake.station.document.station_document import load_station
 from tests.evaluation.composed import tabletop
+from tests.thorough import thorough
 
 pytestmark = pytest.mark.usefixtures("judged_here")
 
@@ -45,7 +46,7 @@ GRASPS = GraspSet.create(
 MOTION = GraspMotion(standoff=0.14)
 
 
-@pytest.fixture(scope="module", params=["csv", "parquet"])
+@pytest.fixture(scope="module", params=["csv", thorough("parquet")])
 def run(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Run:
     if request.param == "parquet":
         pytest.importorskip("pyarrow")

@@ -156,6 +156,7 @@ def test_the_same_again_in_another_process_and_order(run: Run, tmp_path: Path) -
                 assert repr(first[name]) == repr(second[name]), (id, name)
 
 
+@pytest.mark.thorough  # `simulation/test_statics` has it for single trials
 def test_friction_decides_as_statics_says(tmp_path: Path) -> None:
     """Two boxes with friction below and above the limit, 2 mu N = m g."""
     mass, force = 0.411, load_station(STATION).hand.force

@@ -126,7 +126,7 @@ def test_transposed_rotations_that_change_few_grasps(six: Scene, panda: Station)
     assert 30 <= found.before < 50 and found.after == found.count == 60
 
 
-@pytest.mark.parametrize("euler", [(90, 0, 0), (180, 0, 0)])
+@pytest.mark.parametrize("euler", [(90, 0, 0), thorough((180, 0, 0))])
 def test_turns_about_the_closing_direction_before_the_pads(
     euler: tuple[float, float, float], right: GraspSet, six: Scene, panda: Station, tmp_path: Path
 ) -> None:
@@ -183,7 +183,9 @@ def test_right_grasps_and_exchanged_fingers_are_no_mistake(
 
 def test_poor_grasps_are_no_mistake(six: Scene, panda: Station) -> None:
     """Of grasps sampled by points alone, a few in a hundred can be executed."""
-    blind = sample_grasps(six, panda, 24, settings=SamplingSettings(blind=True))
+    blind = sample_grasps(
+        six, panda, 24, settings=SamplingSettings(blind=True), only=["mug", "banana", "box"]
+    )
     for name, part in by_names(six, blind).items():
         assert find_mistake({name: part}, panda, six) is None, name
         in_library = {six.instance(name).object: part}
@@ -197,12 +199,13 @@ def test_turns_of_a_ball_are_no_mistake(panda: Station) -> None:
     assert find_mistake({"marble": turned}, panda, library) is None
 
 
-OBJECT_WORLD_CAMERA = ("isaac_grasp", "burg", "graspnet")
-"""A format of each frame in which files have their poses."""
+OBJECT_AND_WORLD = ("isaac_grasp", "burg")
+"""A format of each of two frames in which files have their poses; the third one, the camera's, is
+that of GraspNet below."""
 
 
 @pytest.mark.parametrize(
-    "name", [name if name in OBJECT_WORLD_CAMERA else thorough(name) for name in FORMATS]
+    "name", [name if name in OBJECT_AND_WORLD else thorough(name) for name in FORMATS]
 )
 def test_files_of_every_format(
     name: str, right: GraspSet, six: Scene, panda: Station, tmp_path: Path

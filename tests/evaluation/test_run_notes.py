@@ -27,7 +27,7 @@ from burg_drake.station.document.station_document import load_station
 
 
 def test_an_object_without_clear_grasps_is_explained_wherever_the_run_is_shown(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    judged_here: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The scissors lie flat: fingers that reach them reach into the table. The screen, asked about
     the blind grasps that were tried, is the oracle of the counts."""

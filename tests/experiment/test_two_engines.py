@@ -48,7 +48,7 @@ def engines(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Run]:
     nothing is gripped any more; within it; above it."""
     folder = tmp_path_factory.mktemp("engines")
     scene = known_runs.make_scene(folder)
-    along = np.stack([ABOVE @ make_pose(p_AB=(0.0, y, 0.0)) for y in np.linspace(-0.09, 0.09, 19)])
+    along = np.stack([ABOVE @ make_pose(p_AB=(0.0, y, 0.0)) for y in np.linspace(-0.09, 0.09, 13)])
     high, low = (ABOVE @ make_pose(p_AB=(0.0, 0.0, z)) for z in (-0.1, 0.1))
     grasps = GraspSet.create(np.concatenate([along, [high, low]]), object="box", width=0.06)
     with pytest.MonkeyPatch.context() as patch:

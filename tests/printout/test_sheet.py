@@ -14,6 +14,7 @@ from burg_drake.printout.projection import Grid, Layer
 from burg_drake.printout.sheet import Sheet, draw_sheet
 from burg_drake.scene.document.markers import Markers, marker_layout
 from tests.printout.paper import rasterised
+from tests.thorough import thorough
 
 DPI = 600
 SIZE = (0.06, 0.06)
@@ -32,7 +33,7 @@ def lines_everywhere() -> Drawing:
     ("side", "spacing", "clear"),
     [
         (0.020, 0.015, 1e-3),
-        (0.020, 0.001, 4e-4),
+        thorough(0.020, 0.001, 4e-4),
         (0.008, 0.004, 5e-4),  # cells of 1 mm
     ],
 )

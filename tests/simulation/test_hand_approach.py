@@ -21,6 +21,7 @@ from burg_drake.simulation.trials.result import TrialResult
 from burg_drake.simulation.trials.trial_settings import TrialSettings
 from burg_drake.station.document.grasp_motion import GraspMotion
 from burg_drake.station.document.station_document import Obstacle, Station
+from tests.thorough import thorough
 
 APPROACH = TrialSettings(approach=True)
 GRASPS = [from_above(0.05, y=y, yaw=yaw) for y, yaw in ((0.0, 0.0), (0.03, 0.0), (-0.02, 0.3))]
@@ -55,7 +56,7 @@ def assert_alike(one: TrialResult, other: TrialResult) -> None:
         assert first == pytest.approx(second, abs=tolerance), name
 
 
-@pytest.mark.parametrize("friction", [0.11, 0.15, 0.5])
+@pytest.mark.parametrize("friction", [0.11, thorough(0.15), 0.5])
 def test_a_clear_approach_makes_no_difference(
     box: HandTrial, box_trial: HandTrial, friction: float
 ) -> None:

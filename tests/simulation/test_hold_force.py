@@ -136,6 +136,7 @@ def test_what_stands_around_does_not_matter(trial: HandTrial, tugged, make_scene
     assert found.forces["-y"] == pytest.approx(tugged.forces["-y"], rel=0.02)
 
 
+@pytest.mark.thorough  # `test_alone` tells pieces from hulls
 def test_hard_parts_of_a_hand_meet_a_bowl_and_not_its_hull(tmp_path: Path) -> None:
     """The fingers over the pads stay clear of the bowl, and would meet its hull within `slide`."""
     panda = load_station("panda_tabletop")

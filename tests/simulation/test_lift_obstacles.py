@@ -14,6 +14,7 @@ from burg_drake.scene.document.scene import Instance
 from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.simulation.trials.result import TrialResult
 from burg_drake.station.document.station_document import Obstacle
+from tests.thorough import thorough
 
 UNDECIDED = 0.6
 """A trial in free air is decided before this [s]."""
@@ -46,7 +47,7 @@ def test_a_shelf_above_the_end_of_the_target_turns_it_in_the_hand(make_scene) ->
     assert early.margins.tilt == pytest.approx(whole.margins.tilt, rel=0.05)
 
 
-@pytest.mark.parametrize("height", [0.30, 0.45])
+@pytest.mark.parametrize("height", [thorough(0.30), 0.45])
 def test_a_shelf_in_the_way_of_the_hand_ends_the_trial(make_scene, height: float) -> None:
     """The hand's top is 0.112 m above the grasp frame, which starts at 0.05 m."""
     for result in both(make_scene, ("box", 0.3, 0.2, 0.0), obstacles=shelf(height, 0.1)):

@@ -20,6 +20,7 @@ from burg_drake.simulation.trials.grip_motion import GripMotion
 from burg_drake.simulation.trials.hand_trial import HandTrial
 from burg_drake.simulation.trials.result import TrialResult
 from burg_drake.simulation.trials.trial_settings import NO_LIMITS, TrialSettings
+from tests.thorough import thorough
 
 OFF_CENTRE = from_above(0.02, y=0.05)
 """A grasp 50 mm off the middle of the bar."""
@@ -54,7 +55,9 @@ def test_without_limits_all_that_is_held_is_lifted(unlimited: dict[float, TrialR
 
 
 @pytest.mark.parametrize("name", ["tilt", "slip"])
-@pytest.mark.parametrize("friction", FRICTIONS)
+@pytest.mark.parametrize(
+    "friction", [mu if mu in (0.14, 0.25) else thorough(mu) for mu in FRICTIONS]
+)
 def test_each_limit_decides_between_lifted_and_turned(
     run: Callable[..., TrialResult], unlimited: dict[float, TrialResult], friction: float, name: str
 ) -> None:

@@ -91,6 +91,7 @@ def test_a_ball_stays_on_slopes_up_to_the_coefficient() -> None:
     )
 
 
+@pytest.mark.thorough  # `test_marble_in_mug` has it without settling a scene
 def test_a_marble_in_a_mug_comes_to_rest() -> None:
     """On the inner floor, 6 mm high, within the wall, 36.5 mm from the axis."""
     scene = pair(
@@ -105,6 +106,7 @@ def test_a_marble_in_a_mug_comes_to_rest() -> None:
     assert is_still(stillness(settled.scene, make_station(), duration=0.3))
 
 
+@pytest.mark.thorough  # `test_stillness` has what rocks until it rests
 def test_a_ring_over_a_peg_comes_to_rest(tmp_path: Path) -> None:
     """In long steps, the peg's foot of few faces starts to rock by itself, ever farther."""
     base = trimesh.creation.box((0.08, 0.08, 0.012))

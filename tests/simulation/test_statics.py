@@ -123,7 +123,12 @@ def box_grasp(trial: HandTrial) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("engine", "tolerance"),
-    [("reference", 0.02), ("standard", 0.01), ("mujoco", 0.01), thorough("screening", 0.01)],
+    [
+        thorough("reference", 0.02),
+        ("standard", 0.01),
+        ("mujoco", 0.01),
+        thorough("screening", 0.01),
+    ],
 )
 def test_smallest_friction_that_holds(slow_trials, engine: str, tolerance: float) -> None:
     """2 mu N = m g, with the commanded force."""
@@ -193,7 +198,8 @@ BAR_FRICTION = limit_friction(*PAD, LEVER) * BAR_MASS * GRAVITY / (2 * FORCE)
 
 
 @pytest.mark.parametrize(
-    ("engine", "tolerance"), [("standard", 0.06), ("mujoco", 0.06), thorough("screening", 0.12)]
+    ("engine", "tolerance"),
+    [("standard", 0.06), thorough("mujoco", 0.06), thorough("screening", 0.12)],
 )
 def test_smallest_friction_that_keeps_a_bar_level(bar_trials, engine, tolerance) -> None:
     """Of what is above 1, the pad's eight triangles make 0.03, as they stand for the whole patch
