@@ -37,7 +37,7 @@ if "BURG_DRAKE_CACHE" not in os.environ:
     os.environ["BURG_DRAKE_CACHE"] = tempfile.mkdtemp(prefix="burg_drake_cache_")
     atexit.register(shutil.rmtree, os.environ["BURG_DRAKE_CACHE"], ignore_errors=True)
 
-# Tests write thousands of small files, and no power supply ends: they need not wait for the disk.
+# Tests write thousands of small files, which need not survive a power failure.
 os.fsync = lambda file: None
 
 # What a script starts in the background ignores Ctrl-C, and so do all its children; the tests of
