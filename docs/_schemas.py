@@ -1,7 +1,7 @@
 """The reference of documents: tables of all keys for the page, and the schemas for editors.
 
-In conf.py: `sys.path.insert(0, os.path.dirname(__file__))` and `extensions += ["_schemas"]`. Then
-`reference/documents.md` ends with the tables, and the site has `schema/scene.json` and the others.
+As an extension of Sphinx it adds the tables to `reference/documents.md`, and `schema/scene.json` and
+the others to the site.
 """
 
 from __future__ import annotations

@@ -451,7 +451,7 @@ def test_flow_style_can_be_changed_and_an_alias_is_refused(tmp_path: Path) -> No
     ("old", "new", "message"),
     [
         ("note_", "notes", r":\d+: trials\[0\]: unknown key 'notes'; did you mean 'note'\?"),
-        ("number: 2", "number: 1", ":\d+: number 1 is used twice, by entries 1 and 2"),
+        ("number: 2", "number: 1", r":\d+: number 1 is used twice, by entries 1 and 2"),
         ("stratum: mug", "stratum: mag", r":\d+: there is no stratum 'mag'; did you mean 'mug'\?"),
         (
             "run: two\n    gr",
@@ -464,7 +464,7 @@ def test_flow_style_can_be_changed_and_an_alias_is_refused(tmp_path: Path) -> No
         (
             "population: 4",
             "population: 3",
-            ":\d+: strata.mug: population 3 is smaller than selected,",
+            r":\d+: strata.mug: population 3 is smaller than selected,",
         ),
     ],
 )
