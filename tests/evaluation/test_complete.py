@@ -62,4 +62,4 @@ def test_the_command_does_not_end_as_if_all_were_well(
     monkeypatch.setattr(local, lambda workers: Short())
     call = ["evaluate", "tabletop_six", "-n", "1", "--mode", "hand", "--blind", "--quiet"]
     assert main([*call, "-o", str(tmp_path / "run")]) == 2
-    assert re.search("\d of \d grasps have no verdict yet", capsys.readouterr().err)
+    assert re.search(r"\d of \d grasps have no verdict yet", capsys.readouterr().err)
