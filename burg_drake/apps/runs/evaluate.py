@@ -184,7 +184,10 @@ def _print_run(run: Run, motion: GraspMotion, *, rejudged: bool) -> None:
     if rejudged or any(verdict.judged_again for verdict in run.verdicts.values()):
         print(settled_line({name: run.results[name] for name in SETTLED_COLUMNS}))
     if contested := run.contested:
-        print(f"contested: {listing(contested)}; --rejudge contested settles them")
+        print(
+            f"contested: {listing(contested)}; judge them again by the same command with"
+            " --rejudge contested"
+        )
     best = run.best(each=True)
     if best:
         print("best    " + "\n        ".join(best))

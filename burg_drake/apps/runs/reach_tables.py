@@ -69,7 +69,7 @@ def reach_table(by_object: Mapping[str, Counter[Outcome]], total: Counter[Outcom
         )
     table.caption = (
         "clear: the open hand collides with nothing at the grasp\n"
-        f"reachable: {Outcome.REACHABLE.meaning.partition(';')[0]}"
+        "reachable: hand and arm can go there, in and up again without a collision"
     )
     return table
 

@@ -184,10 +184,10 @@ def _caption(settings: RobustnessSettings) -> str:
     if {"tug", "shake"} & set(settings.tests):
         parts.append(
             "tug, shake: acceleration withstood along the weakest direction of the grasp frame"
-            " (x closing, z approach)"
+            " (x closing, z approach), in g = 9.81 m/s²"
         )
     if "friction" in settings.tests:
-        parts.append("least mu: smallest friction coefficient that lifts, out of the object's own")
+        parts.append("least mu: smallest friction coefficient that lifts, and the object's own")
     if "noise" in settings.tests:
         noise = settings.noise
         parts.append(
