@@ -233,7 +233,7 @@ def test_intrinsics_that_do_not_fit_the_image(tmp_path: Path) -> None:
 def test_sizes_that_a_sensor_does_not_have(tmp_path: Path) -> None:
     path = tmp_path / "recipe.yaml"
     for size, said in (
-        ("[640, 100]", "d435 has no depth images of 640 x 100 pixels; they have the aspect of 640"),
+        ("[640, 100]", "d435 has no depth images of 640 x 100 pixels; give a size"),
         ("[640, 0]", "d435 has no depth images of 640 x 0 pixels"),
         ("[32000, 24000]", "image of 32000 x 24000 pixels; a side may have at most 16,384"),
     ):
