@@ -94,7 +94,7 @@ def test_binning_and_region(intrinsics: Intrinsics, info_message: Callable[..., 
         (
             {"distortion_model": "thin_prism_fisheye"},
             False,
-            "model 'thin_prism_fisheye'; supported are plumb_bob, rational_polynomial and equidistant",
+            "'thin_prism_fisheye'; supported are plumb_bob, rational_polynomial and equidistant",
         ),
         ({"distortion_model": "equidistant"}, False, "5 coefficients; a fisheye model has 4"),
         ({"d": [np.nan, 0.2, 0.0, 0.0, 0.0]}, False, "not finite"),
