@@ -74,7 +74,7 @@ def test_no_room(tmp_path: Path, capsys: Captured) -> None:
         ),
         (
             ["household", "--size", "A9", "-o", "x.yaml"],
-            "board size 'A9' does not exist; known: A0, A1, A2, A3, A4; or WxH in mm: 700x500",
+            "board size 'A9' does not exist; known: A0, A1, A2, A3, A4; or give WxH in mm",
         ),
         (["household", "-n", "5000", "-o", "x"], "-n 5000: a scene has 1000 objects at most"),
         (["household", "--force", "-o", "x"], "--force goes with --again"),
