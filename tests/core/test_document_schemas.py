@@ -51,7 +51,8 @@ MUTATIONS = 12
 """Of the example of a kind."""
 ONLY_THE_READER_REFUSES = {
     "one key decides about another": r"give (either|unit|mass|rpy)|with a jobqueue|with tls files"
-    r"|needs the baseline|give only one|margin names|is less than|more than lift_height|minimum is at most"
+    r"|needs the baseline|give only one|margin names|is less than|more than lift_height"
+    r"|minimum is at most"
     r"|entries; expected|coefficients|depth images|both fingers|closed and open|simulated$",
     "a range that has to rise": r"must rise|at least grazing",
     "more than 0, or of many numbers": r"above 0|> 0|positive|below 0|or more|at least|each must be"
