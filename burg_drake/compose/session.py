@@ -147,7 +147,7 @@ class ComposeSession(BackgroundEditor):
         with self._exclusive():
             path = self._storage.path if name is None else scene_path(name, self.folder)
             if path is None:
-                raise InvalidInputError("this scene was never saved, so there is nothing to load")
+                raise InvalidInputError("this scene was never saved, so it cannot be loaded")
             self._require_saved(discard=discard)
             if path != self._storage.path:
                 return self._change(open_scene_file(path, self._address))
@@ -222,7 +222,8 @@ class ComposeSession(BackgroundEditor):
             return self.folder / reference
         if reference not in self.libraries():
             raise UnknownNameError(
-                f"no library {reference!r} here; {nearest(reference, self.libraries())}"
+                f"{reference!r} is neither a library of this folder nor built in;"
+                f" {nearest(reference, self.libraries())}"
             )
         return reference if reference in builtin_names("models") else self.folder / reference
 
@@ -244,9 +245,7 @@ class ComposeSession(BackgroundEditor):
     def _require_saved(self, *, discard: bool) -> None:
         if self._changed and not discard:
             name = self._history.state.document.name
-            raise UnsavedChanges(
-                f"scene {name!r} has changes that are not saved; save or discard them"
-            )
+            raise UnsavedChanges(f"scene {name!r} has unsaved changes; save or discard them")
 
     def _update_surroundings(self) -> None:
         self._check_scene_file()
@@ -256,7 +255,7 @@ class ComposeSession(BackgroundEditor):
         try:
             changed = self._watch.reload_if_changed()
         except BurgError as error:
-            self.notify(f"library {library.root} cannot be read any more: {error}")
+            self.notify(f"library {library.root} can no longer be read: {error}")
             return
         if changed is None:
             return
@@ -275,6 +274,6 @@ class ComposeSession(BackgroundEditor):
         except InvalidInputError:
             return  # saving tells
         if found not in (self._storage.known, self._seen):
-            what = "is gone" if found is None else "was changed by something else"
+            what = "is gone" if found is None else "was changed by another program"
             self.notify(f"{path} {what}; load it, or overwrite it by saving")
         self._seen = found

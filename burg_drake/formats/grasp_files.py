@@ -8,7 +8,13 @@ from pathlib import Path
 
 from burg_drake.core import InvalidInputError, UnknownNameError, nearest
 from burg_drake.core.documents import checked_events, load_json
-from burg_drake.core.files import GRASP_FILE, open_regular, read_text, reporting_read_errors
+from burg_drake.core.files import (
+    GRASP_FILE,
+    npy_shape,
+    open_regular,
+    read_text,
+    reporting_read_errors,
+)
 from burg_drake.core.grasps import GraspSet
 from burg_drake.formats.common import PANDA, GraspFormat, Gripper, ImportedGrasps
 
@@ -45,12 +51,6 @@ class _Formats(Mapping[str, GraspFormat]):
 FORMATS: Mapping[str, GraspFormat] = _Formats()
 """Formats by name."""
 
-ARRAY_FILE_HINTS = {
-    ".npz": " GraspSet.create(X_OG, object=NAME).save(FILE) writes an .npz that can be read;",
-    ".npy": " an .npy of bare poses has shape (N, 4, 4);",
-}
-"""What files of arrays have to be like, by suffix."""
-
 
 def read_grasp_file(
     path: str | Path, format: str | None = None, gripper: Gripper = PANDA
@@ -80,7 +80,7 @@ def format_of(path: str | Path) -> GraspFormat:
     """The format of a file, by its content.
 
     Raises:
-        InvalidInputError: it is of none; of YAML and JSON that cannot be read, why.
+        InvalidInputError: it is of none; of `.npz`, YAML and JSON that cannot be read, why.
     """
     path = Path(path)
     for format in FORMATS.values():
@@ -91,10 +91,18 @@ def format_of(path: str | Path) -> GraspFormat:
             pass  # says what is wrong with a file that is damaged or beyond the limits
     if path.suffix == ".json":
         load_json(path, GRASP_FILE)
+    if path.suffix.lower() == ".npz":
+        GraspSet.load(path)
+    shape = npy_shape(path) if path.suffix.lower() == ".npy" else None
+    wanted = (
+        f" its array has shape {shape}; expected (N, 4, 4) or (N, 14) of BURG-Toolkit,"
+        " or (N, 17) of GraspNet;"
+        if shape is not None
+        else ""
+    )
     raise InvalidInputError(
         f"{path} is not a file of grasps in a known format ({', '.join(FORMATS)});"
-        f"{ARRAY_FILE_HINTS.get(path.suffix.lower(), '')} if it should be in one of them,"
-        " name the format to see what is wrong"
+        f"{wanted} if it should be in one of them, name the format to see what is wrong"
     ).about("format")
 
 

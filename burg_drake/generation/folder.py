@@ -140,8 +140,8 @@ class SceneFolder:
                 ).about("folder")
         elif any(self.path.iterdir()):
             raise InvalidInputError(
-                f"{self.path} is not empty and has no sampled scenes ({RECIPE_FILE} is"
-                " missing); choose another folder"
+                f"{self.path} is not empty, but has no sampled scenes ({RECIPE_FILE} is missing);"
+                " choose another folder"
             ).about("folder")
         else:
             save_document(provenance, recipe, "What the scenes of this folder were made with.")
@@ -201,7 +201,7 @@ def _require_readable(path: Path) -> None:
     try:
         load_document(path, SceneDocument)
     except DocumentError as error:
-        raise DocumentError(f"{error}; fix it, or delete it and it is made again") from error
+        raise DocumentError(f"{error}; fix the file, or delete it to have it made again") from error
 
 
 def read_table(path: Path) -> list[SceneRow]:

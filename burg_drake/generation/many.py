@@ -129,7 +129,7 @@ def sample_scene(work: SceneTask) -> SampledScene:
     try:
         return _sampler(work.inputs).sample(work.number, work.inputs.folder)
     except SystemExit as error:  # DRAKE_DEMAND ends this way
-        raise SimulationError(f"Drake gave up: {error}") from error
+        raise SimulationError(f"Drake failed: {error}") from error
 
 
 def _sampling_inputs(
@@ -154,5 +154,7 @@ def _sampler(inputs: SamplingInputs) -> SceneSampler:
         ("station", there.station_content, station.path, inputs.contents[1]),
     ):
         if found != content:
-            raise InvalidInputError(f"the {what} {path} was changed meanwhile; sample again")
+            raise InvalidInputError(
+                f"the {what} {path} was changed while scenes were sampled; run the command again"
+            )
     return sampler

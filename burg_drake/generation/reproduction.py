@@ -44,16 +44,16 @@ def sample_again(scene: Scene, *, force: bool = False) -> ReproducedScene:
     origin = scene.document.origin
     if origin is None:
         raise InvalidInputError(
-            f"{scene.path} has no `origin`, so it was not sampled or was edited since; it"
-            " cannot be made again"
+            f"{scene.path} has no `origin`, so it was not sampled, or was edited since; it cannot"
+            " be made again"
         )
     station = load_station(resolve(origin.recipe.station, "stations", scene.path.parent))
     here = provenance_of(origin.recipe, scene.library, station)
     differences = origin.differences(here)
     if differences and not force:
         raise InvalidInputError(
-            f"the inputs of {scene.path} have changed ({'; '.join(differences)}), so the"
-            " scene may come out differently; make it by force to go on all the same"
+            f"the inputs of {scene.path} have changed ({'; '.join(differences)}), so the scene may"
+            " come out differently; force it to make the scene anyway"
         ).about("force")
     sampler = SceneSampler(origin.recipe, scene.library, station)
     sampled = sampler.sample(origin.number, scene.path.parent)
@@ -61,5 +61,5 @@ def sample_again(scene: Scene, *, force: bool = False) -> ReproducedScene:
         return ReproducedScene(None, station, False, tuple(differences))
     same = sampled.scene.document == scene.document
     if not same and not differences:
-        differences = ["the file was changed since it was sampled"]
+        differences = ["the file was changed after it was sampled"]
     return ReproducedScene(sampled.scene, station, same, tuple(differences))

@@ -33,7 +33,8 @@ def require_rules(recipe: SceneRecipe, station: Station) -> None:
         )
     if recipe.within_reach and station.document.arm is None:
         raise InvalidInputError(
-            f"within_reach: station {station.name!r} has no arm; choose another station"
+            f"within_reach needs an arm, but station {station.name!r} has none; choose another"
+            " station"
         )
 
 

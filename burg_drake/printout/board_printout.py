@@ -67,7 +67,7 @@ class PrintSettings:
         for value in self.measured:
             if not MEASURED[0] <= value <= MEASURED[1]:
                 raise InvalidInputError(
-                    f"a ruler of 100 mm measured {1e3 * value:g} mm; it must be"
+                    f"the measured length of the 100 mm ruler is {1e3 * value:g} mm; it must be"
                     f" {1e3 * MEASURED[0]:g} to {1e3 * MEASURED[1]:g} mm"
                 )
 
@@ -154,7 +154,7 @@ def print_board(scene: SceneLike, settings: PrintSettings | None = None) -> Prin
     warnings += losses
     warnings += _spread(size, layout, drawings, settings, tiling)
     warnings += lacking_white(size, layout)
-    warnings += [f"there is no room for the words {words}" for words in unplaced]
+    warnings += [f"there is no room to print {words}" for words in unplaced]
     pdf, first = _document(scene, sheet, tiling, settings, losses)
     return Printout(pdf, tiling, settings, tuple(warnings), first)
 
@@ -192,10 +192,10 @@ def _spread(
     page = next((name for name in PAPERS if on_one(page=name)), None)
     changes = [f"a margin of {1e3 * margin:g} mm"] if margin is not None else []
     changes += [f"page {page}"] if page else []
-    remedy = f"; {' or '.join(changes)} would do with one" if changes else ""
+    remedy = f"; {' or '.join(changes)} would fit on one" if changes else ""
     return [
-        f"the board is no larger than the page, but takes {pages} because of the margins, rulers"
-        f" and words{remedy}"
+        f"the board is no larger than the page, but takes {pages} pages because of the margins,"
+        f" rulers and text{remedy}"
     ]
 
 

@@ -61,8 +61,8 @@ def printer_losses(sheet: Sheet, tiling: Tiling) -> list[str]:
                 cut += [f"{1e3 * most:.1f} mm of {what}"] if most > 1e-4 else []
         if cut:
             lost.append(
-                f"page {tile.number}: a printer that leaves {1e3 * USUAL_MARGIN:.1f} mm white, as"
-                f" most laser printers do, cuts off {' and '.join(cut)}"
+                f"page {tile.number}: a printer with a margin of {1e3 * USUAL_MARGIN:.1f} mm, as"
+                f" most laser printers have, cuts off {' and '.join(cut)}"
             )
     return lost
 
@@ -75,9 +75,8 @@ def lacking_white(size: tuple[float, float], layout: MarkerLayout) -> list[str]:
     if white > least - 1e-9:
         return []
     return [
-        f"markers are {1e3 * white:.1f} mm from the board's edge; cut out, on a dark table, they"
-        f" lack the white around them that detectors need: leave {1e3 * least:.1f} mm, by a larger"
-        " board or smaller markers"
+        f"markers are {1e3 * white:.1f} mm from the edge of the board, but detectors need a white"
+        f" border of {1e3 * least:.1f} mm around them; give a larger board or smaller markers"
     ]
 
 

@@ -80,13 +80,14 @@ def paper_size(name: str) -> tuple[str, float, float]:
     own = re.fullmatch(r"(\d+(?:\.\d+)?)\s*[x×]\s*(\d+(?:\.\d+)?)(?:\s*mm)?", name.lower())
     if not own:
         raise UnknownNameError(
-            f"page {name!r} does not exist; {nearest(name, PAPERS)}; or WxH in mm: 700x500"
+            f"page {name!r} does not exist; {nearest(name, PAPERS)}; or give WxH in mm, such as"
+            " 700x500"
         )
     short, long = sorted(float(text) * 1e-3 for text in own.groups())
     if short < LEAST_HEIGHT or long < LEAST_WIDTH or long > GREATEST:
         raise InvalidInputError(
-            f"page {name!r}: it must be at least {1e3 * LEAST_WIDTH:g} x {1e3 * LEAST_HEIGHT:g} mm,"
-            f" for rulers and text, and at most {1e3 * GREATEST:g} mm long, as PDF allows"
+            f"page {name!r} must be at least {1e3 * LEAST_WIDTH:g} x {1e3 * LEAST_HEIGHT:g} mm,"
+            f" for rulers and text, and at most {1e3 * GREATEST:g} mm long, the limit of PDF"
         )
     return f"{1e3 * long:g} x {1e3 * short:g} mm", short, long
 
@@ -115,7 +116,7 @@ def orientations(
     fits = [p for p in pages if p.width - white >= LEAST_WIDTH and p.height - white >= LEAST_HEIGHT]
     if not fits:
         raise InvalidInputError(
-            f"margins of {1e3 * margin:g} mm leave too little of page {label}; give smaller ones"
-            " or a larger page"
+            f"margins of {1e3 * margin:g} mm leave too little of page {label}; give smaller"
+            " margins or a larger page"
         )
     return tuple(fits)

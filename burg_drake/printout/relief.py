@@ -60,8 +60,9 @@ def height_map(scene: SceneLike, resolution: float = RESOLUTION) -> HeightMap:
     size = scene.board.size
     if not resolution > 0.0 or size[0] * size[1] / resolution**2 > MAX_PIXELS:
         raise InvalidInputError(
-            f"resolution {resolution:g} m does not suit a board of {1e3 * size[0]:g} x"
-            f" {1e3 * size[1]:g} mm; give metres a pixel that make at most {MAX_PIXELS:.0e} pixels"
+            f"a resolution of {resolution:g} m per pixel does not suit a board of"
+            f" {1e3 * size[0]:g} x {1e3 * size[1]:g} mm; it must be above 0 and give at most"
+            f" {MAX_PIXELS:.0e} pixels"
         )
     grid = Grid(size, resolution)
     layers = projected_layers(scene, grid)

@@ -105,15 +105,16 @@ def tile_board(
     found = [t for paper in papers if (t := _tiling(size, layout, needed, paper)) is not None]
     if not found:
         raise InvalidInputError(
-            f"a marker of {1e3 * layout.side:g} mm, with half the gaps beside it, does not fit on"
-            f" page {papers[0].name}; {_remedy(size, layout, needed, papers[0].margin)}"
+            f"a marker of {1e3 * layout.side:g} mm, with half of the gaps around it, does not fit"
+            f" on page {papers[0].name}; {_remedy(size, layout, needed, papers[0].margin)}"
         )
     wide = size[0] >= size[1]
     best = min(found, key=lambda t: (len(t.tiles), (t.paper.width >= t.paper.height) != wide))
     if len(best.tiles) > MOST_PAGES:
         raise InvalidInputError(
             f"a board of {1e3 * size[0]:g} x {1e3 * size[1]:g} mm needs {len(best.tiles)} pages"
-            f" {best.paper.name}, more than {MOST_PAGES}; board.size is in metres"
+            f" {best.paper.name}, but at most {MOST_PAGES} are printed; check board.size, which is"
+            " in metres"
         )
     return best
 
@@ -123,8 +124,8 @@ def _remedy(
 ) -> str:
     for name in PAPERS:
         if any(_tiling(size, layout, needed, p) for p in orientations(name, margin)):
-            return f"{name} would do"
-    return "print it on larger paper, of WxH mm, or give smaller markers"
+            return f"{name} would be large enough"
+    return "give larger paper as WxH in mm, or smaller markers"
 
 
 def _tiling(

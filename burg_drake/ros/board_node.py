@@ -125,7 +125,7 @@ class BoardNode:
             )
         else:
             raise InvalidInputError(
-                "no camera_info has arrived yet; if the camera publishes none, give its"
+                "no camera_info message has arrived yet; if the camera publishes none, give its"
                 " intrinsics as a file"
             ).about("intrinsics")
         height, width = image.shape[:2]

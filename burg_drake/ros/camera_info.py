@@ -38,14 +38,17 @@ def intrinsics_of(message: Any, *, rectified: bool = False) -> Intrinsics:
     fy, cy = float(matrix[columns + 1]), float(matrix[columns + 2])
     distortion = () if rectified else _distortion(message)
     if not np.isfinite([fx, fy, cx, cy, skew, *distortion]).all():
-        raise InvalidInputError("camera_info has numbers that are not finite")
+        raise InvalidInputError("camera_info has numbers that are not finite; calibrate the camera")
     if min(fx, fy) <= 0.0:
         raise InvalidInputError(
-            f"camera_info has {'P' if rectified else 'K'} = 0, the camera is not calibrated;"
+            f"camera_info has {'P' if rectified else 'K'} = 0, so the camera is not calibrated;"
             " calibrate it, or give its intrinsics as a file"
         ).about("intrinsics")
     if skew:
-        raise InvalidInputError(f"camera_info has sheared pixels, skew {skew:g}")
+        raise InvalidInputError(
+            f"camera_info has skew {skew:g}, which is not supported; calibrate the camera without"
+            " skew"
+        )
     fisheye = not rectified and is_ros_fisheye(message.distortion_model, distortion)
     region = message.roi
     merged_x, merged_y = max(message.binning_x, 1), max(message.binning_y, 1)
@@ -69,9 +72,9 @@ def _distortion(message: Any) -> tuple[float, ...]:
         return ()
     if message.distortion_model not in ROS_MODELS:
         raise InvalidInputError(
-            f"camera_info has the distortion model {message.distortion_model!r}; plumb_bob,"
-            f" rational_polynomial and {ROS_FISHEYE} are read; rectify the images (image_proc) and"
-            " start the node for rectified ones"
+            f"camera_info has the distortion model {message.distortion_model!r}; supported are"
+            f" plumb_bob, rational_polynomial and {ROS_FISHEYE}: rectify the images (image_proc)"
+            " and start the node for rectified ones"
         ).about("rectified")
     return coefficients
 

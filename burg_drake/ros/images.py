@@ -70,8 +70,8 @@ def _raw(message: Any) -> NDArray[np.uint8]:
     encoding = ENCODINGS.get(message.encoding)
     if encoding is None:
         raise InvalidInputError(
-            f"images with encoding {message.encoding!r} are not read;"
-            f" known: {listing(sorted(ENCODINGS))}"
+            f"the image encoding {message.encoding!r} is not supported; supported are"
+            f" {listing(sorted(ENCODINGS))}"
         )
     height, width, step = message.height, message.width, message.step
     dtype = np.dtype(encoding.dtype).newbyteorder(">" if message.is_bigendian else "<")
@@ -79,8 +79,8 @@ def _raw(message: Any) -> NDArray[np.uint8]:
     octets = np.frombuffer(message.data, np.uint8)
     if min(height, width) < 1 or step < row or len(octets) < height * step:
         raise InvalidInputError(
-            f"damaged image: {len(octets)} bytes in rows of {step} do not make {width} x "
-            f"{height} pixels of {message.encoding}"
+            f"the image is damaged: {len(octets)} bytes in rows of {step} are not {width} x"
+            f" {height} pixels of {message.encoding}"
         )
     rows = np.ascontiguousarray(octets[: height * step].reshape(height, step)[:, :row])
     values = rows.view(dtype).reshape(height, width, encoding.channels)
@@ -92,17 +92,20 @@ def _raw(message: Any) -> NDArray[np.uint8]:
         return np.asarray(cv2.cvtColor(values, getattr(cv2, f"COLOR_{encoding.to_rgb}")))
     except cv2.error as error:
         raise InvalidInputError(
-            f"{width} x {height} pixels cannot be {message.encoding}: {error.err}"
+            f"an image of {width} x {height} pixels cannot have encoding {message.encoding}:"
+            f" {error.err}"
         ) from error
 
 
 def _compressed(message: Any) -> NDArray[np.uint8]:
     if "compressedDepth" in message.format:
-        raise InvalidInputError("the topic has depth images; give one with colour images")
+        raise InvalidInputError("the topic publishes depth images; give a topic of colour images")
     data = bytes(message.data)
     image = decode_image(data) if data else None
     if image is None:
-        raise InvalidInputError(f"damaged image: {len(data)} bytes of {message.format!r}")
+        raise InvalidInputError(
+            f"the image is damaged: its {len(data)} bytes cannot be decoded as {message.format!r}"
+        )
     return image
 
 

@@ -60,12 +60,13 @@ class Names:
     def __post_init__(self) -> None:
         if not NODE_NAME.fullmatch(self.node):
             raise InvalidInputError(
-                f"node name {self.node!r} must be letters, digits and _, a letter first"
+                f"node name {self.node!r} is not valid; it must be letters, digits and _, and"
+                " start with a letter"
             )
         for topic in (self.image, self.camera_info or self.image):
             if not TOPIC_NAME.fullmatch(topic):
                 raise InvalidInputError(
-                    f"{topic!r} is not the name of a topic such as /camera/image_raw"
+                    f"{topic!r} is not a valid topic name; give one such as /camera/image_raw"
                 )
         if not self.board_frame or self.board_frame.startswith("/"):
             raise InvalidInputError(f"tf frame {self.board_frame!r} must not start with /")
@@ -114,8 +115,8 @@ class Publications:
         if names.parent is not Parent.NONE:
             if classes.TFMessage is None:
                 raise MissingDependencyError(
-                    "tf2_msgs is not installed, which the board's frame on tf needs; install it, or"
-                    " let the node leave tf alone: none"
+                    "tf2_msgs is not installed, so the frame of the board cannot be published on"
+                    " tf; install it, or give none as parent frame"
                 ).about("tf_parent")
             self._frames = advertise("/tf", classes.TFMessage, TF_QUEUE)
 

@@ -63,8 +63,8 @@ class StatusLog:
         self._hinted = True
         silent = [topic for topic, count in publishers.items() if not count]
         if silent:
-            return f"nobody publishes {' and '.join(silent)}; is the camera running? Still waiting"
-        return f"{next(iter(publishers))} is published, but no images arrive; still waiting"
+            return f"nothing publishes {' and '.join(silent)}; is the camera running? Still waiting"
+        return f"{next(iter(publishers))} has a publisher, but no images arrive; still waiting"
 
     def rate(self, now: float, *, last: bool = False) -> str | None:
         """Images answered a second, and how many of them with a pose.

@@ -101,7 +101,7 @@ class Ros2Link(Link):
 
     def _subscribe_with_best_effort(self, topic: str) -> None:
         self.log(
-            f"{topic} is published with best effort, so an image is lost if one of its"
+            f"{topic} is published with best-effort reliability, so an image is lost if one of its"
             " packets is lost; publish it as reliable to receive more images"
         )
         self._subscribe(topic, reliable=False)

@@ -74,7 +74,7 @@ def test_script_with_a_photo(
     first, second = (load_snapshot(folder).document.board for folder in (shot, tmp_path / "again"))
     assert first.X_SC == second.X_SC and first.markers == second.markers
     assert run(files, "--camera", picture, "--no-browser", "--snapshot", str(shot)) == 2
-    assert "exists; give a snapshot a new name" in capsys.readouterr().err
+    assert "exists already; choose another name" in capsys.readouterr().err
 
 
 def test_script_with_a_video(
@@ -112,9 +112,9 @@ def test_view_serves_for_a_while(files: Path, capsys: pytest.CaptureFixture[str]
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--camera", "{}/none.mp4"], "there is no"),
-        (["--camera", "{}/photo.png", "--record", "a.gif"], "a recording is .mp4 or .avi"),
-        (["--camera", "{}/photo.png", "--snapshot", "{}"], "exists; give a snapshot a new name"),
+        (["--camera", "{}/none.mp4"], "does not exist"),
+        (["--camera", "{}/photo.png", "--record", "a.gif"], "must end in .mp4 or .avi"),
+        (["--camera", "{}/photo.png", "--snapshot", "{}"], "exists already; choose another name"),
         (["--camera", "99"], "camera 99 does not open"),
     ],
 )
@@ -139,7 +139,7 @@ def test_intrinsics_are_needed_and_must_fit(
         ["ar", "tabletop_six", "--camera", picture, "--intrinsics", str(tmp_path / "k.yaml")]
     )
     assert code == 2
-    assert "320 x 240 pixels, the intrinsics are of 640 x 480" in capsys.readouterr().err
+    assert "320 x 240 pixels, but the intrinsics are for 640 x 480" in capsys.readouterr().err
 
 
 @pytest.mark.thorough
@@ -189,7 +189,9 @@ def test_a_recording_replaces_nothing(
     capsys.readouterr()
     assert main(command) == 2
     told = capsys.readouterr().err
-    assert told == f"burg-drake: error: {take} exists; give a recording a new name\n"
+    assert (
+        told == f"burg-drake: error: {take} exists already; choose another name for the recording\n"
+    )
     assert take.read_bytes() == video
 
 

@@ -148,7 +148,7 @@ def test_settings(server: ViewServer) -> None:
     assert settings["guide"] == "mug" and settings["opacity"] == 0.25
     until(lambda: (server.live.picture or pytest.fail()).settings.guide == "mug")
     code, answer = post(server, "/settings", guide="cup")
-    assert code == 409 and "has no 'cup'" in answer["error"]
+    assert code == 409 and "has no instance 'cup'" in answer["error"]
     code, answer = post(server, "/settings", opacity=2)
     assert code == 409 and "not a number from 0 to 1" in answer["error"]
     for opacity in (0, 0.45, 1, 0.25):  # JavaScript knows no 0.0

@@ -120,7 +120,7 @@ def test_few_markers_are_doubted(folder: Path, capsys: Capture) -> None:
 def test_an_overlay_of_no_format_is_refused_at_once(folder: Path, capsys: Capture) -> None:
     words = (folder / "two.yaml", folder / "none.png", "--intrinsics", folder / "K.yaml")
     assert run(*words, "--overlay", folder / "check.txt") == 2
-    assert "check.txt: .png and .jpg are formats of images" in capsys.readouterr().err
+    assert "check.txt: the name of an image must end in .png or .jpg" in capsys.readouterr().err
 
 
 def test_markers_that_do_not_fit_name_their_file(folder: Path, capsys: Capture) -> None:
@@ -138,8 +138,8 @@ def test_files_that_cannot_be_used_are_named(folder: Path, capsys: Capture) -> N
     (folder / "text.png").write_text("hello")
     end = ("--intrinsics", folder / "K.yaml")
     for name, message in (
-        ("small.png", "small.png has 320 x 240 pixels, the intrinsics are of 640 x 480"),
-        ("text.png", "text.png is not an image that can be read"),
+        ("small.png", "small.png has 320 x 240 pixels, but the intrinsics are for 640 x 480"),
+        ("text.png", "text.png cannot be read as an image"),
         ("none.png", "cannot read image"),
     ):
         assert run(folder / "two.yaml", folder / name, *end) == 2

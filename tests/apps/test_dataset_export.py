@@ -14,7 +14,7 @@ from burg_drake.apps.cli import main
 from burg_drake.dataset.samples import DatasetWriter, Sample
 from tests.dataset import drawn_samples as drawn
 
-LEFT_OUT = "burg-drake: warning: {} has one depth image of a view: the {} is left out.\n"
+LEFT_OUT = "burg-drake: warning: {} stores one depth image per view: the {} is left out.\n"
 
 
 def drawn_sample() -> Sample:
@@ -77,8 +77,8 @@ def test_either_depth_in_any_unit(
         ),
         (
             ("webdataset", "--depth-unit", "1e-6"),
-            "depth of sample 000012_000 is up to 0.9 m; images of 16 bits end at 0.0655 m if 1"
-            " stands for 0.001 mm: take a larger unit (--depth-unit)",
+            "sample 000012_000 has depths up to 0.9 m, but 16-bit images with a unit of 0.001 mm"
+            " end at 0.0655 m; give a larger unit (--depth-unit)",
         ),
     ],
 )

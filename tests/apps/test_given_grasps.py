@@ -241,7 +241,7 @@ def test_a_file_that_does_not_say_which_scene_it_is_of(tmp_path: Path) -> None:
         (["--grasps", "missing.npy"], "missing.npy does not exist"),
         (["--grasps", "a.npy", "--camera-pose", "missing.npy"], "cannot read missing.npy"),
         (["--grasps", "a.npy", "--grasps-format", "vgm"], "no grasp format 'vgm'; did you mean"),
-        (["--grasps", "a.npy"], "is not a file of grasps in a known format"),
+        (["--grasps", "a.npy"], "its array has shape (2, 3); expected (N, 4, 4)"),
         (["--grasps", "a.npy"], "name the format to see what is wrong (--grasps-format)"),
         (["--grasps", "a.npy", "--correction", "yup"], "no correction 'yup'; did you mean 'y_up'"),
         (["--correction", "inverse"], "--correction is for grasp files; add --grasps FILE"),

@@ -27,7 +27,7 @@ def test_one_file_and_the_same_again(tmp_path: Path, capsys: Captured) -> None:
     assert again.read_bytes() == file.read_bytes()
     file.write_text(file.read_text().replace("object: ", "name: mine\n    object: ", 1))
     assert main(["scene", "sample", "--again", str(file), "-o", str(again)]) == 1
-    assert "the file was changed since it was sampled" in capsys.readouterr().err
+    assert "the file was changed after it was sampled" in capsys.readouterr().err
 
 
 def test_a_folder_of_scenes(tmp_path: Path, capsys: Captured) -> None:
@@ -74,7 +74,7 @@ def test_no_room(tmp_path: Path, capsys: Captured) -> None:
         ),
         (
             ["household", "--size", "A9", "-o", "x.yaml"],
-            "no board has size 'A9'; known: A0, A1, A2, A3, A4; or WxH in mm: 700x500",
+            "board size 'A9' does not exist; known: A0, A1, A2, A3, A4; or give WxH in mm",
         ),
         (["household", "-n", "5000", "-o", "x"], "-n 5000: a scene has 1000 objects at most"),
         (["household", "--force", "-o", "x"], "--force goes with --again"),

@@ -138,7 +138,7 @@ def test_what_starts_below_the_table_did_not_fall_off(
     (line,) = capsys.readouterr().err.splitlines()
     start = f"burg-drake: error: {scene_file}: 'mug' starts "
     assert line.startswith(start)
-    assert re.fullmatch(r"19\d\d mm below the table's top; move it up", line[len(start) :])
+    assert re.fullmatch(r"19\d\d mm below the top of the table; move it up", line[len(start) :])
 
 
 def test_overlapping_objects(scene_file: Path, capsys: Capture) -> None:

@@ -87,7 +87,7 @@ def test_an_address_for_one_browser_after_the_other(
         assert line.strip().partition("?token=")[2] != token
         assert main(["setup", str(scene)]) == 2  # a second page on the same scene
         said = capsys.readouterr().err
-        assert f":{port}/; go there" in said and "token" not in said
+        assert f":{port}/; use it there" in said and "token" not in said
         process.send_signal(signal.SIGTERM)
         assert process.wait(HANG_GUARD) == 0
 

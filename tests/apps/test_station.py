@@ -92,7 +92,7 @@ def test_check_with_a_scene(tmp_path: Path, capsys: Capture) -> None:
     assert main(["station", "check", str(path)]) == 0
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"burg-drake: warning: {path}: the arm reaches only ")
-    assert line.endswith(" % of the board, with any hand orientation")
+    assert line.endswith(" % of the board in any hand orientation")
 
 
 @pytest.mark.parametrize(
@@ -113,11 +113,11 @@ def test_check_with_a_scene(tmp_path: Path, capsys: Capture) -> None:
         ),
         (
             (("  X_WA:", "  velocity: [1, 1, 1]\n  X_WA:"),),
-            "arm.velocity has 3 numbers, the arm 7 joints",
+            "arm.velocity has 3 numbers, but the arm has 7 joints",
         ),
         (
             (("home: [0.0, -0.7853981634", "home: [0.0, 1.2"),),
-            "arm.home collides in scene 'empty_board': ",
+            "at arm.home the arm collides in scene 'empty_board': ",
         ),
         (
             (("cameras:", "background:\n  rack: {X_WB: {translation: [0.1, 0, 0.1]},"
@@ -141,9 +141,9 @@ def test_an_arm_that_cannot_bend_to_the_board(tmp_path: Path, capsys: Capture) -
     path = own(tmp_path, ("cameras:", f"{lid}cameras:"))
     assert main(["station", "check", str(path)]) == 2
     assert capsys.readouterr().err == (
-        f"burg-drake: error: {path}: no part of the board is within reach: 5 cm above it the arm"
-        " gets the hand to no point in any of 10 orientations; change X_WS, arm.X_WA or what is in"
-        " the way\n"
+        f"burg-drake: error: {path}: no part of the board is within reach: 5 cm above it, the arm"
+        " reaches no point in any of 10 hand orientations; change X_WS, arm.X_WA or the"
+        " obstacles\n"
     )
 
 

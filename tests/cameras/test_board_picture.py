@@ -114,8 +114,8 @@ def test_refusals(plain: np.ndarray, intrinsics: Intrinsics | None) -> None:
     assert "another board" in why(plain, Board(markers=fewer))
     larger = Markers(side=0.05, spacing=0.01)
     assert "another board" in why(plain, Board(markers=larger))
-    assert "an image is (H, W, 3) of uint8" in why(plain[..., 0], BOARD)
-    assert "an image is (H, W, 3) of uint8" in why(plain.astype(float), BOARD)
+    assert "expected RGB, (H, W, 3) uint8" in why(plain[..., 0], BOARD)
+    assert "expected RGB, (H, W, 3) uint8" in why(plain.astype(float), BOARD)
 
 
 @pytest.mark.parametrize("intrinsics", [VGA, None])
@@ -151,7 +151,7 @@ def test_looks_at_files(plain: np.ndarray, tmp_path: Path) -> None:
     assert [look.picture is not None for look in looks] == [True, False, False, False]
     assert looks[0].reason == ""
     assert "no marker of the board in sight" in looks[1].reason
-    assert "3.png is not an image" in looks[2].reason
+    assert "3.png cannot be read as an image" in looks[2].reason
     assert "320 x 240 pixels" in looks[3].reason
 
 

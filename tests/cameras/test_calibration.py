@@ -207,9 +207,9 @@ def test_views_that_do_not_count_are_left_out_with_the_reason() -> None:
     reasons = dict(found.rejected)
     assert set(reasons) == {"blank", "bent", "large", "blurred", "twin", "zoomed"}
     assert reasons["blank"] == "shows nothing"
-    assert reasons["large"] == "has 1280 x 960 pixels, the others 640 x 480"
-    assert reasons["blurred"] == "is blurred: its edges by 6.0 pixels"
-    assert reasons["twin"] == "shows the target where view 4 does"
+    assert reasons["large"] == "has 1280 x 960 pixels, the others have 640 x 480"
+    assert reasons["blurred"] == "is blurred: its edges are 6.0 pixels wide"
+    assert reasons["twin"] == "shows the target in the same place as view 4"
     assert "pixels off, the median" in reasons["zoomed"] and "pixels off" in reasons["bent"]
     assert largest_deviation(LENSES["radial4"], found.intrinsics) < 0.5
     assert [used.view.name for used in found.views] == [view.name for view in views]
@@ -231,7 +231,8 @@ def test_too_few_views_are_refused() -> None:
     with pytest.raises(InvalidInputError) as raised:
         calibrate_views(views, TARGET, rejected=[("a.png", "does not show the target")])
     assert str(raised.value) == (
-        "2 of 3 images can be used, 3 are needed and 15 are good; a.png does not show the target"
+        "2 of 3 images can be used; a calibration needs at least 3, better 15; a.png"
+        " does not show the target"
     )
     with pytest.raises(InvalidInputError, match="0 of 1 images can be used"):
         calibrate([np.zeros((48, 64, 3), dtype=np.uint8)], TARGET)
@@ -257,10 +258,12 @@ def test_advice_names_what_was_not_seen() -> None:
         inside = view.corners[:, 0] < 500
         kept.append(replace(view, ids=view.ids[inside], corners=view.corners[inside]))
     found = calibrate_views([v for v in kept if len(v.ids) > 15], TARGET)
-    (line,) = (text for text in advice(found) if text.startswith("bring the target to the "))
+    (line,) = (
+        text for text in advice(found) if text.startswith("move the target into and across the ")
+    )
     assert "right edge" in line and "left" not in line
     few = calibrate_views(views[:5], TARGET)
-    assert "5 views are few: take 15 to 30" in advice(few)
+    assert "5 views are too few; take 15 to 30" in advice(few)
 
 
 def facing(turns: list[tuple[float, float]], distances: tuple[float, ...]) -> list[CharucoView]:
@@ -336,9 +339,10 @@ def test_corners_of_the_image_are_asked_for_by_what_is_known_of_them() -> None:
     bounds = found.promise.parts
     worst = max(bounds, key=lambda name: bounds[name])
     assert "corner" in worst and bounds[worst] > 2.0 * bounds["middle"]
-    (line,) = (text for text in wanted_views(found) if text.startswith("bring the target"))
+    (line,) = (text for text in wanted_views(found) if text.startswith("move the target"))
     assert line.startswith(
-        f"bring the target to the {worst} of the image, known to {bounds[worst]:.2g} pixels, then"
+        f"move the target into and across the {worst} of the image, where the error may be"
+        f" {bounds[worst]:.2g} pixels, then"
     )
     assert all(f"{name} corner" in line for name in ("upper left", "lower left", "lower right"))
     assert found.intrinsics.except_at[0] == worst

@@ -127,15 +127,15 @@ def test_reasons_why_there_is_no_view(sharp: Image) -> None:
     assert "of the target" in str(find_target(column, TARGET))
     wide = CharucoTarget(marker=0.018)
     close = target_image(wide, CAMERA, looking(0.3, 0.2))
-    assert "shows the target too small: squares of 2" in str(find_target(close, wide))
+    assert "shows the target too small: its squares are 2" in str(find_target(close, wide))
 
 
 @pytest.mark.parametrize(
     ("target", "message"),
     [
-        ({"squares": (2, 9)}, "squares 2 x 9 are too few; 3 x 3 at least"),
+        ({"squares": (2, 9)}, "2 x 9 squares is too small; give at least 3 x 3"),
         ({"marker": 0.02}, "markers of 20 mm do not fit into squares of 20 mm"),
-        ({"squares": (20, 20)}, "needs 200 markers, 5X5_100 has 100"),
+        ({"squares": (20, 20)}, "needs 200 markers, but 5X5_100 has 100"),
         ({"dictionary": "5X5_10"}, "marker dictionary '5X5_10' does not exist"),
     ],
 )
@@ -179,7 +179,7 @@ def test_the_printed_target_has_its_true_size(
 def test_a_target_that_does_not_fit_on_the_page(tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError) as raised:
         write_target(CharucoTarget(square=0.03, marker=0.02), tmp_path / "a.pdf")
-    assert "240 x 330 mm large and does not fit on page A4" in str(raised.value)
+    assert "240 x 330 mm, but page A4 has room" in str(raised.value)
     assert not (tmp_path / "a.pdf").exists()
     with pytest.raises(BurgError, match="page 'A9' does not exist"):
         write_target(TARGET, tmp_path / "a.pdf", PrintSettings(page="A9"))

@@ -108,12 +108,12 @@ def test_colours_and_normals_are_used() -> None:
 
 
 def test_bad_input_is_refused() -> None:
-    with pytest.raises(InvalidInputError, match="seed -1 of depth noise must be 0 to"):
+    with pytest.raises(InvalidInputError, match="seed of depth noise is -1; give 0 to"):
         DepthNoiseSystem(AXIAL, CAMERA, seed=-1)
-    with pytest.raises(InvalidInputError, match="period 0 of depth noise must be above 0"):
+    with pytest.raises(InvalidInputError, match="period of depth noise is 0 s; give more than 0"):
         DepthNoiseSystem(AXIAL, CAMERA, period=0.0)
     system = DepthNoiseSystem(NOISES["d435"], CAMERA)
-    with pytest.raises(InvalidInputError, match="depth_noise: connect or fix port depth_image"):
+    with pytest.raises(InvalidInputError, match="depth_noise: input port depth_image has no value"):
         depth(system, system.CreateDefaultContext())
     with pytest.raises(InvalidInputError, match="the depth image has 32 x 48 pixels"):
         depth(system, context_of(system, width=32))

@@ -120,7 +120,7 @@ def test_drake_has_the_principal_point_half_a_pixel_further() -> None:
 def test_images_of_another_size_are_refused() -> None:
     PINHOLE.require_size(640, 480, "photo.png")
     with pytest.raises(
-        InvalidInputError, match=r"photo\.png has 1280 x 960 pixels, the intrinsics"
+        InvalidInputError, match=r"photo\.png has 1280 x 960 pixels, but the intrinsics"
     ):
         PINHOLE.require_size(1280, 960, "photo.png")
 
@@ -134,17 +134,20 @@ def test_images_of_another_size_are_refused() -> None:
         ({"center": (320.0, np.inf)}, "must be finite"),
         ({"distortion": (0.1, np.nan, 0.0, 0.0)}, "must be finite"),
         ({"width": 640.5}, "width 640.5 and height 480 of a camera must be whole pixels"),
-        ({"model": "fisheye"}, "distortion has 0 coefficients; a fisheye has 4: k1, k2, k3, k4"),
+        (
+            {"model": "fisheye"},
+            "distortion has 0 coefficients; a fisheye model has 4: k1, k2, k3, k4",
+        ),
         ({"model": "fisheyes"}, "model 'fisheyes' does not exist; did you mean 'fisheye'?"),
-        ({"known_to": -3.0}, "known_to is -3; it must be above 0"),
-        ({"known_to": 0.0}, "known_to is 0; it must be above 0"),
-        ({"known_to": np.inf}, "known_to is inf; it must be above 0"),
-        ({"known_to": np.nan}, "known_to is nan; it must be above 0"),
+        ({"known_to": -3.0}, "known_to is -3 pixels; it must be above 0"),
+        ({"known_to": 0.0}, "known_to is 0 pixels; it must be above 0"),
+        ({"known_to": np.inf}, "known_to is inf pixels; it must be above 0"),
+        ({"known_to": np.nan}, "known_to is nan pixels; it must be above 0"),
         (
             {"except_at": ("middle", "nowhere")},
-            "except_at has 'nowhere', which is no part of the image; known: upper left corner",
+            "except_at has 'nowhere', which is not a part of the image; known: upper left corner",
         ),
-        ({"distortion": (0.1,)}, "distortion has 1 coefficients; OpenCV's model takes 0, 4, 5, 8"),
+        ({"distortion": (0.1,)}, "distortion has 1 coefficients; OpenCV's model has 0, 4, 5, 8"),
     ],
 )
 def test_what_no_camera_has(change: dict[str, object], message: str) -> None:

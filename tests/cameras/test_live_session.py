@@ -157,7 +157,7 @@ def test_settings_draw_the_same_frame_again(
     assert running.counts.frames == 1
     with pytest.raises(UnknownNameError):
         running.change(guide="nothing")
-    with pytest.raises(InvalidInputError, match="no setting 'colour'; known: footprints"):
+    with pytest.raises(InvalidInputError, match="setting 'colour' does not exist; known: foot"):
         running.change(colour="red")
     with pytest.raises(InvalidInputError, match="opacity"):
         running.change(opacity="much")
@@ -197,13 +197,13 @@ def test_one_image_of_another_size_is_left_out(
     running.wait(seconds=HANG_GUARD)
     assert running.counts.frames == 3 and running.counts.valid == 2
     (told,) = [line for line in lines(log) if "left out" in line]
-    assert told.startswith("picture 2 has 320 x 238 pixels, the intrinsics are of 320 x 240")
+    assert told.startswith("picture 2 has 320 x 238 pixels, but the intrinsics are for 320 x 240")
 
 
 def test_another_resolution_is_refused(session: FrameProcessor, video: Path) -> None:
     other = FrameProcessor(session.scene, replace(CAMERA, width=640))
     source = open_source(video)
-    with pytest.raises(InvalidInputError, match="320 x 240 pixels, the intrinsics are of 640"):
+    with pytest.raises(InvalidInputError, match="320 x 240 pixels, but the intrinsics are for 640"):
         LiveSession(other, source, events=EventLog())
     source.close()
 

@@ -36,8 +36,8 @@ def test_another_first_id(poses: BoardPose, X_SC: np.ndarray, first_id: int, ids
     estimate = poses.estimate(board_image(other, SMALL, X_SC))
     assert not estimate.valid and np.isnan(estimate.X_SC).all()
     assert estimate.reason == (
-        f"another board: markers beyond those that the document has in sight, ids {ids}; it has"
-        " 4 x 3 from 0 to 11: are count and first_id right?"
+        f"another board: markers with ids {ids} lie next to those of the document, which has"
+        " 4 x 3 from 0 to 11; are count and first_id right?"
     )
 
 
@@ -51,7 +51,7 @@ def test_another_first_id_is_no_second_print(
     estimate = poses.estimate(board_image(other, SMALL, X_SC))
     assert not estimate.valid
     assert estimate.reason == (
-        f"another board: only {fit} markers in sight stand where this one has them; are columns,"
+        f"another board: only {fit} markers in sight are where this one has them; are columns,"
         " rows and first_id right?"
     )
 
@@ -60,14 +60,17 @@ def test_more_rows_than_the_document_has() -> None:
     board = replace(BOARD, markers=Markers(count=(4, 2)))
     estimate = BoardPose(board, SMALL).estimate(board_image(BOARD, SMALL, VIEW))
     assert not estimate.valid
-    assert "ids 8, 9, 10 ...; it has 4 x 2 from 0 to 7" in estimate.reason
+    assert (
+        "ids 8, 9, 10 ... lie next to those of the document, which has 4 x 2 from 0 to 7"
+        in estimate.reason
+    )
 
 
 @pytest.mark.parametrize(
     ("markers", "row", "count"),
     [
-        (Markers(count=(4, 2)), 3, "count [4, 2], first_id 0?"),
-        (Markers(count=(4, 2), first_id=4), 1, "count [4, 2], first_id 4?"),
+        (Markers(count=(4, 2)), 3, "count [4, 2] and first_id 0?"),
+        (Markers(count=(4, 2), first_id=4), 1, "count [4, 2] and first_id 4?"),
     ],
 )
 def test_fewer_rows_are_a_doubt(poses: BoardPose, markers: Markers, row: int, count: str) -> None:
@@ -77,8 +80,8 @@ def test_fewer_rows_are_a_doubt(poses: BoardPose, markers: Markers, row: int, co
     estimate = poses.estimate(image)
     assert estimate.valid
     assert estimate.reason == (
-        f"blank paper where the document has row {row} of markers from the top: covered, or another"
-        f" board ({count})"
+        f"row {row} of markers from the top is blank paper: is it covered, or is it another board"
+        f" with {count}"
     )
 
 

@@ -237,7 +237,7 @@ def test_shown_instances_hide_and_are_hidden_by_no_others(scene: Scene) -> None:
     assert (bowl[at] != 128).any() and (bowl[at] != both[at]).any()  # the bottle stands before it
     nothing = overlay.draw(gray(), X_SC, style=OverlayStyle(shown=()))
     assert (nothing == 128).all()
-    with pytest.raises(UnknownNameError, match=r"no instance 'bowle'.*bowl"):
+    with pytest.raises(UnknownNameError, match=r"instance 'bowle' does not exist; .*bowl"):
         overlay.draw(gray(), X_SC, style=OverlayStyle(shown=("bowle",)))
 
 
@@ -296,8 +296,8 @@ def test_lines_bend_with_the_lens() -> None:
     ("image", "message"),
     [
         (np.zeros((480, 640, 3), np.uint8), "image has 640 x 480 pixels.* 320 x 240"),
-        (np.zeros((240, 320), np.uint8), r"\(H, W, 3\) of uint8"),
-        (np.zeros((240, 320, 3)), r"float64.*\(H, W, 3\) of uint8"),
+        (np.zeros((240, 320), np.uint8), r"\(H, W, 3\) uint8"),
+        (np.zeros((240, 320, 3)), r"float64.*\(H, W, 3\) uint8"),
     ],
 )
 def test_refuses_other_images(scene: Scene, image: Array, message: str) -> None:
@@ -365,7 +365,7 @@ def test_doubtful_results_have_a_question_mark_and_their_spread() -> None:
         displacement_sd=(6e-4, 8e-4),
         angle_sd=math.radians(2.0),
     )
-    doubtful = replace(sure, status="uncertain", reason="two places fit alike")
+    doubtful = replace(sure, status="uncertain", reason="two poses fit equally well")
     assert mark(sure, OverlayStyle(), 0.0).text == "5.0 mm 12°"
     note = mark(doubtful, OverlayStyle(), 0.0)
     assert (note.verdict, note.text) == ("uncertain", "? 5.0±1.0 mm 12±2.0°")

@@ -108,17 +108,21 @@ def test_objects_out_of_view_are_not_seen(scene: Scene) -> None:
 
 def test_inputs_that_cannot_be_used_are_named(scene: Scene) -> None:
     image = np.zeros((480, 640, 3), np.uint8)
-    with pytest.raises(InvalidInputError, match="the photo has 320 x 240 pixels, the intrinsics"):
+    with pytest.raises(
+        InvalidInputError, match="the photo has 320 x 240 pixels, but the intrinsics"
+    ):
         check_placement(scene, np.zeros((240, 320, 3), np.uint8), INTRINSICS)
-    with pytest.raises(InvalidInputError, match=r"the photo is an array \(480, 640\) of float64"):
+    with pytest.raises(
+        InvalidInputError, match=r"the photo has shape \(480, 640\) and type float64"
+    ):
         check_placement(scene, np.zeros((480, 640)), INTRINSICS)
     small = np.ones((240, 320), np.float32)
     with pytest.raises(InvalidInputError, match="the depth image has 320 x 240 pixels"):
         check_placement(scene, image, INTRINSICS, depth=small)
     millimetres = np.full((480, 640), 800.0, np.float32)
-    with pytest.raises(InvalidInputError, match="median of 800; give metres"):
+    with pytest.raises(InvalidInputError, match="is 800 m; give metres"):
         check_placement(scene, image, INTRINSICS, depth=millimetres)
-    with pytest.raises(InvalidInputError, match="no distance above 0"):
+    with pytest.raises(InvalidInputError, match="no pixel has a depth above 0"):
         check_placement(scene, image, INTRINSICS, depth=np.zeros((480, 640), np.float32))
 
 
@@ -151,7 +155,7 @@ def test_by_depth_a_turned_mug_is_not_measured_wrongly_nor_one_with_a_hidden_han
         assert seen.angle is not None
         assert np.rad2deg(seen.angle) == pytest.approx(turn, abs=0.5)
     assert hidden.status == "uncertain"
-    assert "rotated by another" in hidden.reason or "another place" in hidden.reason
+    assert "rotated by another" in hidden.reason or "another pose" in hidden.reason
 
 
 @pytest.mark.thorough

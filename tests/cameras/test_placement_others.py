@@ -210,5 +210,5 @@ def test_extra_objects_of_all_photos_are_named_once() -> None:
 def test_checks_of_different_scenes_are_not_combined() -> None:
     with pytest.raises(InvalidInputError, match="different scenes"):
         combine_checks([check(mug(0, 1e-3)), check(mug(0, 1e-3), scene="b")])
-    with pytest.raises(InvalidInputError, match="give one at least"):
+    with pytest.raises(InvalidInputError, match="give at least one"):
         combine_checks([])

@@ -106,13 +106,13 @@ def test_a_damaged_video_is_reported(tmp_path: Path) -> None:
     for i in range(5):
         recording.add(plate(50), SEEN, 0.1 * i, plate(0))
     (tmp_path / ".a.partial.avi").unlink()  # as a full disk would, in the end
-    with pytest.raises(InvalidInputError, match=r"has 0 frames of the 13 that were recorded"):
+    with pytest.raises(InvalidInputError, match=r"has 0 of the 13 recorded frames"):
         recording.close()
     assert not (tmp_path / "a.avi").exists() and not (tmp_path / "a.csv").exists()
 
 
 def test_bad_places(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match=r"a\.webm: a recording is \.mp4 or \.avi"):
+    with pytest.raises(InvalidInputError, match=r"a\.webm: .* must end in \.mp4 or \.avi"):
         Recording(tmp_path / "a.webm", CAMERA, SCENE)
     (tmp_path / "file").write_text("")
     with pytest.raises(InvalidInputError, match="choose a writable place"):
@@ -141,7 +141,7 @@ def test_a_scene_of_the_same_name_stays(tmp_path: Path) -> None:
 )
 def test_no_file_is_replaced(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text("mine")
-    with pytest.raises(InvalidInputError, match="exists; give a recording a new name") as raised:
+    with pytest.raises(InvalidInputError, match="exists already; choose another name") as raised:
         record(tmp_path / "a.mp4", plain=True)
     assert str(raised.value).startswith(str(tmp_path / name))
     assert [path.name for path in tmp_path.iterdir()] == [name]
@@ -152,14 +152,16 @@ def test_a_file_that_is_made_meanwhile_stays(tmp_path: Path) -> None:
     recording = Recording(tmp_path / "a.avi", CAMERA, SCENE)
     recording.add(plate(50), SEEN, 0.0, plate(0))
     (tmp_path / "a.csv").write_text("mine")
-    with pytest.raises(InvalidInputError, match=r"a\.csv exists by now; .*\.a\.partial\.avi"):
+    with pytest.raises(
+        InvalidInputError, match=r"a\.csv was created while recording; .*\.a\.partial\.avi"
+    ):
         recording.close()
     assert (tmp_path / "a.csv").read_text() == "mine" and not (tmp_path / "a.avi").exists()
     assert levels(tmp_path / ".a.partial.avi") == [50]
 
 
 def test_what_cannot_be_begun_leaves_nothing(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match=r"64 x 48 pixels at 90000 images a second"):
+    with pytest.raises(InvalidInputError, match=r"64 x 48 pixels at 90000 frames per second"):
         record(tmp_path / "a.mp4", frames_per_second=90000.0)
     assert list(tmp_path.iterdir()) == []
 

@@ -151,8 +151,8 @@ def test_refuses_images_of_another_size(system: SceneOverlay, context: Context) 
 
 def test_tells_what_is_not_connected(system: SceneOverlay) -> None:
     context = system.CreateDefaultContext()
-    with pytest.raises(InvalidInputError, match="connect or fix port color_image"):
+    with pytest.raises(InvalidInputError, match="input port color_image has no value"):
         output(system, context)
     system.GetInputPort("color_image").FixValue(context, image())
-    with pytest.raises(InvalidInputError, match="connect or fix port X_SC"):
+    with pytest.raises(InvalidInputError, match="input port X_SC has no value"):
         output(system, context)

@@ -88,16 +88,16 @@ def test_without_a_pose(tmp_path: Path) -> None:
 
 def test_bad_places_and_folders(tmp_path: Path) -> None:
     save_snapshot(snapshot(SEEN), tmp_path / "s")
-    with pytest.raises(InvalidInputError, match="exists; give a snapshot a new name"):
+    with pytest.raises(InvalidInputError, match="exists already; choose another name"):
         save_snapshot(snapshot(SEEN), tmp_path / "s")
     (tmp_path / "file").write_text("")
     with pytest.raises(InvalidInputError, match="choose a writable place"):
         save_snapshot(snapshot(SEEN), tmp_path / "file" / "s")
-    with pytest.raises(DocumentError, match=r"no snapshot.yaml"):
+    with pytest.raises(DocumentError, match=r"snapshot.yaml is missing"):
         load_snapshot(tmp_path)
     picture = tmp_path / "s" / "image.png"
     picture.write_bytes(picture.read_bytes()[:100])
-    with pytest.raises(InvalidInputError, match=r"image\.png is missing or no image"):
+    with pytest.raises(InvalidInputError, match=r"image\.png is missing or cannot be read"):
         load_snapshot(tmp_path / "s")
 
 

@@ -71,7 +71,7 @@ def test_snapshot_of_the_picture(
     actions = ViewActions(running, tmp_path)
     with pytest.raises(InvalidInputError, match="there is no picture yet"):
         actions.snapshot()
-    with pytest.raises(InvalidInputError, match="needs a picture that shows where the board is"):
+    with pytest.raises(InvalidInputError, match="needs a picture in which the board is found"):
         actions.start_check()
     running.start()
     picture = running.next_picture(0, HANG_GUARD)
@@ -176,7 +176,7 @@ def test_a_still_photo_is_recorded_from_the_start_or_not_at_all(
     assert actions.stop_recording() == take
     assert len(read_poses(take.with_suffix(".csv")).times) == 1
     before = sorted(tmp_path.iterdir())
-    with pytest.raises(InvalidInputError, match="pictures has no more frames that could be recor"):
+    with pytest.raises(InvalidInputError, match="pictures has no more frames to recor"):
         actions.start_recording()
     assert actions.recording is None and sorted(tmp_path.iterdir()) == before
 

@@ -39,14 +39,16 @@ def test_killed_sessions_go_on_where_they_were(station: Station, tmp_path: Path)
         other = ComposeSession.open("household", station, folder=tmp_path)
         assert other.view.document.name == "new_scene_2"  # the first one is in use
         other.close()
-        with pytest.raises(SceneInUse, match=r"is open already at http://127.0.0.1:8080; go there"):
+        with pytest.raises(
+            SceneInUse, match=r"is already open at http://127.0.0.1:8080; use it there"
+        ):
             ComposeSession.open(saved, station)
     finally:
         process.send_signal(signal.SIGKILL)
         process.wait()
     with ComposeSession.open("household", station, folder=tmp_path) as session:
         view = session.view
-        assert view.notices == ("recovered what was not saved of 'new_scene', with its history",)
+        assert view.notices == ("recovered the unsaved changes of 'new_scene' and their history",)
         assert list(view.instances) == ["bowl", "bowl_2", "marble"]
         assert (view.undo_label, view.redo_label) == ("add marble", "delete bowl")
         assert list(session.redo().instances) == ["bowl_2", "marble"]
@@ -65,7 +67,7 @@ def test_with_a_full_disk_editing_goes_on_and_the_old_file_stays(tmp_path: Path)
     assert process.stdout is not None
     editing, saving, after = process.stdout.read().splitlines()
     assert process.wait() == 0
-    assert editing.startswith("3 ") and "until then changes are kept in memory alone" in editing
+    assert editing.startswith("3 ") and "until then changes are kept in memory only" in editing
     assert saving.startswith(f"cannot write {tmp_path / 'breakfast.yaml'}: File too large")
     assert saving.endswith(" 2")  # objects in the file
     assert after == "() True"
@@ -109,9 +111,9 @@ def test_of_a_damaged_journal_nothing_is_lost_that_can_be_read(
     with ComposeSession.open(left.with_name("breakfast.yaml"), station) as session:
         aside = left.with_name(".breakfast.yaml.journal.damaged_1")
         assert session.view.notices == (
-            "the journal of the last session is damaged (line 6 of 7 cannot be read); all that"
-            f" can be read of it is recovered, and it is kept as {aside}",
-            "recovered what was not saved of 'breakfast', with its history",
+            "the journal of the last session is damaged (line 6 of 7 cannot be read); the"
+            f" readable part is recovered, and the journal is kept as {aside}",
+            "recovered the unsaved changes of 'breakfast' and their history",
         )
         assert list(session.view.instances) == ["mug", "box"]
         session.do(AddObject("can"))
@@ -182,7 +184,7 @@ def test_a_journal_of_the_version_before_is_read(station: Station, left: Path) -
     left.write_text("\n".join(lines) + "\n")
     with ComposeSession.open(left.with_name("breakfast.yaml"), station) as session:
         assert session.view.notices == (
-            "recovered what was not saved of 'breakfast', with its history",
+            "recovered the unsaved changes of 'breakfast' and their history",
         )
         assert list(session.view.instances) == ["mug", "marble", "box"]
         for _ in range(3):
@@ -208,7 +210,7 @@ def test_a_file_that_was_changed_since_is_not_overwritten(station: Station, left
     path = left.with_name("breakfast.yaml")
     path.write_text(path.read_text().replace("mug", "can"))
     with ComposeSession.open(path, station) as session:
-        assert "was changed since" in session.view.notices[0]
+        assert "was changed by another program" in session.view.notices[0]
         assert list(session.view.instances) == ["mug", "marble", "box"]
         with pytest.raises(FileChanged):
             session.save()

@@ -131,10 +131,10 @@ def test_a_file_that_was_changed_is_not_overwritten(session: ComposeSession) -> 
     theirs = path.read_text() + "# theirs\n"
     path.write_text(theirs)
     assert session.refresh().notices == (
-        f"{path} was changed by something else; load it, or overwrite it by saving",
+        f"{path} was changed by another program; load it, or overwrite it by saving",
     )
     session.do(Delete(("mug",)))
-    with pytest.raises(FileChanged, match=r"was changed by something else meanwhile"):
+    with pytest.raises(FileChanged, match=r"was changed by another program"):
         session.save()
     assert path.read_text() == theirs
     with pytest.raises(UnsavedChanges):
@@ -221,7 +221,7 @@ def test_two_editors_never_hold_one_scene(tmp_path: Path, monkeypatch: pytest.Mo
 
     monkeypatch.setattr(scene_lock, "try_lock", lock_late)
     second = SceneLock(scene, "http://127.0.0.1:7200")
-    with pytest.raises(SceneInUse, match=r"is open already at http://127.0.0.1:7200"):
+    with pytest.raises(SceneInUse, match=r"is already open at http://127.0.0.1:7200"):
         SceneLock(scene)
     second.release()
     SceneLock(scene).release()

@@ -51,7 +51,8 @@ MUTATIONS = 12
 """Of the example of a kind."""
 ONLY_THE_READER_REFUSES = {
     "one key decides about another": r"give (either|unit|mass|rpy)|with a jobqueue|with tls files"
-    r"|needs a baseline|margin names|is less than|more than lift_height|minimum is at most"
+    r"|needs the baseline|give only one|margin names|is less than|more than lift_height"
+    r"|minimum is at most"
     r"|entries; expected|coefficients|depth images|both fingers|closed and open|simulated$",
     "a range that has to rise": r"must rise|at least grazing",
     "more than 0, or of many numbers": r"above 0|> 0|positive|below 0|or more|at least|each must be"
@@ -59,7 +60,7 @@ ONLY_THE_READER_REFUSES = {
     "directions and rotations": r"has length|has no length",
     "letters of names and dates": r"cannot be used in paths|is not a name|write it as in",
     "names of what is elsewhere": r"does not exist|neither the table|there is no|is of object"
-    r"|no part of the image",
+    r"|not a part of the image",
     "something has to be there": r"is empty|are missing",
     "numbers that no document needs": r"too large a number",
     "1.0 is a whole number to JSON": r"\d\.?\d*(e\+?\d+)?' is not a whole number",

@@ -268,6 +268,7 @@ def test_files_that_are_no_grasp_set(tmp_path: Path):
     np.savez(tmp_path / "other.npz", grasps=poses(3))
     for name in ("burg.npy", "other.npz", "other.h5"):
         assert "is not a grasp set" in message(tmp_path / name)
+    assert "no array 'header', only grasps; write it with" in message(tmp_path / "other.npz")
     assert message(tmp_path / "torn.h5").endswith("torn.h5: columns is missing")
     with h5py.File(tmp_path / "kinds.h5", "w") as file:
         file.attrs.update(format="burg_drake.grasps", version=2, provenance="{}")

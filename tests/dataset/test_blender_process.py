@@ -19,7 +19,8 @@ from tests.dataset.blender_parts import image_of
 def test_no_blender(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv(VARIABLE, "no_such_blender")
     with pytest.raises(
-        MissingDependencyError, match=r"'no_such_blender', which is no program: pip install 'burg"
+        MissingDependencyError,
+        match=r"'no_such_blender', which is not an executable: pip install 'burg",
     ):
         burg.render("tabletop_six", "panda_tabletop", renderer="blender")
     recipe = burg.dataset.DatasetRecipe(renderer="blender", views=1)
@@ -55,9 +56,13 @@ def test_labels_need_no_blender(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_no_such_renderer() -> None:
-    with pytest.raises(UnknownNameError, match=r"no renderer 'blendr'; did you mean 'blender'\?"):
+    with pytest.raises(
+        UnknownNameError, match=r"renderer 'blendr' does not exist; did you mean 'blender'\?"
+    ):
         burg.render("tabletop_six", "panda_tabletop", renderer="blendr")  # type: ignore[arg-type]
-    with pytest.raises(FieldError, match=r"no renderer 'blendr'; did you mean 'blender'\?"):
+    with pytest.raises(
+        FieldError, match=r"renderer 'blendr' does not exist; did you mean 'blender'\?"
+    ):
         burg.dataset.DatasetRecipe(renderer="blendr")  # type: ignore[arg-type]
 
 
@@ -76,7 +81,7 @@ def test_a_crash_is_told_with_the_last_lines() -> None:
     )
     with pytest.raises(
         SimulationError,
-        match=r"^Blender ended by SIGABRT when it was given a scene; its last lines: first \| out"
+        match=r"^Blender ended by SIGABRT while loading a scene; its last lines: first \| out"
         r" of memory$",
     ):
         image_of(dying, EMPTY)
@@ -86,10 +91,10 @@ def test_a_crash_is_told_with_the_last_lines() -> None:
 
 
 def test_an_end_and_a_refusal() -> None:
-    with pytest.raises(SimulationError, match=r"^Blender ended with code 3 when it was given a"):
+    with pytest.raises(SimulationError, match=r"^Blender ended with code 3 while loading a"):
         image_of(Blender(program("sys.stdin.readline(); sys.exit(3)")), EMPTY)
     failing = Blender(program('for line in sys.stdin: print(\'{"error": "no"}\', flush=True)'))
-    with pytest.raises(SimulationError, match=r"^Blender failed when it was given a scene: no$"):
+    with pytest.raises(SimulationError, match=r"^Blender failed while loading a scene: no$"):
         image_of(failing, EMPTY)
     failing.close()
 
@@ -114,6 +119,6 @@ def test_half_an_image_is_none() -> None:
             "    print('{}', flush=True)"
         )
     )
-    with pytest.raises(SimulationError, match=r"^Blender wrote no image; it has said nothing$"):
+    with pytest.raises(SimulationError, match=r"^Blender wrote no image; it printed nothing$"):
         image_of(half, EMPTY)
     half.close()

@@ -36,6 +36,6 @@ def test_card_counts(samples: InMemory, tmp_path: Path) -> None:
 
 def test_card_does_not_replace_what_is_not_its_own(samples: InMemory, tmp_path: Path) -> None:
     (tmp_path / "README.md").write_text("mine")
-    with pytest.raises(InvalidInputError, match="no card"):
+    with pytest.raises(InvalidInputError, match="not the card"):
         write_card(samples, tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["README.md"]

@@ -67,7 +67,7 @@ def test_images_that_do_not_fit_are_refused() -> None:
         depth_cloud(plane_depth()[1:], CAMERA)
     with pytest.raises(InvalidInputError, match="the labels image has 63 x 48 pixels"):
         depth_cloud(plane_depth(), CAMERA, labels=np.zeros((48, 63), np.uint16))
-    with pytest.raises(InvalidInputError, match="type uint16; give metres as floats"):
+    with pytest.raises(InvalidInputError, match="type uint16; expected floats in metres"):
         depth_cloud(np.ones((48, 64), np.uint16), CAMERA)
 
 

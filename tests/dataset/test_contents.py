@@ -54,9 +54,9 @@ def test_a_library_of_other_content_is_named(made: Path) -> None:
     library.write_text(text.replace(build[1], build[1][::-1]))  # as after another build
     (found,) = check_generated(made / "data")
     assert found.file == "dataset.yaml" and found.sample == ""
-    assert "the library of distractors has other content than when" in found.message
+    assert "the library of distractors has changed since" in found.message
     dataset = burg.load_dataset(made / "data")
-    with pytest.raises(InvalidInputError, match=r"images cannot be rendered anew"):
+    with pytest.raises(InvalidInputError, match=r"images cannot be rendered again"):
         sample_again(dataset, dataset.keys[0])
     with pytest.raises(InvalidInputError, match=r"the content of the library of distractors is"):
         burg.generate_dataset(
@@ -106,7 +106,7 @@ def test_numbers_below_one(tmp_path: Path, count: int | None, workers: int) -> N
             burg.load_library("household"), "panda_tabletop", tmp_path / "data", recipe,
             count=count, workers=workers,
         )  # fmt: skip
-    with pytest.raises(InvalidInputError, match=r"count is of sampled scenes"):
+    with pytest.raises(InvalidInputError, match=r"count is for sampled scenes"):
         burg.generate_dataset(
             ["tabletop_six"], "panda_tabletop", tmp_path / "data", RECIPE, count=1
         )

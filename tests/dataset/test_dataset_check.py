@@ -122,29 +122,33 @@ def test_a_sound_data_set_has_no_findings(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "file", "message"),
     [
-        (truncated, "color.png", "is cut off"),
-        (of_another_size, "color.png", "has 12 x 10 pixels, its view 64 x 48"),
+        (truncated, "color.png", "is truncated"),
+        (of_another_size, "color.png", "has 12 x 10 pixels, but its view has 64 x 48"),
         (lambda files: files.pop("000012_001.labels.png"), "labels.png", "is missing"),
         (lambda files: files.pop("000012_001.json"), "json", "is missing"),
-        (other_sample(unknown_outcome), "grasps.npz", "outcome 'flew' is none that a grasp can"),
+        (other_sample(unknown_outcome), "grasps.npz", "outcome 'flew' does not exist"),
         (other_sample(short_normals), "normals.png", "normals have a length other than 1"),
         (record(lambda v: v["instances"][0].pop("amodal")), "json", "key 'amodal' is missing"),
-        (record(lambda v: v["files"].remove("depth")), "depth.png", "the record does not have it"),
-        (record(swap_poses), "json", "X_CO of 'mug' is 165 mm and 120 degrees away"),
+        (record(lambda v: v["files"].remove("depth")), "depth.png", "it is not in the record"),
+        (record(swap_poses), "json", "X_CO of 'mug' is 165 mm and 120 degrees from"),
         (record(swap_instances), "json", "instances are bottle, mug, box"),
-        (edit("object", "jug"), "json", "'mug' is a 'jug'; the scene has a 'mug'"),
+        (edit("object", "jug"), "json", "'mug' is object 'jug'; in the scene it is 'mug'"),
         (edit("visible_pixels", 7), "labels.png", "'mug' has"),
-        (edit("visible_box", [1, 2, 3, 4]), "json", "visible_box of 'mug' is (1, 2, 3, 4); its"),
-        (edit("amodal", "PP3"), "json", "amodal mask of 'mug' leaves out"),
+        (
+            edit("visible_box", [1, 2, 3, 4]),
+            "json",
+            "visible_box of 'mug' is (1, 2, 3, 4), but its",
+        ),
+        (edit("amodal", "PP3"), "json", "amodal mask of 'mug' lacks"),
         (edit("amodal_box", None), "json", "amodal_box None does not fit silhouette_pixels"),
         (edit("amodal_box", [0, 0, 2, 2]), "json", "does not contain the mask"),
-        (edit("visibility", 0.25), "json", "visibility 0.25 is not"),
-        (edit("silhouette_pixels", 1), "json", "silhouette_pixels 1 are fewer than the"),
+        (edit("visibility", 0.25), "json", "visibility is 0.25, but"),
+        (edit("silhouette_pixels", 1), "json", "silhouette_pixels is 1, less than the"),
         (edit("visibility", -0.1), "json", "visibility is -0.1; expected a finite number from 0"),
         (
             record(lambda v: v["view"].update(depth_range=[0.1, 0.8])),
             "depth.png",
-            "are outside of the depth range 0.1 to 0.8 m",
+            "are outside the depth range 0.1 to 0.8 m",
         ),
     ],
 )
@@ -159,14 +163,14 @@ def test_a_broken_sample_is_found(
 
 def test_doubled_lost_and_foreign_files_are_found(tmp_path: Path) -> None:
     assert any(
-        f"{SHARD}: 000012_002.json: is of sample 000012_000" == text
+        f"{SHARD}: 000012_002.json: belongs to sample 000012_000" == text
         for text in said(changed(tmp_path / "doubled", doubled))
     )
     assert said(changed(tmp_path / "apart", apart)) == [
-        f"{SHARD}: files of 000012_000 lie in 2 places"
+        f"{SHARD}: the files of 000012_000 are not next to each other, but in 2 places"
     ]
     foreign = changed(tmp_path / "foreign", lambda files: files.update({"../000012_000.json": b""}))
-    assert said(foreign) == [f"{SHARD}: ../000012_000.json: no sample has it"]
+    assert said(foreign) == [f"{SHARD}: ../000012_000.json: it belongs to no sample"]
     lost = drawn.write(tmp_path / "lost")
     (lost / SHARD).unlink()
     assert said(lost) == [
@@ -176,8 +180,8 @@ def test_doubled_lost_and_foreign_files_are_found(tmp_path: Path) -> None:
     (lost / "scenes/000012.yaml").unlink()
     (lost / SHARD).write_bytes((lost / "shards/000013.tar").read_bytes())
     texts = said(lost)
-    assert f"{SHARD}: 000013_000.json: no sample has it" in texts
-    assert f"{SHARD}: it has 0 samples, the index 2" in texts
+    assert f"{SHARD}: 000013_000.json: it belongs to no sample" in texts
+    assert f"{SHARD}: it has 0 samples, but the index says 2" in texts
     assert any(text.startswith("scenes/000012.yaml: cannot read") for text in texts)
 
 
@@ -189,7 +193,7 @@ def test_a_flipped_byte_is_found_wherever_it_is(tmp_path: Path) -> None:
         flipped = bytearray(data)
         flipped[place] ^= 1
         (tmp_path / SHARD).write_bytes(flipped)
-        assert any(f"{SHARD}: its MD5 is " in text for text in said(tmp_path))
+        assert any(f"{SHARD}: it was changed: its MD5 is " in text for text in said(tmp_path))
         assert (len(said(tmp_path)) > 1) == (place in places)  # it is read in all but the end
 
 
@@ -198,7 +202,7 @@ def test_an_unlisted_shard_and_a_broken_document_are_found(tmp_path: Path) -> No
     index = (tmp_path / "index.json").read_bytes()
     drawn.write(tmp_path, [12, 13])
     (tmp_path / "index.json").write_bytes(index)
-    assert said(tmp_path) == ["shards/000013.tar: the index does not have it"]
+    assert said(tmp_path) == ["shards/000013.tar: it is not in the index"]
     (tmp_path / "dataset.yaml").write_text("version: 7")
     assert "version 1" in said(tmp_path)[0]
 
@@ -221,7 +225,7 @@ def test_what_is_drawn_anew_tells_a_scene_that_was_swapped(tmp_path: Path) -> No
     scene.write_text("\n".join(lines))
     assert said(tmp_path) == []
     found = check_dataset(tmp_path, drawn.draw)
-    assert {one.file for one in found if "differ from freshly drawn ones" in one.message} >= {
+    assert {one.file for one in found if "differ when rendered again" in one.message} >= {
         f"{SHARD}: 000012_000.labels.png",
         f"{SHARD}: 000012_001.labels.png",
     }
@@ -234,7 +238,7 @@ def test_a_scene_that_cannot_be_drawn_is_one_finding(tmp_path: Path) -> None:
             raise InvalidInputError("object 'mug' has no visual mesh")
         return Images()
 
-    message = "it cannot be drawn anew: object 'mug' has no visual mesh"
+    message = "it cannot be rendered again: object 'mug' has no visual mesh"
     assert check_dataset(drawn.write(tmp_path), fails) == [
         DatasetFinding("000012_001", f"{SHARD}: 000012_001.json", message)
     ]

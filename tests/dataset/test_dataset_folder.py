@@ -60,7 +60,7 @@ def test_the_index_is_that_of_wids(tmp_path: Path) -> None:
     before = (tmp_path / "index.json").read_bytes()
     (tmp_path / "index.json").unlink()
     with pytest.raises(
-        InvalidInputError, match=r"has no index\.json: its samples are not finished"
+        InvalidInputError, match=r"has no index\.json, so the data set is not finished"
     ):
         load_dataset(tmp_path)
     write_index(tmp_path)
@@ -91,7 +91,9 @@ def test_only_what_is_asked_for_is_read(tmp_path: Path) -> None:
     assert [one.key for one in dataset[1:3]] == ["000012_001", "000013_000"]
     with pytest.raises(IndexError, match="has no sample 4; it has 4"):
         dataset[4]
-    with pytest.raises(UnknownNameError, match="samples have no 'colour'; did you mean 'color'"):
+    with pytest.raises(
+        UnknownNameError, match="samples have no part 'colour'; did you mean 'color'"
+    ):
         dataset.read(0, ["colour"])
 
 
@@ -117,7 +119,7 @@ def test_a_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
     drawn.write(parts, [13])
     with DatasetWriter(parts, drawn.DOCUMENT) as writer:
         assert writer.missing([13, 3, 12]) == [3, 12]
-        with pytest.raises(InvalidInputError, match=r"000013\.tar is there already"):
+        with pytest.raises(InvalidInputError, match=r"000013\.tar exists already"):
             writer.add(13, drawn.scene(), [])
         samples = [drawn.sample(i, 12) for i in range(2)]
         writer.added(write_scene(parts, 12, drawn.scene(), samples))
@@ -150,7 +152,9 @@ def test_kills_lose_and_double_nothing(tmp_path: Path, when: str, complete: list
     assert done.returncode == -signal.SIGKILL
     said = " ".join(map(str, check_dataset(data)))
     assert "has no index.json" in said
-    assert ("it was being written when its process ended" in said) == (when == "within")
+    assert ("it is unfinished: the process that wrote it was interrupted" in said) == (
+        when == "within"
+    )
     assert ("scenes/000013.yaml: the scene has no shard" in said) == (when == "within")
     with DatasetWriter(data, drawn.DOCUMENT) as writer:
         missing = writer.missing([12, 13])
@@ -177,8 +181,8 @@ def test_a_full_disk_leaves_nothing_half_written(tmp_path: Path) -> None:
         finally:
             resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert str(refused.value) == (
-        f"cannot write {tmp_path}/shards/000013.tar: File too large; nothing of this shard is kept,"
-        " and all others are: make room, and run the same command to continue"
+        f"cannot write {tmp_path}/shards/000013.tar: File too large; all shards except this one"
+        " are kept: make room, and run the same command to continue"
     )
     assert files(tmp_path) == before
 
@@ -225,11 +229,9 @@ def test_other_content_is_refused(tmp_path: Path, change: dict[str, object], mes
 
 def test_folders_of_other_things_are_refused(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("")
-    with pytest.raises(
-        InvalidInputError, match=r"not empty, and holds no data set \(dataset\.yaml"
-    ):
+    with pytest.raises(InvalidInputError, match=r"not empty and is not a data set \(dataset\.yaml"):
         DatasetWriter(tmp_path, drawn.DOCUMENT)
-    with pytest.raises(InvalidInputError, match=r"is no data set: dataset\.yaml is missing"):
+    with pytest.raises(InvalidInputError, match=r"is not a data set: dataset\.yaml is missing"):
         load_dataset(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
@@ -260,8 +262,8 @@ def test_a_document_that_does_not_fit_is_refused(
     ("old", "new", "message"),
     [
         ('"wids_version": 1', '"wids_version": 2', "wids_version is 2; expected a whole number"),
-        ("shards/000013", "../../000013", "url is '../../000013.tar'; expected one such as"),
-        ("000012.tar", "000013.tar", "shards are there twice, or in a wrong order"),
+        ("shards/000013", "../../000013", "url is '../../000013.tar'; expected a value such as"),
+        ("000012.tar", "000013.tar", "shards are repeated or not in ascending order"),
         ('"nsamples": 2', '"nsamples": -2', "nsamples is -2; expected a whole number from 0"),
     ],
 )
@@ -278,7 +280,7 @@ def test_an_index_that_does_not_fit_is_refused(
 def test_a_lost_shard_and_a_wrong_count_are_named(tmp_path: Path) -> None:
     index = drawn.write(tmp_path) / "index.json"
     index.write_text(index.read_text().replace('"nsamples": 2', '"nsamples": 3'))
-    with pytest.raises(DocumentError, match=r"000012\.tar has 2 samples, the index 3"):
+    with pytest.raises(DocumentError, match=r"000012\.tar has 2 samples, but the index says 3"):
         load_dataset(tmp_path)[0]
     (tmp_path / "shards/000013.tar").unlink()
     with pytest.raises(InvalidInputError, match=r"read shard .*000013\.tar: No such file"):

@@ -37,14 +37,14 @@ def shuffled(data: InMemory) -> InMemory:
         (write_graspnet, bent, "has lens distortion, which GraspNet cannot"),
         (write_bop, lambda d: without(d, labels=None), "000003_000 has no labels image, which BOP"),
         (write_coco, lambda d: without(d, color=None), "has no color image, which COCO needs"),
-        (write_bop, deep, "depth of sample 000003_000 is up to 7.* m; .* take a larger unit"),
-        (write_bop, shuffled, "scene 3 begins twice"),
+        (write_bop, deep, "000003_000 has depths up to 7.* m, .* give a larger unit"),
+        (write_bop, shuffled, "samples of scene 3 are not next to"),
         (write_graspnet, zoomed, "000003_001 has other intrinsics"),
         (write_graspnet, lambda d: d, "scene 5 has object gem twice"),
         (write_coco, lambda d: replace(d, objects=("gem",)), "object 'box' of sample 000003_000"),
         (lambda d, f: write_bop(d, f, sensor_depth=True), lambda d: d, "no depth of a simulated"),
         (lambda d, f: write_bop(d, f, depth_unit=0.0), lambda d: d, "it must be above 0"),
-        (lambda d, f: write_webdataset(d, f, shard_size=0), lambda d: d, "shard size 0 must"),
+        (lambda d, f: write_webdataset(d, f, shard_size=0), lambda d: d, "shard size is 0"),
     ],
 )
 def test_what_cannot_be_expressed_is_named(
@@ -60,7 +60,7 @@ def test_a_folder_of_something_else_is_refused(
     single: InMemory, tmp_path: Path, write: object
 ) -> None:
     (tmp_path / "mine").write_text("")
-    with pytest.raises(InvalidInputError, match="has files in it; choose a new folder"):
+    with pytest.raises(InvalidInputError, match="is not empty; choose another folder"):
         write(single, tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["mine"]
 

@@ -94,7 +94,7 @@ def test_a_scene_that_fails_leaves_the_others(tmp_path: Path) -> None:
 
 
 def test_bad_requests(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(FieldError, match=r"sampled or taken from a run, not both"):
+    with pytest.raises(FieldError, match=r"sampled or taken from a run; give only one"):
         DatasetRecipe(run="runs/first", grasps_per_object=3)
     with pytest.raises(InvalidInputError, match=r"no depth images of 640 x 100"):
         DatasetRecipe(sensor="d435", size=(640, 100))

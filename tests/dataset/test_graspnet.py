@@ -116,7 +116,7 @@ def test_graspnet_is_the_same_each_time(graspnet: Path, single: InMemory, tmp_pa
     lost = " ".join(write_graspnet(single, tmp_path / "again"))
     for missing in ("grasp_label", "collision_label", "textured.sdf", "rs_wrt_kn.npy"):
         assert missing in lost
-    assert "all scenes of a split, of 'train' 0 to 99: here are 1" in lost
+    assert "'train' has scenes 0 to 99, and here are 1" in lost
     meta = tmp_path / "again/scenes/scene_0000/realsense/meta/0001.mat"
     assert meta.read_bytes() == (graspnet / "meta/0001.mat").read_bytes()
     assert b"Created on" not in meta.read_bytes()

@@ -187,7 +187,7 @@ def test_bad_requests(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert "--workers: not allowed with argument --cluster" in capsys.readouterr().err
     recipe = DatasetRecipe(sampled=SceneRecipe(library="household", count=2), run="run")
     with (
-        pytest.raises(InvalidInputError, match="a cluster takes the grasps of a run for given"),
+        pytest.raises(InvalidInputError, match="grasps of a run can only be used for given"),
         scene_maker(
             "local:1", 1, recipe, burg.load_library("household"), burg.load_station(STATION)
         ),

@@ -47,11 +47,11 @@ def test_texts_are_those_of_coco(mask: np.ndarray) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("5", "have 5 pixels; one of 2 x 2 has 4"),
+        ("5", "have 5 pixels; a mask of 2 x 2 has 4"),
         ("3N3", "have 4 pixels"),
         ("P", "end within a number"),
-        ("4 ", "' ' where none can be"),
-        ("PPPPPPPPPPPP1", "'P' where none can be"),
+        ("4 ", "invalid character ' '"),
+        ("PPPPPPPPPPPP1", "invalid character 'P'"),
         ("", "have 0 pixels"),
     ],
 )

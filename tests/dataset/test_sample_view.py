@@ -105,7 +105,7 @@ def test_the_arm_is_where_the_view_has_it(meshcat: Meshcat) -> None:
     turn = home[:3, :3].T @ turned[:3, :3]
     assert np.arccos((np.trace(turn) - 1) / 2) == pytest.approx(0.5)
     with pytest.raises(
-        InvalidInputError, match="posture of 3 joints; the arm of the station has 7"
+        InvalidInputError, match="joint positions of 3 joints; the arm of the station has 7"
     ):
         show_sample(sample(view=drawn.view()), drawn.scene(), STATION, meshcat)
 
@@ -114,7 +114,7 @@ def test_a_data_set_without_a_station(tmp_path: Path) -> None:
     assert (
         load_dataset(with_station(tmp_path / "one", "panda_tabletop")).station.name == STATION.name
     )
-    with pytest.raises(InvalidInputError, match="has no station: its document names none"):
+    with pytest.raises(InvalidInputError, match="has no station: its document does not name one"):
         _ = load_dataset(with_station(tmp_path / "two", "")).station
 
 

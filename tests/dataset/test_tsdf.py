@@ -161,5 +161,5 @@ def test_what_does_not_fit_is_refused() -> None:
         fuse_tsdf([depth], CAMERA, np.tile(np.eye(4), (2, 1, 1)), X_SV)
     with pytest.raises(InvalidInputError, match="depth image 1 has 320 x 239 pixels"):
         fuse_tsdf([depth, depth[1:]], CAMERA, np.tile(np.eye(4), (2, 1, 1)), X_SV)
-    with pytest.raises(InvalidInputError, match="0 voxels an edge; give 1 to 512"):
+    with pytest.raises(InvalidInputError, match="0 voxels per edge; give 1 to 512"):
         fuse_tsdf([depth], CAMERA, [np.eye(4)], X_SV, voxels=0)

@@ -88,7 +88,10 @@ def test_all_that_follows_from_rays_is_the_same(without: Path, colored: Path) ->
 def test_python_asks_for_libraries_or_for_no_colours(lost: None, tmp_path: Path) -> None:
     with pytest.raises(MissingDependencyError) as refused:
         burg.generate_dataset([SCENE], STATION, tmp_path / "set", WITH_COLORS)
-    assert str(refused.value) == f"the recipe has colours (colors=False leaves them out): {MISSING}"
+    assert str(refused.value) == (
+        "the recipe has colour images, which cannot be rendered (colors=False leaves them out):"
+        f" {MISSING}"
+    )
     assert not (tmp_path / "set").exists()
     assert burg.render(SCENE, STATION, "board", ["depth"]).depth is not None
     with pytest.raises(MissingDependencyError, match=r"libEGL\.so\.1"):

@@ -51,7 +51,7 @@ UNUSABLE = {
     "home": (
         "arm",
         with_box(0.36, 0.55, (0.1, 0.4, 0.1)),
-        "arm.home collides in scene 'tabletop_six': panda_hand with post",
+        "at arm.home the arm collides in scene 'tabletop_six': panda_hand with post",
     ),
     "base": (
         "reach",

@@ -99,7 +99,7 @@ def test_damaged_files(whole: Path, household: ObjectLibrary, tabletop: Station)
     scene = min(whole.glob("scene_*.yaml"))
     text = scene.read_bytes()
     scene.write_bytes(b"")
-    with pytest.raises(DocumentError, match=f"{scene.name}: .*empty.*; fix it, or delete it"):
+    with pytest.raises(DocumentError, match=f"{scene.name}: .*empty.*; fix the file, or delete it"):
         sample_scenes(RECIPE, household, tabletop, whole, 12)
     scene.write_bytes(text)
 
@@ -119,5 +119,5 @@ def test_another_recipe_is_refused(
     assert contents(whole) == before
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.tex").write_text("")
-    with pytest.raises(InvalidInputError, match="is not empty and has no sampled scenes"):
+    with pytest.raises(InvalidInputError, match="is not empty, but has no sampled scenes"):
         sample_scenes(RECIPE, household, tabletop, tmp_path / "mine", 1)

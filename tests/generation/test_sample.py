@@ -83,7 +83,7 @@ def test_a_scene_is_made_again(household: ObjectLibrary, tabletop: Station) -> N
     moved = replace(scene.document, instances=scene.document.instances[::-1])
     again = sample_again(Scene(moved, household, scene.path))
     assert not again.same
-    assert again.differences == ("the file was changed since it was sampled",)
+    assert again.differences == ("the file was changed after it was sampled",)
 
 
 def test_what_was_made_with_other_things_is_refused(
@@ -99,8 +99,8 @@ def test_what_was_made_with_other_things_is_refused(
     assert str(caught.value) == (
         "the inputs of scene_0000.yaml have changed (the library has content 000000000000 there,"
         f" {origin.library_content} here; drake is 1.0 there, {origin.versions['drake']}"
-        " here), so the scene may come out differently; make it by force to go on all the"
-        " same"
+        " here), so the scene may come out differently; force it to make the scene"
+        " anyway"
     )
     assert sample_again(other, force=True).scene is not None
     with pytest.raises(InvalidInputError, match="has no `origin`, so it was not sampled"):
@@ -206,6 +206,8 @@ def test_rules(household: ObjectLibrary, tabletop: Station) -> None:
     assert rules.broken_rule(scene(can, *boxes), tabletop, blocked) == rules.FEW_GRASPS
     away = scene(("can", "can", (3.0, 0.2, 0.0), 0.0))
     assert rules.broken_rule(away, tabletop, asked) == rules.HIDDEN
-    with pytest.raises(InvalidInputError, match="within_reach: station 'wsg_tabletop' has no arm"):
+    with pytest.raises(
+        InvalidInputError, match="within_reach needs an arm, but station 'wsg_tabletop' has none"
+    ):
         reach = replace(PLACED, within_reach=True)
         SceneSampler(reach, household, load_station("wsg_tabletop"))

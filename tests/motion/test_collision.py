@@ -244,10 +244,12 @@ def test_nothing_remains_of_what_was_carried(station: Station) -> None:
 def test_what_cannot_be_carried(station: Station) -> None:
     can = Instance(name="can", object="can", X_SO=Pose((0.3, 0.2, 0.0)))
     checked = collision(station, can)
-    with pytest.raises(UnknownNameError, match=r"no instance 'cam' that can be carried.*'can'"):
+    with pytest.raises(
+        UnknownNameError, match=r"'cam' is not an instance that can be carried.*'can'"
+    ):
         checked.is_free(HOME, carried="cam")
     with pytest.raises(
-        InvalidInputError, match=r"moved_W is \[0\.0, 0\.0, 0\.1\] m, but nothing is"
+        InvalidInputError, match=r"moved_W is \[0\.0, 0\.0, 0\.1\] m, but no instance is"
     ):
         checked.overlaps(HOME, moved_W=(0.0, 0.0, 0.1))
 

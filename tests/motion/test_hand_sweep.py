@@ -379,7 +379,7 @@ def test_swapped_fingers_and_a_turned_world(
 def test_bad_input() -> None:
     scene, station = place(CAN)
     swept = HandSweep(scene, station, MOTION)
-    with pytest.raises(UnknownNameError, match=r"there is no instance 'cam'.*'can'"):
+    with pytest.raises(UnknownNameError, match=r"instance 'cam' does not exist.*'can'"):
         swept.approach("cam", X_WG[None])
     with pytest.raises(InvalidInputError, match="NaN"):
         swept.lift("can", np.full((1, 4, 4), np.nan), np.array([0.05]))

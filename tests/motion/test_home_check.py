@@ -48,7 +48,8 @@ def test_a_box_that_cuts_into_the_base() -> None:
         " its collision shapes (panda_link0 '"
     )
     assert str(error.value).endswith(
-        "); move the base or what is in its place, or write arm.stands_in: [post] if it is let in"
+        "); move the base or the obstacle, or write arm.stands_in: [post] if the base is mounted"
+        " inside it"
     )
     assert base_overlaps(built(with_box("post", 0.25, 0.1, (0.2, 0.1, 0.2)))) == ()
 
@@ -77,7 +78,7 @@ def test_a_base_plate_that_dips_below_the_table(tmp_path: Path) -> None:
     assert str(error.value) == (
         f"{usual.path}: arm.X_WA puts the arm's base 20 mm deep into 'table' by its collision"
         " shapes (panda_link0 'dip' 20 mm); raise the base by 20 mm (arm.X_WA.translation:"
-        " [0, 0, 0.02]), or write arm.stands_in: [table] if it is let in"
+        " [0, 0, 0.02]), or write arm.stands_in: [table] if the base is mounted inside it"
     )
     for good in (with_arm(X_WA=Pose((0.0, 0.0, 0.02))), with_arm(stands_in=("table",))):
         require_free_home(good, ArmCollision(good))
@@ -92,9 +93,11 @@ def test_what_collides_at_home_is_named() -> None:
     with pytest.raises(InvalidInputError) as error:
         require_free_home(diagram, ArmCollision(diagram))
     text = str(error.value)
-    assert text.startswith(f"{diagram.station.path}: arm.home collides in scene 'empty_board': ")
+    assert text.startswith(
+        f"{diagram.station.path}: at arm.home the arm collides in scene 'empty_board': "
+    )
     assert "panda_hand with crate" in text
-    assert text.endswith("; change the posture or move what is in the way")
+    assert text.endswith("; change arm.home or move the obstacle")
 
 
 def test_a_tall_object_under_the_hand_is_named() -> None:

@@ -75,12 +75,14 @@ def test_another_arm_is_careful_where_nothing_is_stated(tmp_path: Path) -> None:
 
 
 def test_no_limit_of_velocity_is_one_clear_error(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match=r"'panda_joint1' states no velocity limit; give"):
+    with pytest.raises(InvalidInputError, match=r"'panda_joint1' has no velocity limit; add it to"):
         limits(without(tmp_path, "panda_tabletop", "<velocity>.*"))
 
 
 def test_limits_for_another_number_of_joints() -> None:
-    with pytest.raises(InvalidInputError, match=r"arm\.jerk has 6 numbers, the arm 7 joints"):
+    with pytest.raises(
+        InvalidInputError, match=r"arm\.jerk has 6 numbers, but the arm has 7 joints"
+    ):
         limits(with_arm(jerk=(1.0,) * 6))
 
 

@@ -337,16 +337,18 @@ def test_home_in_collision(empty: Scene, changed: Callable[..., Station]) -> Non
         ArmReach(empty, changed(background={"post": post}))
     message = str(error.value)
     assert "\n" not in message
-    assert "panda_tabletop.yaml: arm.home collides in scene 'tabletop_six': " in message
+    assert "panda_tabletop.yaml: at arm.home the arm collides in scene 'tabletop_six': " in message
     assert "panda_hand with post" in message
-    assert message.endswith("; change the posture or move what is in the way")
+    assert message.endswith("; change arm.home or move the obstacle")
 
 
 def test_home_folded_into_itself(empty: Scene, changed: Callable[..., Station]) -> None:
     arm = changed().document.arm
     assert arm is not None
     folded = changed(arm=replace(arm, home=(0.0, 0.0, 0.0, -3.0, 0.0, 0.1, 0.0)))
-    with pytest.raises(InvalidInputError, match=r"arm\.home collides .*panda_\w+ with panda_link"):
+    with pytest.raises(
+        InvalidInputError, match=r"at arm\.home the arm collides .*panda_\w+ with panda_link"
+    ):
         ArmReach(empty, folded)
 
 
@@ -370,5 +372,5 @@ def test_bad_grasps(arm: ArmReach) -> None:
     ],
 )
 def test_bad_settings(wrong: dict[str, object]) -> None:
-    with pytest.raises(InvalidInputError, match="must be"):
+    with pytest.raises(InvalidInputError, match=r" be at least 0|give whole numbers above 0"):
         ReachSettings(**wrong)  # type: ignore[arg-type]

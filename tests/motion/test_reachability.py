@@ -150,10 +150,13 @@ def test_cells_cover_the_board(shelf_map: ReachabilityMap) -> None:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"spacing": 0.0}, "spacing must be above 0, heights at least 0 [m]"),
-        ({"heights": ()}, "spacing must be above 0, heights at least 0 [m]"),
-        ({"headings": (1, 6)}, "3 tilts_deg and 2 headings; give a number of headings for each"),
-        ({"tilts_deg": (0.0, 30.0, 200.0)}, "tilts_deg [0.0, 30.0, 200.0] must be from 0 to 180"),
+        ({"spacing": 0.0}, "spacing must be above 0 m, and each height at least 0 m"),
+        ({"heights": ()}, "spacing must be above 0 m, and each height at least 0 m"),
+        ({"headings": (1, 6)}, "3 tilts_deg and 2 headings; give one number of headings for each"),
+        (
+            {"tilts_deg": (0.0, 30.0, 200.0)},
+            "tilts_deg is [0.0, 30.0, 200.0]; each must be from 0 to 180",
+        ),
         ({"yaws": 0}, "yaws, headings and redundant must be whole numbers above 0"),
     ],
 )

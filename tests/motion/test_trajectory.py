@@ -210,7 +210,7 @@ def test_a_csv_alone_is_the_motion(plan: Plan, tmp_path: Path) -> None:
     with pytest.raises(InvalidInputError) as error:
         load_plan(path, scene=scene)
     assert str(error.value) == (
-        f"{path} does not say which scene and arm it is for; a CSV plan has that in the file"
+        f"{path} does not say which scene and arm it is for; a CSV plan has this in"
         " NAME.csv-metadata.json next to it"
     )
 
@@ -274,9 +274,9 @@ def test_uneven_samples_are_not_written(plan: Plan, tmp_path: Path) -> None:
     uneven = plan.lift.t.copy()
     uneven[5] += 1e-4
     plan = replace(plan, lift=replace(plan.lift, t=uneven))
-    with pytest.raises(InvalidInputError, match=r"^phase 'lift' does not have 1000 samples a seco"):
+    with pytest.raises(InvalidInputError, match=r"^phase 'lift' is not sampled at 1000 Hz"):
         plan.to_json(tmp_path / "plan.json")
-    with pytest.raises(InvalidInputError, match=r"^phase 'lift' does not have 1000 samples a seco"):
+    with pytest.raises(InvalidInputError, match=r"^phase 'lift' is not sampled at 1000 Hz"):
         plan.to_csv(tmp_path / "plan.csv")
 
 
@@ -308,47 +308,47 @@ def points(document: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 DAMAGES: list[tuple[Damage, str]] = [
-    (lambda d: d.pop("rate"), "'rate' is not as it was written"),
-    (lambda d: d.update(rate=0), "'rate' is not as it was written"),
-    (lambda d: d.update(hand=3), "'hand' is not as it was written"),
-    (lambda d: d.update(phases=3), "'phases' is not as it was written"),
+    (lambda d: d.pop("rate"), "'rate' is missing or was changed"),
+    (lambda d: d.update(rate=0), "'rate' is missing or was changed"),
+    (lambda d: d.update(hand=3), "'hand' is missing or was changed"),
+    (lambda d: d.update(phases=3), "'phases' is missing or was changed"),
     (lambda d: d.update(phases={}), "phase 'transfer' is missing"),
-    (lambda d: d.update(origin=3), "'origin' is not as it was written"),
-    (lambda d: d["origin"].update(foo=3), "'origin' is not as it was written"),
-    (lambda d: d["origin"].update(limits=3), "'origin' is not as it was written"),
+    (lambda d: d.update(origin=3), "'origin' is missing or was changed"),
+    (lambda d: d["origin"].update(foo=3), "'origin' is missing or was changed"),
+    (lambda d: d["origin"].update(limits=3), "'origin' is missing or was changed"),
     (
         lambda d: d["origin"]["limits"].update(lower=[float("nan"), -3.0]),
-        "position limits [nan, -3.0] to [3.0, 3.0] of an arm have to be one pair of numbers a"
-        " joint, the lower one first",
+        "position limits of an arm are [nan, -3.0] to [3.0, 3.0]; give a lower and a higher number"
+        " for each joint",
     ),
     (
         lambda d: d["origin"]["limits"].update(torque=[-1.0, 1.0]),
-        "torque limits [-1.0, 1.0] of an arm have to be at least 0, or inf",
+        "torque limits of an arm are [-1.0, 1.0]; each must be at least 0, or inf",
     ),
     (
         lambda d: d["origin"]["limits"].update(torque=[1.0]),
-        "the limits in 'origin' are not those of 2 joints",
+        "origin has limits for another number of joints than the 2 of the plan",
     ),
-    (lambda d: d["hand"].update(opening=-0.1), "'hand' is not as it was written"),
+    (lambda d: d["hand"].update(opening=-0.1), "'hand' is missing or was changed"),
     (
         lambda d: points(d).reverse(),
-        "point 0 is at 4.4 s; of 1000 samples a second it is that at 0 s",
+        "point 0 is at 4.4 s; with 1000 samples per second it must be at 0 s",
     ),
     (
         lambda d: points(d)[7]["time_from_start"].update(nanosec=7_000_002),
-        "point 7 is at 0.007000002 s; of 1000 samples a second it is that at 0.007 s",
+        "point 7 is at 0.007000002 s; with 1000 samples per second it must be at 0.007 s",
     ),
     (
         lambda d: d.update(rate=500),
-        "point 1 is at 0.001 s; of 500 samples a second it is that at 0.002 s",
+        "point 1 is at 0.001 s; with 500 samples per second it must be at 0.002 s",
     ),
     (
         lambda d: points(d)[7].update(velocities=[0.0]),
-        "velocities of point 7 are not 2 finite numbers",
+        "velocities of point 7 must be 2 finite numbers",
     ),
     (
         lambda d: points(d)[7].update(positions=[0.0, "x"]),
-        "'joint_trajectory' is not as it was written",
+        "'joint_trajectory' is missing or was changed",
     ),
     (
         lambda d: points(d)[7].update(positions=[0.0, 50.0]),
@@ -356,19 +356,19 @@ DAMAGES: list[tuple[Damage, str]] = [
     ),
     (
         lambda d: points(d)[7]["positions"].__setitem__(0, 0.5),
-        "the velocity of joint 'a' gets to 500, beyond its limit of 1",
+        "the velocity of joint 'a' reaches 500, above its limit of 1",
     ),
     (
         lambda d: points(d)[7]["accelerations"].__setitem__(1, -4.5),
-        "the acceleration of joint 'b' gets to 4.5, beyond its limit of 4",
+        "the acceleration of joint 'b' reaches 4.5, above its limit of 4",
     ),
     (
         lambda d: points(d)[-1]["velocities"].__setitem__(1, -1e-3),
-        "at an end of phase 'lift' the arm does not rest",
+        "the arm is not at rest at the ends of phase 'lift'",
     ),
     (
         lambda d: d["hand"].update(close_time=99.0),
-        "phase 'close' takes 0.5 s, and the hand closes for 99 s",
+        "phase 'close' takes 0.5 s, but the hand closes for 99 s",
     ),
     (
         lambda d: points(d)[d["phases"]["close"][0] + 1]["positions"].__setitem__(1, 0.2001),
@@ -391,15 +391,15 @@ def test_a_damaged_plan_is_refused(plan: Plan, tmp_path: Path, damage: Damage, w
 
 CSV_DAMAGES: list[tuple[int, str, str, str]] = [
     (0, "t,phase", "phase,t", ""),
-    (7, ",transfer,", ",transfr,", "line 9 has phase 'transfr', not one of"),
-    (7, ",transfer,", ",lift,", "phase 'transfer' begins again in line 10"),
-    (7, ",transfer,", ",transfer,,", "line 9 has 10 cells, not 9"),
+    (7, ",transfer,", ",transfr,", "line 9 has phase 'transfr'; expected one of"),
+    (7, ",transfer,", ",lift,", "phase 'transfer' starts a second time in line 10"),
+    (7, ",transfer,", ",transfer,,", "line 9 has 10 cells; expected 9"),
     (7, ",transfer,", ",transfer,nan", "q_a in line 9 is 'nan"),
-    (7, "0.007,", "0.0071,", "point 7 is at 0.0071 s; of 1000 samples a"),
-    (7, "0.007,", "soon,", "t in line 9 is 'soon', no number"),
+    (7, "0.007,", "0.0071,", "point 7 is at 0.0071 s; with 1000 samples per"),
+    (7, "0.007,", "soon,", "t in line 9 is 'soon', which is not a number"),
     (7, ",transfer,", ",transfer,5", "point 7 has joint 'a' at 50."),
     (7, ",0.08", ",0.09", "width in line 9 is '0.09'; in phase 'transfer' of this plan"),
-    (7, ",0.08", ",wide", "width in line 9 is 'wide', no number"),
+    (7, ",0.08", ",wide", "width in line 9 is 'wide', which is not a number"),
 ]
 """Line, what stands there, what takes its place, and what is said."""
 
@@ -426,9 +426,9 @@ def test_a_damaged_file_beside_a_csv_is_named(plan: Plan, tmp_path: Path) -> Non
     beside = Path(f"{path}-metadata.json")
     text = beside.read_text()
     for old, new, message in (
-        ('"notes"', '"note"', "has no notes on a plan; write it again"),
-        ("q_a", "q_c", "is of a table with other columns; write it again"),
-        ("burg_drake plan", "plan", "is not a plan: it lacks format 'burg_drake plan'"),
+        ('"notes"', '"note"', "does not describe a plan; write the plan again"),
+        ("q_a", "q_c", "describes a table with other columns; write the plan again"),
+        ("burg_drake plan", "plan", "is not a plan: its format is not 'burg_drake plan'"),
         ("{", "", "not valid JSON"),
     ):
         beside.write_text(text.replace(old, new))
@@ -450,6 +450,6 @@ def test_phases_cover_all_points(plan: Plan, tmp_path: Path) -> None:
         with pytest.raises(InvalidInputError) as error:
             load_plan(path)
         assert str(error.value) == (
-            f"{path}: the plan is damaged: phase 'lift' has points {wanted}; it has to go from"
+            f"{path}: the plan is damaged: phase 'lift' has points {wanted}; it must go from"
             f" point {end} to the last one, {last}; write it again"
         )

@@ -73,5 +73,5 @@ def test_drake_giving_up_is_a_failure(tmp_path: Path, monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(pool, "build_object", gives_up)
     report = build_library(boxes(1), tmp_path / "lib")
-    assert report.failed == {"box_0": "Drake gave up: abort: Failure at plant.cc"}
+    assert report.failed == {"box_0": "Drake failed: abort: Failure at plant.cc"}
     assert issubclass(SimulationError, RuntimeError)

@@ -237,12 +237,12 @@ def test_a_board_that_only_margins_spread_over_pages() -> None:
     printout = print_board(scene, bare)
     assert len(printout.tiling.tiles) > 1
     (said,) = printout.warnings
-    assert said.startswith("the board is no larger than the page, but takes 2 because of the mar")
-    margin, page = re.findall(r"a margin of (\S+) mm or page (\S+) would do", said)[0]
+    assert said.startswith("the board is no larger than the page, but takes 2 pages because of")
+    margin, page = re.findall(r"a margin of (\S+) mm or page (\S+) would fit", said)[0]
     for changes in ({"margin": float(margin) * 1e-3}, {"page": page}):
         again = print_board(scene, dataclasses.replace(bare, **changes))
         assert len(again.tiling.tiles) == 1
-        assert ["printer that leaves 4.2 mm" in w for w in again.warnings] == [True] * (
+        assert ["printer with a margin of 4.2 mm" in w for w in again.warnings] == [True] * (
             "margin" in changes
         )
     larger = print_board(changed(scene, board=Board()), bare)
@@ -306,7 +306,10 @@ def test_what_stands_wholly_on_another() -> None:
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"measured": (0.0985, 9.85)}, "a ruler of 100 mm measured 9850 mm; it must be 80 to 125"),
+        (
+            {"measured": (0.0985, 9.85)},
+            "the measured length of the 100 mm ruler is 9850 mm; it must be 80 to 125",
+        ),
         ({"margin": 0.2}, "margin is 200 mm; it must be 0 to 50 mm"),
         ({"margin": float("nan")}, "margin is nan mm"),
     ],
@@ -323,8 +326,8 @@ def test_markers_at_the_edge_lack_white_around_them() -> None:
         board=Board(size=(0.1, 0.1), markers=Markers(side=0.1, count=(1, 1))),
     )
     assert print_board(tiny).warnings == (
-        "markers are 0.0 mm from the board's edge; cut out, on a dark table, they lack the white"
-        " around them that detectors need: leave 10.0 mm, by a larger board or smaller markers",
+        "markers are 0.0 mm from the edge of the board, but detectors need a white border of"
+        " 10.0 mm around them; give a larger board or smaller markers",
     )
     larger = changed(tiny, board=Board(size=(0.12, 0.12), markers=tiny.board.markers))
     assert not print_board(larger).warnings

@@ -97,7 +97,7 @@ def test_what_a_printer_cuts_off_is_told_with_its_page() -> None:
     printout = with_guide(wide, margin=2e-3, height_map=False)
     (said,) = [w for w in printout.warnings if "printer" in w]
     number, lost = re.findall(
-        r"page (\d): a printer that leaves 4.2 mm white, as most .* cuts off (\S+) mm of markers",
+        r"page (\d): a printer with a margin of 4.2 mm, as most .* cuts off (\S+) mm of markers",
         said,
     )[0]
     top = printout.p_PQ(int(number), wide.board.layout.p_SQ.max(axis=(0, 1)))[1]
@@ -121,6 +121,6 @@ def test_an_object_has_its_name_on_every_page_that_shows_it() -> None:
             inside &= (p_SV[:, 1] > bottom + inset) & (p_SV[:, 1] < top - inset)
             if inside.sum() > 30:
                 told = re.search(rf"(?<!\w){name}(?!\w)", text)
-                assert told or f"there is no room for the words '{name}' on page {tile.number}" in (
+                assert told or f"there is no room to print '{name}' on page {tile.number}" in (
                     printout.warnings
                 )

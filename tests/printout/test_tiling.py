@@ -87,15 +87,17 @@ def test_narrow_gaps_leave_no_strip_for_glue() -> None:
 
 def test_mistakes() -> None:
     large = marker_layout(A2, Markers(side=0.3))
-    with pytest.raises(InvalidInputError, match=r"300 mm.* does not fit on page A4; A2 would do"):
+    with pytest.raises(InvalidInputError, match=r"300 mm.* does not fit on page A4; A2 would be"):
         tile_board(A2, large, corners(large), orientations("A4", 5e-3))
     size = (2.0, 2.0)
     huge = marker_layout(size, Markers(side=1.8))
-    with pytest.raises(InvalidInputError, match=r"larger paper, of WxH mm, or give smaller"):
+    with pytest.raises(InvalidInputError, match=r"larger paper as WxH in mm, or smaller"):
         tile_board(size, huge, corners(huge), orientations("A4", 5e-3))
     size = (4.4, 3.2)
     wide = marker_layout(size, Markers(spacing=0.2))
-    with pytest.raises(InvalidInputError, match=r"needs .* pages A4, more than 100; board.size is"):
+    with pytest.raises(
+        InvalidInputError, match=r"needs .* pages A4, but at most 100 .* board.size"
+    ):
         tile_board(size, wide, corners(wide), orientations("A4", 5e-3))
     with pytest.raises(UnknownNameError, match="page 'A44' does not exist; did you mean 'A4'"):
         paper_size("A44")

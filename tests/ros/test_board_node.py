@@ -93,7 +93,7 @@ def test_resolution_may_change(
 def test_without_camera_info_the_overlay_says_so(scene: Scene, message: Any) -> None:
     node = BoardNode(scene)
     sighting = node.locate(message, None)
-    assert "no camera_info has arrived yet" in sighting.estimate.reason
+    assert "no camera_info message has arrived yet" in sighting.estimate.reason
     drawn = node.draw(sighting)
     assert drawn is not None
     changed = (drawn != sighting.image).any(axis=2)
@@ -104,7 +104,7 @@ def test_damaged_image(scene: Scene, intrinsics: Intrinsics, message: Any) -> No
     node = BoardNode(scene, intrinsics=intrinsics)
     message.data = message.data[:1000]
     sighting = node.locate(message, None)
-    assert sighting.estimate.reason.startswith("damaged image: 1000 bytes")
+    assert sighting.estimate.reason.startswith("the image is damaged: 1000 bytes")
     assert node.draw(sighting) is None
 
 

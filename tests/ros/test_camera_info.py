@@ -89,14 +89,14 @@ def test_binning_and_region(intrinsics: Intrinsics, info_message: Callable[..., 
 @pytest.mark.parametrize(
     ("fields", "rectified", "text"),
     [
-        ({"k": [0.0] * 9}, False, "K = 0, the camera is not calibrated"),
-        ({"p": [0.0] * 12}, True, "P = 0, the camera is not calibrated"),
+        ({"k": [0.0] * 9}, False, "K = 0, so the camera is not calibrated"),
+        ({"p": [0.0] * 12}, True, "P = 0, so the camera is not calibrated"),
         (
             {"distortion_model": "thin_prism_fisheye"},
             False,
-            "distortion model 'thin_prism_fisheye'; plumb_bob, rational_polynomial and equidistant",
+            "'thin_prism_fisheye'; supported are plumb_bob, rational_polynomial and equidistant",
         ),
-        ({"distortion_model": "equidistant"}, False, "5 coefficients; a fisheye has 4"),
+        ({"distortion_model": "equidistant"}, False, "5 coefficients; a fisheye model has 4"),
         ({"d": [np.nan, 0.2, 0.0, 0.0, 0.0]}, False, "not finite"),
         ({"k": [np.inf] * 9}, False, "not finite"),
         ({"d": [0.1, 0.2, 0.3]}, False, "3 coefficients"),

@@ -101,10 +101,10 @@ def test_the_image_is_the_callers_own(image_message: Callable[..., Any]) -> None
 @pytest.mark.parametrize(
     ("fields", "text"),
     [
-        ({"step": 17}, "damaged image: 72 bytes in rows of 17 do not make 6 x 4 pixels of rgb8"),
-        ({"data": RGB.tobytes()[:-1]}, "damaged image: 71 bytes in rows of 18"),
-        ({"height": 0}, "do not make 6 x 0 pixels"),
-        ({"encoding": "32FC1"}, "encoding '32FC1' are not read; known: .*bgr8.*rgb8"),
+        ({"step": 17}, "damaged: 72 bytes in rows of 17 are not 6 x 4 pixels of rgb8"),
+        ({"data": RGB.tobytes()[:-1]}, "damaged: 71 bytes in rows of 18"),
+        ({"height": 0}, "are not 6 x 0 pixels"),
+        ({"encoding": "32FC1"}, "encoding '32FC1' is not supported; .*bgr8.*rgb8"),
     ],
 )
 def test_what_cannot_be_read(
@@ -117,7 +117,7 @@ def test_what_cannot_be_read(
 
 
 def test_colours_in_pairs_of_pixels_need_pairs(image_message: Callable[..., Any]) -> None:
-    with pytest.raises(InvalidInputError, match="1 x 1 pixels cannot be yuyv"):
+    with pytest.raises(InvalidInputError, match="1 x 1 pixels cannot have encoding yuyv"):
         pixels(image_message(bytes(2), (1, 1), "yuyv"))
 
 
@@ -130,8 +130,8 @@ def test_compressed() -> None:
 @pytest.mark.parametrize(
     ("form", "data", "text"),
     [
-        ("jpeg", b"", "damaged image: 0 bytes of 'jpeg'"),
-        ("jpeg", b"no picture", "damaged image: 10 bytes of 'jpeg'"),
+        ("jpeg", b"", "damaged: its 0 bytes cannot be decoded as 'jpeg'"),
+        ("jpeg", b"no picture", "damaged: its 10 bytes cannot be decoded as 'jpeg'"),
         ("16UC1; compressedDepth png", b"x", "depth images"),
     ],
 )

@@ -35,8 +35,8 @@ def test_topics_beside_the_images(image: str, compressed: bool, info: str) -> No
 @pytest.mark.parametrize(
     ("fields", "text"),
     [
-        ({"image": "/camera image"}, "'/camera image' is not the name of a topic"),
-        ({"image": ""}, "'' is not the name of a topic"),
+        ({"image": "/camera image"}, "'/camera image' is not a valid topic name"),
+        ({"image": ""}, "'' is not a valid topic name"),
         ({"image": "/image/"}, "'/image/' is not"),
         ({"camera_info": "2/info"}, "'2/info' is not"),
         ({"node": "a/b"}, "node name 'a/b'"),
@@ -119,6 +119,6 @@ def test_images_without_a_frame_stay_off_tf(
 
 def test_tf_needs_its_messages(ros2_classes: MessageClasses) -> None:
     classes = replace(ros2_classes, TFMessage=None)
-    with pytest.raises(MissingDependencyError, match=r"tf2_msgs .* leave tf alone"):
+    with pytest.raises(MissingDependencyError, match=r"tf2_msgs .* parent frame"):
         Graph().publications(Names(image="/image"), classes)
     Graph().publications(Names(image="/image", parent=Parent.NONE), classes)

@@ -56,14 +56,14 @@ def test_silence_is_told_once_and_again_after_images() -> None:
     topics = {"/camera/image_raw": 0, "/camera/camera_info": 0}
     assert account.record_silence(topics, 0.9 * HINT_AFTER) is None
     assert account.record_silence(topics, 1.1 * HINT_AFTER) == (
-        "nobody publishes /camera/image_raw and /camera/camera_info; is the camera running?"
+        "nothing publishes /camera/image_raw and /camera/camera_info; is the camera running?"
         " Still waiting"
     )
     assert account.record_silence(topics, 9.0 * HINT_AFTER) is None
     account.record_image(FOUND, 10.0 * HINT_AFTER)
     assert account.record_silence({"/image": 1}, 10.5 * HINT_AFTER) is None
     assert account.record_silence({"/image": 1}, 11.5 * HINT_AFTER) == (
-        "/image is published, but no images arrive; still waiting"
+        "/image has a publisher, but no images arrive; still waiting"
     )
 
 

@@ -261,7 +261,7 @@ def test_neighbours_in_the_way_of_a_finger_are_pushed_as_if_never_locked(make_sc
 
 
 def test_clear_errors(box_trial: HandTrial) -> None:
-    with pytest.raises(InvalidInputError, match="'mug' is not a free object of scene 'test'"):
+    with pytest.raises(InvalidInputError, match="'mug' is not a free instance of scene 'test'"):
         box_trial.run("mug", CENTRE)
     with pytest.raises(InvalidInputError, match="X_OG has NaN"):
         box_trial.run("box", np.full((4, 4), np.nan))

@@ -164,7 +164,7 @@ def test_what_is_not_held_has_no_grip(trial: HandTrial) -> None:
 
 
 def test_bad_settings() -> None:
-    with pytest.raises(InvalidInputError, match="loads from 5 to 1 g: must rise from above 0"):
+    with pytest.raises(InvalidInputError, match="loads are from 5 to 1 g"):
         LoadSettings(smallest=5.0, largest=1.0)
     with pytest.raises(InvalidInputError, match="frequency is 0; give more than 0"):
         LoadSettings(frequency=0.0)

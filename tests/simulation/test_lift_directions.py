@@ -164,5 +164,5 @@ def test_a_lift_down_through_the_table_is_blocked(make_scene) -> None:
 
 @pytest.mark.parametrize("lift", [0.0, -0.1, np.inf, np.nan])
 def test_a_lift_of_no_length(box_trial: HandTrial, lift: float) -> None:
-    with pytest.raises(InvalidInputError, match=r"lift is .* m; with a retreat of 0 m"):
+    with pytest.raises(InvalidInputError, match=r"lift is .* m and retreat 0 m"):
         box_trial.run("box", CENTRE, lift=lift)

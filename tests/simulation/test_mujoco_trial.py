@@ -356,5 +356,5 @@ def test_a_piece_needs_a_volume(scene: Scene, tmp_path: Path) -> None:
     entry = replace(entry, contact=replace(entry.contact, kind="pieces", primitive=None))
     objects = {**document.objects, "box": entry}
     library = replace(scene.library, document=replace(document, objects=objects), root=tmp_path)
-    with pytest.raises(InvalidInputError, match=r"its piece flat.obj has no volume \(3 points\)"):
+    with pytest.raises(InvalidInputError, match=r"piece flat.obj has no volume \(3 points\)"):
         check_objects(replace(scene, library=library))

@@ -97,8 +97,8 @@ def test_a_plate_on_edge_stands_if_its_tilt_is_below_the_closed_form(
     else:
         assert [p.probability for p in found.poses] == [1.0]
         assert found.notes == (
-            "a stable pose (10.0 %) topples in simulation and is left out; the share goes to where"
-            " it ends up",
+            "a stable pose (10.0 %) topples in simulation and is left out; its probability goes"
+            " to the poses in which the object ends up",
         )
     for pose in found.poses:
         assert pose.residual is not None and pose.residual < TILT
@@ -164,7 +164,7 @@ def test_where_it_ends_up_is_not_a_known_pose(tmp_path: Path) -> None:
     assert len(found.poses) == 1
     assert found.poses[0].probability == 1.0
     assert found.poses[0].residual == pytest.approx(0.5 * np.pi, abs=0.02)
-    assert "the most probable is kept, though the object tilts by 90 degrees" in found.notes[0]
+    assert "the most probable one is kept, though the object tilts by 90 degrees" in found.notes[0]
 
 
 def test_shares_that_are_lost(tmp_path: Path) -> None:

@@ -208,7 +208,7 @@ def test_what_falls_off_the_table_is_left_out(make_scene) -> None:
 
 def test_clear_errors(make_scene) -> None:
     scene = make_scene(("block", 0.3, 0.2, 0.0), placed("other", "block", 0.33, 0.2, 0.0))
-    with pytest.raises(InvalidInputError, match=r"'block' and 'other' overlap by 20\.0 mm, and"):
+    with pytest.raises(InvalidInputError, match=r"'block' and 'other' overlap by 20\.0 mm and"):
         settle_scene(scene, make_station())
     with pytest.raises(InvalidInputError, match="time limit is 0 s; give more than 0"):
         settle_scene(scene, make_station(), time_limit=0.0)

@@ -48,7 +48,7 @@ def test_a_doubtful_object_looks_doubtful(page: Page, server: ViewServer) -> Non
         displacement=(3e-4, 4e-4),
         displacement_sd=(3e-5, 4e-5),
     )
-    doubtful = replace(sure, status="uncertain", reason="two places fit alike")
+    doubtful = replace(sure, status="uncertain", reason="two poses fit equally well")
     server.live.placement = PlacementCheck(
         scene=CheckedScene(name="tabletop_six", content=load_scene("tabletop_six").content),
         method="silhouette",
@@ -62,7 +62,7 @@ def test_a_doubtful_object_looks_doubtful(page: Page, server: ViewServer) -> Non
     mug, bowl = (page.locator("#objects tr", has_text=name) for name in ("mug", "bowl"))
     expect(mug).to_contain_text("✓ 0.50± 0.05")
     expect(bowl).to_contain_text("? 0.50± 0.05")
-    expect(bowl).to_contain_text("two places fit alike")
+    expect(bowl).to_contain_text("two poses fit equally well")
     colors = [
         row.locator(".number").first.evaluate("cell => getComputedStyle(cell).color")
         for row in (mug, bowl)
@@ -81,6 +81,5 @@ def test_a_photograph_cannot_be_recorded_and_the_page_says_why(
     )
     page.keyboard.press("r")
     expect(page.locator("#events .bad")).to_have_text(
-        "pictures has no more frames that could be recorded; a snapshot keeps the picture that is"
-        " shown"
+        "pictures has no more frames to record; take a snapshot to keep the picture that is shown"
     )

@@ -288,7 +288,7 @@ def test_a_photo_of_the_board_is_laid_under_the_objects(
     until(lambda: alpha() == round(0.4 * 255), "a fainter photo")
     client.upload(BACKDROP, "Photo of the board", "note.png", b"no picture")
     until(lambda: client.told, "a word")
-    assert "note.png is not an image that can be read; give PNG or JPEG" in client.told[0]
+    assert "note.png cannot be read as an image; give PNG or JPEG" in client.told[0]
     assert layer in client.nodes
     client.click(BACKDROP, "Remove the picture")
     until(lambda: layer not in client.nodes, "no photo")

@@ -266,7 +266,7 @@ def test_two_pages_show_the_same_and_come_back_after_a_kill(
         page = SetupPage(door.server, session)
         assert session.view.document == before
         until(door.server.get_clients, "the tab that is still open has come back")
-        setup.tab.get_by_text("recovered what was not saved").wait_for()
+        setup.tab.get_by_text("recovered the unsaved changes").wait_for()
         setup.tab.get_by_text("1 ok").wait_for()
         page.close()
 

@@ -83,7 +83,8 @@ def run_list(arguments: argparse.Namespace) -> int:
         found += 1
     if not found:
         print(
-            "burg-drake: no camera gives images; is one plugged in, free, and may you read it?",
+            "burg-drake: no camera gives images; is one plugged in and not in use, and do you have"
+            " permission to read it?",
             file=sys.stderr,
         )
     return 0 if found else 1

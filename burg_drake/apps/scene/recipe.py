@@ -142,6 +142,7 @@ def board_extents(size: str, *, upright: bool) -> tuple[float, float]:
         return float(own[1]) * 1e-3, float(own[2]) * 1e-3
     if size.upper() not in BOARD_SIZES:
         raise UnknownNameError(
-            f"no board has size {size!r}; {nearest(size, BOARD_SIZES)}; or WxH in mm: 700x500"
+            f"board size {size!r} does not exist; {nearest(size, BOARD_SIZES)}; or give WxH in mm,"
+            " such as 700x500"
         )
     return board_size(size.upper(), upright=upright)

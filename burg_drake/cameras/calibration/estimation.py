@@ -218,11 +218,11 @@ def _usable(
         (size, _), *_ = sizes.most_common(1)
         twin = next((other for other in kept if displacement(view, other) < SAME), None)
         if view.size != size:
-            reason = "has {} x {} pixels, the others {} x {}".format(*view.size, *size)
+            reason = "has {} x {} pixels, the others have {} x {}".format(*view.size, *size)
         elif view.blur > BLURRED * view.side:
-            reason = f"is blurred: its edges by {view.blur:.1f} pixels"
+            reason = f"is blurred: its edges are {view.blur:.1f} pixels wide"
         elif twin is not None:
-            reason = f"shows the target where {twin.name} does"
+            reason = f"shows the target in the same place as {twin.name}"
         else:
             kept.append(view)
             continue
@@ -247,8 +247,8 @@ def _require_views(views: Sequence[CharucoView], refused: Sequence[tuple[str, st
         count = len(views) + len(refused)
         first = f"; {refused[0][0]} {refused[0][1]}" if refused else ""
         raise InvalidInputError(
-            f"{len(views)} of {count} images can be used, {LEAST_VIEWS} are needed and 15 are"
-            f" good{first}"
+            f"{len(views)} of {count} images can be used; a calibration needs at least"
+            f" {LEAST_VIEWS}, better 15{first}"
         )
 
 
@@ -268,10 +268,19 @@ def _without_outliers(
         # A few wrong corners are left out by themselves, without their view.
         if of_view > limit and (good.mean() < 0.8 or rms_of(length[good, None]) > limit):
             refused.append(
-                (view.name, f"is {of_view:.2f} pixels off, the median {np.median(rms):.2f}")
+                (
+                    view.name,
+                    f"is {of_view:.2f} pixels off, the median is {np.median(rms):.2f}",
+                )
             )
         elif good.sum() < LEAST_CORNERS:
-            refused.append((view.name, f"has {good.sum()} corners that fit to the other views"))
+            refused.append(
+                (
+                    view.name,
+                    f"has {good.sum()} corners that agree with the other images;"
+                    f" {LEAST_CORNERS} are needed",
+                )
+            )
         else:
             part = replace(view, ids=view.ids[good], corners=view.corners[good])
             kept.append(view if good.all() else part)

@@ -38,21 +38,21 @@ def wanted_views(calibration: Calibration) -> tuple[str, ...]:
     poor = [name for name in worst_first if not (name in unseen or bound[name] <= UNCERTAIN)]
     lines = []
     if hidden:
-        lines.append(f"bring the target to the {_listed(hidden, promise)}, and beyond")
+        lines.append(f"move the target into and across the {_listed(hidden, promise)}")
     lines += _tilts(calibration.views)
     lines += _distances(calibration)
     if poor:
         lines.append(f"show more of the target at the {_listed(poor, promise)}")
     count = len(calibration.views)
     if not lines and count < FEW_VIEWS:
-        lines = [f"take more views, from all sides: {count} are few"]
+        lines = [f"take more views from all sides; {count} are too few"]
     return tuple(lines)
 
 
 def _listed(names: Sequence[str], promise: Promise) -> str:
     """Parts of the image and what is known of them; the first is the worst."""
     first, *others = names
-    text = f"{first} of the image, known to {promise.bound(first)} pixels"
+    text = f"{first} of the image, where the error may be {promise.bound(first)} pixels"
     return ", ".join([text, *(f"then the {name} ({promise.bound(name)})" for name in others)])
 
 

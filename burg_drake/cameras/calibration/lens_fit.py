@@ -238,8 +238,8 @@ class _Problem:
                 break
         if not np.isfinite(state.cost):
             raise InvalidInputError(
-                f"{len(self.counts)} views of the target do not determine a camera; take more,"
-                " tilted to all sides"
+                f"{len(self.counts)} views of the target do not determine the intrinsics; take"
+                " more, with the target tilted to all sides"
             )
         return state
 

@@ -18,11 +18,11 @@ def advice(calibration: Calibration) -> list[str]:
     views, promise = calibration.views, calibration.promise
     lines = list(wanted_views(calibration))
     if len(views) < FEW_VIEWS:
-        lines.insert(0, f"{len(views)} views are few: take 15 to 30")
+        lines.insert(0, f"{len(views)} views are too few; take 15 to 30")
     if calibration.rms > LARGE_RMS:
         lines.append(
-            f"residuals of {calibration.rms:.2f} pixels are large: is the target flat, are its"
-            " squares and markers as given, was the focus fixed?"
+            f"the reprojection error of {calibration.rms:.2f} pixels is large: is the target flat,"
+            " do its squares and markers have the given sizes, and was the focus fixed?"
         )
     if not promise.known_to <= UNCERTAIN or is_local(promise.except_at):
         lines.append(f"the camera is {promise}")

@@ -70,7 +70,10 @@ class CharucoTarget:
     def __post_init__(self) -> None:
         if min(self.squares) < 3:
             raise FieldError(
-                "squares {} x {} are too few; 3 x 3 at least".format(*self.squares), "squares"
+                "a target of {} x {} squares is too small; give at least 3 x 3".format(
+                    *self.squares
+                ),
+                "squares",
             )
         if not 0.0 < self.marker < self.square:
             raise InvalidInputError(
@@ -81,8 +84,9 @@ class CharucoTarget:
         needed = self.squares[0] * self.squares[1] // 2
         if needed > known:
             raise InvalidInputError(
-                f"a board of {self.squares[0]} x {self.squares[1]} squares needs {needed} markers,"
-                f" {self.dictionary} has {known}"
+                f"a target of {self.squares[0]} x {self.squares[1]} squares needs {needed}"
+                f" markers, but {self.dictionary} has {known}; give fewer squares or a larger"
+                " dictionary"
             )
 
     @cached_property
@@ -157,13 +161,13 @@ def find_target(image: Image, target: CharucoTarget, name: str = "image") -> Cha
     clear = gap >= LEAST_GAP
     if inside.sum() >= LEAST_CORNERS > (inside & clear).sum():
         side = float(np.median(_sides(corners, ids, target)))
-        return f"shows the target too small: squares of {side:.0f} pixels"
+        return f"shows the target too small: its squares are {side:.0f} pixels wide"
     ids, corners = ids[inside & clear], corners[inside & clear]
     if len(ids) < LEAST_CORNERS:
         return f"shows {len(ids)} corners of the target; {LEAST_CORNERS} are needed"
     spread = np.linalg.svd(corners - corners.mean(axis=0), compute_uv=False)[1]
     if 2.0 * spread / np.sqrt(len(ids)) < LEAST_SPREAD * np.hypot(*gray.shape):
-        return "shows corners of the target in one line only"
+        return "shows only corners on one line of the target"
     refined = refine_corners(light, corners, ids, target)
     blur, side = _edges(light, refined, ids, target)
     return CharucoView(name, (gray.shape[1], gray.shape[0]), ids, refined, blur, side)

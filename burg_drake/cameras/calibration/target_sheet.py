@@ -52,9 +52,8 @@ def write_target(
     paper = next((p for p in papers if _fits(target, p)), None)
     if paper is None:
         raise InvalidInputError(
-            "a target of {} x {} squares of {:g} mm is {:.0f} x {:.0f} mm large and does not fit on"
-            " page {}, which has room for {:.0f} x {:.0f} mm; take a larger page or smaller"
-            " squares".format(
+            "a target of {} x {} squares of {:g} mm measures {:.0f} x {:.0f} mm, but page {} has"
+            " room for {:.0f} x {:.0f} mm; give a larger page or smaller squares".format(
                 *target.squares,
                 1e3 * target.square,
                 *(1e3 * side for side in target.size),

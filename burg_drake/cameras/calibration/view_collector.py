@@ -55,7 +55,7 @@ class ViewCollector:
         if before is None or displacement(view, before) > STILL:
             return False, "hold still"
         if view.blur > BLURRED * view.side:
-            return False, "blurred: more light, or focus"
+            return False, "blurred: add light, or focus"
         if any(displacement(view, other) < DIFFERENT for other in self.views):
             return False, self.wanted
         self.views.append(view)

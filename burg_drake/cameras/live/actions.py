@@ -109,8 +109,8 @@ class ViewActions:
                 raise InvalidInputError(f"{self.recording.path} is being recorded; stop that first")
             if self.live.is_over:
                 raise InvalidInputError(
-                    f"{self.live.source.name} has no more frames that could be recorded; a snapshot"
-                    " keeps the picture that is shown"
+                    f"{self.live.source.name} has no more frames to record; take a snapshot to"
+                    " keep the picture that is shown"
                 )
             if path is None:
                 path = self._free_path("recording", ".mp4", taken=self._is_recorded)
@@ -142,7 +142,8 @@ class ViewActions:
         if path is None:
             frozen = " while the picture was frozen" if self.live.settings.frozen else ""
             self.live.events.add(
-                f"{recording.path}: nothing was recorded, as no frame came{frozen}", bad=True
+                f"{recording.path}: nothing was recorded, because no new frame arrived{frozen}",
+                bad=True,
             )
         else:
             seconds = recording.frames / recording.frames_per_second
@@ -157,9 +158,7 @@ class ViewActions:
         """
         picture = self._newest()
         if picture is None or not picture.located.estimate.valid:
-            raise InvalidInputError(
-                "a placement check needs a picture that shows where the board is"
-            )
+            raise InvalidInputError("a placement check needs a picture in which the board is found")
         with self._lock:
             if self.checking:
                 raise InvalidInputError("a placement check is already running")

@@ -190,7 +190,8 @@ def checked_settings(scene: Scene, settings: ViewSettings) -> ViewSettings:
     known = (*scene.background, *scene.instances)
     if settings.guide and settings.guide not in known:
         raise UnknownNameError(
-            f"scene {scene.name!r} has no {settings.guide!r}; {nearest(settings.guide, known)}"
+            f"scene {scene.name!r} has no instance {settings.guide!r};"
+            f" {nearest(settings.guide, known)}"
         )
     return settings
 
@@ -205,13 +206,15 @@ def changed_settings(scene: Scene, before: ViewSettings, changes: dict[str, Any]
     known = asdict(ViewSettings())
     for name, value in changes.items():
         if name not in known:
-            raise InvalidInputError(f"no setting {name!r}; {nearest(name, known)}")
+            raise InvalidInputError(f"setting {name!r} does not exist; {nearest(name, known)}")
         wanted = type(known[name])
         is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if not (is_number if wanted is float else isinstance(value, wanted)):
             raise InvalidInputError(f"{name} must be a {wanted.__name__}, not {value!r}")
         if wanted is float and not abs(value) < LARGEST:  # integers may be too large for a float
-            raise InvalidInputError(f"{name} is out of bounds")
+            raise InvalidInputError(
+                f"{name} is out of bounds; give a number between -{LARGEST:g} and {LARGEST:g}"
+            )
     return checked_settings(scene, replace(before, **changes))
 
 

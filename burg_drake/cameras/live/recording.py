@@ -176,13 +176,14 @@ class Recording:
             found = _frames_in(partial(path))
             if found != self.frames:
                 raise InvalidInputError(
-                    f"{partial(path)} has {found} frames of the {self.frames} that were recorded;"
-                    " is the disk full?"
+                    f"{partial(path)} has {found} of the {self.frames} recorded frames; is the"
+                    " disk full?"
                 )
         for path in (*files.growing, files.document):
             if os.path.lexists(path):
                 raise InvalidInputError(
-                    f"{path} exists by now; the recording is left in {partial(files.video)}"
+                    f"{path} was created while recording; the recording is kept as"
+                    f" {partial(files.video)}"
                 )
         save_document(self._document, files.document)
         for path in (files.table, *files.videos):
@@ -237,7 +238,7 @@ def _writer(path: Path, rate: float, intrinsics: Intrinsics) -> cv2.VideoWriter:
     if not writer.isOpened():
         raise InvalidInputError(
             f"cannot write {path}: OpenCV cannot encode {size[0]} x {size[1]} pixels at {rate:g}"
-            f" images a second as {path.suffix}"
+            f" frames per second as {path.suffix}"
         )
     return writer
 

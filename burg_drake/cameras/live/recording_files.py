@@ -63,7 +63,9 @@ class RecordingFiles:
         """
         existing = self.existing()
         if existing is not None:
-            raise InvalidInputError(f"{existing} exists; give a recording a new name")
+            raise InvalidInputError(
+                f"{existing} exists already; choose another name for the recording"
+            )
 
 
 def partial(path: Path) -> Path:
@@ -84,7 +86,9 @@ def require_video_path(path: str | Path, *, plain: bool = False) -> Path:
     """
     path = Path(path)
     if path.suffix.lower() not in CODECS:
-        raise InvalidInputError(f"{path}: a recording is {' or '.join(CODECS)}")
+        raise InvalidInputError(
+            f"{path}: the name of a recording must end in {' or '.join(CODECS)}"
+        )
     RecordingFiles(path, plain).require_free()
     require_writable(path)
     return path

@@ -76,7 +76,7 @@ def read_poses(path: str | Path) -> RecordedPoses:
         raise
     except (KeyError, ValueError) as error:
         raise DocumentError(
-            f"{path} is not the table of a recording; expected rows of {', '.join(COLUMNS)}"
+            f"{path} is not the table of a recording; expected the columns {', '.join(COLUMNS)}"
         ) from error
     return RecordedPoses(
         np.array([frame for frame, _ in numbers], dtype=np.int64),

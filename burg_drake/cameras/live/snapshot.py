@@ -152,7 +152,7 @@ def require_new_folder(folder: str | Path) -> Path:
     """
     folder = Path(folder)
     if folder.exists():
-        raise InvalidInputError(f"{folder} exists; give a snapshot a new name")
+        raise InvalidInputError(f"{folder} exists already; choose another name for the snapshot")
     require_writable(folder)
     return folder
 
@@ -167,7 +167,7 @@ def load_snapshot(folder: str | Path) -> Snapshot:
     """
     folder = Path(folder)
     if not (folder / DOCUMENT).is_file():
-        raise DocumentError(f"{folder} is not the folder of a snapshot; it has no {DOCUMENT}")
+        raise DocumentError(f"{folder} is not the folder of a snapshot: {DOCUMENT} is missing")
     document = load_document(folder / DOCUMENT, SnapshotDocument)
     image, overlay = (_read_image(folder / name) for name in (IMAGE, OVERLAY))
     height, width = image.shape[:2]
@@ -237,7 +237,9 @@ def _read_image(path: Path) -> NDArray[np.uint8]:
     )
     image = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
     if image is None:
-        raise InvalidInputError(f"{path} is missing or no image; take the snapshot again")
+        raise InvalidInputError(
+            f"{path} is missing or cannot be read as an image; take the snapshot again"
+        )
     return np.ascontiguousarray(image[..., ::-1])
 
 

@@ -104,11 +104,16 @@ class DepthNoise:
             )
         if 0.0 < self.hole_size < 1.0:
             raise FieldError(
-                f"hole_size is {self.hole_size:g}; it must be 0, or 1 to 20", "hole_size"
+                f"hole_size is {self.hole_size:g} pixels; it must be 0, or from 1 to 20",
+                "hole_size",
             )
         for name in ("disparity_sigma", "disparity_step", "second_view"):
             if not self.baseline and getattr(self, name) not in (0.0, "none"):
-                raise FieldError(f"{name} needs a baseline, which is 0", name)
+                raise FieldError(
+                    f"{name} needs the baseline of the sensor, but baseline is 0; give it in"
+                    " metres",
+                    name,
+                )
 
     @property
     def uses_angles(self) -> bool:

@@ -104,16 +104,17 @@ def _checked_depth(depth: Single, intrinsics: Intrinsics) -> Single:
     values = np.asarray(depth)
     if values.ndim != 2 or not np.issubdtype(values.dtype, np.floating):
         raise InvalidInputError(
-            f"depth is an array of {values.dtype} of shape {values.shape}; (H, W) of float32 is"
-            " expected [m]"
+            f"depth has shape {values.shape} and type {values.dtype}; expected (H, W) floats in"
+            " metres"
         )
     intrinsics.require_size(values.shape[1], values.shape[0], "the depth image")
     wrong = ~(np.isfinite(values) & (values >= 0.0))
     if wrong.any():
         row, column = np.argwhere(wrong)[0]
         raise InvalidInputError(
-            f"depth has {np.count_nonzero(wrong)} pixels that are not finite or below 0, such as"
-            f" {values[row, column]:g} in row {row}, column {column}; 0 stands for none"
+            f"depth has {np.count_nonzero(wrong)} pixels that are negative or not finite, such as"
+            f" {values[row, column]:g} in row {row}, column {column}; use 0 where nothing was"
+            " measured"
         )
     return values.astype(np.float32, copy=False)
 
@@ -126,6 +127,6 @@ def _check_beside(
         return
     if image.shape != (*shape, 3) or not np.issubdtype(image.dtype, kind):
         raise InvalidInputError(
-            f"{name} is an array of {image.dtype} of shape {image.shape}; beside a depth image of"
-            f" {shape} it must be {kind.__name__} of {(*shape, 3)}"
+            f"{name} has shape {image.shape} and type {image.dtype}; a depth image of shape"
+            f" {shape} needs shape {(*shape, 3)} and type {kind.__name__}"
         )

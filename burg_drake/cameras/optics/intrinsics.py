@@ -90,24 +90,26 @@ class Intrinsics:
         self._check_promise()
         if self.is_fisheye and len(self.distortion) != COEFFICIENTS:
             raise FieldError(
-                f"distortion has {len(self.distortion)} coefficients; a fisheye has {COEFFICIENTS}:"
-                " k1, k2, k3, k4",
+                f"distortion has {len(self.distortion)} coefficients; a fisheye model has"
+                f" {COEFFICIENTS}: k1, k2, k3, k4",
                 "distortion",
             )
         if len(self.distortion) not in DISTORTION_SIZES:
             raise FieldError(
-                f"distortion has {len(self.distortion)} coefficients; OpenCV's model takes"
+                f"distortion has {len(self.distortion)} coefficients; OpenCV's model has"
                 f" {', '.join(map(str, DISTORTION_SIZES))}",
                 "distortion",
             )
 
     def _check_promise(self) -> None:
         if self.known_to is not None and not 0.0 < self.known_to < np.inf:
-            raise FieldError(f"known_to is {self.known_to:g}; it must be above 0", "known_to")
+            raise FieldError(
+                f"known_to is {self.known_to:g} pixels; it must be above 0", "known_to"
+            )
         for k, name in enumerate(self.except_at):
             if name not in PARTS:
                 raise FieldError(
-                    f"except_at has {name!r}, which is no part of the image;"
+                    f"except_at has {name!r}, which is not a part of the image;"
                     f" {nearest(name, PARTS, ordered=True)}",
                     *("except_at", k),
                 )
@@ -145,9 +147,9 @@ class Intrinsics:
         """
         if (width, height) != (self.width, self.height):
             raise InvalidInputError(
-                f"{source} has {width} x {height} pixels, the intrinsics are of"
-                f" {self.width} x {self.height}; calibrate at that resolution (for another one"
-                " cameras scale, bin or cut)"
+                f"{source} has {width} x {height} pixels, but the intrinsics are for {self.width}"
+                f" x {self.height}; calibrate at the resolution of the images, because cameras"
+                " scale, bin or crop to get another one"
             )
 
     def project(self, p_CQ: Array) -> Array:

@@ -121,9 +121,9 @@ def _of_ros(data: Tree, name: str) -> Intrinsics:
     coefficients = _numbers(data, ROS_DISTORTION, name)
     if model not in ROS_MODELS:
         raise InvalidInputError(
-            f"{name}: distortion_model {quoted(model)} is not supported; plumb_bob,"
-            f" rational_polynomial and {ROS_FISHEYE} (fisheye) are, of which"
-            " `burg-drake camera calibrate` makes one"
+            f"{name}: distortion_model {quoted(model)} is not supported; supported are plumb_bob,"
+            f" rational_polynomial and {ROS_FISHEYE} (fisheye): calibrate with `burg-drake camera"
+            " calibrate`"
         )
     if any(coefficients) and len(coefficients) not in ROS_MODELS[model]:
         raise DocumentError(
@@ -158,8 +158,8 @@ def _refuse_part_of_image(data: Tree, name: str) -> None:
         part = []
     if any(n > 1 for n in binning) or any(part):
         raise InvalidInputError(
-            f"{name}: images are a part of what the camera matrix is of (binning or roi); that is"
-            " not supported: calibrate at the resolution that you use"
+            f"{name}: binning or roi is set, so images show only a part of what the camera matrix"
+            " describes; that is not supported: calibrate at the resolution that you use"
         )
 
 
@@ -182,7 +182,7 @@ def _whole(data: Tree, key: str, name: str) -> int:
 def _text(data: Tree, key: str, name: str) -> str:
     value = data.get(key, "")
     if not isinstance(value, str):
-        raise DocumentError(f"{name}: {key} is a structure; expected a text")
+        raise DocumentError(f"{name}: {key} is a list or mapping; expected text")
     return value
 
 
@@ -194,13 +194,13 @@ def _camera_matrix(data: Tree, name: str) -> list[float]:
         raise DocumentError(f"{name}: the camera is not calibrated (its fx is 0)")
     if not abs(K[1]) <= 1e-6 * abs(K[0]):
         raise InvalidInputError(
-            f"{name}: the camera's axes are skewed (by {K[1]:g}); that is not supported, calibrate"
+            f"{name}: the camera matrix has skew {K[1]:g}, which is not supported; calibrate"
             " without skew"
         )
     if [K[3], *K[6:]] != [0.0, 0.0, 0.0, 1.0]:
         raise DocumentError(
-            f"{name}: the camera matrix has {K[3]:g} below fx, and {K[6]:g}, {K[7]:g}, {K[8]:g} in"
-            " its last row; it has to have 0, and 0, 0, 1"
+            f"{name}: the camera matrix must have 0 below fx and 0, 0, 1 in its last row; it has"
+            f" {K[3]:g} and {K[6]:g}, {K[7]:g}, {K[8]:g}"
         )
     return K
 
@@ -228,7 +228,7 @@ def _of_opencv(data: Tree, name: str) -> Intrinsics:
         rms = float(data["avg_reprojection_error"]) if "avg_reprojection_error" in data else None
     except (TypeError, ValueError) as error:
         raise DocumentError(
-            f"{name}: fisheye_model and avg_reprojection_error have to be numbers"
+            f"{name}: fisheye_model and avg_reprojection_error must be numbers"
         ) from error
     key = ROS_DISTORTION[0]
     coefficients = _numbers(data, (key,), name) if key in data else []

@@ -83,7 +83,7 @@ class _XmlReader:
         self._text += text
 
     def _doctype(self, *_: object) -> None:
-        raise self._failure("a document type is declared; leave it out")
+        raise self._failure("document type declarations (DOCTYPE) are not supported; remove it")
 
     def _failure(self, what: str) -> DocumentError:
         return DocumentError(f"{self._name}:{self._parser.CurrentLineNumber}: {what}")

@@ -61,8 +61,8 @@ class Sensor:
                 return scaled(mode, *size)
         known = ", ".join(f"{mode.width} x {mode.height}" for mode in modes)
         raise InvalidInputError(
-            f"{self.name} has no {kind} images of {size[0]} x {size[1]} pixels; they have the"
-            f" aspect of {known}"
+            f"{self.name} has no {kind} images of {size[0]} x {size[1]} pixels; give a size with"
+            f" the aspect ratio of {known}"
         )
 
 
@@ -94,7 +94,7 @@ def scaled(intrinsics: Intrinsics, width: int, height: int) -> Intrinsics:
         fitting = max(1, round(intrinsics.height * width / intrinsics.width))
         raise InvalidInputError(
             f"images of {intrinsics.width} x {intrinsics.height} pixels cannot be scaled to"
-            f" {width} x {height}, which is another aspect; {width} x {fitting} would fit"
+            f" {width} x {height}, which has another aspect ratio; {width} x {fitting} would fit"
         )
     sx, sy = width / intrinsics.width, height / intrinsics.height
     (fx, fy), (cx, cy) = intrinsics.focal, intrinsics.center

@@ -149,8 +149,8 @@ class Overlay:
     def _copy(self, image: Bytes) -> Bytes:
         if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8:
             raise InvalidInputError(
-                f"image of shape {image.shape} and type {image.dtype} is no RGB image;"
-                " give (H, W, 3) of uint8"
+                f"the image has shape {image.shape} and type {image.dtype}; expected RGB, (H, W,"
+                " 3) uint8"
             )
         self.intrinsics.require_size(image.shape[1], image.shape[0], "image")
         return np.array(image, order="C")

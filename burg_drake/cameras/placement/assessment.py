@@ -123,15 +123,18 @@ def _doubt(
     assert alignment is not None
     if alignment.agreement < AGREEMENT:
         return (
-            f"only {100 * alignment.agreement:.0f} % of its outline fit what is seen:"
-            " is it another object, or in another pose?"
+            f"only {100 * alignment.agreement:.0f} % of its outline match the image: is it another"
+            " object, or in another pose?"
         )
     if found.support < SUPPORT and alignment.agreement < MIN_INK_AGREEMENT:
         return (
-            "the board is seen where it should hide it: is it another object, or in another pose?"
+            "the board is visible where the object should cover it: is it another object, or in"
+            " another pose?"
         )
     if alignment.residual > rough:
-        return "its outline does not quite fit: is it another object, or in another pose?"
+        return (
+            "its outline does not quite match the image: is it another object, or in another pose?"
+        )
     if (
         shape.colors is not None
         and found.likeness < MIN_LIKENESS_RATIO * typical
@@ -139,16 +142,16 @@ def _doubt(
     ):
         return "it does not have the colors of its mesh: is it another object?"
     if found.spill > MAX_SPILL_SHARE:
-        return "something stands out beside it: is it another object, or in another pose?"
+        return "something sticks out next to it: is it another object, or in another pose?"
     if alignment.ambiguous:
-        return "another place fits almost as well"
+        return "another pose fits almost as well"
     if alignment.turnable:
         turn = np.rad2deg(max(alignment.turnable, key=abs))
         return f"it fits as well when rotated by another {turn:+.0f} deg"
     if found.seen < MIN_MEASUREMENT_VISIBILITY:
         return f"only {100 * found.seen:.0f} % of it can be seen"
     if deviation[:2].max() > MAX_DISPLACEMENT_SD:
-        return f"its place is known to {1e3 * deviation[:2].max():.1f} mm only"
+        return f"its position is only known to {1e3 * deviation[:2].max():.1f} mm"
     if not shape.symmetric and deviation[2] > MAX_ANGLE_SD:
-        return f"its rotation is known to {np.rad2deg(deviation[2]):.0f} deg only"
+        return f"its rotation is only known to {np.rad2deg(deviation[2]):.0f} deg"
     return ""

@@ -200,7 +200,8 @@ def _checked_image(image: NDArray[np.uint8], intrinsics: Intrinsics) -> NDArray[
     image = np.asarray(image)
     if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] not in (3, 4):
         raise InvalidInputError(
-            f"the photo is an array {image.shape} of {image.dtype}; give (H, W, 3) of uint8, RGB"
+            f"the photo has shape {image.shape} and type {image.dtype}; expected RGB, (H, W, 3)"
+            " uint8"
         )
     intrinsics.require_size(image.shape[1], image.shape[0], "the photo")
     return np.ascontiguousarray(image[..., :3])

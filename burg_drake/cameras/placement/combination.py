@@ -34,7 +34,7 @@ def combine_checks(checks: Sequence[PlacementCheck]) -> PlacementCheck:
         InvalidInputError: none, or of different scenes or methods.
     """
     if not checks:
-        raise InvalidInputError("no placement check to combine; give one at least")
+        raise InvalidInputError("no placement checks are given to combine; give at least one")
     first, *others = checks
     if any((c.scene.content, c.method) != (first.scene.content, first.method) for c in others):
         raise InvalidInputError(

@@ -63,8 +63,9 @@ def locate_camera(
     angle = float(np.max(rotation_angle(R_mean.T @ X_SC[:, :3, :3])))
     if distance > APART[0] or angle > APART[1]:
         raise InvalidInputError(
-            f"the images are up to {1e3 * distance:.1f} mm and {np.rad2deg(angle):.2f} degrees"
-            " away from their mean: camera or board moved between them; give images of one place"
+            f"the camera poses of the images are up to {1e3 * distance:.1f} mm and"
+            f" {np.rad2deg(angle):.2f} degrees from their mean, so the camera or the board moved;"
+            " give images from one place"
         )
     X_WC = station.document.X_WS.matrix() @ X_mean
     camera = Camera(

@@ -117,13 +117,13 @@ class BoardPose:
         self.intrinsics.require_size(grey.shape[1], grey.shape[0], "the image")
         if depth is not None and np.shape(depth) != grey.shape:
             raise InvalidInputError(
-                f"the depth image is {np.shape(depth)}, the image {grey.shape}; give one of the"
-                " same camera"
+                f"the depth image has shape {np.shape(depth)}, but the image {grey.shape}; give"
+                " images of the same camera"
             )
         try:
             return self._estimate_coarse_to_fine(grey, _untinted_light(image), depth, X_SC_known)
         except (np.linalg.LinAlgError, cv2.error):  # a degenerate view, such as one line of edges
-            return BoardEstimate(reason="what is in sight of the board does not determine a pose")
+            return BoardEstimate(reason="the visible part of the board does not determine a pose")
 
     def _estimate_coarse_to_fine(
         self,
@@ -135,7 +135,7 @@ class BoardPose:
         """Finds markers, and from them the pose."""
         seen = self._detector.detect(grey)
         if len(seen.twice) >= FEWEST_OTHER:
-            return BoardEstimate(reason=_two_copies(f"{len(seen.twice)} markers are at two places"))
+            return BoardEstimate(reason=_two_copies(f"{len(seen.twice)} markers appear twice"))
         if not len(seen.index):
             reason = self._mirrored_reason(grey, seen) or self._no_markers_reason(grey, seen)
             return BoardEstimate(reason=reason)
@@ -165,15 +165,15 @@ class BoardPose:
         if not rounds:
             return (
                 None,
-                "the edges of the markers are too unclear (blur, contrast); see to the light",
+                "the edges of the markers are not clear enough; improve focus, contrast or light",
             )
         best = self._refinement.with_disturbance(light, rounds[0])
         turn = _turn(rounds[0], rounds[1]) if len(rounds) > 1 else 0.0
         if turn > DIFFERENT and not self._decided(rounds[0], rounds[1], found):
             if turn > NEARBY:
                 return None, (
-                    f"{_markers(len(found))} in sight: two poses fit alike;"
-                    " come nearer or show more of the board"
+                    f"{_markers(len(found))} in sight: two poses fit equally well; move closer or"
+                    " show more of the board"
                 )
             best = replace(best, covariance=_covariance_of_both(best, rounds[1]))
         known = np.sqrt(np.linalg.eigvalsh(best.covariance[3:, 3:])[-1])
@@ -181,12 +181,12 @@ class BoardPose:
             best.X_SC[:3, 3] - self._p_SQ[found].mean(axis=(0, 1))
         ):
             return None, (
-                f"{_markers(len(found))} in sight: the camera's place is known to"
-                f" {1e3 * known:.0f} mm only; come nearer or show more of the board"
+                f"{_markers(len(found))} in sight: the position of the camera is only known to"
+                f" {1e3 * known:.0f} mm; move closer or show more of the board"
             )
         own = np.isin(self._edges.marker[best.views.which], found)
         if (best.weight[own] > 0.0).mean() < PLAUSIBLE:
-            return None, "the markers' cells are not where their corners put them: another board?"
+            return None, "the cells of the markers do not match their corners: is it another board?"
         return best, ""
 
     def _decided(self, best: EdgeRound, second: EdgeRound, found: NDArray[np.intp]) -> bool:
@@ -260,10 +260,10 @@ class BoardPose:
         if other.dictionary == layout.dictionary:
             listed = ", ".join(map(str, other.ids[:3])) + (" ..." if len(other.ids) > 3 else "")
             return (
-                f"{start} with ids {listed} in sight, this one has {layout.ids[0]} to"
+                f"{start} with ids {listed} in sight, but this one has {layout.ids[0]} to"
                 f" {layout.ids[-1]}; is first_id right?"
             )
-        return f"{start} in sight, this one has {layout.dictionary}"
+        return f"{start} in sight, but this one has {layout.dictionary}"
 
     def _mirrored_reason(self, grey: NDArray[np.uint8], seen: Detection) -> str:
         """That more markers can be read in the mirrored image, if so."""
@@ -273,8 +273,8 @@ class BoardPose:
         if mirrored.count < max(MIN_MIRRORED, len(seen.index) + 1):
             return ""
         return (
-            f"the image is mirrored: {mirrored.count} markers of the board can be read the other"
-            " way round; turn off mirroring in the camera's settings or driver"
+            f"the image is mirrored: {mirrored.count} markers of the board can be read in the"
+            " flipped image; turn off mirroring in the camera's settings or driver"
         )
 
     def _copy_reason(self, seen: Detection, coarse: CoarsePose) -> str:
@@ -295,7 +295,7 @@ class BoardPose:
             return ""
         if self._continue_rows(seen.index[rest][copy.inliers], at):
             return _misplaced(len(seen.index), int(coarse.inliers.sum()))
-        return _two_copies(f"{_markers(len(at))} stand as on another print beside it")
+        return _two_copies(f"{_markers(len(at))} belong to a second print next to it")
 
     def _continue_rows(self, index: NDArray[np.intp], at: Array) -> bool:
         """Whether markers stand where the board's rows would have them if they went on past its
@@ -336,8 +336,9 @@ class BoardPose:
     def _other_size_reason(self, marker_scale: float) -> str:
         markers = self.board.markers
         return (
-            f"another board: its markers are {marker_scale:.2f} times as large for their distances"
-            f" as this one's (side {1e3 * markers.side:g} mm, spacing {1e3 * markers.spacing:g} mm)"
+            f"another board: its markers are {marker_scale:.2f} times as large, relative to their"
+            f" spacing, as those of this one (side {1e3 * markers.side:g} mm, spacing"
+            f" {1e3 * markers.spacing:g} mm)"
         )
 
 
@@ -372,14 +373,14 @@ def grey_image(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     image = np.asarray(image)
     if image.dtype != np.uint8 or image.ndim not in (2, 3):
         raise InvalidInputError(
-            f"an image is (H, W), (H, W, 3) or (H, W, 4) of uint8, not {image.shape} of"
-            f" {image.dtype}"
+            f"the image has shape {image.shape} and type {image.dtype}; expected (H, W), (H, W, 3)"
+            " or (H, W, 4) uint8"
         )
     if image.ndim == 2:
         return np.ascontiguousarray(image)
     codes = {3: cv2.COLOR_RGB2GRAY, 4: cv2.COLOR_RGBA2GRAY}
     if image.shape[2] not in codes:
-        raise InvalidInputError(f"an image has 3 or 4 channels, not {image.shape[2]}")
+        raise InvalidInputError(f"the image has {image.shape[2]} channels; expected 3 or 4")
     return np.asarray(cv2.cvtColor(np.ascontiguousarray(image), codes[image.shape[2]]))
 
 
@@ -403,8 +404,8 @@ def _covariance_of_both(one: RefinedPose, other: EdgeRound) -> Array:
 def _scale_warning(scale: float) -> str:
     """What is wrong with a print of another size: distances by it are false by as much."""
     return (
-        f"the board is printed at {scale:.3g} of its size: print it at 100 %, or say what its"
-        " rulers measure"
+        f"the board is printed at {scale:.3g} of its size: print it at 100 %, or give the measured"
+        " lengths of its rulers"
     )
 
 
@@ -421,7 +422,7 @@ def _residual_doubt(error: float) -> str:
 def _misplaced(count: int, fit: int) -> str:
     """That markers stand as another board has them."""
     return (
-        f"another board: only {fit} of {_markers(count)} in sight stand where this one has them;"
+        f"another board: only {fit} of {_markers(count)} in sight are where this one has them;"
         " are columns, rows and first_id right?"
     )
 

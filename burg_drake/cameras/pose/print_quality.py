@@ -56,8 +56,8 @@ def implausible(found: Disturbance) -> str:
     """Why no print of a board looks like that; empty if one may."""
     if abs(found.aspect) > ASPECT[1]:
         return (
-            f"another board: {1.0 + found.aspect:.2f} times as long along y as along x; or check"
-            " the intrinsics"
+            f"another board, or wrong intrinsics: it is {1.0 + found.aspect:.2f} times as long"
+            " along y as along x"
         )
     if (
         found.rows > MAX_ROW_MOTION
@@ -65,7 +65,7 @@ def implausible(found: Disturbance) -> str:
         or found.out_of_plane > MOST_HEIGHT
     ):
         return (
-            "markers are not where a board that lies still and flat has them: check the intrinsics,"
+            "markers are not where a flat board at rest has them: check the intrinsics and the"
             " light, and that the board is one sheet"
         )
     return ""
@@ -76,26 +76,27 @@ def print_doubt(found: Disturbance) -> str:
     if abs(found.aspect) > ASPECT[0]:
         return (
             f"the board is printed {1.0 + found.aspect:.3f} times as long along y as along x:"
-            " measure its rulers and print it anew with what they measure, or check the intrinsics"
+            " measure its rulers and print it again with the measured lengths, or check the"
+            " intrinsics"
         )
     if abs(found.size) > MARKER_SIZE[0]:
         return (
-            f"uncertain scale: markers look {1.0 + found.size:.3f} times as large for their"
-            " distances: too much light, or another board?"
+            f"the scale is uncertain: markers look {1.0 + found.size:.3f} times as large, relative"
+            " to their spacing: too much light, or another board?"
         )
     if found.rows > ROWS:
         return (
-            f"the camera moved by {found.rows:.1f} pixels while its rows were exposed one after"
-            " the other: hold it still, or give more light"
+            f"the camera moved by {found.rows:.1f} pixels during its rolling shutter: hold it"
+            " still, or add light"
         )
     if found.in_plane > BESIDE:
         return (
-            f"markers lie up to {1e3 * found.in_plane:.1f} mm beside their places: check the"
-            " intrinsics, and that pages are glued exactly"
+            f"markers are up to {1e3 * found.in_plane:.1f} mm from their positions in the plane:"
+            " check the intrinsics, and that pages are glued exactly"
         )
     if found.out_of_plane > HEIGHT:
         return (
-            f"the sheet is up to {1e3 * found.out_of_plane:.1f} mm off its plane: check the"
+            f"the sheet is up to {1e3 * found.out_of_plane:.1f} mm out of its plane: check the"
             " intrinsics, and that it lies flat"
         )
     return ""

@@ -97,9 +97,9 @@ class WrongBoardCheck:
             return ""
         listed = ", ".join(map(str, ids[:3])) + (" ..." if len(ids) > 3 else "")
         return (
-            f"another board: markers beyond those that the document has in sight, ids {listed};"
-            f" it has {self._columns} x {self._rows} from {self._layout.ids[0]} to"
-            f" {self._layout.ids[-1]}: are count and first_id right?"
+            f"another board: markers with ids {listed} lie next to those of the document, which"
+            f" has {self._columns} x {self._rows} from {self._layout.ids[0]} to"
+            f" {self._layout.ids[-1]}; are count and first_id right?"
         )
 
     def blank(self, light: NDArray[np.float32], X_SC: Array, used: NDArray[np.intp]) -> str:
@@ -150,12 +150,12 @@ class WrongBoardCheck:
         looks = ""
         if across:
             looks = (
-                f" (count [{self._columns}, {last - first + 1}], first_id"
-                f" {self._layout.ids[first * self._columns]}?)"
+                f" with count [{self._columns}, {last - first + 1}] and first_id"
+                f" {self._layout.ids[first * self._columns]}"
             )
         return (
-            f"blank paper where the document has {names[0]} {line + 1} of markers {names[1]}:"
-            f" covered, or another board{looks}"
+            f"{names[0]} {line + 1} of markers {names[1]} is blank paper: is it covered, or is it"
+            f" another board{looks}?"
         )
 
     def _places(self, X_SC: Array, middles: Array, offsets: Array) -> tuple[Array, Any]:

@@ -52,7 +52,9 @@ class SceneMesh:
             return self
         for name in names:
             if name not in self._placed:
-                raise UnknownNameError(f"no instance {name!r}; {nearest(name, self.names)}")
+                raise UnknownNameError(
+                    f"instance {name!r} does not exist; {nearest(name, self.names)}"
+                )
         return SceneMesh({name: self._placed[name] for name in names})
 
     def vertices(self, name: str) -> Array:

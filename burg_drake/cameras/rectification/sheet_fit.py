@@ -96,8 +96,8 @@ class SheetFinder:
         n, fit = len(kept), int(kept.sum())
         if fit < max(1, n / 2) or (n > 1 and fit < 2):
             raise InvalidInputError(
-                f"the image shows another board: only {fit} of {n} markers in sight stand where"
-                " this one has them; are columns, rows and first_id right?"
+                f"the image shows another board: only {fit} of {n} markers in sight are where this"
+                " one has them; are columns, rows and first_id right?"
             )
         if 2 * fit < len(self._layout.ids):
             self._require_no_foreign_markers(grey, fit)
@@ -108,9 +108,9 @@ class SheetFinder:
         error = scale * float(np.sqrt((off**2).sum(axis=1).mean()))
         if error > FAR_OFF * self._layout.side:
             raise InvalidInputError(
-                f"the image shows another board: corners of its markers are off by"
-                f" {1e3 * error:.1f} mm on average from where this one has them; are side and"
-                " spacing right, and does the sheet lie flat?"
+                "the image shows another board: the corners of its markers are off by"
+                f" {1e3 * error:.1f} mm on average; are side and spacing right, and is the sheet"
+                " flat?"
             )
         ids = tuple(int(i) for i in self._layout.ids[seen.index[kept]])
         return SheetFit(H, distortion, middle, radius, error, ids)
@@ -126,14 +126,14 @@ class SheetFinder:
         if len(foreign_markers) > fit:
             raise InvalidInputError(
                 f"the image shows another board: {len(foreign_markers)} markers in sight have ids"
-                f" beyond {layout.ids[-1]}, the last of this one; is its size right?"
+                f" above {layout.ids[-1]}, the last of this one; are columns and rows right?"
             )
 
     def _no_markers_reason(self, grey: NDArray[np.uint8], candidates: int) -> str:
         layout = self._layout
         other = other_markers(grey, layout) if candidates else None
         if other is None:
-            return "the image shows no marker of the board; see to the light, or come nearer"
+            return "the image shows no marker of the board; improve the light, or move closer"
         own = f"this one has {layout.dictionary} with ids {layout.ids[0]} to {layout.ids[-1]}"
         listed = ", ".join(map(str, other.ids[:3])) + (" ..." if len(other.ids) > 3 else "")
         return (
@@ -158,7 +158,7 @@ def _fitted(p_SQ: Array, corners: Array, markers: int, pixel: float) -> tuple[Ar
     hidden, and were found beside their place, hardly count."""
     H, _ = cv2.findHomography(p_SQ, corners, 0)
     if H is None:
-        raise InvalidInputError("what the image shows of the board does not say how it lies")
+        raise InvalidInputError("the visible part of the board does not determine its pose")
 
     def off(x: Array) -> Array:
         return (_project(_homography(x), float(x[8:].sum()), p_SQ) - corners).ravel()

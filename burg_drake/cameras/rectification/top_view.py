@@ -72,7 +72,8 @@ class BoardRectifier:
     ) -> None:
         if not (0.0 <= margin < np.inf and 0.0 < resolution < np.inf):
             raise InvalidInputError(
-                f"margin {margin:g} m must be at least 0, resolution {resolution:g} m above 0"
+                f"margin is {margin:g} m and resolution {resolution:g} m; margin must be at least"
+                " 0, resolution above 0"
             )
         size = np.array(board.size)
         self._intrinsics = intrinsics
@@ -96,7 +97,8 @@ class BoardRectifier:
         image = np.asarray(image)
         if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
             raise InvalidInputError(
-                f"an image is (H, W, 3) of uint8, not {image.shape} of {image.dtype}"
+                f"the image has shape {image.shape} and type {image.dtype}; expected RGB, (H, W,"
+                " 3) uint8"
             )
         p_SQ = self._points()
         if self._pose is None:
@@ -124,7 +126,7 @@ class BoardRectifier:
         assert self._pose is not None and self._intrinsics is not None
         found = self._pose.estimate(image)
         if not found.valid:
-            raise InvalidInputError(f"the image does not show where the board lies: {found.reason}")
+            raise InvalidInputError(f"the board was not found in the image: {found.reason}")
         X_CS = inverse(found.X_SC)
         p_CQ = transform_points(X_CS, np.column_stack([p_SQ, np.zeros(len(p_SQ))]))
         ahead = p_CQ[:, 2] >= NEAR

@@ -38,8 +38,8 @@ def read_depth(path: str | Path, unit: float | None = None) -> NDArray[np.float3
     depth = _array(path) if path.suffix.lower() == ".npy" else _image(path)
     if depth.ndim != 2 or depth.dtype.kind not in "fui" or depth.dtype == np.uint8:
         raise InvalidInputError(
-            f"{path} is an array {depth.shape} of {depth.dtype}; a depth image is (H, W) of 16-bit"
-            " millimetres, or of metres as floating-point numbers"
+            f"{path} has shape {depth.shape} and type {depth.dtype}; a depth image is (H, W), in"
+            " millimetres as 16-bit integers or in metres as floats"
         )
     if unit is None:
         unit = 1.0 if depth.dtype.kind == "f" else MILLIMETRE
@@ -62,5 +62,5 @@ def _image(path: Path) -> NDArray[Any]:
         if data:
             depth = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if depth is None:
-        raise InvalidInputError(f"{path} is not an image that can be read; give .png or .npy")
+        raise InvalidInputError(f"{path} cannot be read as a depth image; give .png or .npy")
     return np.asarray(depth)

@@ -25,10 +25,10 @@ FIRST_WAIT, LONGEST_WAIT = 0.5, 5.0
 """Between attempts to open a lost camera again; doubled after each [s]."""
 
 PLUGGED = (
-    "is it plugged in, free (no other program uses it), and may you read it?"
+    "is it plugged in, is no other program using it, and do you have permission to read it?"
     " `burg-drake camera list` shows which cameras open"
 )
-ON_AIR = "is the address right, does the network reach it, and does it send a video?"
+ON_AIR = "is the address right, is it reachable on the network, and does it send video?"
 """What to look at where a camera, or a stream, does not open."""
 
 BACKENDS = {"linux": cv2.CAP_V4L2, "darwin": cv2.CAP_AVFOUNDATION}
@@ -149,7 +149,7 @@ def open_device(
     if size is not None and source.size != tuple(size):
         source.close()
         raise InvalidInputError(
-            "{} gives {} x {} pixels in place of {} x {}; ask for a size that it has".format(
+            "{} gives {} x {} pixels instead of {} x {}; choose a size that it supports".format(
                 source.name, *source.size, *size
             )
         )

@@ -48,7 +48,7 @@ def read_image(path: str | Path) -> Image:
     image = decode_image(data)
     if image is None:
         raise InvalidInputError(
-            f"{path} is not an image that can be read, or is cut off; PNG and JPEG are"
+            f"{path} cannot be read as an image; give a complete PNG or JPEG file"
         )
     return image
 
@@ -88,13 +88,13 @@ def require_image_size(data: bytes, name: str) -> None:
     except PIL.Image.DecompressionBombError as error:
         raise InvalidInputError(
             f"{name} has more than {2e-6 * (PIL.Image.MAX_IMAGE_PIXELS or 0):.0f} million pixels;"
-            f" it may have {MAX_SIDE:,} a side at most"
+            f" a side may have at most {MAX_SIDE:,}"
         ) from error
     except (OSError, *READ_ERRORS):
         return
     if max(width, height) > MAX_SIDE:
         raise InvalidInputError(
-            f"{name} has {width:,} x {height:,} pixels; a side has at most {MAX_SIDE:,}"
+            f"{name} has {width:,} x {height:,} pixels; a side may have at most {MAX_SIDE:,}"
         )
 
 
@@ -118,7 +118,9 @@ def require_image_format(path: str | Path) -> None:
         InvalidInputError: no such format.
     """
     if Path(path).suffix.lower() not in SUFFIXES:
-        raise InvalidInputError(f"cannot write {path}: .png and .jpg are formats of images")
+        raise InvalidInputError(
+            f"cannot write {path}: the name of an image must end in .png or .jpg"
+        )
 
 
 def write_image(path: str | Path, image: Image) -> None:
@@ -133,5 +135,7 @@ def write_image(path: str | Path, image: Image) -> None:
     except cv2.error:
         good = False
     if not good:
-        raise InvalidInputError(f"cannot write {path}: .png and .jpg are formats of images")
+        raise InvalidInputError(
+            f"cannot write {path}: the name of an image must end in .png or .jpg"
+        )
     atomic_write(path, data.tobytes())

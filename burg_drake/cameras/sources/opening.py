@@ -58,7 +58,9 @@ def open_source(
 
         return open_device(int(text) if text.isdecimal() else text, size, fps)
     if not text:
-        raise InvalidInputError("a camera has no name; give 0, a file, a folder or sim:STATION")
+        raise InvalidInputError(
+            "the camera is an empty text; give 0, a file, a folder or sim:STATION"
+        )
     from burg_drake.cameras.sources.photos import is_image
 
     path = expanded(text)
@@ -74,7 +76,7 @@ def _simulated(reference: str, scene: Scene | None, fps: float | None) -> FrameS
 
     station, camera = simulated_camera(reference)
     if scene is None:
-        raise InvalidInputError(f"{reference} is simulated and needs a scene to look at")
+        raise InvalidInputError(f"{reference} is a simulated camera, which needs a scene; give one")
     return SimulatedSource(scene, station, camera, fps=fps or DEFAULT_FPS)
 
 
@@ -103,11 +105,11 @@ def image_paths(references: Sequence[str]) -> list[Path]:
             found = [Path(name) for name in glob.glob(str(path), recursive=True)]
             images = [name for name in found if is_image(name)]
             if not images:
-                raise InvalidInputError(f"no image files go by {reference!r}")
+                raise InvalidInputError(f"no image files match {reference!r}")
             paths += in_order(images)
         else:
             raise InvalidInputError(
-                f"there is no {reference}; give an image or video file, a folder or pattern of"
+                f"{reference} does not exist; give an image or video file, a folder or pattern of"
                 " images, the number of a camera, an rtsp or http address, or"
                 f" {SIMULATED}STATION/CAMERA"
             )

@@ -25,7 +25,7 @@ class ImageSource(FrameSource):
     def __init__(self, paths: Sequence[str | Path], name: str = "") -> None:
         self._paths = [Path(path) for path in paths]
         if not self._paths:
-            raise InvalidInputError("no image files were given")
+            raise InvalidInputError("no image files are given")
         others = len(self._paths) - 1
         self.name = name or f"{self._paths[0]}" + (f" and {others} others" if others else "")
         self.live = False

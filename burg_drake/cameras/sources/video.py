@@ -34,7 +34,7 @@ class VideoSource(FrameSource):
     def __init__(self, path: str | Path) -> None:
         path = Path(path)
         if not path.is_file():
-            raise InvalidInputError(f"there is no video or image {path}")
+            raise InvalidInputError(f"video or image {path} does not exist")
         with quiet():
             self._capture = cv2.VideoCapture(str(path), cv2.CAP_ANY)
             self._capture.set(cv2.CAP_PROP_ORIENTATION_AUTO, 0)
@@ -45,7 +45,7 @@ class VideoSource(FrameSource):
         self._count = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
         self._ahead = self._next_image() if self._capture.isOpened() else None
         if self._ahead is None:
-            raise InvalidInputError(f"{path} is not a video or image that can be read, or is empty")
+            raise InvalidInputError(f"{path} is empty, or cannot be read as a video or image")
         self.size = (self._ahead.shape[1], self._ahead.shape[0])
 
     def __len__(self) -> int:

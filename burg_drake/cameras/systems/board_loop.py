@@ -66,7 +66,9 @@ class LoopCamera:
 
     def __post_init__(self) -> None:
         if self.period is not None and self.period <= 0.0:
-            raise InvalidInputError(f"period {self.period:g} of a camera must be above 0 [s]")
+            raise InvalidInputError(
+                f"the period of a camera is {self.period:g} s; give more than 0"
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +106,9 @@ class BoardLoop:
         """
         free = self.built.free
         if instance not in free:
-            raise UnknownNameError(f"{instance!r} cannot be moved; {nearest(instance, free)}")
+            raise UnknownNameError(
+                f"{instance!r} is not a free instance; {nearest(instance, free)}"
+            )
         plant = self.built.plant
         mine = plant.GetMyMutableContextFromRoot(context)
         plant.SetFreeBodyPose(mine, plant.get_body(free[instance]), self._in_world(X_SO))

@@ -57,9 +57,9 @@ class DepthNoiseSystem(LeafSystem):
         period: float | None = None,
     ) -> None:
         if not 0 <= seed <= LARGEST_SEED:
-            raise InvalidInputError(f"seed {seed} of depth noise must be 0 to {LARGEST_SEED}")
+            raise InvalidInputError(f"seed of depth noise is {seed}; give 0 to {LARGEST_SEED}")
         if period is not None and not 0.0 < period < math.inf:
-            raise InvalidInputError(f"period {period:g} of depth noise must be above 0 [s]")
+            raise InvalidInputError(f"period of depth noise is {period:g} s; give more than 0")
         super().__init__()
         self.set_name("depth_noise")
         self.noise, self.intrinsics = noise, intrinsics
@@ -79,7 +79,9 @@ class DepthNoiseSystem(LeafSystem):
 
     def _measure(self, context: Context, output: AbstractValue) -> None:
         if not self._depth.HasValue(context):
-            raise InvalidInputError(f"{self.get_name()}: connect or fix port depth_image")
+            raise InvalidInputError(
+                f"{self.get_name()}: input port depth_image has no value; connect or fix it"
+            )
         perfect = self._depth.Eval(context).data[..., 0]
         measured = noisy_depth(
             np.where(np.isfinite(perfect), perfect, np.float32(0.0)),

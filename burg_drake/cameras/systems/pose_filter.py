@@ -87,8 +87,8 @@ class PoseFilter(LeafSystem):
         offset = LATER * period if offset is None else offset
         if not 0.0 <= offset < period:
             raise InvalidInputError(
-                f"offset {offset:g} of a pose filter must be from 0 to below its period"
-                f" {period:g} [s]"
+                f"offset of a pose filter is {offset:g} s; give 0 or more, and less than its"
+                f" period of {period:g} s"
             )
         # The variance of an exponential mean with this factor is 1 / window of one estimate's.
         self._keep = (window - 1.0) / (window + 1.0)

@@ -100,7 +100,9 @@ class SceneOverlay(LeafSystem):
 
     def _required(self, context: Context, port: Any) -> Any:
         if not port.HasValue(context):
-            raise InvalidInputError(f"{self.get_name()}: connect or fix port {port.get_name()}")
+            raise InvalidInputError(
+                f"{self.get_name()}: input port {port.get_name()} has no value; connect or fix it"
+            )
         return port.Eval(context)
 
     def _optional(self, context: Context, port: Any) -> Any:

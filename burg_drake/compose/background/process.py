@@ -213,7 +213,7 @@ def _outcome(job: BackgroundJob[Any], future: Future[Any]) -> Any:
     if error is None:
         return future.result()
     if isinstance(error, WorkerDied):
-        return SimulationError(f"{error}; the scene is as it was, try again")
+        return SimulationError(f"{error}; the scene was not changed, try again")
     return error if isinstance(error, BurgError) else _failed(error)
 
 

@@ -33,7 +33,7 @@ def board_size(name: str, *, upright: bool = False) -> tuple[float, float]:
         UnknownNameError: no size of that name.
     """
     if name not in BOARD_SIZES:
-        raise UnknownNameError(f"no board has size {name!r}; {nearest(name, BOARD_SIZES)}")
+        raise UnknownNameError(f"board size {name!r} does not exist; {nearest(name, BOARD_SIZES)}")
     short, long = BOARD_SIZES[name]
     return (short, long) if upright else (long, short)
 

@@ -195,8 +195,8 @@ class SetFixed:
             heavy = _without_mass(state, [state.instance(name) for name in names])
             if heavy:
                 raise InvalidInputError(
-                    f"{sorted(heavy)[0]!r} has no mass, so it can only be background; build its"
-                    " object with a mass"
+                    f"{sorted(heavy)[0]!r} has no mass, so it must stay background; build its"
+                    " object with a mass to make it free"
                 )
         document = state.document
         others = document.instances if self.fixed else document.background

@@ -51,7 +51,8 @@ class RandomConfiguration:
         covered = sum(min(map(area, shapes[one.object].shadows)) for one in wanted)
         if self.layout != "heap" and covered > board.size[0] * board.size[1]:
             raise InvalidInputError(
-                f"{len(wanted)} objects cover more than the board; take fewer, or a larger board"
+                f"{len(wanted)} objects need more area than the board has; choose fewer, or a"
+                " larger board"
             )
         found = arrange(
             wanted,
@@ -65,8 +66,8 @@ class RandomConfiguration:
         )
         if found.missing:
             raise InvalidInputError(
-                f"no room on the board for {len(found.missing)} of {len(wanted)} objects"
-                f" ({listing(found.missing)}); take fewer, another seed, or a larger board"
+                f"the board has no room for {len(found.missing)} of {len(wanted)} objects"
+                f" ({listing(found.missing)}); choose fewer, another seed, or a larger board"
             )
         document = replace(state.document, instances=found.instances)
         return replace(state, document=document, selection=())
@@ -77,7 +78,9 @@ class RandomConfiguration:
         scene = known_scene(state, surroundings.path)
         if self.count is None:
             if not scene.instances:
-                raise InvalidInputError("there is nothing to arrange; add objects, or give a count")
+                raise InvalidInputError(
+                    "there are no objects to arrange; add some, or give a count"
+                )
             return tuple(ObjectRequest(name=n, object=i.object) for n, i in scene.instances.items())
         count = int(require_number(self.count, "number of objects", 1, MAX_OBJECTS, ""))
         taken = set(surroundings.taken_names(state)) - set(scene.instances)

@@ -46,7 +46,7 @@ class State:
         known = self.instances
         if name not in known:
             raise UnknownNameError(
-                f"scene {self.document.name!r} has no {name!r}; {nearest(name, known)}"
+                f"scene {self.document.name!r} has no instance {name!r}; {nearest(name, known)}"
             )
         return known[name]
 

@@ -42,8 +42,8 @@ class Surroundings:
         """
         require_name(name)
         if name in state.instances:
-            raise FieldError(f"name {name!r} is used already; give another one")
+            raise FieldError(f"name {name!r} is used already; choose another one")
         if name in self.taken_names(state):
             raise FieldError(
-                f"name {name!r} belongs to station {self.station.name!r}; give another one"
+                f"name {name!r} is used by station {self.station.name!r}; choose another one"
             )

@@ -76,7 +76,9 @@ class Drag:
         """
         for name in X_SO:
             if name not in self._start:
-                raise InvalidInputError(f"{name!r} is not held; drag it, too")
+                raise InvalidInputError(
+                    f"{name!r} is not part of this drag; start a drag that includes it"
+                )
         with self._newest:
             self._X_SO, self._changes_height = {**self._X_SO, **X_SO}, changes_height
             self._asked += 1

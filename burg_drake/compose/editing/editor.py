@@ -317,12 +317,12 @@ class Editor:
         journal = self._storage.problem
         problems = (
             self._check_problem,
-            journal and f"{journal}; until then changes are kept in memory alone",
+            journal and f"{journal}; until then changes are kept in memory only",
         )
         return self._notices + tuple(t for t in problems if t and t not in self._dismissed)
 
     def _require(self, drag: Drag) -> None:
         if self._drag is not drag:
             raise InvalidInputError(
-                "the drag is over: something else changed the scene; drag again"
+                "the scene was changed during the drag, which ended it; drag again"
             )

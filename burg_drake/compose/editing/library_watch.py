@@ -52,9 +52,9 @@ def changes_notice(state: State, library: ObjectLibrary) -> str:
     ]
     parts = []
     if missing:
-        parts.append(f"it has no object any more for {listing(missing)}")
+        parts.append(f"it no longer has the objects of {listing(missing)}")
     if other:
-        parts.append(f"{listing(other)} {'is' if len(other) == 1 else 'are'} built anew")
+        parts.append(f"{listing(other)} {'was' if len(other) == 1 else 'were'} built again")
     return f"library {library.root} has changed: {'; '.join(parts) or 'no object of this scene'}"
 
 
@@ -70,12 +70,12 @@ def require_objects(state: State, library: ObjectLibrary) -> None:
     if missing:
         raise UnknownNameError(
             f"library {library.root} has no {listing([repr(m) for m in missing])}; delete their"
-            " instances first, or take a library that has them"
+            " instances first, or choose a library that has them"
         )
     heavy = [name_of(i) for i in state.document.instances if library.entry(i.object).is_fixed]
     if heavy:
         raise InvalidInputError(
-            f"library {library.root} gives {listing(heavy)} no mass; make them background first"
+            f"library {library.root} has no mass for {listing(heavy)}; make them background first"
         )
 
 

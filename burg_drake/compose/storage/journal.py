@@ -135,8 +135,8 @@ def recover(path: Path) -> Recovered | None:
         reader = JournalReader(_libraries(lines))
     except BurgError as error:
         raise LibraryMissing(
-            f"{error}; the last session of this scene, whose steps are in {path}, used it: bring it"
-            " back, or delete that file"
+            f"{error}; the last session of this scene used it, and its steps are in {path}:"
+            " restore the library, or delete that file"
         ) from error
     damaged = [number for number, line in enumerate(lines, 1) if not reader.take(line)]
     return Recovered(
@@ -162,7 +162,7 @@ def set_aside(path: Path) -> Path:
 
 def _damage(damaged: list[int], count: int) -> str:
     if not count:
-        return "it has no whole line"
+        return "it has no complete line"
     if not damaged:
         return ""
     lines = f"line {damaged[0]}"

@@ -77,7 +77,10 @@ def open_scene_file(path: Path, address: str = "") -> Opened:
         if found and found.history and found.history.state.document != found.saved:
             if found.known != known:
                 notices += (
-                    f"{path} was changed since; shown are the unsaved changes of the last session",
+                    (
+                        f"{path} was changed by another program; the unsaved changes of the last"
+                        " session are shown"
+                    ),
                 )
             return _recovered(path, path, found, lock, notices)
         if found and found.history and found.known == known:
@@ -167,7 +170,7 @@ def _recovered(
     )
     storage.record_all(history)
     if not quiet:
-        notices += (f"recovered what was not saved of {place.stem!r}, with its history",)
+        notices += (f"recovered the unsaved changes of {place.stem!r} and their history",)
     return Opened(history, storage, notices)
 
 
@@ -176,8 +179,8 @@ def _keep_damaged(found: Recovered | None, scene: Path) -> tuple[str, ...]:
     if found is None or not found.damage:
         return ()
     return (
-        f"the journal of the last session is damaged ({found.damage}); all that can be read of it"
-        f" is recovered, and it is kept as {set_aside(journal_path(scene))}",
+        f"the journal of the last session is damaged ({found.damage}); the readable part is"
+        f" recovered, and the journal is kept as {set_aside(journal_path(scene))}",
     )
 
 

@@ -51,7 +51,7 @@ def scene_path(name: str, folder: Path) -> Path:
     require_name(stem)
     path = folder / f"{stem}.yaml"
     if path.is_symlink() and not path.resolve().is_relative_to(folder.resolve()):
-        raise InvalidInputError(f"{path} is a link to another folder; give another name")
+        raise InvalidInputError(f"{path} is a link to another folder; choose another name")
     return path
 
 
@@ -76,7 +76,7 @@ def write_scene(
     """
     found = fingerprint(path)
     if found not in (known, None) and not force:
-        what = "is there already" if known is None else "was changed by something else meanwhile"
+        what = "exists already" if known is None else "was changed by another program"
         raise FileChanged(
             f"{path} {what}; overwrite it, save under another name, or load it to see what it holds"
         )

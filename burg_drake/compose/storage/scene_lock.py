@@ -74,7 +74,7 @@ def _locked(path: Path, scene: Path) -> int | None:
             os.close(file)
             where = f" at {shown(address, 200)}" if address else ""
             raise SceneInUse(
-                f"{scene} is open already{where}; go there, or close it first", address
+                f"{scene} is already open{where}; use it there, or close it first", address
             )
         with contextlib.suppress(OSError):
             if os.path.samestat(os.fstat(file), os.stat(path)):

@@ -14,7 +14,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import InvalidInputError, listing
 from burg_drake.core.files.atomic import atomic_write, open_regular
 from burg_drake.core.files.read_errors import READ_ERRORS, reporting_read_errors, without_warnings
 from burg_drake.core.files.stored_array import ArrayShape, ReadBudget, StoredArray
@@ -50,10 +50,13 @@ class NpzFile:
         """An array by its name.
 
         Raises:
-            InvalidInputError: it is damaged, compressed in another way than numpy does, or of
-                Python objects.
-            KeyError: there is none.
+            InvalidInputError: there is none, or it is damaged, compressed in another way than numpy
+                does, or of Python objects.
         """
+        if name not in self.names:
+            raise InvalidInputError(
+                f"{self.path} has no array {name!r}; it has {listing(self.names)}"
+            )
         info = self._archive.getinfo(f"{name}.npy")
         where = f"{self.path}: {name}"
         if info.compress_type not in COMPRESSIONS:

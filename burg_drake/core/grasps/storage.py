@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core.documents import parse_json
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.errors import InvalidInputError, listing
 from burg_drake.core.files import (
     DOCUMENT,
     NUMBERS,
@@ -125,6 +125,12 @@ def _npz(header: dict[str, Any], fixed: SetColumns, columns: SetColumns) -> byte
 
 def _read_npz(path: Path) -> tuple[dict[str, Any], SetColumns, SetColumns]:
     with open_npz(path) as file:
+        if "header" not in file.names:
+            raise InvalidInputError(
+                f"{path} is not a grasp set: it has no array 'header', only {listing(file.names)};"
+                " write it with GraspSet.create(X_OG, object=NAME).save(FILE), where X_OG has shape"
+                " (N, 4, 4); a plain .npy of that shape is read as poses of BURG-Toolkit"
+            )
         stored = file.array("header")
         if stored.itemsize > 4 * DOCUMENT.size:
             raise ValueError("its header is too long")

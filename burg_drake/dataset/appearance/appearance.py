@@ -25,12 +25,12 @@ MAX_GAIN = 1e4
 
 def _require_gains(values: Vector3, name: str) -> None:
     if not all(0.0 <= value <= MAX_GAIN for value in values):
-        raise FieldError(f"{name} {list(values)} must be 0 to {MAX_GAIN:g} each", name)
+        raise FieldError(f"{name} is {list(values)}; each must be from 0 to {MAX_GAIN:g}", name)
 
 
 def _require_seed(seed: int | None, name: str) -> None:
     if seed is not None and not 0 <= seed <= LARGEST_SEED:
-        raise FieldError(f"{name} is {seed}; a seed is 0 to {LARGEST_SEED}", name)
+        raise FieldError(f"{name} is {seed}; give a seed from 0 to {LARGEST_SEED}", name)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,8 +57,8 @@ class DirectedLight:
         _require_gains(self.color, "color")
         if not any(self.direction) or not any(self.color):
             raise InvalidInputError(
-                "a light needs a direction and a color; given:"
-                f" {list(self.direction)}, {list(self.color)}"
+                "a light needs a direction and a colour that are not zero; given are direction"
+                f" {list(self.direction)} and color {list(self.color)}"
             )
         require_ranges(self)
 
@@ -158,7 +158,9 @@ class Appearance:
         require_ranges(self)
         if self.room_light and self.room is None:
             raise FieldError(
-                f"room_light is {self.room_light:g}; it is 0 without a room", "room_light"
+                f"room_light is {self.room_light:g}, but there is no room; give a room, or"
+                " room_light 0",
+                "room_light",
             )
         for gains in self.object_gains:
             _require_gains(gains, "object_gains")

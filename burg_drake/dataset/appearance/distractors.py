@@ -92,8 +92,8 @@ def place_distractors(
     usable = sorted(n for n, e in library.objects.items() if e.stable_poses and n not in labelled)
     if not usable:
         raise InvalidInputError(
-            f"library {library.root} has no object with a stable pose that could be a distractor,"
-            " other than those that the scene has"
+            f"library {library.root} has no object that could be a distractor: it needs a stable"
+            " pose, and must not be in the scene"
         )
     table = free_table(scene, station, settings.distractors_on_board)
     found = []

@@ -34,7 +34,7 @@ def table_texture(appearance: Appearance) -> bytes:
         InvalidInputError: the table has its own colour.
     """
     if appearance.table is None:
-        raise InvalidInputError("an appearance without a pattern of the table has no texture")
+        raise InvalidInputError("the appearance has no pattern of the table, so it has no texture")
     image = _image(appearance.table)
     _, png = cv2.imencode(".png", np.ascontiguousarray(image[..., ::-1]))
     return bytes(png)

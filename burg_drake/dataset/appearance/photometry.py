@@ -77,13 +77,13 @@ def _gains(
     if labels is None or labels.shape != shape:
         given = "none" if labels is None else f"{labels.shape[1]} x {labels.shape[0]}"
         raise InvalidInputError(
-            "gains of objects need the label image of the same"
-            f" {shape[1]} x {shape[0]} pixels; given: {given}"
+            f"gains of objects need the label image, with {shape[1]} x {shape[0]} pixels; given:"
+            f" {given}"
         )
     gains = np.array([(1.0, 1.0, 1.0), *appearance.object_gains], np.float32)
     if (most := int(labels.max(initial=0))) >= len(gains):
         raise InvalidInputError(
-            f"label {most} has no gain; the appearance is of a scene of {len(gains) - 1} objects"
+            f"label {most} has no gain; the appearance is for a scene of {len(gains) - 1} objects"
         )
     of_pixels: Single = gains[labels]
     return of_pixels

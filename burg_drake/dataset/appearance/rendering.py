@@ -123,7 +123,7 @@ def environment_file(appearance: Appearance) -> Path:
         InvalidInputError: there is no room.
     """
     if appearance.room is None:
-        raise InvalidInputError("an appearance without a room has no environment")
+        raise InvalidInputError("the appearance has no room, so it has no environment")
     radiance = room_radiance(appearance.room, appearance.room_light or 1.0)
     _, encoded = cv2.imencode(".hdr", np.ascontiguousarray(radiance[..., ::-1]))
     content = bytes(encoded)

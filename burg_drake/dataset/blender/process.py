@@ -56,7 +56,9 @@ def blender_command() -> list[str]:
         return [sys.executable, "-P", str(WORKER)]
     found = shutil.which(given)
     if found is None:
-        raise MissingDependencyError(f"{VARIABLE} is {given!r}, which is no program: {REMEDY}")
+        raise MissingDependencyError(
+            f"{VARIABLE} is {given!r}, which is not an executable: {REMEDY}"
+        )
     told = subprocess.run([found, "--version"], capture_output=True, text=True, check=False)
     if told.stdout.startswith("Blender"):
         quiet = ["--background", "--factory-startup", "--python-exit-code", "1"]
@@ -94,7 +96,7 @@ class Blender:
         self._lock = RLock()
         self._shown: BlenderScene | None = None
         self._program = command[0]
-        self.version = str(self._answer("started")["version"])
+        self.version = str(self._answer("starting")["version"])
 
     @property
     def alive(self) -> bool:
@@ -130,11 +132,11 @@ class Blender:
             if self._shown is not scene:
                 self._shown = None
                 scene.write(folder, _threads())
-                self._ask("it was given a scene", do="load", folder=name)
+                self._ask("loading a scene", do="load", folder=name)
                 self._shown = scene
             path = folder / "view.png"
             self._ask(
-                "it rendered",
+                "rendering",
                 do="render",
                 width=intrinsics.width,
                 height=intrinsics.height,
@@ -169,7 +171,7 @@ class Blender:
             self._process.kill()  # an answer that nobody waits for must not be taken for the next
             raise
         if error is not None:
-            raise SimulationError(f"Blender failed when {when}: {error}")
+            raise SimulationError(f"Blender failed while {when}: {error}")
 
     def _answer(self, when: str) -> dict[str, Any]:
         assert self._process.stdout is not None
@@ -179,7 +181,7 @@ class Blender:
         if not line.endswith(b"\n"):
             code = self._process.wait()
             how = f"by {signal.Signals(-code).name}" if code < 0 else f"with code {code}"
-            raise SimulationError(f"Blender ended {how} when {when}; {self._last_words()}")
+            raise SimulationError(f"Blender ended {how} while {when}; {self._last_words()}")
         found: dict[str, Any] = json.loads(line)
         if "missing" in found:
             self.close()
@@ -192,7 +194,7 @@ class Blender:
         self._log.seek(0)
         lines = self._log.read().decode(errors="replace").split("\n")
         said = [line.strip() for line in lines if line.strip()][-LAST:]
-        return f"its last lines: {' | '.join(said)}" if said else "it has said nothing"
+        return f"its last lines: {' | '.join(said)}" if said else "it printed nothing"
 
 
 def blender() -> Blender:

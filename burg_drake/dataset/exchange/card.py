@@ -52,7 +52,7 @@ def write_card(
     for name in licences or {}:
         if name not in samples.objects:
             raise UnknownNameError(
-                f"there is a licence of object {name!r}, which the data set does not have;"
+                f"a licence is given for object {name!r}, which is not in the data set;"
                 f" {nearest(name, samples.objects)}"
             )
     if not len(samples):
@@ -91,7 +91,9 @@ def _require_own_card(path: Path) -> None:
     except (OSError, UnicodeDecodeError):
         own = False
     if not own:
-        raise InvalidInputError(f"{path} is there and no card of a data set; move it away")
+        raise InvalidInputError(
+            f"{path} exists already and is not the card of a data set; move it away"
+        )
 
 
 def _charts(counted: Tally) -> dict[str, str]:

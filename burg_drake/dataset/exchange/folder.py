@@ -30,9 +30,9 @@ def new_folder(folder: str | Path) -> Iterator[Path]:
     path = Path(os.path.realpath(folder))
     if os.path.lexists(path):
         if not path.is_dir():
-            raise InvalidInputError(f"{folder} is a file; name a folder for the export")
+            raise InvalidInputError(f"{folder} is a file; give a folder for the export")
         if any(path.iterdir()):
-            raise InvalidInputError(f"{folder} has files in it; choose a new folder for the export")
+            raise InvalidInputError(f"{folder} is not empty; choose another folder for the export")
     writable_folder(path.parent)
     fresh = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
     try:

@@ -124,7 +124,7 @@ def write_graspnet(
         MeshError: a mesh of the library is damaged.
     """
     lost = {
-        "GraspNet has no silhouettes behind other objects, and no visibilities.",
+        "GraspNet has no amodal masks and no visibilities.",
         "graspnetAPI's loadGrasp of 6D grasps and its evaluation do not work: grasp_label and"
         " collision_label have 300 directions, 12 angles and 4 depths at each of thousands of"
         " points, of which only some were judged; these are in the folder grasps of each camera.",
@@ -151,8 +151,8 @@ def write_graspnet(
                 one.finish()
     if not numbers >= set(range(TRAIN_SCENES)):
         lost.add(
-            f"graspnetAPI opens a data set only with all scenes of a split, of 'train' 0 to"
-            f" {TRAIN_SCENES - 1}: here are {len(numbers)}; read the files by themselves."
+            "graspnetAPI opens a data set only if a split is complete; 'train' has scenes 0 to"
+            f" {TRAIN_SCENES - 1}, and here are {len(numbers)} scenes: read the files without it."
         )
     return tuple(sorted(lost))
 
@@ -178,9 +178,9 @@ class _Camera:
         K = sample.view.intrinsics.K
         if self._K is not None and not np.array_equal(K, self._K):
             raise InvalidInputError(
-                f"sample {sample.key} has other intrinsics than the views before it; GraspNet has"
-                " one matrix for all views of a camera: write a folder for each camera of the scene"
-                " (camera=None), or generate views with the same intrinsics"
+                f"sample {sample.key} has other intrinsics than the views before it, but GraspNet"
+                " has one camera matrix for all views of a camera; write a folder for each camera"
+                " of the scene (camera=None), or generate views with the same intrinsics"
             )
         self._K, ids = K, self._object_ids(sample)
         self._ids = ids
@@ -212,8 +212,8 @@ class _Camera:
         for k, number in enumerate(ids):
             if number in ids[:k]:
                 raise InvalidInputError(
-                    f"scene {sample.scene} has object {self._objects[number]} twice; labels of"
-                    " GraspNet tell objects and not instances: write BOP or COCO instead"
+                    f"scene {sample.scene} has object {self._objects[number]} twice, but GraspNet"
+                    " labels objects, not instances; write BOP or COCO instead"
                 )
         return ids
 

@@ -37,7 +37,7 @@ def depth_numbers(depth: Single, unit: float, key: str) -> NDArray[np.uint16]:
     numbers = np.rint(depth / unit)
     if numbers.max(initial=0.0) > DEEPEST:
         raise InvalidInputError(
-            f"depth of sample {key} is up to {depth.max():.3g} m; images of 16 bits end at"
-            f" {DEEPEST * unit:.3g} m if 1 stands for {1e3 * unit:g} mm: take a larger unit"
+            f"sample {key} has depths up to {depth.max():.3g} m, but 16-bit images with a unit of"
+            f" {1e3 * unit:g} mm end at {DEEPEST * unit:.3g} m; give a larger unit"
         ).about("depth_unit")
     return np.asarray(numbers, dtype=np.uint16)

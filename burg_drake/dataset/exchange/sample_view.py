@@ -102,7 +102,7 @@ def _publish(built: StationDiagram, posture: tuple[float, ...]) -> None:
     """Shows the arm in a posture."""
     if len(posture) != len(built.arm_joints):
         raise InvalidInputError(
-            f"the view has a posture of {len(posture)} joints; the arm of the station has"
+            f"the view has joint positions of {len(posture)} joints; the arm of the station has"
             f" {len(built.arm_joints)}"
         )
     context = built.diagram.CreateDefaultContext()

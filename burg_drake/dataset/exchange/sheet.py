@@ -67,7 +67,7 @@ def contact_sheet(
         raise InvalidInputError(f"{path} must end in {' or '.join(SUFFIXES)}")
     if rows < 1 or columns < 1:
         raise InvalidInputError(
-            f"a sheet of {rows} x {columns} samples shows nothing; give 1 or more"
+            f"a sheet of {rows} x {columns} samples is empty; give at least 1 row and 1 column"
         )
     chosen = [samples[k] for k in spread(len(samples), rows * columns)]
     if not chosen:

@@ -44,7 +44,7 @@ def scenes_of(samples: Iterable[Sample]) -> Iterator[tuple[int, Iterator[Sample]
     for number, views in groupby(samples, key=lambda sample: sample.scene):
         if number in seen:
             raise InvalidInputError(
-                f"scene {number} begins twice; the samples of a scene must follow each other"
+                f"the samples of scene {number} are not next to each other; sort samples by scene"
             )
         seen.add(number)
         yield number, views
@@ -78,7 +78,7 @@ def require_pinhole(sample: Sample, format: str) -> None:
     if not sample.view.intrinsics.is_pinhole:
         raise InvalidInputError(
             f"camera {sample.view.camera} of sample {sample.key} has lens distortion, which"
-            f" {format} cannot express; generate the data set with a camera without it"
+            f" {format} cannot store; generate the data set with a camera without distortion"
         )
 
 
@@ -98,7 +98,7 @@ def depth_of(sample: Sample, format: str, *, sensor: bool) -> Single:
     depth = sample.sensor_depth if sensor else sample.images.depth
     if depth is None:
         raise InvalidInputError(
-            f"sample {sample.key} has no depth of a simulated sensor; write the exact one, or"
+            f"sample {sample.key} has no depth of a simulated sensor; write the exact depth, or"
             " generate the data set with a sensor"
         )
     return depth
@@ -111,9 +111,9 @@ def lost_depth(sample: Sample, format: str, *, sensor: bool) -> set[str]:
         sample, format, sensor: as for `depth_of`.
     """
     if sensor and sample.images.depth is not None:
-        return {f"{format} has one depth image of a view: the exact depth is left out."}
+        return {f"{format} stores one depth image per view: the exact depth is left out."}
     if not sensor and sample.sensor_depth is not None:
-        return {f"{format} has one depth image of a view: the depth of the sensor is left out."}
+        return {f"{format} stores one depth image per view: the depth of the sensor is left out."}
     return set()
 
 
@@ -125,7 +125,7 @@ def object_index(objects: Sequence[str], sample: Sample, label: InstanceLabel) -
     """
     if label.object not in objects:
         raise UnknownNameError(
-            f"object {label.object!r} of sample {sample.key} is not among those of the data set;"
+            f"object {label.object!r} of sample {sample.key} is not an object of the data set;"
             f" {nearest(label.object, objects)}"
         )
     return objects.index(label.object)

@@ -58,7 +58,8 @@ def write_webdataset(
     """
     if shard_size < 1 or not depth_unit > 0.0:
         raise InvalidInputError(
-            f"shard size {shard_size} must be at least 1, unit of depth {depth_unit:g} m above 0"
+            f"shard size is {shard_size} and unit of depth {depth_unit:g} m; the size must be at"
+            " least 1, the unit above 0"
         )
     lost: set[str] = set()
     with new_folder(folder) as fresh:

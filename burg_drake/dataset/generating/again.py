@@ -79,6 +79,8 @@ def check_generated(folder: str | Path) -> list[DatasetFinding]:
 
 def _made_with(document: DatasetDocument, folder: Path) -> tuple[DatasetRecipe, Station]:
     if document.recipe is None:
-        raise InvalidInputError(f"{folder} was not generated: its document has no recipe")
+        raise InvalidInputError(
+            f"{folder} has no recipe in its document, so its samples cannot be made again"
+        )
     recipe = read_recipe(document.recipe, f"recipe of {folder}")
     return recipe, require_same_contents(document, recipe, folder)

@@ -91,7 +91,7 @@ def require_same_contents(
     ):
         if then != now:
             raise InvalidInputError(
-                f"{what} has other content than when the data set {folder} was made: images cannot"
-                " be rendered anew"
+                f"{what} has changed since the data set {folder} was made, so its images cannot be"
+                " rendered again"
             )
     return station

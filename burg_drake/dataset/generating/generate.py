@@ -111,10 +111,14 @@ def generate_dataset(
     workers, folder = worker_count(workers), Path(folder)
     if isinstance(scenes, ObjectLibrary):
         if recipe.sampled is None or count is None or count < 1:
-            raise InvalidInputError("sampled scenes need a recipe and their count, 1 or more")
+            raise InvalidInputError(
+                "to sample scenes, give a recipe of sampled scenes and a count of 1 or more"
+            )
         library, paths = scenes, [None] * count
     elif count is not None:
-        raise InvalidInputError("count is of sampled scenes; of given ones all are taken")
+        raise InvalidInputError(
+            "count is for sampled scenes; leave it out, all given scenes are used"
+        )
     else:
         library, recipe, paths = _given(scenes, recipe)
     _require_possible(recipe, station)
@@ -161,7 +165,8 @@ def _require_possible(recipe: DatasetRecipe, station: Station) -> None:
         blender()
     elif missing := missing_render_libraries():
         raise MissingDependencyError(
-            f"the recipe has colours (colors=False leaves them out): {describe_missing(missing)}"
+            "the recipe has colour images, which cannot be rendered (colors=False leaves them"
+            f" out): {describe_missing(missing)}"
         )
 
 
@@ -170,15 +175,17 @@ def _given(
 ) -> tuple[ObjectLibrary, DatasetRecipe, list[Path]]:
     """The library of given scenes, the recipe with their contents, and their files."""
     if recipe.sampled is not None:
-        raise InvalidInputError("scenes are given or sampled, not both")
+        raise InvalidInputError(
+            "scenes are given, but the recipe samples scenes; leave one of the two out"
+        )
     loaded = [as_scene(scene) for scene in scenes]
     if not loaded:
-        raise InvalidInputError("no scenes are given")
+        raise InvalidInputError("no scenes are given; give at least one")
     library = loaded[0].library
     for scene in loaded:
         if scene.library.root.resolve() != library.root.resolve():
             raise InvalidInputError(
-                f"{scene.path} is of library {scene.library.root}, {loaded[0].path} of"
+                f"{scene.path} uses library {scene.library.root}, but {loaded[0].path} uses"
                 f" {library.root}; a data set has one library"
             )
         if not scene.path.is_file():

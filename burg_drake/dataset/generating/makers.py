@@ -54,13 +54,13 @@ def scene_maker(
         return
     if recipe.sampled is not None and recipe.run:
         raise InvalidInputError(
-            "a cluster takes the grasps of a run for given scenes, which they travel with; sample"
-            " the scenes first, or give no cluster"
+            "on a cluster, grasps of a run can only be used for given scenes; sample the scenes"
+            " first, or give no cluster"
         )
     if recipe.looks is not None and not recipe.looks.distractor_library.startswith(PACKAGE_URI):
         raise InvalidInputError(
-            f"a cluster takes distractors of a built-in library, not of"
-            f" {recipe.looks.distractor_library}, which its machines do not have"
+            f"library of distractors {recipe.looks.distractor_library} is not available on the"
+            " cluster; give a built-in library"
         )
     with connect_cluster(cluster) as executor:
         yield partial(_make_on_cluster, executor, recipe, library, station)

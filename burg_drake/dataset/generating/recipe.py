@@ -80,10 +80,13 @@ class DatasetRecipe:
             depth_noise(self.sensor)
         if self.renderer not in RENDERERS:
             raise FieldError(
-                f"no renderer {self.renderer!r}; {nearest(self.renderer, RENDERERS)}", "renderer"
+                f"renderer {self.renderer!r} does not exist; {nearest(self.renderer, RENDERERS)}",
+                "renderer",
             )
         if self.run and self.grasps_per_object:
-            raise FieldError("grasps are sampled or taken from a run, not both", "run")
+            raise FieldError(
+                "grasps are either sampled or taken from a run; give only one of the two", "run"
+            )
 
     def _require_size(self) -> None:
         """Refuses images that the sensor does not have, or that are too large to be rendered."""
@@ -93,8 +96,8 @@ class DatasetRecipe:
             raise FieldError(str(error), "size") from error
         if max(camera.width, camera.height) > MAX_SIDE:
             raise FieldError(
-                f"images of {camera.width} x {camera.height} pixels; a side has at most"
-                f" {MAX_SIDE:,}",
+                f"images of {camera.width} x {camera.height} pixels are too large; a side may have"
+                f" at most {MAX_SIDE:,}",
                 "size",
             )
 

@@ -73,7 +73,8 @@ def make_sent_scene(sent: SentScene, folder: Path) -> MadeScene:
     """
     if sent.blender and (version := blender().version) != sent.blender:
         raise InvalidInputError(
-            f"the worker has Blender {version}, the data set is made with {sent.blender}"
+            f"the worker has Blender {version}, but the data set is made with {sent.blender};"
+            " install that version"
         )
     with drake_errors():
         library, station = _world(sent.world, folder)

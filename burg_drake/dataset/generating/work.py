@@ -84,7 +84,9 @@ def given_scene(
     assert work.path is not None
     scene = load_scene(work.path, library=library)
     if scene.content != work.inputs.recipe.given[work.number]:
-        raise InvalidInputError(f"{work.path} was changed meanwhile; generate again")
+        raise InvalidInputError(
+            f"{work.path} was changed while the data set was made; run the command again"
+        )
     return scene
 
 
@@ -116,7 +118,7 @@ def drake_errors() -> Iterator[None]:
     try:
         yield
     except SystemExit as error:  # DRAKE_DEMAND ends this way
-        raise SimulationError(f"Drake gave up: {error}") from error
+        raise SimulationError(f"Drake failed: {error}") from error
 
 
 @lru_cache(maxsize=1)

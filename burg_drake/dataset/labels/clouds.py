@@ -111,7 +111,7 @@ def surface_cloud(
     from burg_drake.geometry import Surface
 
     if (per_object is None) == (density is None):
-        raise InvalidInputError("give either per_object or density of a surface cloud")
+        raise InvalidInputError("give either per_object or density for a surface cloud")
     for name, value in (("per_object", per_object), ("density", density)):
         if value is not None and not 0 < value < np.inf:
             raise InvalidInputError(f"{name} of a surface cloud is {value:g}; give more than 0")
@@ -140,7 +140,7 @@ def checked_depth(
     """
     values = np.asarray(depth)
     if values.dtype.kind != "f":
-        raise InvalidInputError(f"{name} has values of type {values.dtype}; give metres as floats")
+        raise InvalidInputError(f"{name} has type {values.dtype}; expected floats in metres")
     if values.ndim != 2:
         raise InvalidInputError(f"{name} has shape {values.shape}; expected (H, W)")
     require_image(values, intrinsics, name)

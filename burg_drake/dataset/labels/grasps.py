@@ -47,7 +47,7 @@ def grasps_of_run(run: Run | Campaign | str | Path, scene: SceneLike) -> SceneGr
             raise InvalidInputError(
                 f"{found.path} is a run of scene {judged.name!r} ({judged.path}, content"
                 f" {judged.content[:SHOWN_DIGITS]}), not of {scene.name!r} ({scene.path}, content"
-                f" {scene.content[:SHOWN_DIGITS]}); objects or their places differ"
+                f" {scene.content[:SHOWN_DIGITS]}); their objects or poses differ"
             )
         return _grasps_of(found)
     return _joined([_grasps_of(one) for one in _runs_of(found, scene)])
@@ -120,14 +120,14 @@ def _runs_of(campaign: Campaign, scene: Scene) -> list[Run]:
     names = [entry.name for entry in entries if entry.content == scene.content]
     if not names:
         raise InvalidInputError(
-            f"{campaign.path} has no scene with the objects and places of {scene.name!r}"
+            f"{campaign.path} has no scene with the objects and poses of {scene.name!r}"
             f" ({scene.path}, content {scene.content[:SHOWN_DIGITS]}); it has"
             f" {listing([entry.name for entry in entries])}"
         )
     for name in names:
         if name in campaign.failed:
             raise InvalidInputError(
-                f"{campaign.path} has no grasps of scene {name!r}, which could not be judged:"
+                f"{campaign.path} has no grasps of scene {name!r}, because its evaluation failed:"
                 f" {campaign.failed[name]}"
             )
     return [load_run(campaign.folder(name)) for name in names]

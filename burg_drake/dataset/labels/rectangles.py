@@ -93,7 +93,7 @@ def grasp_rectangles(
             raise InvalidInputError(f"{name} of rectangles is {value:g}; give more than 0")
     if most_angle >= np.pi / 2:
         raise InvalidInputError(
-            f"most_angle of rectangles is {most_angle:g} rad; give less than a right angle"
+            f"most_angle of rectangles is {most_angle:g} rad; give less than pi / 2"
         )
     chosen = np.flatnonzero(_in_view(grasps.X_CG, intrinsics, most_angle))
     X_CG = grasps.X_CG[chosen]
@@ -101,7 +101,7 @@ def grasp_rectangles(
     if np.isnan(width).any():
         first = int(chosen[np.isnan(width)][0])
         raise InvalidInputError(
-            f"the width of grasp {first} is not known; give the opening of its rectangle"
+            f"the width of grasp {first} is unknown; give the opening of its rectangle"
         )
     p, closing, across = X_CG[:, :3, 3], X_CG[:, :3, 0], X_CG[:, :3, 1]
     along = _span(intrinsics, p, 0.5 * width[:, None] * closing)

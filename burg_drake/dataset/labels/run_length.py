@@ -52,7 +52,8 @@ def decode_mask(text: str, height: int, width: int) -> NDArray[np.bool_]:
     total, size = sum(runs), height * width
     if min(runs, default=0) < 0 or total != size:
         raise InvalidInputError(
-            f"run lengths of a mask have {total} pixels; one of {width} x {height} has {size}"
+            f"the run lengths of a mask have {total} pixels; a mask of {width} x {height} has"
+            f" {size}"
         )
     mask = np.zeros((height, width), dtype=bool)
     if len(runs) < 2:
@@ -101,7 +102,9 @@ def _runs(text: str) -> list[int]:
     for character in text:
         group = ord(character) - FIRST_CHARACTER
         if not 0 <= group < 2 * FOLLOWS or shift >= BITS * LONGEST_NUMBER:
-            raise InvalidInputError(f"run lengths of a mask have {character!r} where none can be")
+            raise InvalidInputError(
+                f"the run lengths of a mask have the invalid character {character!r}"
+            )
         number |= (group & (FOLLOWS - 1)) << shift
         shift += BITS
         if group & FOLLOWS:
@@ -111,5 +114,5 @@ def _runs(text: str) -> list[int]:
         runs.append(number + runs[-2] if len(runs) >= FIRST_DIFFERENCE else number)
         number = shift = 0
     if shift:
-        raise InvalidInputError("run lengths of a mask end within a number")
+        raise InvalidInputError("the run lengths of a mask end within a number")
     return runs

@@ -40,8 +40,8 @@ class SceneGrasps:
         for name, values in (columns | self.margins).items():
             if np.shape(values) != self.X_OG.shape[:1]:
                 raise InvalidInputError(
-                    f"{name} of grasps has shape {np.shape(values)}; there are {len(self)}"
-                    f" grasps, give ({len(self)},)"
+                    f"{name} of grasps has shape {np.shape(values)}; expected ({len(self)},), one"
+                    " for each grasp"
                 )
 
     def __len__(self) -> int:

@@ -110,8 +110,8 @@ def fuse_tsdf(
     cameras = [intrinsics] * len(images) if isinstance(intrinsics, Intrinsics) else [*intrinsics]
     if not images or not len(images) == len(poses) == len(cameras):
         raise InvalidInputError(
-            f"there are {len(images)} depth images, {len(poses)} poses and {len(cameras)}"
-            " intrinsics; give as many of each, at least one"
+            f"{len(images)} depth images, {len(poses)} poses and {len(cameras)} intrinsics are"
+            " given; give the same number of each, at least one"
         )
     voxel, truncation = grid_lengths(size, voxels, truncation)
     p_SQ = transform_points(check_pose(X_SV, "X_SV"), voxel_centers(voxels, voxel))
@@ -140,9 +140,9 @@ def grid_lengths(size: float, voxels: int, truncation: float | None) -> tuple[fl
         InvalidInputError: a number does not make sense.
     """
     if not 0.0 < size < np.inf:
-        raise InvalidInputError(f"size of a volume is {size:g} m; give more than 0")
+        raise InvalidInputError(f"the size of a volume is {size:g} m; give more than 0")
     if not 1 <= voxels <= MOST_VOXELS:
-        raise InvalidInputError(f"a volume has {voxels} voxels an edge; give 1 to {MOST_VOXELS}")
+        raise InvalidInputError(f"a volume has {voxels} voxels per edge; give 1 to {MOST_VOXELS}")
     voxel = size / voxels
     if truncation is None:
         return voxel, TRUNCATION * voxel

@@ -75,7 +75,9 @@ def station_view(station: Station, camera: str, *, arm: bool = False) -> View:
     """
     document = station.document
     if arm and document.arm is None:
-        raise InvalidInputError(f"station {station.name!r} has no arm that could be in view")
+        raise InvalidInputError(
+            f"station {station.name!r} has no arm to show in the view; give a station with an arm"
+        )
     found = station.camera(camera)
     return View(
         camera=camera,

@@ -72,7 +72,7 @@ class SceneRenderer:
         """
         if renderer not in RENDERERS:
             raise UnknownNameError(
-                f"no renderer {renderer!r}; {nearest(renderer, RENDERERS)}"
+                f"renderer {renderer!r} does not exist; {nearest(renderer, RENDERERS)}"
             ).about("renderer")
         self.scene, self.station = as_scene(scene), as_station(station)
         self.numbers = instance_numbers(self.scene)
@@ -114,7 +114,9 @@ class SceneRenderer:
         kinds = tuple(kinds)
         for kind in kinds:
             if kind not in KINDS:
-                raise InvalidInputError(f"no image of kind {kind!r}; {nearest(kind, KINDS)}")
+                raise InvalidInputError(
+                    f"image kind {kind!r} does not exist; {nearest(kind, KINDS)}"
+                )
         self._place_arm(view)
         by_rays = Images()
         if {"depth", "labels", "normals"} & {*kinds} or self._appearance is not None:
@@ -148,7 +150,9 @@ class SceneRenderer:
     @cached_property
     def _colors(self) -> DrakeColors | BlenderColors:
         if self._renderer is None:
-            raise InvalidInputError("this scene was built without colours")
+            raise InvalidInputError(
+                "this scene was built without colours, so colour images cannot be rendered"
+            )
         if self._in_blender:
             scene = blender_scene(self._built, self._appearance)
             return BlenderColors(scene, self._poses, self._appearance)
@@ -163,16 +167,17 @@ class SceneRenderer:
     def _place_arm(self, view: View) -> None:
         joints = self._built.arm_joints
         if bool(joints) != (view.posture is not None):
-            have = "no arm" if not joints else "its arm"
             raise InvalidInputError(
-                f"a view {'without' if view.posture is None else 'with'} the arm in it, of a scene"
-                f" with {have}"
+                "the view has no joint positions, but the scene has an arm; give them"
+                if joints
+                else "the view has joint positions, but the scene has no arm; leave them out"
             )
         if view.posture is None or view.posture == self._posture:
             return
         if len(view.posture) != len(joints):
             raise InvalidInputError(
-                f"posture of {len(view.posture)} joints; the arm has {len(joints)}"
+                f"the view has joint positions of {len(view.posture)} joints; the arm has"
+                f" {len(joints)}"
             )
         for joint, position in zip(joints, view.posture, strict=True):
             joint.set_angle(self._plant_context, position)

@@ -87,7 +87,7 @@ def check_dataset(folder: str | Path, redraw: Redraw | None = None) -> list[Data
         found.append(_finding(folder, FILE, error))
     for number in sorted({*entries, *shard_numbers(folder)}):
         if entries and number not in entries:
-            found.append(DatasetFinding("", shard_name(number), "the index does not have it"))
+            found.append(DatasetFinding("", shard_name(number), "it is not in the index"))
         found += check_shard(folder, number, entries.get(number), redraw)
     return found
 
@@ -111,9 +111,11 @@ def check_shard(
         shard = open_shard(folder / name)
     except InvalidInputError as error:
         return [*found, _finding(folder, name, error)]
-    found += [DatasetFinding("", f"{name}: {one}", "no sample has it") for one in shard.strangers]
+    found += [
+        DatasetFinding("", f"{name}: {one}", "it belongs to no sample") for one in shard.strangers
+    ]
     if entry is not None and len(shard.keys) != entry.nsamples:
-        message = f"it has {len(shard.keys)} samples, the index {entry.nsamples}"
+        message = f"it has {len(shard.keys)} samples, but the index says {entry.nsamples}"
         found.append(DatasetFinding("", name, message))
     found += _apart(shard, name)
     document, drawn = None, None
@@ -139,7 +141,9 @@ def _left_over(folder: Path) -> Iterator[DatasetFinding]:
         for path in sorted(place.iterdir()):
             if UNFINISHED.fullmatch(path.name):
                 name = path.relative_to(folder).as_posix()
-                yield DatasetFinding("", name, "it was being written when its process ended")
+                yield DatasetFinding(
+                    "", name, "it is unfinished: the process that wrote it was interrupted"
+                )
     complete = {scene_name(number) for number in shard_numbers(folder)}
     for path in sorted((folder / SCENES).glob("*.yaml")):
         name = path.relative_to(folder).as_posix()
@@ -150,10 +154,10 @@ def _left_over(folder: Path) -> Iterator[DatasetFinding]:
 def _wrong_entry(folder: Path, entry: ShardEntry) -> Iterator[DatasetFinding]:
     size, md5 = file_sum(folder / entry.url)
     if size != entry.filesize:
-        message = f"it has {size} bytes, the index {entry.filesize}"
+        message = f"it has {size} bytes, but the index says {entry.filesize}"
         yield DatasetFinding("", entry.url, message)
     elif md5 != entry.md5sum:
-        message = f"its MD5 is {md5}, in the index {entry.md5sum}: it was changed"
+        message = f"it was changed: its MD5 is {md5}, but the index says {entry.md5sum}"
         yield DatasetFinding("", entry.url, message)
 
 
@@ -163,7 +167,9 @@ def _apart(shard: SampleShard, name: str) -> Iterator[DatasetFinding]:
     runs = Counter(key for key, _ in itertools.groupby(kinds, key=lambda kind: kind[0]))
     for key, count in runs.items():
         if count > 1:
-            yield DatasetFinding(key, name, f"files of {key} lie in {count} places")
+            yield DatasetFinding(
+                key, name, f"the files of {key} are not next to each other, but in {count} places"
+            )
 
 
 def _sample_faults(
@@ -181,7 +187,7 @@ def _sample_faults(
         return
     unannounced = sorted({*shard.samples[key]} - {RECORD, *record.files})
     for kind in unannounced:
-        yield kind, "the record does not have it"
+        yield kind, "it is not in the record"
     sample = record.sample
     for kind in record.files:
         if kind not in SUFFIXES or kind == RECORD:
@@ -198,7 +204,7 @@ def _sample_faults(
         try:
             yield from drawing_faults(sample, redraw(scene, sample), record.depth_unit)
         except BurgError as error:
-            yield RECORD, f"it cannot be drawn anew: {error}"
+            yield RECORD, f"it cannot be rendered again: {error}"
 
 
 def _with_part(sample: Sample, part: Sample, kind: str) -> Sample:

@@ -27,8 +27,8 @@ from burg_drake.scene.document import Scene, load_scene
 from burg_drake.station.document import Station, load_station
 
 REMAKE_SHARD_ADVICE = (
-    "run the command that made the data set once more, which makes the shard anew; if it does not,"
-    " delete the shard first"
+    "repeat the command that made the data set, which makes the shard again; if it does not, delete"
+    " the shard first"
 )
 """What mends a data set with a damaged shard."""
 
@@ -153,7 +153,7 @@ class Dataset(Sequence[Sample]):
             UnknownNameError: it is not there any more.
         """
         if not self.document.station:
-            raise InvalidInputError(f"{self.folder} has no station: its document names none")
+            raise InvalidInputError(f"{self.folder} has no station: its document does not name one")
         return load_station(resolve(self.document.station, "stations", self.folder))
 
     def index(self, value: Sample | str, start: int = 0, stop: int | None = None) -> int:
@@ -167,8 +167,8 @@ class Dataset(Sequence[Sample]):
         scene, known = key.partition("_")[0], {f"{one:06d}": one for one in self.scenes}
         if scene not in known:
             raise UnknownNameError(
-                f"{self.folder} has no sample {key!r}, whose scene would be {scene!r}; its scenes"
-                f" are {listing(list(known))}"
+                f"{self.folder} has no sample {key!r} and no scene {scene!r}; its scenes are"
+                f" {listing(list(known))}"
             )
         number = known[scene]
         indices, keys = self.indices(number), self._shard(self._scene_place(number)).keys
@@ -212,7 +212,7 @@ class Dataset(Sequence[Sample]):
     def _place(self, index: int) -> tuple[SampleShard, str]:
         """SampleShard and key of a sample."""
         if not -len(self) <= index < len(self):
-            raise IndexError(f"{self.folder} has no sample {index}; it has {len(self)}")
+            raise IndexError(f"{self.folder} has no sample {index}; it has {len(self)} samples")
         index %= len(self)
         number = bisect.bisect_right(self._ends, index)
         shard = self._shard(number)
@@ -233,12 +233,12 @@ class Dataset(Sequence[Sample]):
         size = os.stat(path).st_size
         if size != entry.filesize:
             raise InvalidInputError(
-                f"shard {path} has {size} bytes, the index {entry.filesize}: it was changed;"
-                f" {REMAKE_SHARD_ADVICE}"
+                f"shard {path} was changed: it has {size} bytes, but the index says"
+                f" {entry.filesize}; {REMAKE_SHARD_ADVICE}"
             )
         if len(shard.keys) != entry.nsamples:
             raise DocumentError(
-                f"{path} has {len(shard.keys)} samples, the index {entry.nsamples};"
+                f"{path} has {len(shard.keys)} samples, but the index says {entry.nsamples};"
                 f" {REMAKE_SHARD_ADVICE}"
             )
         return shard
@@ -265,6 +265,6 @@ def load_dataset(folder: str | Path) -> Dataset:
     """
     folder = Path(folder)
     if not (folder / DOCUMENT_FILE).is_file():
-        raise InvalidInputError(f"{folder} is no data set: {DOCUMENT_FILE} is missing")
+        raise InvalidInputError(f"{folder} is not a data set: {DOCUMENT_FILE} is missing")
     document = load_dataset_document(folder / DOCUMENT_FILE)
     return Dataset(folder, document, read_index(folder))

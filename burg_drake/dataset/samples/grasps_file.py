@@ -96,10 +96,11 @@ def require_fitting(grasps: LabelledGrasps, instances: int, where: str) -> None:
     for name, column in (columns | dict(grasps.margins)).items():
         if column.shape != (len(grasps),):
             raise InvalidInputError(
-                f"{where}: {name} of grasps has shape {column.shape}; there are {len(grasps)}"
+                f"{where}: {name} of grasps has shape {column.shape}; expected one value for each"
+                f" of the {len(grasps)} grasps"
             )
     if len(grasps) and not 1 <= grasps.number.min() <= grasps.number.max() <= instances:
         raise InvalidInputError(
-            f"{where}: grasps have numbers {grasps.number.min()} to {grasps.number.max()}; the"
+            f"{where}: grasps are of instances {grasps.number.min()} to {grasps.number.max()}; the"
             f" sample has instances 1 to {instances}"
         )

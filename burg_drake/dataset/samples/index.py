@@ -73,9 +73,9 @@ def read_index(folder: Path) -> list[ShardEntry]:
     path = folder / FILE
     if not path.exists():
         raise InvalidInputError(
-            f"{folder} has no {FILE}: its samples are not finished; run the command that makes them"
-            " once more, or burg_drake.dataset.samples.write_index on the folder, to use what is"
-            " there"
+            f"{folder} has no {FILE}, so the data set is not finished; run the command that makes"
+            " it again, or call burg_drake.dataset.samples.write_index on the folder to use the"
+            " samples that are there"
         )
     fields = PlainFields(load_json(path, LIMITS), ("wids_version", "name", "shardlist"), str(path))
     fields.whole("wids_version", WIDS_VERSION, WIDS_VERSION)
@@ -93,10 +93,10 @@ def read_index(folder: Path) -> list[ShardEntry]:
         place, _, name = url.rpartition("/")
         if place != FOLDER or not SHARD.fullmatch(name):
             raise DocumentError(
-                f"{path}: shardlist: url is {url!r}; expected one such as {FOLDER}/000012.tar"
+                f"{path}: shardlist: url is {url!r}; expected a value such as {FOLDER}/000012.tar"
             )
     if urls != sorted(set(urls), key=_scene):
-        raise DocumentError(f"{path}: shardlist: shards are there twice, or in a wrong order")
+        raise DocumentError(f"{path}: shardlist: shards are repeated or not in ascending order")
     return entries
 
 

@@ -29,7 +29,7 @@ class PlainFields:
         """
         self.where = where
         if not isinstance(values, dict):
-            raise DocumentError(f"{where}: {quoted(values)} is no mapping")
+            raise DocumentError(f"{where}: {quoted(values)} is not a mapping")
         names = list(names)
         for name in values:
             if name not in names:
@@ -106,7 +106,7 @@ class PlainFields:
         try:
             return check_pose(rows, name)
         except ValueError as error:  # rows of different lengths, too
-            raise DocumentError(f"{self.where}: {name} is no pose: {error}") from error
+            raise DocumentError(f"{self.where}: {name} is not a pose: {error}") from error
 
     def mapping(self, name: str) -> dict[str, Any]:
         """A mapping, with whatever it holds."""

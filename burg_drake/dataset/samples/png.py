@@ -157,7 +157,7 @@ def depth_unit_of(depth_range: tuple[float, float]) -> float:
         if depth_range[1] <= LARGEST_DEPTH * unit:
             return unit
     raise InvalidInputError(
-        f"a depth range up to {depth_range[1]:g} m cannot be kept; its images reach"
+        f"a depth range up to {depth_range[1]:g} m cannot be stored; the limit is"
         f" {LARGEST_DEPTH * DEPTH_UNITS[-1]:g} m"
     )
 
@@ -166,7 +166,7 @@ def _in_units(name: str, depth: Single, unit: float) -> NDArray[np.uint16]:
     units: Single = np.rint(depth * np.float32(1.0 / unit))
     if not (units.min(initial=0.0) >= 0.0 and units.max(initial=0.0) <= LARGEST_DEPTH):
         raise InvalidInputError(
-            f"{name.replace('_', ' ')} has values that are negative, not finite or beyond"
+            f"{name.replace('_', ' ')} has values that are negative, not finite or above"
             f" {LARGEST_DEPTH * unit:g} m"
         )
     return units.astype(np.uint16)
@@ -175,7 +175,7 @@ def _in_units(name: str, depth: Single, unit: float) -> NDArray[np.uint16]:
 def _whole_normals(normals: Single) -> NDArray[np.uint16]:
     whole: Single = np.rint(normals * np.float32(ONE_NORMAL))
     if not (whole.min(initial=0.0) >= -ONE_NORMAL and whole.max(initial=0.0) <= ONE_NORMAL):
-        raise InvalidInputError("normals have components that are not finite or beyond 1")
+        raise InvalidInputError("normals have components that are not finite or outside -1 to 1")
     return (whole + ZERO_NORMAL).astype(np.uint16)
 
 
@@ -188,16 +188,16 @@ def _require_whole(data: bytes, where: str) -> None:
         length = int.from_bytes(data[at : at + 4], "big")
         kind, end = data[at + 4 : at + 8], at + 8 + length
         if kind not in CHUNKS or (kind == HEADER_CHUNK) != (len(found) == 1):
-            raise InvalidInputError(f"{where} is damaged: it has chunk {kind!r} in a wrong place")
+            raise InvalidInputError(f"{where} is damaged: chunk {kind!r} is in the wrong place")
         sum_ = int.from_bytes(data[end : end + 4], "big")
         if end + 4 > len(data):
             break
         if zlib.crc32(memoryview(data)[at + 4 : end]) != sum_:
-            raise InvalidInputError(f"{where} is damaged: a check sum is wrong")
+            raise InvalidInputError(f"{where} is damaged: a checksum is wrong")
         found.append(kind)
         at = end + 4
     if found[-1] != CHUNKS[-1] or at != len(data):
-        raise InvalidInputError(f"{where} is cut off, or goes on behind its end")
+        raise InvalidInputError(f"{where} is truncated, or has data after its end")
 
 
 def _require_header(data: bytes, kind: PngKind, size: tuple[int, int], where: str) -> None:
@@ -206,13 +206,13 @@ def _require_header(data: bytes, kind: PngKind, size: tuple[int, int], where: st
     width, height = (int.from_bytes(header[i : i + 4], "big") for i in (0, 4))
     if (width, height) != size:
         raise InvalidInputError(
-            f"{where} has {width} x {height} pixels, its view {size[0]} x {size[1]}"
+            f"{where} has {width} x {height} pixels, but its view has {size[0]} x {size[1]}"
         )
     bits = [8 * np.dtype(numbers).itemsize for numbers in kind.types]
     depth, color_type, *methods = header[8:13]
     if depth not in bits or color_type != COLOR_TYPES[kind.channels] or any(methods):
         expected = " or ".join(map(str, bits))
         raise InvalidInputError(
-            f"{where} has {depth} bits and colour type {color_type} of PNG; expected {expected}"
+            f"{where} has bit depth {depth} and PNG colour type {color_type}; expected {expected}"
             f" bits and colour type {COLOR_TYPES[kind.channels]}"
         )

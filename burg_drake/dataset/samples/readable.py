@@ -74,5 +74,5 @@ class ReadableSamples:
                 yield sample
         if first is not None and not found:
             raise InvalidInputError(
-                f"no sample of {self.dataset.folder} can be read; the first: {first}"
+                f"no sample of {self.dataset.folder} can be read; the first error is: {first}"
             ) from first

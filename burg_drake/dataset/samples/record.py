@@ -77,8 +77,9 @@ def record_text(sample: Sample, files: Sequence[str]) -> str:
     count = len(sample.instances)
     if width * height > MOST_PIXELS or count * width * height > MOST_MASK_PIXELS:
         raise InvalidInputError(
-            f"sample {sample.key}: {width} x {height} pixels with {count} instances are more than a"
-            f" sample may have: {MOST_PIXELS:,} pixels, and {MOST_MASK_PIXELS:,} in all masks"
+            f"sample {sample.key} is too large with {width} x {height} pixels and {count}"
+            f" instances: an image may have {MOST_PIXELS:,} pixels, and all masks together"
+            f" {MOST_MASK_PIXELS:,}"
         )
     values = {
         "version": VERSION,
@@ -95,7 +96,7 @@ def record_text(sample: Sample, files: Sequence[str]) -> str:
         return json.dumps(plain_data(values), sort_keys=True, allow_nan=False, indent=1)
     except (TypeError, ValueError) as error:
         raise InvalidInputError(
-            f"sample {sample.key} has values that are no plain data: {error}"
+            f"sample {sample.key} has values that cannot be written as JSON: {error}"
         ) from error
 
 
@@ -113,15 +114,16 @@ def parse_record(text: str, where: str) -> SampleRecord:
     version = values.get("version") if isinstance(values, dict) else None
     if version != VERSION:
         raise DocumentError(
-            f"{where}: a sample of version {version!r} cannot be read; this release reads version"
-            f" {VERSION}"
+            f"{where}: the sample has version {version!r}; this release reads version {VERSION}"
         )
     fields = PlainFields(values, KEYS, where)
     view = _view(fields.within("view", VIEW_KEYS))
     width, height = view.intrinsics.width, view.intrinsics.height
     instances = fields.each("instances", INSTANCE_KEYS)
     if len(instances) > MOST_INSTANCES or len(instances) * width * height > MOST_MASK_PIXELS:
-        raise DocumentError(f"{where}: {len(instances)} instances are too many for such images")
+        raise DocumentError(
+            f"{where}: {len(instances)} instances are too many for images of this size"
+        )
     sample = Sample(
         scene=fields.whole("scene"),
         number=fields.whole("number"),
@@ -177,8 +179,8 @@ def _intrinsics(fields: PlainFields) -> Intrinsics:
     width, height = (fields.whole(name, 1, LONGEST_SIDE) for name in ("width", "height"))
     if width * height > MOST_PIXELS:
         raise DocumentError(
-            f"{fields.where}: {width} x {height} pixels are more than the {MOST_PIXELS:,} that an"
-            " image may have"
+            f"{fields.where}: {width} x {height} pixels are too many; an image may have"
+            f" {MOST_PIXELS:,}"
         )
     focal, center = fields.numbers("focal", 2), fields.numbers("center", 2)
     try:

@@ -36,24 +36,27 @@ def label_faults(sample: Sample) -> Iterator[Fault]:
         return
     top = int(labels.max(initial=0))
     if top > len(sample.instances):
-        yield "labels", f"there is label {top}; there are {len(sample.instances)} instances"
+        yield "labels", f"label {top} has no instance; there are {len(sample.instances)} instances"
     counts = np.bincount(labels.ravel(), minlength=len(sample.instances) + 1)
     for one in sample.instances:
         count = int(counts[one.number]) if one.number < len(counts) else 0
         if count != one.visible_pixels:
             yield (
                 "labels",
-                f"{one.name!r} has {count} pixels; its record says {one.visible_pixels}",
+                f"{one.name!r} has {count} pixels, but its record says {one.visible_pixels}",
             )
         visible = labels == one.number
         box = box_of_mask(visible)
         if box != one.visible_box:
-            yield RECORD, f"visible_box of {one.name!r} is {one.visible_box}; its labels have {box}"
+            yield (
+                RECORD,
+                f"visible_box of {one.name!r} is {one.visible_box}, but its labels have {box}",
+            )
         outside = int(np.count_nonzero(visible & ~one.amodal))
         if outside:
             yield (
                 RECORD,
-                f"amodal mask of {one.name!r} leaves out {outside} of its {count} visible pixels",
+                f"the amodal mask of {one.name!r} lacks {outside} of its {count} visible pixels",
             )
 
 
@@ -62,23 +65,23 @@ def silhouette_faults(sample: Sample) -> Iterator[Fault]:
     for i, one in enumerate(sample.instances, start=1):
         if one.number != i:
             yield RECORD, f"{one.name!r} has number {one.number}; expected {i}"
-        yield from ((RECORD, f"{text} of {one.name!r}") for text in _contradictions(one))
+        yield from ((RECORD, f"{one.name!r}: {text}") for text in _contradictions(one))
 
 
 def _contradictions(one: InstanceLabel) -> Iterator[str]:
     within, pixels = int(np.count_nonzero(one.amodal)), one.silhouette_pixels
     if within > pixels:
-        yield f"silhouette_pixels {pixels} are fewer than the {within} of the amodal mask"
+        yield f"silhouette_pixels is {pixels}, less than the {within} of the amodal mask"
     if one.visible_pixels > pixels:
-        yield f"visible_pixels {one.visible_pixels} are more than the silhouette_pixels {pixels}"
+        yield f"visible_pixels is {one.visible_pixels}, more than silhouette_pixels, {pixels}"
     share = one.visible_pixels / pixels if pixels else 0.0
     if abs(share - one.visibility) > VISIBILITY_TOLERANCE:
-        yield f"visibility {one.visibility:g} is not {share:g}, as its pixels have it"
+        yield f"visibility is {one.visibility:g}, but its pixels give {share:g}"
     box = box_of_mask(one.amodal)
     if (one.amodal_box is None) != (pixels == 0):
         yield f"amodal_box {one.amodal_box} does not fit silhouette_pixels {pixels}"
     elif box is not None and one.amodal_box is not None and not _contains(one.amodal_box, box):
-        yield f"amodal_box {one.amodal_box} does not contain the mask, which has {box}"
+        yield f"amodal_box {one.amodal_box} does not contain the mask, whose box is {box}"
 
 
 def surface_faults(sample: Sample, depth_unit: float) -> Iterator[Fault]:
@@ -91,8 +94,8 @@ def surface_faults(sample: Sample, depth_unit: float) -> Iterator[Fault]:
         if wrong.any():
             yield (
                 "depth",
-                f"{np.count_nonzero(wrong)} pixels are outside of the depth range {near:g} to"
-                f" {far:g} m of the view",
+                f"{np.count_nonzero(wrong)} pixels are outside the depth range {near:g} to {far:g}"
+                " m of the view",
             )
     if normals is not None:
         length = np.linalg.norm(normals, axis=-1)
@@ -108,9 +111,9 @@ def grasp_faults(sample: Sample) -> Iterator[Fault]:
     known = {"", *(outcome.value for outcome in Outcome)}
     unknown = sorted(set(sample.grasps.outcome.tolist()) - known)
     if unknown:
-        yield GRASPS, f"outcome {quoted(unknown[0])} is none that a grasp can have"
+        yield GRASPS, f"outcome {quoted(unknown[0])} does not exist"
     if (sample.grasps.width < 0.0).any() or np.isinf(sample.grasps.width).any():
-        yield GRASPS, "there are negative or infinite widths"
+        yield GRASPS, "widths are negative or infinite"
 
 
 def scene_faults(
@@ -131,15 +134,18 @@ def scene_faults(
         if one.name not in placed:
             continue
         if one.object != placed[one.name]:
-            yield RECORD, f"{one.name!r} is a {one.object!r}; the scene has a {placed[one.name]!r}"
+            yield (
+                RECORD,
+                f"{one.name!r} is object {one.object!r}; in the scene it is {placed[one.name]!r}",
+            )
         X_CO = inverse(sample.view.X_SC) @ X_SO[one.name]
         if np.abs(one.X_CO - X_CO).max() > POSE_TOLERANCE:
             distance = 1e3 * float(np.linalg.norm(one.X_CO[:3, 3] - X_CO[:3, 3]))
             angle = float(np.rad2deg(rotation_angle(one.X_CO[:3, :3].T @ X_CO[:3, :3])))
             yield (
                 RECORD,
-                f"X_CO of {one.name!r} is {distance:.3g} mm and {angle:.3g} degrees away from where"
-                " the scene has it",
+                f"X_CO of {one.name!r} is {distance:.3g} mm and {angle:.3g} degrees from its pose"
+                " in the scene",
             )
 
 
@@ -155,13 +161,15 @@ def drawing_faults(sample: Sample, drawn: Images, depth_unit: float) -> Iterator
 
 def _different(kind: str, image: NDArray[np.generic], differs: Booleans) -> Iterator[Fault]:
     if differs.shape != image.shape:
-        raise InvalidInputError(f"{kind} were drawn anew as {differs.shape}, not {image.shape}")
+        raise InvalidInputError(
+            f"{kind} rendered again has shape {differs.shape}, not {image.shape}"
+        )
     count = int(np.count_nonzero(differs))
     if count > DIFFERENT * differs.size:
         y, x = np.argwhere(differs)[0]
         yield (
             kind,
-            f"{count} pixels differ from freshly drawn ones, the first in column {x} of row {y}",
+            f"{count} pixels differ when rendered again, the first in column {x} of row {y}",
         )
 
 

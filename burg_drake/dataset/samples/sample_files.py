@@ -79,7 +79,7 @@ def require_consistent(sample: Sample) -> None:
         channels = (3,) if name in KINDS and KINDS[name].channels == 3 else ()
         if image.shape != size + channels:
             raise InvalidInputError(
-                f"{where}: {name} has shape {image.shape}; its intrinsics are of {size[1]} x"
+                f"{where}: {name} has shape {image.shape}; its intrinsics are for {size[1]} x"
                 f" {size[0]} pixels"
             )
     numbers = [one.number for one in sample.instances]
@@ -87,13 +87,11 @@ def require_consistent(sample: Sample) -> None:
         raise InvalidInputError(f"{where}: instances have numbers {numbers}; expected 1, 2, ...")
     color, labels = sample.images.color, sample.images.labels
     if color is not None and color.dtype != np.uint8:
-        raise InvalidInputError(f"{where}: color is of {color.dtype}; expected 8 bits a channel")
+        raise InvalidInputError(f"{where}: color has type {color.dtype}; expected uint8")
     if labels is not None and labels.dtype.kind != "u":
-        raise InvalidInputError(f"{where}: labels are of {labels.dtype}; expected uint16")
+        raise InvalidInputError(f"{where}: labels has type {labels.dtype}; expected uint16")
     if labels is not None and labels.max(initial=0) > len(numbers):
-        raise InvalidInputError(
-            f"{where}: there is label {labels.max()}, but no instance of that number"
-        )
+        raise InvalidInputError(f"{where}: label {labels.max()} has no instance of that number")
     if sample.grasps is not None:
         require_fitting(sample.grasps, len(numbers), where)
 
@@ -107,7 +105,7 @@ def asked_parts(parts: Iterable[str]) -> frozenset[str]:
     asked = frozenset([parts] if isinstance(parts, str) else parts)
     for name in asked:
         if name not in PARTS:
-            raise UnknownNameError(f"samples have no {name!r}; {nearest(name, PARTS)}")
+            raise UnknownNameError(f"samples have no part {name!r}; {nearest(name, PARTS)}")
     return asked
 
 
@@ -126,10 +124,10 @@ def read_record(key: str, read: Callable[[str, int], bytes], where: str) -> Samp
     try:
         text = read(RECORD, DOCUMENT.size).decode()
     except UnicodeDecodeError as error:
-        raise DocumentError(f"{where} is no text") from error
+        raise DocumentError(f"{where} is not text") from error
     record = parse_record(text, where)
     if record.sample.key != key:
-        raise DocumentError(f"{where} is of sample {record.sample.key}")
+        raise DocumentError(f"{where} belongs to sample {record.sample.key}")
     return record
 
 

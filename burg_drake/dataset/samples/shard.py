@@ -219,7 +219,7 @@ class _Reader:
         if kind not in self.places:
             raise DocumentError(f"{self.path}: {name} is missing")
         if self.places[kind].size > most:
-            raise DocumentError(f"{self.path}: {name} has more than {most} bytes, too much for it")
+            raise DocumentError(f"{self.path}: {name} has more than the {most} bytes allowed")
         return read_member(self.path, self.places[kind])
 
 
@@ -252,6 +252,6 @@ def _reporting(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise InvalidInputError(
-            f"cannot write {shown(str(path), 500)}: {error.strerror or error}; nothing of this"
-            " shard is kept, and all others are: make room, and run the same command to continue"
+            f"cannot write {shown(str(path), 500)}: {error.strerror or error}; all shards except"
+            " this one are kept: make room, and run the same command to continue"
         ).about("folder") from error

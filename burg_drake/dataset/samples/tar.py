@@ -55,14 +55,14 @@ def tar_members(path: Path) -> dict[str, MemberPlace]:
         while True:
             header = os.pread(stream.fileno(), BLOCK, at)
             if len(header) < BLOCK:
-                raise InvalidInputError(f"{path} is cut off behind {last}")
+                raise InvalidInputError(f"{path} is truncated after {last}")
             if not any(header):
                 return found
-            name, place = _parsed(header, at, f"{path}, behind {last}")
+            name, place = _parsed(header, at, f"{path}, after {last}")
             if place.start + place.size > size:
-                raise InvalidInputError(f"{path} is cut off within {name}")
+                raise InvalidInputError(f"{path} is truncated within {name}")
             if name in found:
-                raise InvalidInputError(f"{path} has {name} twice")
+                raise InvalidInputError(f"{path} contains {name} twice")
             if len(found) == MOST_MEMBERS:
                 raise InvalidInputError(f"{path} has more than {MOST_MEMBERS:,} members")
             found[name], last = place, name
@@ -81,7 +81,7 @@ def read_member(path: Path, place: MemberPlace) -> bytes:
         except OSError as error:
             raise InvalidInputError(f"cannot read {path}: {error.strerror or error}") from error
     if len(data) != place.size:
-        raise InvalidInputError(f"{path} is cut off")
+        raise InvalidInputError(f"{path} is truncated")
     return data
 
 
@@ -90,17 +90,17 @@ def _parsed(header: bytes, at: int, where: str) -> tuple[str, MemberPlace]:
     blank = header[: SUM.start] + b" " * 8 + header[SUM.stop :]
     try:
         if sum(blank) != _octal(header[SUM]):
-            raise InvalidInputError(f"{where}, is damaged: the check sum of a header is wrong")
+            raise InvalidInputError(f"{where}: the checksum of a header is wrong")
         size = _octal(header[SIZE])
         name = header[NAME].split(b"\0", 1)[0].decode("ascii")
     except ValueError as error:
         if isinstance(error, InvalidInputError):
             raise
-        raise InvalidInputError(f"{where}, has a header that is none of a tar archive") from error
+        raise InvalidInputError(f"{where}: the header is not that of a tar archive") from error
     if header[KIND] not in FILES or any(header[PREFIX]) or not name:
         raise InvalidInputError(
-            f"{where}, has {shown(name)!r}, which is no plain file with a short name; pack the"
-            " shard with such files alone"
+            f"{where}: {shown(name)!r} is not a regular file with a name of at most 100"
+            " characters; only such files may be in a shard"
         )
     return name, MemberPlace(at + BLOCK, size)
 

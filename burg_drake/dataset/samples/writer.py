@@ -91,7 +91,7 @@ def _written(
 ) -> ShardEntry:
     shard, document = folder / shard_name(number), folder / scene_name(number)
     if shard.exists():
-        raise InvalidInputError(f"{shard} is there already; a scene can be added once")
+        raise InvalidInputError(f"{shard} exists already; a scene can be added only once")
     library = portable_reference(scene.library.root, document.parent)
     try:
         save_scene(replace(scene.document, library=library), document)
@@ -147,7 +147,7 @@ class DatasetWriter:
                 ).about("folder")
         elif any(self.folder.iterdir()):
             raise InvalidInputError(
-                f"{self.folder} is not empty, and holds no data set ({DOCUMENT_FILE} is missing);"
+                f"{self.folder} is not empty and is not a data set ({DOCUMENT_FILE} is missing);"
                 " choose another folder"
             ).about("folder")
         else:

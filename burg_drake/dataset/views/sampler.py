@@ -71,8 +71,8 @@ class ViewSampler:
         known = self._station.document.cameras
         if intrinsics is None and not known:
             raise InvalidInputError(
-                f"station {self._station.name!r} ({self._station.path}) has no camera that views"
-                " could have their intrinsics from; give intrinsics"
+                f"station {self._station.name!r} ({self._station.path}) has no camera whose"
+                " intrinsics the views could use; give intrinsics"
             )
         if not len(self._seen.objects):
             raise InvalidInputError(f"scene {self._scene.name!r} ({self._scene.path}) is empty")
@@ -95,7 +95,9 @@ class ViewSampler:
         if camera is None:
             camera = cameras[int(rng.integers(len(cameras)))]
         elif camera not in cameras:
-            raise UnknownNameError(f"no views are drawn of {camera!r}; {nearest(camera, cameras)}")
+            raise UnknownNameError(
+                f"views cannot be from camera {camera!r}; {nearest(camera, cameras)}"
+            )
         refused: Counter[str] = Counter()
         still = camera in self._station.document.cameras and not (
             self.settings.position_jitter or self.settings.angle_jitter_deg
@@ -107,9 +109,9 @@ class ViewSampler:
             refused[view] += 1
         why = "; ".join(f"{count} {reason}" for reason, count in refused.most_common())
         raise InvalidInputError(
-            f"scene {self._scene.name!r} ({self._scene.path}) is outside the camera's view: of"
+            f"no view of scene {self._scene.name!r} ({self._scene.path}) was found: of"
             f" {refused.total()} views from {camera!r}, {why}; move the camera or the objects, or"
-            " let views be drawn nearer to them"
+            " allow views from nearer"
         )
 
     def _draw(self, camera: str, rng: np.random.Generator) -> View | str:

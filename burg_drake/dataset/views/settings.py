@@ -74,8 +74,7 @@ class ViewpointSettings:
     def __post_init__(self) -> None:
         if not self.cameras:
             raise FieldError(
-                f"cameras of views are missing; name {SPHERE!r}, {WRIST!r} or cameras of the"
-                " station",
+                f"cameras is empty; give {SPHERE!r}, {WRIST!r} or cameras of the station",
                 "cameras",
             )
         require_ranges(self)

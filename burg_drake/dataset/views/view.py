@@ -39,11 +39,12 @@ class View:
         check_pose(self.X_SC, "X_SC")
         if self.intrinsics.is_fisheye:
             raise InvalidInputError(
-                f"camera {self.camera} of a view is a fisheye, whose images cannot be rendered;"
-                " give a perspective model"
+                f"camera {self.camera} of a view is a fisheye, which cannot be rendered; give a"
+                " perspective model"
             )
         near, far = self.depth_range
         if not 0.0 < near < far:
             raise InvalidInputError(
-                f"depth range {near:g} to {far:g} m of a view must rise from above 0"
+                f"depth range of a view is {near:g} to {far:g} m; it must start above 0 and end"
+                " above its start"
             )

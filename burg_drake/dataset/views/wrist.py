@@ -53,9 +53,8 @@ class WristCamera:
         arm = station.document.arm
         if arm is None:
             raise InvalidInputError(
-                f"a camera on the wrist needs an arm, and station {station.name!r}"
-                f" ({station.path}) has none; view the scene from 'sphere' or a camera of the"
-                " station"
+                f"a wrist camera needs an arm, but station {station.name!r} ({station.path}) has"
+                " none; view the scene from 'sphere' or a camera of the station"
             )
         built = build_station_diagram(scene, station, robot="arm", weld_objects=True)
         self._collision = ArmCollision(built)

@@ -43,7 +43,7 @@ class Carried:
         if name not in self._height:
             known = tuple(self._height)
             raise UnknownNameError(
-                f"no instance {name!r} that can be carried; {nearest(name, known)}"
+                f"{name!r} is not an instance that can be carried; {nearest(name, known)}"
             )
         return self._height[name]
 

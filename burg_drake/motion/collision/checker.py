@@ -264,7 +264,7 @@ def _checked(carried: str | None, moved_W: ArrayLike) -> Array:
     moved = np.asarray(moved_W, dtype=float)
     if not carried and moved.any():
         raise InvalidInputError(
-            f"moved_W is {moved.tolist()} m, but nothing is carried; give `carried`"
+            f"moved_W is {moved.tolist()} m, but no instance is carried; give `carried`"
         )
     return moved
 

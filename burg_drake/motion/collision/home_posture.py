@@ -75,8 +75,8 @@ def require_free_home(station_diagram: StationDiagram, collision: ArmCollision) 
     if at_home:
         pairs = ", ".join(dict.fromkeys(f"{o.link} with {o.other}" for o in at_home))
         raise InvalidInputError(
-            f"{station.path}: arm.home collides in scene {scene.name!r}: {pairs}; change the"
-            " posture or move what is in the way"
+            f"{station.path}: at arm.home the arm collides in scene {scene.name!r}: {pairs};"
+            " change arm.home or move the obstacle"
         )
 
 
@@ -116,7 +116,7 @@ def _repair_hint(inside: Sequence[BaseOverlap], station: Station) -> str:
     depth = 1e3 * shapes[0].depth
     listed = ", ".join(f"{s.link} {s.shape!r} {1e3 * s.depth:.0f} mm" for s in shapes[:SHAPES])
     more = f" and {len(shapes) - SHAPES} more" if len(shapes) > SHAPES else ""
-    moves = "move the base or what is in its place"
+    moves = "move the base or the obstacle"
     arm = station.document.arm
     if all(shape.upwards for shape in shapes) and arm is not None:
         x, y, z = arm.X_WA.translation
@@ -125,7 +125,11 @@ def _repair_hint(inside: Sequence[BaseOverlap], station: Station) -> str:
         moves += f"[{x:g}, {y:g}, {z + rise:g}])"
     allowed = [*arm.stands_in, name] if arm is not None else [name]
     stated = name == "table" or name in station.document.background
-    let_in = f", or write arm.stands_in: [{', '.join(allowed)}] if it is let in" if stated else ""
+    let_in = (
+        f", or write arm.stands_in: [{', '.join(allowed)}] if the base is mounted inside it"
+        if stated
+        else ""
+    )
     return (
         f"arm.X_WA puts the arm's base {depth:.0f} mm deep into {name!r} by its collision shapes"
         f" ({listed}{more}); {moves}{let_in}"

@@ -47,19 +47,20 @@ class ArmLimits:
     def __post_init__(self) -> None:
         if not (self.lower <= self.upper).all():
             raise InvalidInputError(
-                f"position limits {self.lower.tolist()} to {self.upper.tolist()} of an arm have to"
-                " be one pair of numbers a joint, the lower one first"
+                f"position limits of an arm are {self.lower.tolist()} to {self.upper.tolist()};"
+                " give a lower and a higher number for each joint"
             )
         if not (self.torque >= 0.0).all():
             raise InvalidInputError(
-                f"torque limits {self.torque.tolist()} of an arm have to be at least 0, or inf"
+                f"torque limits of an arm are {self.torque.tolist()}; each must be at least 0, or"
+                " inf"
             )
         for name in ("velocity", "acceleration", "jerk"):
             value = getattr(self, name)
             if value.shape != self.lower.shape or not (np.isfinite(value) & (value > 0.0)).all():
                 raise InvalidInputError(
-                    f"{name} limits {value.tolist()} of an arm of {len(self.lower)} joints have to"
-                    " be one number a joint, above 0 and finite"
+                    f"{name} limits of an arm of {len(self.lower)} joints are {value.tolist()};"
+                    " give one finite number above 0 for each joint"
                 )
 
     @classmethod
@@ -136,8 +137,8 @@ def _modelled_velocity(diagram: StationDiagram) -> Array:
     for joint, limit in zip(joints, velocity, strict=True):
         if not 0.0 < limit < np.inf:
             raise InvalidInputError(
-                f"{diagram.station.arm_model}: joint {joint.name()!r} states no velocity limit;"
-                " give it in the model, or those of all joints as arm.velocity in"
+                f"{diagram.station.arm_model}: joint {joint.name()!r} has no velocity limit; add"
+                " it to the model, or give the limits of all joints as arm.velocity in"
                 f" {diagram.station.path}"
             )
     return velocity
@@ -148,5 +149,5 @@ def _stated(values: tuple[float, ...] | None, n: int, where: str) -> Array | Non
     if values is None:
         return None
     if len(values) != n:
-        raise InvalidInputError(f"{where} has {len(values)} numbers, the arm {n} joints")
+        raise InvalidInputError(f"{where} has {len(values)} numbers, but the arm has {n} joints")
     return np.array(values)

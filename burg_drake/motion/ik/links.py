@@ -171,8 +171,8 @@ def _z_along(joint: Joint) -> Array:
         axis = joint.translation_axis()
     else:
         raise InvalidInputError(
-            f"joint {joint.name()!r} of the arm is of type {joint.type_name()!r}; an arm's joints"
-            " are revolute or prismatic"
+            f"arm joint {joint.name()!r} is {joint.type_name()}; the joints of an arm must be"
+            " revolute or prismatic"
         )
     if np.allclose(axis, (0.0, 0.0, 1.0), atol=ZERO):
         return np.eye(3)

@@ -63,8 +63,8 @@ class ArmKinematics:
         for joint in joints:
             if not isinstance(joint, (RevoluteJoint, PrismaticJoint)):
                 raise InvalidInputError(
-                    f"arm joint {joint.name()!r} is {joint.type_name()}; the inverse kinematics"
-                    " knows revolute and prismatic joints"
+                    f"arm joint {joint.name()!r} is {joint.type_name()}; inverse kinematics"
+                    " supports revolute and prismatic joints"
                 )
             positions[joint.position_start()] = 0.0
         plant.SetPositions(context, positions)

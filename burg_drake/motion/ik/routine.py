@@ -83,20 +83,21 @@ class RoutineSolutions:
         ):
             raise InvalidInputError(
                 f"the IK routine returned arrays of shapes {list(dict.fromkeys(shapes))[:4]} for"
-                f" {len(X_AH)} poses; expected {len(X_AH)} arrays (S, {n}), one a pose"
+                f" {len(X_AH)} poses; expected {len(X_AH)} arrays of shape (S, {n}), one for each"
+                " pose"
             )
         return found
 
     def _check(self, X_AH: Array, q: Array) -> None:
         if not np.isfinite(q).all():
-            raise InvalidInputError("the IK routine returned positions that are not finite")
+            raise InvalidInputError("the IK routine returned joint positions that are not finite")
         X = self._arm.forward(q)[0]
         off = np.linalg.norm(X[:, :3, 3] - X_AH[:, :3, 3], axis=1)
         turned = rotation_angle(X[:, :3, :3].swapaxes(-1, -2) @ X_AH[:, :3, :3])
         if len(q) and max(off.max(), turned.max()) > MISSED:
             k = int(np.argmax(np.maximum(off, turned)))
             raise InvalidInputError(
-                f"the IK routine's positions {q[k].round(4).tolist()} bring the hand"
-                f" {off[k]:.4f} m and {np.rad2deg(turned[k]):.2f} degrees away from the"
-                " requested pose; poses are of the hand body in the frame of the arm's base"
+                f"the joint positions {q[k].round(4).tolist()} of the IK routine place the hand"
+                f" {off[k]:.4f} m and {np.rad2deg(turned[k]):.2f} degrees from the requested pose;"
+                " poses are those of the hand body in the frame of the arm's base"
             )

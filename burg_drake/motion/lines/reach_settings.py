@@ -53,11 +53,13 @@ class ReachSettings:
             raise InvalidInputError("limit_margin must be at least 0, joint_travel above 0")
         if not self.redundant or min(self.redundant) < 1:
             raise InvalidInputError(
-                f"redundant {list(self.redundant)} must be whole numbers above 0"
+                f"redundant is {list(self.redundant)}; give whole numbers above 0"
             )
         if not self.starts or min(self.starts) < 1:
-            raise InvalidInputError(f"starts {list(self.starts)} must be whole numbers above 0")
+            raise InvalidInputError(f"starts is {list(self.starts)}; give whole numbers above 0")
         if min(self.chains, self.starts_tried) < 1:
             raise InvalidInputError("chains and starts_tried must be at least 1")
         if not 0.0 < self.deviation[0] <= self.deviation[1]:
-            raise InvalidInputError(f"deviation {list(self.deviation)} must be two rising lengths")
+            raise InvalidInputError(
+                f"deviation is {list(self.deviation)}; give two lengths, the smaller one first"
+            )

@@ -76,7 +76,8 @@ def read_csv(path: Path) -> PlannedMotion:
     joints = tuple(name[2:] for name in header if name.startswith("q_"))
     if not joints or header != list(_meanings(joints)):
         raise InvalidInputError(
-            f"{path} is not a plan: its columns are not t, phase, q_JOINT, v_JOINT, a_JOINT, width"
+            f"{path} is not a plan: it must have the columns t, phase, q_JOINT, v_JOINT, a_JOINT,"
+            " width"
         )
     beside = metadata_path(path)
     try:
@@ -95,9 +96,11 @@ def _data_beside(path: Path, header: Sequence[str]) -> dict[str, Any]:
         (data,) = document["notes"]
         titles = [column["titles"] for column in document["tableSchema"]["columns"]]
     except READ_ERRORS as error:
-        raise InvalidInputError(f"{path} has no notes on a plan; write it again") from error
+        raise InvalidInputError(f"{path} does not describe a plan; write the plan again") from error
     if titles != list(header):
-        raise InvalidInputError(f"{path} is of a table with other columns; write it again")
+        raise InvalidInputError(
+            f"{path} describes a table with other columns; write the plan again"
+        )
     require_version(data, path)
     return dict(data)
 
@@ -106,7 +109,7 @@ def _plan(rows: CsvRows, joints: tuple[str, ...], data: Any) -> PlannedMotion:
     n = len(joints)
     for line, row in rows:
         if len(row) != 3 * n + 3:
-            raise InvalidInputError(f"line {line} has {len(row)} cells, not {3 * n + 3}")
+            raise InvalidInputError(f"line {line} has {len(row)} cells; expected {3 * n + 3}")
     spans = _read_spans(rows)
     t = np.array([_number(row[0], "t", line) for line, row in rows])
     names = [f"{kind}_{joint}" for kind in KINDS for joint in joints]
@@ -146,9 +149,11 @@ def _read_spans(rows: CsvRows) -> dict[str, tuple[int, int]]:
     for k, (line, row) in enumerate(rows):
         name = row[1]
         if name not in PHASES:
-            raise InvalidInputError(f"line {line} has phase {quoted(name)}, not one of {PHASES}")
+            raise InvalidInputError(
+                f"line {line} has phase {quoted(name)}; expected one of {', '.join(PHASES)}"
+            )
         if name in spans and spans[name][1] != k - 1:
-            raise InvalidInputError(f"phase {name!r} begins again in line {line}")
+            raise InvalidInputError(f"phase {name!r} starts a second time in line {line}")
         spans[name] = (spans[name][0] if name in spans else max(0, k - 1), k)
     return spans
 
@@ -159,7 +164,7 @@ def _described_by_rows(
     """What a table alone tells of its plan."""
     step = float(t[1]) if len(t) > 1 else 0.0
     if not step > 0.0:
-        raise InvalidInputError("t does not rise from 0")
+        raise InvalidInputError("the times t do not increase from 0")
     near = round(1.0 / step, 6)
     first, last = spans.get("close", (0, 0))
     widths = [_number(r[-1], "width", n) if r[-1] else None for n, r in (rows[0], rows[-1])]
@@ -172,7 +177,9 @@ def _number(text: str, name: str, line: int) -> float:
     try:
         return float(text)
     except ValueError as error:
-        raise InvalidInputError(f"{name} in line {line} is {quoted(text)}, no number") from error
+        raise InvalidInputError(
+            f"{name} in line {line} is {quoted(text)}, which is not a number"
+        ) from error
 
 
 def _width(plan: PlannedMotion, phase: str) -> str:

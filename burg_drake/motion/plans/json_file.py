@@ -64,7 +64,9 @@ def read_json(path: Path) -> PlannedMotion:
     try:
         document = load_json(path, GRASP_FILE)
     except DocumentError as error:
-        raise DocumentError(f"{error}; give a file of Plan.to_json or Plan.to_csv") from error
+        raise DocumentError(
+            f"{error}; give a file that Plan.to_json or Plan.to_csv wrote"
+        ) from error
     require_version(document, path)
     try:
         return _plan(document)
@@ -92,6 +94,6 @@ def _rows(points: list[dict[str, Any]], n: int) -> list[Array]:
     for name in ("positions", "velocities", "accelerations"):
         for k, point in enumerate(points):
             if len(point[name]) != n or not np.isfinite(point[name]).all():
-                raise InvalidInputError(f"{name} of point {k} are not {n} finite numbers")
+                raise InvalidInputError(f"{name} of point {k} must be {n} finite numbers")
         found.append(np.array([point[name] for point in points], dtype=float))
     return found

@@ -68,10 +68,10 @@ def require_writable(plan: PlannedMotion) -> None:
     """
     whole, rate = plan.whole, plan.approach.rate
     if not np.isfinite([whole.q, whole.v, whole.a]).all():
-        raise InvalidInputError("a plan with samples that are not finite cannot be written")
+        raise InvalidInputError("the plan has samples that are not finite, so it cannot be written")
     for name, phase in plan.phases.items():
         if not np.allclose(phase.t, np.arange(len(phase.t)) / rate, rtol=0.0, atol=1.0 / NANO):
-            raise InvalidInputError(f"phase {name!r} does not have {rate:g} samples a second")
+            raise InvalidInputError(f"phase {name!r} is not sampled at {rate:g} Hz")
 
 
 def plan_data(plan: PlannedMotion) -> dict[str, Any]:
@@ -93,7 +93,7 @@ def require_version(data: Any, path: str | Path) -> None:
         InvalidInputError: it is not.
     """
     if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise InvalidInputError(f"{path} is not a plan: it lacks format {FORMAT!r}")
+        raise InvalidInputError(f"{path} is not a plan: its format is not {FORMAT!r}")
     if data.get("version") != VERSION:
         raise InvalidInputError(
             f"{path} has version {quoted(data.get('version'))}; this release reads {VERSION}"
@@ -108,7 +108,7 @@ def part(document: Mapping[str, Any], name: str) -> Iterator[Any]:
     except BurgError:
         raise
     except READ_ERRORS as error:
-        raise InvalidInputError(f"{name!r} is not as it was written") from error
+        raise InvalidInputError(f"{name!r} is missing or was changed") from error
 
 
 def read_data(document: Mapping[str, Any], joints: tuple[str, ...]) -> PlanDescription:
@@ -154,8 +154,8 @@ def assembled(
     if apart.any():
         k = apart.argmax()
         raise InvalidInputError(
-            f"point {k} is at {t[k]:.9g} s; of {description.rate:g} samples a second it is that at"
-            f" {exact[k]:.9g} s"
+            f"point {k} is at {t[k]:.9g} s; with {description.rate:g} samples per second it must"
+            f" be at {exact[k]:.9g} s"
         )
     _require_spans(spans, len(t))
     parts = {
@@ -187,8 +187,7 @@ def _require_spans(spans: Spans, count: int) -> None:
         if not (first == end < last < count and complete):
             wanted = "to a later one" if name != PHASES[-1] else f"to the last one, {count - 1}"
             raise InvalidInputError(
-                f"phase {name!r} has points {first} to {last}; it has to go from point {end}"
-                f" {wanted}"
+                f"phase {name!r} has points {first} to {last}; it must go from point {end} {wanted}"
             )
         end = last
 
@@ -197,11 +196,11 @@ def _require_rest(parts: Mapping[str, Trajectory], plan: PlannedMotion) -> None:
     """The arm rests between the phases, and for as long as the hand closes."""
     for name, trajectory in parts.items():
         if np.any([trajectory.v[[0, -1]], trajectory.a[[0, -1]]]):
-            raise InvalidInputError(f"at an end of phase {name!r} the arm does not rest")
+            raise InvalidInputError(f"the arm is not at rest at the ends of phase {name!r}")
     close = parts["close"]
     if not np.isfinite(plan.close_time) or len(plan.phases["close"].t) != len(close.t):
         raise InvalidInputError(
-            f"phase 'close' takes {close.duration:g} s, and the hand closes for"
+            f"phase 'close' takes {close.duration:g} s, but the hand closes for"
             f" {plan.close_time:g} s"
         )
     if np.any(close.q != close.q[0]):
@@ -225,7 +224,7 @@ def _require_within(whole: Trajectory, origin: PlanOrigin) -> None:
         if (peak > limit * (1.0 + SLACK)).any():
             joint = int((peak / limit).argmax())
             raise InvalidInputError(
-                f"the {name} of joint {origin.joints[joint]!r} gets to {peak[joint]:.4g}, beyond"
+                f"the {name} of joint {origin.joints[joint]!r} reaches {peak[joint]:.4g}, above"
                 f" its limit of {limit[joint]:.4g}"
             )
 
@@ -259,6 +258,8 @@ def _read_origin(data: dict[str, Any], joints: tuple[str, ...]) -> PlanOrigin:
     }
     limits = ArmLimits(**given)
     if any(len(values) != len(joints) for values in given.values()):
-        raise InvalidInputError(f"the limits in 'origin' are not those of {len(joints)} joints")
+        raise InvalidInputError(
+            f"origin has limits for another number of joints than the {len(joints)} of the plan"
+        )
     rest = {name: value for name, value in data.items() if name not in ("limits", "X_WG")}
     return PlanOrigin(joints=joints, limits=limits, X_WG=check_pose(data["X_WG"], "X_WG"), **rest)

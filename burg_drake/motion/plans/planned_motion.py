@@ -126,8 +126,8 @@ class PlannedMotion:
             wanted.append(("scene", as_scene(scene)))
         if wanted and self.origin is None:
             raise InvalidInputError(
-                f"{name} does not say which scene and arm it is for; a CSV plan has that in the"
-                " file NAME.csv-metadata.json next to it"
+                f"{name} does not say which scene and arm it is for; a CSV plan has this in"
+                " NAME.csv-metadata.json next to it"
             )
         for kind, here in wanted:
             there = getattr(self.origin, kind), getattr(self.origin, f"{kind}_content")

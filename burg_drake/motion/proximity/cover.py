@@ -112,7 +112,8 @@ def _cover(
             return _cover_hull(points, overshoot, given)
     raise InvalidInputError(
         f"collision geometry {inspector.GetName(geometry)!r} of the robot is a"
-        f" {type(shape).__name__}; known are boxes, capsules, cylinders, spheres and convex meshes"
+        f" {type(shape).__name__}; supported are boxes, capsules, cylinders, spheres and convex"
+        " meshes"
     )
 
 

@@ -147,7 +147,8 @@ def _core(inspector: SceneGraphInspector, geometry: GeometryId) -> _Core:
             return _Core(np.array([hull.vertex(i) for i in range(hull.num_vertices())]))
     raise InvalidInputError(
         f"collision geometry {inspector.GetName(geometry)!r} of the robot is a"
-        f" {type(shape).__name__}; known are boxes, capsules, cylinders, spheres and convex meshes"
+        f" {type(shape).__name__}; supported are boxes, capsules, cylinders, spheres and convex"
+        " meshes"
     )
 
 

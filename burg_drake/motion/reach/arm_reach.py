@@ -136,8 +136,8 @@ class ArmReach:
         widths = np.full(len(X), np.nan) if width is None else np.asarray(width, dtype=float)
         if X.ndim != 3 or not len(X) == len(instances) == len(widths):
             raise InvalidInputError(
-                f"X_WG has shape {X.shape} for {len(instances)} instances and {len(widths)} widths;"
-                " give as many poses (N, 4, 4)"
+                f"X_WG has shape {X.shape} for {len(instances)} instances and {len(widths)}"
+                " widths; give N poses (N, 4, 4), N instances and N widths"
             )
         paths = HandPaths(
             self._sweep,

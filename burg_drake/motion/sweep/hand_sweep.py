@@ -206,7 +206,7 @@ class HandSweep:
     def _checked(self, instance: str, X_WG: Array) -> Array:
         if instance and instance not in self._instances:
             raise UnknownNameError(
-                f"there is no instance {instance!r}; {nearest(instance, self._instances)}"
+                f"instance {instance!r} does not exist; {nearest(instance, self._instances)}"
             )
         return check_pose(X_WG, "X_WG")
 

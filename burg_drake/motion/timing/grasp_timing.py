@@ -126,8 +126,8 @@ def _within(q: Array, limits: ArmLimits, name: str) -> Array:
     if outside.any():
         row, joint = np.argwhere(outside)[0]
         raise InvalidInputError(
-            f"{name} of a witness: waypoint {row} has joint {joint + 1} at {q[row, joint]:.4f} rad,"
-            f" outside its limits {limits.lower[joint]:.4f} to {limits.upper[joint]:.4f}"
+            f"{name} of a witness has joint {joint + 1} at {q[row, joint]:.4f} rad in waypoint"
+            f" {row}, outside its limits {limits.lower[joint]:.4f} to {limits.upper[joint]:.4f}"
         )
     return q
 
@@ -164,6 +164,6 @@ def _sampled(
             return trajectory
         motion = motion.time_scaled(MORE * factor)
     raise InvalidInputError(
-        f"a motion still exceeds the arm's limits after it was slowed down {SLOWED} times, to"
+        f"a motion still exceeds the limits of the arm after it was slowed down {SLOWED} times, to"
         f" {motion.duration:g} s"
     )

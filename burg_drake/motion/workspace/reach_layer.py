@@ -104,8 +104,8 @@ def reach_from_above(
     station = as_station(station)
     if not (0.0 < spacing < np.inf and 0.0 <= height < np.inf and yaws >= 1):
         raise InvalidInputError(
-            f"spacing {spacing:g} m must be above 0, height {height:g} m at least 0, and yaws"
-            f" {yaws} at least 1"
+            f"spacing is {spacing:g} m, height {height:g} m and yaws {yaws}; spacing must be above"
+            " 0, height at least 0, and yaws at least 1"
         )
     require_arm(station)
     board = board or Board()

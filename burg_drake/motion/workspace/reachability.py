@@ -65,14 +65,16 @@ class ReachabilitySettings:
 
     def __post_init__(self) -> None:
         if not self.spacing > 0.0 or not self.heights or min(self.heights) < 0.0:
-            raise InvalidInputError("spacing must be above 0, heights at least 0 [m]")
+            raise InvalidInputError("spacing must be above 0 m, and each height at least 0 m")
         if len(self.tilts_deg) != len(self.headings) or not self.tilts_deg:
             raise InvalidInputError(
-                f"{len(self.tilts_deg)} tilts_deg and {len(self.headings)} headings; give a number"
-                " of headings for each tilt"
+                f"there are {len(self.tilts_deg)} tilts_deg and {len(self.headings)} headings;"
+                " give one number of headings for each tilt"
             )
         if not all(0.0 <= tilt <= 180.0 for tilt in self.tilts_deg):
-            raise InvalidInputError(f"tilts_deg {list(self.tilts_deg)} must be from 0 to 180")
+            raise InvalidInputError(
+                f"tilts_deg is {list(self.tilts_deg)}; each must be from 0 to 180"
+            )
         if min(self.yaws, *self.headings, *self.redundant) < 1 or not self.redundant:
             raise InvalidInputError("yaws, headings and redundant must be whole numbers above 0")
 

@@ -166,20 +166,19 @@ def _reach_warnings(
     if not reached.any() and not _reaches_cleared(scene, station, settings):
         heights = " or ".join(f"{100 * h:g}" for h in arm.reachability.heights)
         raise InvalidInputError(
-            f"{station.path}: no part of the board is within reach: {heights} cm above it the arm"
-            f" gets the hand to no point in any of {len(arm.reachability.tilt)} orientations;"
-            " change X_WS, arm.X_WA or what is in the way"
+            f"{station.path}: no part of the board is within reach: {heights} cm above it, the arm"
+            f" reaches no point in any of {len(arm.reachability.tilt)} hand orientations; change"
+            " X_WS, arm.X_WA or the obstacles"
         )
     lines = []
     if not scene.instances and not reached.all():
         lines.append(
-            f"the arm reaches only {percent(reached.mean())} of the board, with any hand"
-            " orientation"
+            f"the arm reaches only {percent(reached.mean())} of the board in any hand orientation"
         )
     far = unreachable_objects(arm.span, scene, station)
     lines += far.values()
     lines += [
-        f"over {name!r} and close around it the arm reaches none of {len(arm.reachability.tilt)}"
+        f"above {name!r} and close around it, the arm reaches none of {len(arm.reachability.tilt)}"
         " hand orientations"
         for name in scene.instances
         if name not in far

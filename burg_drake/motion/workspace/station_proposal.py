@@ -108,7 +108,7 @@ def propose_station(scene: Scene, path: Path) -> StationProposal:
                 found.append((station, report.warnings))
         if found and not found[-1][1]:
             break
-    nowhere = (bare, ("no place was found for an arm: it has the hand alone",))
+    nowhere = (bare, ("no place for an arm was found: the station has only a hand",))
     station, warnings = min(found, key=lambda item: len(item[1]), default=nowhere)
     return StationProposal(station.document, "", misfits, warnings)
 
@@ -151,13 +151,13 @@ def misfit(scene: Scene, station: Station) -> str:
         beyond = float((np.abs(p_W[:, :2] - center) - half).max())
         if beyond > TOUCH_TOLERANCE:
             what = name if name == "the board" else repr(name)
-            return f"{size}, and {what} would reach {1e3 * beyond:.0f} mm beyond"
+            return f"{size}, and {what} would extend {1e3 * beyond:.0f} mm over its edge"
     for obstacle, box in station.document.background.items():
         corners = np.array(list(itertools.product((-0.5, 0.5), repeat=3))) * box.size
         p_WB = transform_points(box.X_WB.matrix(), corners)
         for name in scene.background:
             if _depth(placed[name], p_WB) > TOUCH_TOLERANCE:
-                return f"its {obstacle!r} would stand in {name!r}"
+                return f"its {obstacle!r} would overlap {name!r}"
     try:
         require_valid_scene(scene, station)
         far = require_usable_arm(scene, station)

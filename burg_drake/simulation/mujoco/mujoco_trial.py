@@ -79,8 +79,8 @@ class MujocoTrial(HandAloneTrial[MujocoWorld]):
         mujoco = load_mujoco()
         if engine.simulator != "mujoco":
             raise InvalidInputError(
-                f"engine {engine.name!r} is {engine.simulator}; a MujocoTrial needs one whose"
-                " simulator is mujoco"
+                f"engine {engine.name!r} has simulator {engine.simulator}; a MujocoTrial needs an"
+                " engine with simulator mujoco"
             )
         self.failures = (*self.failures, mujoco.FatalError)
         check_objects(scene)

@@ -96,7 +96,7 @@ class MujocoWorld:
             self.model: Any = mj.MjModel.from_xml_string(xml)
         except ValueError as error:
             raise InvalidInputError(
-                f"{scene.path}: MuJoCo cannot have the scene ({' '.join(str(error).split())})"
+                f"{scene.path}: MuJoCo cannot load the scene: {' '.join(str(error).split())}"
             ) from error
         self.data: Any = mj.MjData(self.model)
         self._scratch: Any = mj.MjData(self.model)

@@ -34,7 +34,7 @@ def _check_object(library: ObjectLibrary, name: str) -> None:
     if not entry.pieces:
         raise InvalidInputError(
             f"object {name!r} has no convex pieces, which engine mujoco needs; build it again"
-            " without a contact geometry of its own, or evaluate it with an engine of Drake"
+            " without a contact geometry of its own, or evaluate with an engine of Drake"
         )
     for piece in entry.pieces:
         path = library.path(piece)
@@ -45,6 +45,6 @@ def _check_object(library: ObjectLibrary, name: str) -> None:
         extents = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
         if len(points) < FEWEST_POINTS or extents[-1] <= FLAT * extents[0]:
             raise InvalidInputError(
-                f"object {name!r}: its piece {path.name} has no volume ({len(points)} points);"
-                " engine mujoco needs convex pieces that have one"
+                f"object {name!r}: convex piece {path.name} has no volume ({len(points)} points),"
+                " which engine mujoco needs; build the object again"
             )

@@ -38,7 +38,8 @@ class LoadSettings:
     def __post_init__(self) -> None:
         if not 0.0 < self.smallest < self.largest:
             raise InvalidInputError(
-                f"loads from {self.smallest:g} to {self.largest:g} g: must rise from above 0"
+                f"loads are from {self.smallest:g} to {self.largest:g} g; the smallest must be"
+                " above 0, the largest above the smallest"
             )
         for name in ("tolerance", "slide", "tug_rise", "tug_time", "frequency", "periods"):
             if not getattr(self, name) > 0:
@@ -61,7 +62,8 @@ class FrictionSettings:
     def __post_init__(self) -> None:
         if not 0.0 < self.smallest < self.largest:
             raise InvalidInputError(
-                f"friction from {self.smallest:g} to {self.largest:g}: must rise from above 0"
+                f"friction is from {self.smallest:g} to {self.largest:g}; the smallest must be"
+                " above 0, the largest above the smallest"
             )
         if not self.tolerance > 0.0:
             raise InvalidInputError(f"tolerance is {self.tolerance:g}; give more than 0")

@@ -159,8 +159,8 @@ def _judge(poses: Sequence[StablePose], outcomes: Sequence[_Outcome]) -> Confirm
     if not confirmed:
         kept = replace(poses[0], probability=1.0, residual=_rounded(outcomes[0].residual))
         note = (
-            "no stable pose is confirmed by simulation; the most probable is kept, though the"
-            f" object tilts by {np.rad2deg(outcomes[0].residual):.0f} degrees from it"
+            "simulation confirms no stable pose; the most probable one is kept, though the object"
+            f" tilts by {np.rad2deg(outcomes[0].residual):.0f} degrees from it"
         )
         return Confirmation((kept,), (note,))
     share = {k: 0.0 for k in confirmed}
@@ -195,9 +195,10 @@ def _note(toppled: Sequence[StablePose], lost: float) -> str:
     if len(toppled) > 1:
         which = f"{len(toppled)} stable poses ({share:.1f} %) topple in simulation and are left out"
     if lost == 0.0:
-        return f"{which}; the share goes to where it ends up"
+        return f"{which}; its probability goes to the poses in which the object ends up"
     return (
-        f"{which}; {100.0 * lost:.1f} % go to all others, as where it ends up is not a known pose"
+        f"{which}; {100.0 * lost:.1f} % are shared by all others, because the object ends up in no"
+        " known pose"
     )
 
 

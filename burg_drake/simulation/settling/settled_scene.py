@@ -205,8 +205,8 @@ def _require_above(built: StationDiagram) -> None:
         height = float((built.X_WO(name) @ center_of_mass)[2])
         if height < 0.0:
             raise InvalidInputError(
-                f"{built.scene.path}: {name!r} starts {-height * 1e3:.0f} mm below the table's top;"
-                " move it up"
+                f"{built.scene.path}: {name!r} starts {-height * 1e3:.0f} mm below the top of the"
+                " table; move it up"
             )
 
 
@@ -217,6 +217,6 @@ def _require_apart(built: StationDiagram) -> None:
             depth = min(depth, depth_in_table(built.scene, built.X_WO(a), a))
         if depth > (DEEPEST if b in yielding else TOUCH_TOLERANCE):
             raise InvalidInputError(
-                f"{built.scene.path}: {a!r} and {b!r} overlap by {depth * 1e3:.1f} mm, and would"
-                " burst apart; move them apart"
+                f"{built.scene.path}: {a!r} and {b!r} overlap by {depth * 1e3:.1f} mm and would be"
+                " thrown apart; move them apart"
             )

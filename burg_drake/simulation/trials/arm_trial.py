@@ -207,11 +207,14 @@ class ArmTrial(DrakeTrial):
         if not self._transfer:
             del parts["transfer"]
         if not _phases_with_target(plan):
-            raise InvalidInputError("the plan does not move the hand with what it holds")
+            raise InvalidInputError(
+                "the plan does not move the hand while it holds the object; it needs a lift or a"
+                " retreat"
+            )
         for name, part in parts.items():
             if part.q.shape[1] != joints:
                 raise InvalidInputError(
-                    f"the plan's {name} moves {part.q.shape[1]} joints; the arm of station"
+                    f"the plan's {name} has {part.q.shape[1]} joints, but the arm of station"
                     f" {self.station.name!r} has {joints}"
                 )
         names = list(parts)
@@ -219,7 +222,7 @@ class ArmTrial(DrakeTrial):
             gap = float(np.abs(parts[other].q[0] - parts[one].q[-1]).max())
             if gap > APART:
                 raise InvalidInputError(
-                    f"the plan's {other} begins {gap:.2g} rad from where its {one} ends"
+                    f"the plan's {other} starts {gap:.2g} rad from the end of its {one}"
                 )
         X_WG_end = self._X_WG_at(plan.approach.q[-1:])[0]
         distance = float(np.linalg.norm(X_WG_end[:3, 3] - X_WG[:3, 3]))
@@ -227,8 +230,8 @@ class ArmTrial(DrakeTrial):
         angle = min(float(rotation_angle(R)) for R in turns)
         if distance > OFF_POSITION or angle > OFF_ANGLE:
             raise InvalidInputError(
-                f"the plan leads the hand to {1e3 * distance:.1f} mm and"
-                f" {np.rad2deg(angle):.1f} degrees from the grasp; plan this grasp in this scene"
+                f"the plan ends {1e3 * distance:.1f} mm and {np.rad2deg(angle):.1f} degrees from"
+                " the grasp; plan this grasp in this scene"
             )
 
     def _X_WG_at(self, q: Array) -> Array:

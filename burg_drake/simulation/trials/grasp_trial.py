@@ -126,7 +126,7 @@ class GraspTrial(ABC, Generic[W]):
         if instance not in self.scene.instances:
             free = ", ".join(self.scene.instances) or "(none)"
             raise InvalidInputError(
-                f"{instance!r} is not a free object of scene {self.scene.name!r}; free are: {free}"
+                f"{instance!r} is not a free instance of scene {self.scene.name!r}; free are {free}"
             )
         return instance_pose(self.scene, self.station, instance) @ check_pose(X_OG, "X_OG")
 

@@ -249,8 +249,8 @@ def lift_paths(motion: GraspMotion, X_WG: Array, lift: float | None = None) -> t
     height = motion.lift_height if lift is None else lift
     if not 0.0 <= height < math.inf or motion.retreat + height <= 0.0:
         raise InvalidInputError(
-            f"lift is {height:g} m; with a retreat of {motion.retreat:g} m it must be"
-            " finite, from 0 on, and move the hand"
+            f"lift is {height:g} m and retreat {motion.retreat:g} m; give a finite lift of 0 or"
+            " more, and above 0 if there is no retreat"
         )
     paths = (
         LiftPath(-X_WG[:3, 2], motion.retreat),

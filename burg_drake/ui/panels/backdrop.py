@@ -112,12 +112,14 @@ class BackdropPanel:
     def _chosen_camera(self) -> str:
         number = str(self._camera.value)
         if number not in CAMERAS:
-            raise InvalidInputError(f"camera {number!r}; give one of {', '.join(CAMERAS)}")
+            raise InvalidInputError(
+                f"camera {number!r} does not exist; give one of {', '.join(CAMERAS)}"
+            )
         return number
 
     def _use_image(self, image: Image | None, name: str) -> None:
         if image is None:
-            raise InvalidInputError(f"{name} is not an image that can be read; give PNG or JPEG")
+            raise InvalidInputError(f"{name} cannot be read as an image; give PNG or JPEG")
         from burg_drake.cameras.rectification import board_picture
 
         self._show_picture(board_picture(image, self._actions.session.view.document.board), name)

@@ -40,8 +40,8 @@ def require_guarded(address: str, port: int) -> None:
     for headers in foreign:
         if _status(near, port, headers) != HTTPStatus.FORBIDDEN:
             raise MissingDependencyError(
-                "the page was not opened, because other web sites could reach it with this version"
-                " of viser: pip install 'burg-drake[ui]'"
+                "the page was not opened, because other web sites could reach it with this"
+                " version of viser; install another one: pip install 'burg-drake[ui]'"
             )
 
 

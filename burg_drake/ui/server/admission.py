@@ -62,14 +62,14 @@ class Admission:
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         for name in SINGLE_HEADERS:
             if len(request.headers.get_all(name)) > 1:
-                raise RequestError(HTTPStatus.BAD_REQUEST, f"{name} is given twice")
+                raise RequestError(HTTPStatus.BAD_REQUEST, f"header {name} is given twice")
         path, _, query = request.path.partition("?")
         upgrade = "Upgrade" in request.headers
         require_local_host(
             request.headers.get, served=self.host, is_page=path == "/" and not upgrade
         )
         if path != "/":
-            raise RequestError(HTTPStatus.NOT_FOUND, "there is only one page, /")
+            raise RequestError(HTTPStatus.NOT_FOUND, "the only page of this server is /")
         if upgrade:
             self._require_browser(connection, request)
             return None
@@ -78,7 +78,7 @@ class Admission:
     def _require_browser(self, connection: ServerConnection, request: Request) -> None:
         """What opens a websocket is our page: browsers always say whose page asks."""
         if "Origin" not in request.headers:
-            raise RequestError(HTTPStatus.FORBIDDEN, "a websocket of no page is refused")
+            raise RequestError(HTTPStatus.FORBIDDEN, "a websocket without Origin is refused")
         if not self._has_cookie(request):
             raise RequestError(HTTPStatus.FORBIDDEN, NO_TOKEN)
         if len(connection.server.connections) >= MAX_CONNECTIONS:

@@ -53,7 +53,8 @@ def guarded_server(listener: socket.socket, admission: Admission) -> viser.Viser
         return server
     stop(server)
     raise MissingDependencyError(
-        f"viser {viser.__version__} cannot be guarded: pip install 'burg-drake[ui]'"
+        f"viser {viser.__version__} cannot be protected from other web sites; install another"
+        " version: pip install 'burg-drake[ui]'"
     )
 
 

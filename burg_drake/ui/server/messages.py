@@ -109,7 +109,7 @@ class BoundedConnection(ServerConnection):
             raise RefusedError("only values of controls can be set")
         if message.type == "FileTransferStartUpload":
             if not self._connected:
-                raise RefusedError("uploads come after the page's camera")
+                raise RefusedError("a file can only be uploaded after the page has sent its camera")
             self._uploads.start(
                 self,
                 message.transfer_uuid,

@@ -58,15 +58,17 @@ class Uploads:
             RefusedError: it is too large, or no page announces files like that.
         """
         if not 0 <= size <= LARGEST_UPLOAD:
-            raise RefusedError(f"a file of {size} bytes is refused")
+            raise RefusedError(
+                f"a file of {size} bytes is refused; at most {LARGEST_UPLOAD} bytes are allowed"
+            )
         if not (size > 0) <= parts <= -(-size // SMALLEST_PART):
             raise RefusedError(f"a file in {parts} parts is refused")
         if len(name) > LONGEST_NAME or name in ("", ".", "..") or {*name} & {*"/\\\0"}:
-            raise RefusedError("this name of a file is refused")
+            raise RefusedError("the file name is not allowed")
         if key in self._transfers or len(self._transfers) >= MOST_UPLOADS:
-            raise RefusedError("too many files at once")
+            raise RefusedError("too many files are uploaded at once")
         if size + sum(transfer.size for transfer in self._transfers.values()) > ALL_UPLOADS:
-            raise RefusedError("too many files at once")
+            raise RefusedError("the files uploaded at once are too large")
         if parts:
             self._transfers[key] = _Transfer(owner, size, size, parts)
 
@@ -85,7 +87,7 @@ class Uploads:
         transfer.bytes_left -= size
         transfer.parts_left -= 1
         if transfer.bytes_left < 0:
-            raise RefusedError("a file is larger than it was announced")
+            raise RefusedError("a file is larger than announced")
         if transfer.parts_left == 0:
             del self._transfers[key]
         return True

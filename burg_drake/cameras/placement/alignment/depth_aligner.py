@@ -56,16 +56,17 @@ def check_depth(depth: NDArray[Any], intrinsics: Intrinsics) -> NDArray[np.float
     depth = np.asarray(depth)
     if depth.ndim != 2 or depth.dtype.kind not in "fui":
         raise InvalidInputError(
-            f"the depth image is an array {depth.shape} of {depth.dtype}; give (H, W) of metres"
+            f"the depth image has shape {depth.shape} and type {depth.dtype}; expected (H, W) in"
+            " metres"
         )
     intrinsics.require_size(depth.shape[1], depth.shape[0], "the depth image")
     clean = np.where(np.isfinite(depth) & (depth > 0), depth, 0).astype(np.float32)
     if not clean.any():
-        raise InvalidInputError("the depth image has no distance above 0 in it")
+        raise InvalidInputError("the depth image is empty: no pixel has a depth above 0")
     middle = float(np.median(clean[clean > 0]))
     if middle > FARTHEST:
         raise InvalidInputError(
-            f"the depth image has a median of {middle:g}; give metres (is it in millimetres?)"
+            f"the median of the depth image is {middle:g} m; give metres (is it in millimetres?)"
         )
     return clean
 
