@@ -183,6 +183,17 @@ def judged_here() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="module")
+def no_pose_mistakes() -> Iterator[None]:
+    """Grasps that fit are not looked for in the frames of other projects. That is most of the work
+    on a file of few grasps, and has tests of its own."""
+    place = "burg_drake.evaluation.grasp_sets.mistake_search"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(f"{place}.find_mistake", lambda *_: None)
+        patch.setattr(f"{place}.half_width_note", lambda *_: "")
+        yield
+
+
 def _pool_or_this_process(pool: type) -> Any:
     from burg_drake.core import BurgError
     from burg_drake.evaluation.stages.judge import ScreenAnswers, judge_grasp, screen_grasps

@@ -42,7 +42,7 @@ X_OG = np.stack([ABOVE, ABOVE @ make_pose(p_AB=(0, 0, 0.1)), ABOVE @ make_pose(p
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _judged_here(judged_here: None, measured_once: None) -> None:
+def _judged_here(judged_here: None, measured_once: None, no_pose_mistakes: None) -> None:
     """What the verbs say and write is not about processes; `tests/evaluation` has those."""
 
 

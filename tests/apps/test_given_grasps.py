@@ -33,6 +33,11 @@ OUTCOMES = ["lifted", "no_contact"]
 QUICK = ["--engine", "screening", "--workers", "1", "--quiet"]
 
 
+@pytest.fixture(scope="module")
+def no_pose_mistakes() -> None:
+    """Here they are looked for."""
+
+
 def judged(folder: Path, *arguments: str) -> dict[str, np.ndarray]:
     """The results of evaluating on a scene of two objects."""
     (folder / "two.yaml").write_text(TWO)

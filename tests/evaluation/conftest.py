@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 
 @pytest.fixture(scope="module", autouse=True)
-def no_chart_of_reach() -> Iterator[None]:
+def no_chart_of_reach(no_pose_mistakes: None) -> Iterator[None]:
     """How far the arm reaches is most of the work of a page, and has a test of its own."""
     with pytest.MonkeyPatch.context() as patch:
         place = "burg_drake.evaluation.report.page.reachability_section"

@@ -69,6 +69,11 @@ PLANTED = {
 
 
 @pytest.fixture(scope="module")
+def no_pose_mistakes() -> None:
+    """Here they are looked for."""
+
+
+@pytest.fixture(scope="module")
 def six() -> Scene:
     return load_scene("tabletop_six")
 

@@ -43,7 +43,7 @@ MEASURED = ("clearance", "slip", "tilt", "pad_force", "patch_area", "lift")
 
 
 @pytest.fixture(scope="module")
-def engines(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Run]:
+def engines(no_pose_mistakes: None, tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Run]:
     """The same grasps by `screening` and by `standard`: along the box's upper edge, up to where
     nothing is gripped any more; within it; above it."""
     folder = tmp_path_factory.mktemp("engines")
