@@ -1,7 +1,7 @@
 """The reference of documents: tables of all keys for the page, and the schemas for editors.
 
-As an extension of Sphinx it adds the tables to `reference/documents.md`, and `schema/scene.json` and
-the others to the site.
+As an extension of Sphinx it adds the tables to `reference/documents.md`, and files such as
+`schema/scene.json` to the site.
 """
 
 from __future__ import annotations
