@@ -50,7 +50,7 @@ def test_beyond_what_is_tried(trial: HandTrial) -> None:
 
 
 def test_bad_settings() -> None:
-    with pytest.raises(InvalidInputError, match=r"friction from 0\.5 to 0\.2: must rise"):
+    with pytest.raises(InvalidInputError, match=r"friction is from 0\.5 to 0\.2;"):
         FrictionSettings(smallest=0.5, largest=0.2)
     with pytest.raises(InvalidInputError, match="tolerance is 0; give more than 0"):
         FrictionSettings(tolerance=0.0)

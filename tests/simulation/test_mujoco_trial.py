@@ -333,7 +333,9 @@ def test_an_engine_runs_its_own_trials(scene: Scene) -> None:
         InvalidInputError, match="'mujoco' is mujoco, which simulates the hand alone"
     ):
         HandTrial(scene, make_station(), engine="mujoco")
-    with pytest.raises(InvalidInputError, match="'standard' is drake; a MujocoTrial needs"):
+    with pytest.raises(
+        InvalidInputError, match="'standard' has simulator drake; a MujocoTrial needs"
+    ):
         MujocoTrial(scene, make_station(), engine="standard")
 
 
