@@ -109,7 +109,7 @@ def test_a_collision_before_the_approach_is_shown_where_it_is(
 def test_unknown_target(scene: Scene, station: Station) -> None:
     meshcat = open_meshcat()
     trial = HandTrial(scene, station, meshcat=meshcat)
-    with pytest.raises(InvalidInputError, match=r"'table' is not a free object.*mug"):
+    with pytest.raises(InvalidInputError, match=r"'table' is not a free instance.*mug"):
         record_trial(trial, "table", X_OG, meshcat)
 
 

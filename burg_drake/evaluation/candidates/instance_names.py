@@ -100,7 +100,7 @@ def instances_called(scene: Scene, name: str) -> list[str]:
     if not found:
         known = {*instances, *(instance.object for instance in instances.values())}
         raise UnknownNameError(
-            f"scene {scene.name!r} has no free object {name!r}; {nearest(name, known)}"
+            f"scene {scene.name!r} has no free instance {name!r}; {nearest(name, known)}"
         )
     return found
 

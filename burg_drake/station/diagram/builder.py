@@ -145,7 +145,7 @@ def build_station_diagram(
     alone = for_trials if isinstance(for_trials, str) else None
     if alone is not None and alone not in scene.instances:
         known = nearest(alone, tuple(scene.instances))
-        raise UnknownNameError(f"{alone!r} is not a free object of scene {scene.name!r}; {known}")
+        raise UnknownNameError(f"{alone!r} is not a free instance of scene {scene.name!r}; {known}")
     on_patches = engine.contact_model != "point"
     if alone is not None:
         free = {alone: add(alone, bare=on_patches and needs_no_pieces(scene, station, alone))}
