@@ -206,7 +206,7 @@ def test_an_object_without_grasps_is_said(
         (["household", "--only", "bxo", "-o", "x.h5"], "has no object 'bxo'; did you mean 'box'?"),
         (["household", "--only", "mug, bxo", "-o", "x.h5"], "has no object 'bxo'; did you mean"),
         (["household", "--approach-angle", "60", "-o", "x.h5"], "limit the approach"),
-        (["tabletop_six", "--only", "can", "-o", "x.h5"], "has no free object 'can'"),
+        (["tabletop_six", "--only", "can", "-o", "x.h5"], "has no free instance 'can'"),
         (["tabletop_six", "-o", "x.txt"], "no format of grasps has the suffix '.txt'"),
         (["tabletop_six", "-o", "x.csv"], "has grasps in the world frame; write a .h5 file"),
         (["tabletop_six", "--to", "acronim", "-o", "x.h5"], "there is no grasp format 'acronim'"),

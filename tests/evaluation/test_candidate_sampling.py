@@ -131,7 +131,7 @@ def test_standoffs_end_with_the_pads_of_the_hand(scene: Scene) -> None:
 
 def test_what_does_not_fit(scene: Scene, station: Station) -> None:
     library, settings = scene.library, SamplingSettings()
-    with pytest.raises(UnknownNameError, match=r"'three' has no free object 'lef'; .*'left'"):
+    with pytest.raises(UnknownNameError, match=r"'three' has no free instance 'lef'; .*'left'"):
         on_scene(scene, station, only=["lef"])
     with pytest.raises(UnknownNameError, match="weights: the scene does not have object 'cub'"):
         on_scene(scene, station, weights={"cub": np.ones(12)})
