@@ -70,6 +70,15 @@ pygments_dark_style = "a11y-dark"
 def setup(app: Any) -> None:
     """Called by Sphinx."""
     app.connect("autodoc-process-docstring", _as_written, priority=900)  # after napoleon
+    app.connect("html-page-context", _link_only_stored_pages)
+
+
+def _link_only_stored_pages(
+    app: Any, pagename: str, templatename: str, context: dict[str, Any], doctree: Any
+) -> None:
+    """Leaves the links to view and edit a page out where the repository has no such page."""
+    if "generated" in (context.get("meta") or {}):
+        context["page_source_suffix"] = ""
 
 
 def _as_written(app: Any, what: str, name: str, value: Any, options: Any, lines: list[str]) -> None:

@@ -2,8 +2,8 @@
 
 Sphinx reads a copy of docs/ in build/site. Pages that code can tell are added to the copy: the
 public names, the command line, outcomes and columns, and the gallery of examples. Nothing that is
-generated lies in docs/ itself. Comments for tests are left out, and links that lead out of docs/
-go to the repository.
+generated lies in docs/ itself. Comments for tests are left out, links that lead out of docs/ go to
+the repository, and each picture and each named script gets a link to its source.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import itertools
 import re
 import shutil
 import sys
+import tempfile
 import textwrap
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -82,11 +83,14 @@ COMMAND_PICTURES = {
     ),
 }
 """Pictures that commands give, with a title."""
+LIVE_RUN = "evaluate tabletop_six --only mug -n 1 --mode arm --quiet"
 LIVE_PAGES = {
-    "frames.html": (("frames",), "frames.png", "Grasp frames of other projects, in 3D"),
-    "household.html": (("library", "show", "household"), "household.png", "Built-in objects in 3D"),
+    "lift.html": ("replay RUN --best", "replay.png", "A grasp, from the approach to the lift"),
+    "frames.html": ("frames", "frames.png", "Grasp frames of other projects"),
+    "household.html": ("library show household", "household.png", "Built-in objects"),
 }
-"""Self-contained 3D pages, by the command that writes them, with picture and title."""
+"""Self-contained 3D pages, by the command that writes them, with picture and title. RUN is the
+folder that `LIVE_RUN` writes."""
 
 
 def main() -> int:
@@ -112,6 +116,8 @@ def build_site(output: Path, source: Path = ROOT / "build" / "site") -> int:
     """
     from sphinx.cmd.build import main as sphinx
 
+    if (output / ".buildinfo").exists():  # an earlier site, with pages that may be gone
+        shutil.rmtree(output)
     write_source(source)
     options = ["--fail-on-warning", "--keep-going", "--quiet", "--jobs", "auto"]
     code = sphinx([*options, str(source), str(output)])
@@ -134,7 +140,7 @@ def write_source(folder: Path) -> None:
     for name, text in generated_pages().items():
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, "utf-8")
+        path.write_text(f"---\ngenerated: true\n---\n\n{_for_sphinx(text, DOCS / name)}", "utf-8")
 
 
 def generated_pages() -> dict[str, str]:
@@ -149,7 +155,8 @@ def generated_pages() -> dict[str, str]:
 
 
 def _for_sphinx(text: str, place: Path) -> str:
-    """A page without comments, whose links out of docs/ go to the repository."""
+    """A page without comments, whose links out of docs/ go to the repository, with links to the
+    scripts that it names and to those that make its pictures."""
 
     def link(found: re.Match[str]) -> str:
         target, _, anchor = found[1].partition("#")
@@ -158,8 +165,39 @@ def _for_sphinx(text: str, place: Path) -> str:
             return found[0]
         return f"]({BLOB}{path.relative_to(ROOT)}{anchor and '#'}{anchor})"
 
+    def picture(found: re.Match[str]) -> str:
+        script = picture_script(found[1])
+        return f"{found[0]}\n\n[How this picture is made]({BLOB}{script}){{.picture-script}}"
+
+    def script(found: re.Match[str]) -> str:
+        known = (ROOT / found[1]).exists()
+        return f"[{found[0]}]({BLOB}{found[1]})" if known else found[0]
+
     text = re.sub(r"^<!--.*?-->\n", "", text, flags=re.DOTALL | re.MULTILINE)
+    text = re.sub(r"(?<!\[)`((?:benchmarks|examples|tools)/[\w/]+\.py)[^`\n]*`", script, text)
+    text = re.sub(r"^!\[.*\]\([./]*images/([\w.]+)\)$", picture, text, flags=re.MULTILINE)
     return re.sub(r"\]\(([^)\s]+)\)", link, text)
+
+
+def picture_script(name: str) -> str:
+    """The script that makes a picture of docs/images.
+
+    Args:
+        name: of the picture's file.
+
+    Returns:
+        Path from the root of the repository.
+
+    Raises:
+        LookupError: no script in tools/ or benchmarks/ names it.
+    """
+    wanted = name, f'"{Path(name).stem}": '  # those of the setup page have no ending
+    for folder in ("tools", "benchmarks"):
+        for path in sorted((ROOT / folder).glob("*.py")):
+            code = path.read_text("utf-8")
+            if path.stem != "site" and any(text in code for text in wanted):
+                return path.relative_to(ROOT).as_posix()
+    raise LookupError(f"no script in tools/ or benchmarks/ makes docs/images/{name}")
 
 
 def _python_pages() -> Iterator[tuple[str, str]]:
@@ -362,15 +400,15 @@ def _gallery_pages() -> Iterator[tuple[str, str]]:
         for command, (picture, title) in COMMAND_PICTURES.items()
     ]
     live = [
-        _card(title, "Turn it with the mouse.", picture, f"live/{page}", "url")
+        _card(title, "Turn it with the mouse; some megabytes.", picture, f"live/{page}", "url")
         for page, (_, picture, title) in LIVE_PAGES.items()
     ]
     yield (
         "gallery.md",
-        "# Gallery\n\n## Programs\n\nEach picture opens the program in `examples/` that it belongs"
-        f" to.\n\n{_grid(cards)}\n## In 3D\n\n{_grid(live)}\n## Commands\n\n"
+        "# Gallery\n\n## Programs\n\nEach card opens a program in `examples/`, with what it prints. Its"
+        f" picture shows what the program is about.\n\n{_grid(cards)}\n## In 3D\n\n{_grid(live)}\n"
+        "## Commands\n\nRuns, trials and photos in these commands are your own.\n\n"
         + "\n".join(commands)
-        + f"\nAll pictures are made by the scripts in [tools/]({TREE}tools).\n"
         + f"\n```{{toctree}}\n:hidden:\n\n{toctree}\n```\n",
     )
 
@@ -398,9 +436,15 @@ def _grid(cards: list[str]) -> str:
 def _write_live_pages(folder: Path) -> None:
     """Runs the commands that write 3D pages."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, (words, _, _) in LIVE_PAGES.items():
-        if code := command([*words, "--html", str(folder / name)]):
-            raise SystemExit(code)
+    with tempfile.TemporaryDirectory() as temporary:
+        run = str(Path(temporary) / "run")
+        commands = [[*LIVE_RUN.split(), "-o", run]]
+        for name, (line, _, _) in LIVE_PAGES.items():
+            words = [run if word == "RUN" else word for word in line.split()]
+            commands.append([*words, "--html", str(folder / name)])
+        for words in commands:
+            if code := command(words):
+                raise SystemExit(code)
 
 
 def _table(head: str, rows: Iterable[str]) -> str:

@@ -61,4 +61,4 @@ def build(item: BuildTask) -> Built:
     try:
         return build_object(item.source, item.keys, item.root, item.folder, item.confirm)
     except SystemExit as error:  # DRAKE_DEMAND ends this way
-        raise SimulationError(f"Drake gave up: {error}") from error
+        raise SimulationError(f"Drake failed: {error}") from error

@@ -3,4 +3,8 @@ document.addEventListener("DOMContentLoaded", () => {
   for (const block of document.querySelectorAll("pre, article table.docutils")) {
     block.tabIndex = 0;
   }
+  // Titles of tables of contents are headings without a level.
+  for (const title of document.querySelectorAll("p.caption[role=heading]")) {
+    title.setAttribute("aria-level", "2");
+  }
 });

@@ -108,7 +108,7 @@ def test_a_node_in_a_real_ros(
     assert "the board is in sight" in told
     # Images that arrive before the first camera_info have no pose.
     assert re.search(r"images a second, \d+ % with a pose", told)
-    assert ("with best effort" in told) == (reliability == "best_effort")
+    assert ("with best-effort" in told) == (reliability == "best_effort")
     if reliability == "reliable":
         assert [answer["sent"] for answer in answers] == [1] * images
 
