@@ -117,7 +117,8 @@ EXAMPLES = {
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_examples_of_docstrings_are_about_what_there_is(name: str) -> None:
-    assert f"{name}(" in EXAMPLES[name] or f"{name}." in EXAMPLES[name]
+    loader = f"burg.load_{name.rpartition('.')[2].lower()}"
+    assert any(f"{call}{end}" in EXAMPLES[name] for call in (name, loader) for end in "(.")
     require_existing(ast.parse(EXAMPLES[name], name))
 
 
@@ -199,10 +200,28 @@ def test_yaml_fits_its_schema(block: Block) -> None:
     parse_document(code, schema, block.page.name)
 
 
+UNCLEAR = re.compile(
+    r"\bof which\b|\bsuch an? [a-z]|\banew\b|\b(?:is|are) none of\b|\bwhat there is\b"
+    r"|\b[wW]hat became of\b"
+)
+"""Phrases that readers of earlier pages and messages had to read twice."""
+
+
 @pytest.mark.parametrize("page", PAGES, ids=ids)
 def test_pages_read_plainly(page: Path) -> None:
-    """Phrases that readers of earlier pages had to read twice."""
     if "contributing" not in page.parts:
-        phrases = r"\bof which\b|\bsuch an? [a-z]|\banew\b|\b(?:is|are) none of\b|\bwhat there is\b"
         text = re.sub(r"```.*?```", "", page.read_text("utf-8"), flags=re.DOTALL)
-        assert re.findall(phrases, text) == []
+        assert UNCLEAR.findall(text) == []
+
+
+def test_messages_read_plainly() -> None:
+    """All strings of the package but docstrings: messages, help, reports and pages."""
+    found = []
+    for path in (ROOT / "burg_drake").rglob("*.py"):
+        nodes = list(ast.walk(ast.parse(path.read_text("utf-8"))))
+        docstrings = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
+        for node in nodes:
+            text = getattr(node, "value", None) if isinstance(node, ast.Constant) else None
+            if isinstance(text, str) and id(node) not in docstrings and UNCLEAR.search(text):
+                found.append(f"{path.relative_to(ROOT)}:{node.lineno}: {text}")
+    assert found == []

@@ -405,8 +405,9 @@ def _gallery_pages() -> Iterator[tuple[str, str]]:
     ]
     yield (
         "gallery.md",
-        "# Gallery\n\n## Programs\n\nEach card opens a program in `examples/`, with what it prints. Its"
-        f" picture shows what the program is about.\n\n{_grid(cards)}\n## In 3D\n\n{_grid(live)}\n"
+        "# Gallery\n\n## Programs\n\nEach card opens a program in `examples/`, with what it prints."
+        f" Its picture shows what the program is about.\n\n{_grid(cards)}\n"
+        f"## In 3D\n\n{_grid(live)}\n"
         "## Commands\n\nRuns, trials and photos in these commands are your own.\n\n"
         + "\n".join(commands)
         + f"\n```{{toctree}}\n:hidden:\n\n{toctree}\n```\n",

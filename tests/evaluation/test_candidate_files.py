@@ -152,7 +152,7 @@ def test_object_ids_and_names_decide(scene: Scene, tmp_path: Path) -> None:
         read_grasps(scene, path, X_SF=X_SC, object_ids={7: "bar"})
     with pytest.raises(InvalidInputError, match=r"7 is named 'cube', but .* left, right"):
         read_grasps(scene, path, X_SF=X_SC, object_ids={0: "bar", 7: "cube"})
-    with pytest.raises(UnknownNameError, match="no free object 'baar'; did you mean 'bar'"):
+    with pytest.raises(UnknownNameError, match="no free instance 'baar'; did you mean 'bar'"):
         read_grasps(scene, path, X_SF=X_SC, object_ids={0: "baar", 7: "bar"})
 
 
@@ -179,7 +179,7 @@ def test_a_frame_in_place_of_the_formats(scene: Scene, tmp_path: Path) -> None:
     assert poses(read_grasps(scene, path).by_instance) == {"left": [[0.0, 0.0, 0.0]]}
     on_the_mesh = read_grasps(scene, path, frame="object", objects={"": "bar"}).by_instance
     assert poses(on_the_mesh) == {"bar": [list(LEFT)]}
-    with pytest.raises(InvalidInputError, match="does not say of which object its grasps are"):
+    with pytest.raises(InvalidInputError, match="does not name the object of its grasps"):
         read_grasps(scene, path, frame="object")
     with pytest.raises(UnknownNameError, match="no grasps of object 'a'; it names no objects"):
         read_grasps(scene, path, frame="object", objects={"a": "bar"})
@@ -218,7 +218,7 @@ def test_options_that_do_not_apply(scene: Scene, tmp_path: Path) -> None:
         read_grasps(scene, path, objects={"": "cube"}, object_ids={0: "left"})
     with pytest.raises(NoSceneIdsError, match="no scene ids; leave the scene id out"):
         read_grasps(scene, path, objects={"": "cube"}, scene_id="one")
-    with pytest.raises(UnknownNameError, match="no free object 'cub'; did you mean 'cube'"):
+    with pytest.raises(UnknownNameError, match="no free instance 'cub'; did you mean 'cube'"):
         read_grasps(scene, path, objects={"": "cub"})
     burg = tmp_path / "a.npy"
     write_grasp_file(GraspSet.create(down(LEFT), object=""), burg, "burg")

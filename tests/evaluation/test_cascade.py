@@ -324,7 +324,7 @@ def test_some_objects_only(
         )
     with pytest.raises(UnknownNameError, match="'lef', which is not a free instance"):
         evaluate(scene, station, tmp_path / "d", grasps={"lef": given["left"]}, progress=False)
-    with pytest.raises(UnknownNameError, match="no free object 'lef'; did you mean 'left'"):
+    with pytest.raises(UnknownNameError, match="no free instance 'lef'; did you mean 'left'"):
         evaluate(scene, station, tmp_path / "d", **asked(only=["lef"], **options))
     assert not (tmp_path / "d").exists()
 

@@ -268,7 +268,7 @@ def test_a_set_has_to_name_its_objects(station: Station) -> None:
     with pytest.raises(InvalidInputError) as error:
         reach(scene, station, GraspSet.create(GRASPS, object=""))
     assert str(error.value) == (
-        "the set does not say of which object its grasps are; name it"
+        "the set does not name the object of its grasps; name it"
         " (GraspSet.create(..., object=NAME)); scene 'tabletop_six' has banana, bottle,"
         " bowl, box, mug, screwdriver"
     )

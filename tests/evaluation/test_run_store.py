@@ -211,7 +211,7 @@ def test_what_makes_another_run_is_told_without_hashes(run: Run) -> None:
     )
     built = replace(there.library, objects={**there.library.objects, "bar": "0"})
     assert told(scene=replace(scene, content="0"), library=built) == (
-        f"scene {scene.path} has objects that were built anew: bar"
+        f"scene {scene.path} has objects that were built again: bar"
     )
     given = replace(there.grasps, origin="given", content="0", count=5)
     there = replace(there, grasps=given)

@@ -75,7 +75,9 @@ def test_contact_at_points_meets_pieces_and_not_the_hull_of_a_surface() -> None:
 
 
 def test_what_cannot_be_alone_is_refused() -> None:
-    with pytest.raises(UnknownNameError, match=r"'mugg' is not a free instance .*did you mean 'mug'"):
+    with pytest.raises(
+        UnknownNameError, match=r"'mugg' is not a free instance .*did you mean 'mug'"
+    ):
         build_station_diagram("tabletop_six", "panda_tabletop", robot="hand", for_trials="mugg")
     with pytest.raises(InvalidInputError, match="welded objects are not simulated"):
         build_station_diagram(

@@ -192,7 +192,7 @@ def test_refusals(check: SceneCheck, scene: MakeScene) -> None:
         check.travel(one, [], DOWN, 1.0)
     for direction in ((0.0, 0.0, 0.0), (math.nan, 0.0, 1.0), (1.0, 0.0)):
         with pytest.raises(
-            InvalidInputError, match="three finite numbers, of which one at least is not 0"
+            InvalidInputError, match="three finite numbers, at least one of them not 0"
         ):
             check.travel(one, ["can"], direction, 1.0)
     for limit in (-1.0, math.nan):

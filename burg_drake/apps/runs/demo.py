@@ -22,7 +22,7 @@ DEFAULT_GRASPS = 100
 DEFAULT_OUTPUT = "runs/demo"
 REPLAY_FILE = "replay.html"
 FILE_DESCRIPTIONS = {
-    "report.html": "the report: what became of the grasps, for each object",
+    "report.html": "the report: how the grasps of each object ended",
     REPLAY_FILE: "the best grasp in 3D, as it was simulated",
     "results.csv": "the table: one row for each grasp",
 }

@@ -184,9 +184,10 @@ def _print_run(run: Run, motion: GraspMotion, *, rejudged: bool) -> None:
     if rejudged or any(verdict.judged_again for verdict in run.verdicts.values()):
         print(settled_line({name: run.results[name] for name in SETTLED_COLUMNS}))
     if contested := run.contested:
+        finer = "mujoco" if run.document.engine.name == "reference" else "reference"
         print(
             f"contested: {listing(contested)}; judge them again by the same command with"
-            " --rejudge contested"
+            f" --rejudge contested --engine {finer}"
         )
     best = run.best(each=True)
     if best:

@@ -148,5 +148,7 @@ def _tests(text: str) -> tuple[str, ...]:
     names = [name.strip() for name in text.split(",")]
     for name in names:
         if name not in TESTS:
-            raise argparse.ArgumentTypeError(f"{name!r} is none of {', '.join(TESTS)}")
+            raise argparse.ArgumentTypeError(
+                f"{name!r} is not a test; tests are {', '.join(TESTS)}"
+            )
     return tuple(test for test in TESTS if test in names)

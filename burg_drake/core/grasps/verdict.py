@@ -304,7 +304,7 @@ class Verdict(Findings):
             another try may give an answer.
     """
 
-    outcome: Outcome = field(metadata=text("what became of the grasp", of=Outcome))
+    outcome: Outcome = field(metadata=text("how the grasp ended", of=Outcome))
     stage: Stage = field(
         metadata=text("the stage that decided the outcome", of=Stage, replayed=False)
     )

@@ -125,7 +125,7 @@ def _summary(counted: Tally) -> str:
         ("views (samples)", ", ".join(views)),
         ("images (samples)", ", ".join(images)),
         ("size [pixel] (samples)", ", ".join(sizes)),
-        ("instances in samples", f"{instances:,}, of which {visible:,} visible"),
+        ("instances in samples", f"{instances:,}, {visible:,} of them visible"),
         ("grasps in samples", f"{counted.outcomes.total():,}"),
     ]
     return _table(("", ""), rows)

@@ -127,7 +127,7 @@ def write_graspnet(
         "GraspNet has no amodal masks and no visibilities.",
         "graspnetAPI's loadGrasp of 6D grasps and its evaluation do not work: grasp_label and"
         " collision_label have 300 directions, 12 angles and 4 depths at each of thousands of"
-        " points, of which only some were judged; these are in the folder grasps of each camera.",
+        " points, but only some were judged; these are in the folder grasps of each camera.",
         "graspnetAPI's evaluation also needs models/*/textured.obj and textured.sdf, and its check"
         " of completeness rs_wrt_kn.npy of two cameras; none of them is written.",
     }

@@ -87,7 +87,7 @@ def _covering_of(key: tuple[Any, ...]) -> tuple[Intrinsics, Single]:
     if max(np.abs(low).max(), np.abs(high).max()) > WIDEST:
         raise InvalidInputError(
             f"the lens sees more than {np.degrees(np.arctan(WIDEST)):.0f} degrees from its axis;"
-            " colour images of such a camera cannot be rendered"
+            " colour images of this camera cannot be rendered"
         )
     start = np.floor(low * focal) - 1.0
     size = (np.ceil(high * focal) + 1.0 - start).astype(int) + 1

@@ -66,7 +66,7 @@ class InstanceNames:
         if not foreign:
             how = "" if self.is_file else " (GraspSet.create(..., object=NAME))"
             raise InvalidInputError(
-                f"{self.path} does not say of which object its grasps are; name it{how};"
+                f"{self.path} does not name the object of its grasps; name it{how};"
                 f" scene {self.scene.name!r} has {listing(sorted(known))}"
             ).about("objects")
         if foreign not in known:

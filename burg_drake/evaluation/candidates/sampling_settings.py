@@ -26,6 +26,11 @@ sixth fails, and none on two of the objects."""
 class SamplingSettings:
     """How grasps are sampled on each object; more on these in `grasping.sampling.antipodal`.
 
+    Example::
+
+        wide = burg.SamplingSettings(approach_angle_deg=90.0)
+        burg.sample_grasps("tabletop_six", "panda_tabletop", 20, settings=wide)
+
     Attributes:
         friction: coefficient; the object's own if None.
         approaches: approach angles for each pair of contacts.

@@ -197,7 +197,7 @@ def _scene_difference(there: RunDocument, here: RunDocument) -> str:
     old, new = there.library.objects, here.library.objects
     built = [name for name in new if name in old and old[name] != new[name]]
     if built and there.scene.path == here.scene.path:
-        return f"scene {here.scene.path} has objects that were built anew: {listing(built)}"
+        return f"scene {here.scene.path} has objects that were built again: {listing(built)}"
     return input_difference("scene", there.scene, here.scene, behind="objects")
 
 

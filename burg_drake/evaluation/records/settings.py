@@ -27,6 +27,11 @@ DEFAULT_SLIP_LIMIT_MM = round(1000.0 * DEFAULT_TRIAL.slip_limit, 9)
 class EvaluationSettings:
     """Which grasps are judged, and how.
 
+    Example::
+
+        settings = burg.EvaluationSettings(grasps_per_object=20, only=("mug",), engine="screening")
+        burg.evaluate("tabletop_six", "panda_tabletop", "runs/mug", settings=settings)
+
     Attributes:
         grasps_per_object: antipodal grasps to sample for each free instance, unless grasps are
             given; the same ones as those of `sample_grasps` with these settings. Of an object that

@@ -58,6 +58,12 @@ RUN_HEADER = "Record of a burg-drake evaluation; written by the program."
 class Run:
     """A run on disk, complete or not.
 
+    Example::
+
+        run = burg.load_run("runs/first")
+        for id in run.best(3):
+            print(id, run.verdicts[id].outcome, run.verdicts[id].margins)
+
     Attributes:
         path: its folder.
         document: contents of run.yaml.

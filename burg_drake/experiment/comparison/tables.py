@@ -192,8 +192,8 @@ def group_table(title: str, head: str, groups: Sequence[FactorGroup]) -> TextTab
 
 
 def stopped_table(comparison: Comparison, judged: Judgement, name: str = "") -> TextTable:
-    """What became of grasps by verdict."""
-    table = TextTable(f"What became of each verdict{name}")
+    """Outcomes on the robot, or in the second run, by verdict."""
+    table = TextTable(f"Outcomes for each verdict{name}")
     runs = comparison.kind == "runs"
     table.texts("first run" if runs else "simulated").names("body in the way")
     table.numbers("trials", "success in the second" if runs else "succeeded", "95 % CI")

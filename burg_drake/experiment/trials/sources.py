@@ -124,7 +124,7 @@ def _load(key: str, source: SourceRun, path: Path, moved: Moved) -> Run:
     raise InvalidInputError(
         f"{path}: run {key!r} is {source.hash}, of scene {source.scene.name!r}, but {folder} holds"
         f" {what}, of scene {there[0].document.scene.name!r}; give the one"
-        " that the trials were planned with, or plan them anew"
+        " that the trials were planned with, or plan them again"
     ).about("moved")
 
 

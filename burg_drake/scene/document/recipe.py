@@ -18,6 +18,11 @@ ATTEMPTS = 100
 class SceneRecipe:
     """How scenes are drawn.
 
+    Example::
+
+        recipe = burg.SceneRecipe(library="household", count=6, layout="close", seed=7)
+        burg.save_scene(burg.sample_scene(recipe).scene.document, "lunch.yaml")
+
     Files have all of its values, because defaults may change between versions.
 
     Attributes:

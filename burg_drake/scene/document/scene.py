@@ -79,6 +79,12 @@ class SceneDocument:
 class Scene:
     """A scene with its library at hand.
 
+    Example::
+
+        scene = burg.load_scene("tabletop_six")
+        for name in scene.instances:
+            print(name, scene.X_SO(name)[:3, 3])
+
     Attributes:
         document: contents of the scene file.
         library: the library that the instances refer to.

@@ -176,8 +176,8 @@ class SceneCheck:
         length = float(np.linalg.norm(direction))
         if direction.shape != (3,) or not (np.isfinite(length) and length > 0.0):
             raise InvalidInputError(
-                f"direction {direction.tolist()} must be three finite numbers, of which"
-                " one at least is not 0"
+                f"direction {direction.tolist()} must be three finite numbers, at least"
+                " one of them not 0"
             )
         if not limit >= 0.0:
             raise InvalidInputError(f"limit {limit} must be a distance of at least 0 [m]")

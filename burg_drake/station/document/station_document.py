@@ -242,6 +242,11 @@ class StationDocument:
 class Station:
     """A station with its hand at hand.
 
+    Example::
+
+        station = burg.load_station("panda_tabletop")
+        print(station.document.cameras, station.hand)
+
     Attributes:
         document: contents of the station file.
         hand: the hand that `document.hand` names.

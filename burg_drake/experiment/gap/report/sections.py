@@ -45,7 +45,7 @@ ABOUT = {
     " controllers that yield; here the hand may push objects before it closes.",
     "placed": "The hand goes where it was planned to go, but the objects stand a little off. It"
     " counts as a collision if the open hand overlaps a displaced object. The arm knows"
-    " where things stand and plans its path anew. Each grasp counts once a scene.",
+    " where things stand and plans its path again. Each grasp counts once a scene.",
 }
 
 
