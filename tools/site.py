@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import argparse
 import ast
+import contextlib
 import inspect
+import io
 import itertools
 import re
 import shutil
@@ -444,7 +446,9 @@ def _write_live_pages(folder: Path) -> None:
             words = [run if word == "RUN" else word for word in line.split()]
             commands.append([*words, "--html", str(folder / name)])
         for words in commands:
-            if code := command(words):
+            with contextlib.redirect_stdout(io.StringIO()):
+                code = command(words)
+            if code:
                 raise SystemExit(code)
 
 
