@@ -37,7 +37,7 @@ def test_the_demo(
     assert "\nall " in told and "as recorded" in told and opened == []
     with (folder / "results.csv").open(newline="") as table:
         lifted = [row for row in csv.DictReader(table) if row["outcome"] == "lifted"]
-    (listed,) = re.findall(r"^best    ((?:.*\n {8})*.*)\ntable ", told, re.MULTILINE)
+    (listed,) = re.findall(r"^best    ((?:.*\n {8})*.*)\nbest: ", told, re.MULTILINE)
     best = [next(row for row in lifted if row["id"] == id) for id in listed.split()]
     assert best and [row["object"] for row in best] == list(
         dict.fromkeys(r["object"] for r in lifted)

@@ -189,12 +189,10 @@ def _print_run(run: Run, motion: GraspMotion, *, rejudged: bool) -> None:
             f"contested: {listing(contested)}; judge them again by the same command with"
             f" --rejudge contested --engine {finer}"
         )
-    best = run.best(each=True)
-    if best:
-        print("best    " + "\n        ".join(best))
     print(f"table   {run.table_path}")
     print(f"report  {run.report_path}")
-    if best:
+    if best := run.best(each=True):
+        print("best    " + "\n        ".join(best))
         print(_where_lifted(str(run.path)))
     if run.failures:
         print(
