@@ -102,7 +102,7 @@ def test_a_scene_with_furniture(tmp_path: Path, capsys: Capture) -> None:
     assert "instance of object 'table' is called 'table_1'" in said.out
     misfits = [line for line in said.out.splitlines() if "does not fit: " in line]
     assert len(misfits) == len(builtin_names("stations"))
-    assert "its table is 1.2 x 1.4 m, and the board would reach 1340 mm beyond" in misfits[0]
+    assert "its table is 1.2 x 1.4 m, and the board would extend 1340 mm over" in misfits[0]
     scene, proposed = load_scene(output), load_station(station)
     assert list(scene.background) == ["table_1", "open_shelf"]
     assert [issue for issue in check_scene(scene, proposed) if issue.is_error] == []
