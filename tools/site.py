@@ -35,7 +35,6 @@ from burg_drake.core.grasps.outcome import Outcome, Stage
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 BLOB = "https://github.com/burg-drake/burg_drake/blob/main/"
-TREE = "https://github.com/burg-drake/burg_drake/tree/main/"
 
 MAIN_NAMES = {
     "Load and save": "load_scene save_scene load_station load_library load_run load_campaign"

@@ -65,7 +65,7 @@ board is not flat [pixels]."""
 
 MIN_COPY_MARKERS = 3
 """Markers beside the board that stand to each other as on another print of it."""
-ON_GRID = 0.2
+MAX_GRID_OFFSET = 0.2
 """Distance along both axes up to which a marker stands on the grid [pitches]."""
 
 
@@ -311,7 +311,7 @@ class BoardPose:
         column, row = ((at - middles[0]) / pitch * [1.0, -1.0]).T
         off = np.abs(column - np.round(column)) + np.abs(row - np.round(row))
         follows = np.round(row) * columns + np.round(column) == index
-        return bool(follows.all() and off.max() < ON_GRID)
+        return bool(follows.all() and off.max() < MAX_GRID_OFFSET)
 
     def _other_board_reason(self, seen: Detection, coarse: CoarsePose) -> str:
         """Why the markers that were found are not this board; empty if they are."""
