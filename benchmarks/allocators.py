@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from burg_drake.core.workers.allocator import PRELOAD, installed_allocators
+from burg_drake.core import AllocatorSettings, installed_allocators
 
 TRIALS = Path(__file__).with_name("trials.py")
 OURS = "C library"
@@ -51,9 +51,11 @@ def main() -> None:
 
 def measured(name: str, trials: int) -> tuple[tuple[float, float, float], str]:
     """CPU time of a trial and of all [s], and peak memory [MiB]; the outcomes."""
-    environment = {key: value for key, value in os.environ.items() if key != PRELOAD}
+    environment = {
+        key: value for key, value in os.environ.items() if key != AllocatorSettings.preload_variable
+    }
     if name != OURS:
-        environment[PRELOAD] = name
+        environment[AllocatorSettings.preload_variable] = name
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     printed = subprocess.run(
         [sys.executable, TRIALS, "--engine", "standard", "--trials", str(trials)],

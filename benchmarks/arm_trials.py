@@ -20,16 +20,11 @@ import numpy as np
 from mixed_grasps import SLIPPERY, sampled_set
 
 import burg_drake as burg
-from burg_drake.core.arrays import Array
-from burg_drake.motion.planner import Planner
-from burg_drake.motion.plans.grasp_plan import Plan
-from burg_drake.motion.reach.arm_reach import ArmReach
-from burg_drake.scene.document.scene import Scene
-from burg_drake.simulation.trials.arm_trial import ArmTrial
-from burg_drake.simulation.trials.hand_trial import HandTrial
-from burg_drake.simulation.trials.result import TrialResult
-from burg_drake.station.document.engine import Engine, as_engine
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import Array
+from burg_drake.motion import ArmReach, Plan, Planner
+from burg_drake.scene import Scene
+from burg_drake.simulation import ArmTrial, HandTrial, TrialResult
+from burg_drake.station import Engine, Station, as_engine
 
 SAMPLED = 400
 """Grasps that are sampled for each one that is wanted: few are clear in a bin or on a shelf."""

@@ -31,17 +31,18 @@ import numpy as np
 from scipy.stats import rankdata
 
 import burg_drake as burg
-from burg_drake.apps.cli import main as burg_drake
-from burg_drake.core.arrays import Array
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.evaluation.candidates.candidates import INSTANCE
-from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
-from burg_drake.evaluation.grasp_sets.sampled import sample_grasps
-from burg_drake.evaluation.grasp_sets.scored import scored_set
-from burg_drake.evaluation.records.rows import best_rows
-from burg_drake.grasping.quality.metrics import METRICS
-from burg_drake.simulation.robustness.perturbation import success_rate
-from burg_drake.station.document.engine import as_engine
+from burg_drake.apps import main as burg_drake
+from burg_drake.core import Array, Outcome
+from burg_drake.evaluation import (
+    INSTANCE_COLUMN,
+    SamplingSettings,
+    best_rows,
+    sample_grasps,
+    scored_set,
+)
+from burg_drake.grasping import METRICS
+from burg_drake.simulation import success_rate
+from burg_drake.station import as_engine
 
 REPEATS, PICKED = 20, 5
 SMALLER_IS_BETTER = (
@@ -123,7 +124,7 @@ def measured(
     exact, quick = (
         burg.HandTrial(scene, station, engine=as_engine(name)) for name in ("standard", "screening")
     )
-    instance = grasps.column(INSTANCE)
+    instance = grasps.column(INSTANCE_COLUMN)
     queues = {name: list(np.flatnonzero(instance == name)) for name in scene.instances}
     lifted = dict.fromkeys(queues, 0)
     while any(queues.values()):

@@ -14,20 +14,18 @@ import os
 import time
 from dataclasses import replace
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.workers.processes import ONE_THREAD
+from burg_drake.core import SINGLE_THREAD_ENVIRONMENT, Array
 
-os.environ.update(ONE_THREAD)
+os.environ.update(SINGLE_THREAD_ENVIRONMENT)
 
 import cv2
 import numpy as np
 from pydrake.systems.framework import Context
 
 import burg_drake as burg
-from burg_drake.cameras.systems.board_loop import BoardLoop, LoopCamera, build_board_loop
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import inverse, make_pose, rotation_angle
-from burg_drake.station.document.station_document import Camera
+from burg_drake.cameras import BoardLoop, LoopCamera, build_board_loop
+from burg_drake.core import Pose, inverse, make_pose, rotation_angle
+from burg_drake.station import Camera
 
 CAMERAS = {
     "640x480": Camera(X_WC=Pose(), width=640, height=480, focal=(600.0, 600.0)),

@@ -32,10 +32,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 import burg_drake as burg
-from burg_drake.cameras.calibration.estimation import calibrate_views
-from burg_drake.cameras.calibration.image_parts import part_of
-from burg_drake.cameras.calibration.target import find_target
-from burg_drake.cameras.optics.known_parts import PARTS
+from burg_drake.cameras import IMAGE_PARTS, calibrate_views, find_target, image_part_indices
 
 Array = np.ndarray
 
@@ -173,7 +170,7 @@ def judged(camera: Camera, views: list[burg.cameras.CharucoView]) -> Judgement:
     found = calibrate_views(views, TARGET)
     seconds = time.process_time() - start
     pixels, off = errors(camera, found.intrinsics)
-    part = np.array(PARTS)[part_of(pixels, camera.size)]
+    part = np.array(IMAGE_PARTS)[image_part_indices(pixels, camera.size)]
     promise = found.promise
     of_parts = {name: off[part == name].max() for name in promise.parts if (part == name).any()}
     held = [of_parts[name] for name in of_parts if name not in promise.except_at]

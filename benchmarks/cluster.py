@@ -31,9 +31,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "evaluation"))
 from known_judge import Make, TimedJudge
 
-from burg_drake.evaluation.candidates.candidates import Candidate
-from burg_drake.evaluation.cluster.dask_executor import connect_cluster
-from burg_drake.evaluation.workers import Executor, Job, LocalExecutor
+from burg_drake.evaluation import Candidate, Executor, Job, LocalExecutor, connect_cluster
 
 SLOWEST = 1800.0
 """An attempt that takes longer has hung [s]."""

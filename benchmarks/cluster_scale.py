@@ -29,17 +29,20 @@ sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "evaluation"))
 from known_judge import KnownJudge, Make
 
-from burg_drake.core.workers.processes import start_worker
-from burg_drake.evaluation.candidates.candidates import Candidate
-from burg_drake.evaluation.cluster import remote
-from burg_drake.evaluation.cluster.bundles.judge_recipe import JudgeRecipe
-from burg_drake.evaluation.cluster.dask_executor import connect_cluster
-from burg_drake.evaluation.cluster.local_nodes import LocalNodes
-from burg_drake.evaluation.cluster.node import LOOPBACK, NO_WEB
-from burg_drake.evaluation.cluster.sent_job import MOST
-from burg_drake.evaluation.stages.judge import judge_grasp
-from burg_drake.evaluation.workers import Job
-from burg_drake.evaluation.workers.limits import WorkerLimits
+from burg_drake.core import start_worker
+from burg_drake.evaluation import (
+    LOOPBACK,
+    NO_DASHBOARD,
+    Candidate,
+    ChunkSettings,
+    Job,
+    JudgeRecipe,
+    LocalNodes,
+    WorkerLimits,
+    connect_cluster,
+    judge_grasp,
+)
+from burg_drake.evaluation.cluster import worker_tasks
 
 IDLE = 10.0
 """For so long the scheduler is watched with nothing to do [s]."""
@@ -106,13 +109,15 @@ def measure(
     used[0] = max(0.0, used[0] - idle * took)
     ideal = seconds * arguments.grasps
     # with whole chunks, and what idle workers cost besides
-    each = [u / chunks / (MOST * seconds) for u in used]  # of a processor, a worker
+    each = [
+        u / chunks / (ChunkSettings.max_grasps * seconds) for u in used
+    ]  # of a processor, a worker
     full = min(1.0 / (each[0] + idle / arguments.workers), 1.0 / each[1])
     print(
         f"{seconds:g} s a grasp: {judged} grasps in {chunks} chunks, {took:.1f} s for {ideal:.1f} s"
         f" a worker; CPU time of the scheduler {used[0]:.2f} s ({1e3 * used[0] / chunks:.1f} ms a"
         f" chunk), of the driver {used[1]:.2f} s ({1e3 * used[1] / chunks:.1f} ms a chunk);"
-        f" with chunks of {MOST} grasps full at {full:,.0f} workers",
+        f" with chunks of {ChunkSettings.max_grasps} grasps full at {full:,.0f} workers",
         flush=True,
     )
 
@@ -133,16 +138,21 @@ def _judged_here() -> int:
 def sizes() -> None:
     """Prints bytes a grasp, as Dask pickles them."""
     rng = np.random.default_rng(0)
-    grasps = tuple(Candidate(f"cube-{k:06d}", "cube", rng.random((4, 4))) for k in range(MOST))
-    recipe = JudgeRecipe(pickle.dumps(Make(KnownJudge())))
-    empty = len(pickle.dumps(remote.Chunk("burg-drake-" + "0" * 32, recipe, (), WorkerLimits())))
-    there = len(
-        pickle.dumps(remote.Chunk("burg-drake-" + "0" * 32, recipe, grasps, WorkerLimits()))
+    grasps = tuple(
+        Candidate(f"cube-{k:06d}", "cube", rng.random((4, 4)))
+        for k in range(ChunkSettings.max_grasps)
     )
-    back = len(pickle.dumps(remote.Answers(answers(grasps))))
+    recipe = JudgeRecipe(pickle.dumps(Make(KnownJudge())))
+    empty = len(
+        pickle.dumps(worker_tasks.Chunk("burg-drake-" + "0" * 32, recipe, (), WorkerLimits()))
+    )
+    there = len(
+        pickle.dumps(worker_tasks.Chunk("burg-drake-" + "0" * 32, recipe, grasps, WorkerLimits()))
+    )
+    back = len(pickle.dumps(worker_tasks.ChunkAnswers(answers(grasps))))
     print(
-        f"a chunk of {MOST} grasps: {there} bytes there ({empty} without grasps), {back} bytes"
-        f" back; {there / MOST:.0f} and {back / MOST:.0f} a grasp",
+        f"a chunk of {ChunkSettings.max_grasps} grasps: {there} bytes there ({empty} without grasps), {back} bytes"
+        f" back; {there / ChunkSettings.max_grasps:.0f} and {back / ChunkSettings.max_grasps:.0f} a grasp",
         flush=True,
     )
 
@@ -171,17 +181,17 @@ def main_of_sleepers(handle: int) -> None:
     connection = Connection(handle)
     scheduler, count = connection.recv()
 
-    def judge(self: Any, job: Job, limits: WorkerLimits) -> remote.Answers:
+    def judge(self: Any, job: Job, limits: WorkerLimits) -> worker_tasks.ChunkAnswers:
         global _judged
         _judged += 1
         seconds: float = pickle.loads(job.make_judge.make_judge).judge.pause  # type: ignore[attr-defined]
         time.sleep(seconds * len(job.candidates))
-        return remote.Answers(answers(tuple(job.candidates)), seconds=seconds)
+        return worker_tasks.ChunkAnswers(answers(tuple(job.candidates)), seconds=seconds)
 
-    remote.Supervisor.judge = judge  # type: ignore[method-assign]
+    worker_tasks.Supervisor.judge = judge  # type: ignore[method-assign]
 
     async def run() -> None:
-        options = {"nthreads": 1, "memory_limit": 0, "host": LOOPBACK, **NO_WEB}
+        options = {"nthreads": 1, "memory_limit": 0, "host": LOOPBACK, **NO_DASHBOARD}
         workers = [Worker(scheduler, **options) for _ in range(count)]
         for worker in workers:
             await worker

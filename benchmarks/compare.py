@@ -32,24 +32,29 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.statistics import wilson_interval
-from burg_drake.experiment.comparison.comparing import compare
-from burg_drake.experiment.comparison.judge_assessment import judgement
-from burg_drake.experiment.comparison.of_runs import pairs_of_runs
-from burg_drake.experiment.comparison.run_agreement import run_agreement
-from burg_drake.experiment.comparison.standing_out import standing_out
-from burg_drake.experiment.pairing.matching import match_rows
-from burg_drake.experiment.pairing.pairs import NAMES, REFERENCE_NAMES, VerdictPairs
-from burg_drake.experiment.pairing.result_table import ResultTable
-from burg_drake.experiment.pairing.text_codes import Factor, Ids
-from burg_drake.experiment.statistics import ordered
-from burg_drake.experiment.statistics.confusion import _all_measures, agreement
-from burg_drake.experiment.statistics.estimates import MEASURES
-from burg_drake.experiment.statistics.margin_calibration import PREDICTORS
-from burg_drake.experiment.statistics.ordered import Ordered
-from burg_drake.experiment.statistics.rank_statistics import ranking
-from burg_drake.experiment.statistics.resampling import bounds
+from burg_drake.core import Array, wilson_interval
+from burg_drake.experiment import (
+    AGREEMENT_MEASURES,
+    PREDICTION_COLUMNS,
+    PREDICTOR_COLUMNS,
+    REFERENCE_COLUMNS,
+    IdColumn,
+    OrderedTrials,
+    ResultTable,
+    TextFactor,
+    VerdictPairs,
+    _compute_measures,
+    assess_judge,
+    assess_run_agreement,
+    compare,
+    estimate_agreement,
+    estimate_auroc,
+    find_outlier_groups,
+    interval_bounds,
+    match_rows,
+    pair_runs,
+)
+from burg_drake.experiment.comparison import margin_calibration
 
 FIGURES = (
     "precision",
@@ -109,7 +114,7 @@ def _cover(objects: int, each: int, right: float, repeats: int, rng: np.random.G
         truth = _figures(_cells(chance) * population[:, None])
         seen = rng.binomial(each, chance) / each
         counts = np.rint(_cells(seen) * each).astype(int)
-        a = agreement(counts, population=population)
+        a = estimate_agreement(counts, population=population)
         mine = np.array(
             [[getattr(a.figure(n), e) for n in FIGURES] for e in ("low", "high")], float
         )
@@ -134,7 +139,7 @@ def _cells(right: Array) -> Array:
 
 
 def _figures(cells: Array) -> Array:
-    every = dict(zip(MEASURES, _all_measures(cells.sum(axis=0)), strict=True))
+    every = dict(zip(AGREEMENT_MEASURES, _compute_measures(cells.sum(axis=0)), strict=True))
     return np.array([every[name] for name in FIGURES])
 
 
@@ -147,8 +152,8 @@ def _resampled(counts: Array, population: Array, rng: np.random.Generator) -> tu
             for n, c, w in zip(size, counts, population, strict=True)
         ]
     ).sum(axis=0)
-    low, high = bounds(_all_measures(drawn))
-    order = [list(MEASURES).index(name) for name in FIGURES]
+    low, high = interval_bounds(_compute_measures(drawn))
+    order = [list(AGREEMENT_MEASURES).index(name) for name in FIGURES]
     return low[order], high[order]
 
 
@@ -157,7 +162,7 @@ def _wilson(counts: Array, population: Array) -> tuple[Array, Array]:
     weight = population / counts.sum(axis=1)
     low, high = np.full(len(FIGURES), np.nan), np.full(len(FIGURES), np.nan)
     for k, name in enumerate(FIGURES):
-        measure = MEASURES[name]
+        measure = AGREEMENT_MEASURES[name]
         if measure.is_share:
             part = (weight[:, None] * counts)[:, list(measure.part)].sum()
             whole = (weight[:, None] * counts)[:, list(measure.whole)].sum()
@@ -183,7 +188,7 @@ def _cover_ranking(repeats: int, rng: np.random.Generator) -> None:
         for _ in range(repeats):
             good = rng.random(trials) < 0.3
             values = np.round(rng.normal(size=trials) + shift * good, digits)
-            found = ranking(Ordered.of(values, good))
+            found = estimate_auroc(OrderedTrials.of(values, good))
             if found.low is not None and found.high is not None:
                 held += found.low <= truth <= found.high
                 wide += found.high - found.low
@@ -198,9 +203,9 @@ def name_what_stands_out(arguments: argparse.Namespace) -> None:
         for wrong, planted in ((0.05, 0.5), (0.05, 0.8), (0.2, 0.6), (0.2, 0.8), (0.4, 0.8)):
             false, power = 0, 0
             for _ in range(arguments.repeats):
-                found, _ = standing_out(_made_up_trials(objects, each, wrong, wrong, rng))
+                found, _ = find_outlier_groups(_made_up_trials(objects, each, wrong, wrong, rng))
                 false += bool(found)
-                found, _ = standing_out(_made_up_trials(objects, each, wrong, planted, rng))
+                found, _ = find_outlier_groups(_made_up_trials(objects, each, wrong, planted, rng))
                 power += any((one.kind, one.name) == ("object", "0") for one in found)
             rates = (f"{100 * n / arguments.repeats:.1f} %" for n in (false, power))
             print(f"{objects:7} {each:8} {wrong:6} {planted:14}", *(f"{r:>14}" for r in rates))
@@ -222,18 +227,18 @@ def _made_up_trials(
     verdicts = rng.choice(["slipped", "collision_table", "collision_clutter"], len(index))
     bodies = rng.choice(["a", "b", "c"], len(index))
     simulated = np.where(predicted, "lifted", verdicts)
-    none = Factor.of(np.full(len(index), ""))
+    none = TextFactor.of(np.full(len(index), ""))
     return VerdictPairs(
-        id=Ids(np.arange(len(index)).astype(str)),
+        id=IdColumn(np.arange(len(index)).astype(str)),
         run=none,
         scene=none,
-        object=Factor.of(index.astype(str)),
-        simulated=Factor.of(simulated),
+        object=TextFactor.of(index.astype(str)),
+        simulated=TextFactor.of(simulated),
         stage=none,
-        blocker=Factor.of(np.where(predicted | (verdicts == "slipped"), "", bodies)),
+        blocker=TextFactor.of(np.where(predicted | (verdicts == "slipped"), "", bodies)),
         judged_again=none,
         confidence=np.full(len(index), np.nan),
-        ended=Factor.of(np.where(actual, "lifted", "slipped")),
+        ended=TextFactor.of(np.where(actual, "lifted", "slipped")),
         predicted=predicted,
         actual=actual,
         margins={},
@@ -244,17 +249,17 @@ def speed(arguments: argparse.Namespace) -> None:
     """Prints wall times."""
     columns = _made_up(arguments.rows, 0)
     outcomes = np.random.default_rng(5).permutation(columns["outcome"])
-    first = ResultTable.of_columns(columns, NAMES)
-    tables = first, ResultTable.of_columns(columns | {"outcome": outcomes}, REFERENCE_NAMES)
+    first = ResultTable.of_columns(columns, PREDICTION_COLUMNS)
+    tables = first, ResultTable.of_columns(columns | {"outcome": outcomes}, REFERENCE_COLUMNS)
     with _timed(f"{arguments.rows} rows in memory"):
         with _timed("  matching"):
             found = match_rows(*tables)
         with _timed("  pairs"):
-            pairs, second, _ = pairs_of_runs(tables, found, "lifted")
+            pairs, second, _ = pair_runs(tables, found, "lifted")
         with _timed("  figures"):
-            judgement(pairs, scenes={})
+            assess_judge(pairs, scenes={})
         with _timed("  agreement"):
-            run_agreement(pairs, second, {}, [])
+            assess_run_agreement(pairs, second, {}, [])
     if len(arguments.runs) == 2:
         with _timed("runs on the disk"):
             c = compare(*arguments.runs)
@@ -265,7 +270,7 @@ def area(arguments: argparse.Namespace) -> None:
     """Prints the largest change of the area and of its interval, for normal and skewed numbers
     that tell nothing to nearly all, and frequent to rare successes."""
     rng = np.random.default_rng(0)
-    finest = ordered.FINEST
+    finest = margin_calibration.MAX_ORDERED_ROWS
     for rows in (finest + 1000, 5 * finest, arguments.rows):
         worst = np.zeros(3)
         for shift in (0.0, 0.5, 2.0, 5.0):
@@ -274,8 +279,8 @@ def area(arguments: argparse.Namespace) -> None:
                 values = rng.normal(size=rows) + shift * good
                 for numbers in (values, np.minimum(np.exp(3 * values), 2.0)):
                     found = []
-                    for ordered.FINEST in (finest, rows):
-                        f = ranking(Ordered.of(numbers, good))
+                    for margin_calibration.MAX_ORDERED_ROWS in (finest, rows):
+                        f = estimate_auroc(OrderedTrials.of(numbers, good))
                         found.append(np.array([f.value, f.low, f.high], dtype=float))
                     worst = np.maximum(worst, np.abs(found[0] - found[1]))
         print(f"{rows} rows: area {worst[0]:.1e}, interval {worst[1:].max():.1e}")
@@ -310,7 +315,7 @@ def _made_up(rows: int, seed: int) -> dict[str, Array]:
     }
     for name in ("x", "y", "z", "qw", "qx", "qy", "qz", "width"):
         columns[name] = rng.normal(size=rows)
-    for name in PREDICTORS:
+    for name in PREDICTOR_COLUMNS:
         values = rng.normal(size=rows)
         values[ended > 1] = np.nan  # what is stopped before its trial has no such margin
         columns[name] = values if name not in ("clearance", "score") else rng.normal(size=rows)

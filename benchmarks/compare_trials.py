@@ -21,20 +21,18 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import burg_drake as burg
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.core.grasps.outcome import Outcome, RealOutcome
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.experiment.trials.sheet import (
+from burg_drake.core import GraspSet, Outcome, RealOutcome
+from burg_drake.evaluation import EvaluationSettings, Run, evaluate
+from burg_drake.experiment import (
     ObjectPlace,
     RealTrial,
     Selection,
     Stratum,
     TrialSheet,
+    grasp_content,
+    make_source_run,
     save_trials,
 )
-from burg_drake.experiment.trials.sources import grasp_content, source_of
 
 
 def main() -> None:
@@ -75,7 +73,7 @@ def make_sheet(
     ]
     return TrialSheet(
         created="2026-05-04T16:30:00+02:00",
-        runs={"a": source_of(run, folder)},
+        runs={"a": make_source_run(run, folder)},
         selection=Selection(per_object=per_object, balance="outcome", seed=seed),
         strata=strata,
         trials=tuple(trials),

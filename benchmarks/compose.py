@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from burg_drake import load_station
 from burg_drake.compose import AddObject, ComposeSession, SetBoard, Turn, board_size
-from burg_drake.scene.document.scene import Board
+from burg_drake.scene import Board
+from burg_drake.station import load_station
 
 
 def main() -> None:

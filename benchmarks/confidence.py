@@ -40,12 +40,9 @@ from oracle.cases import Case, judge
 from oracle.catalogue import HELD_OUT, TUNED
 from trial_journal import Row, TrialJournal
 
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.simulation.confidence.calibration import CALIBRATION_FILE
-from burg_drake.simulation.confidence.grip_signs import grip_signs
-from burg_drake.simulation.mujoco.mujoco_trial import MujocoTrial
-from burg_drake.simulation.trials.hand_trial import HandTrial
-from burg_drake.station.document.engine import ENGINES
+from burg_drake.core import Outcome
+from burg_drake.simulation import CALIBRATION_FILE, HandTrial, MujocoTrial, grip_signs
+from burg_drake.station import ENGINES
 
 ORACLE = "oracle"
 WORLD = "world "

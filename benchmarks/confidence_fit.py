@@ -10,16 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.core.grasps.verdict import CONTESTED
-from burg_drake.core.statistics import wilson_interval
-from burg_drake.simulation.confidence.calibration import Curve, Curves, confidence_of
-from burg_drake.simulation.confidence.grip_signs import FAR
+from burg_drake.core import CONTESTED_CONFIDENCE, Array, Outcome, wilson_interval
+from burg_drake.simulation import MAX_LIMIT_DISTANCE, Curve, Curves, confidence_from_signs
 
 KNOTS = (0.02, 0.25, 0.5, 0.75, 0.98)
 """Quantiles of a sign's values at which its curve bends."""
-OWN_KNOTS = {"limit": (0.0, 0.02, 0.05, 0.1, 0.2, FAR)}
+OWN_KNOTS = {"limit": (0.0, 0.02, 0.05, 0.1, 0.2, MAX_LIMIT_DISTANCE)}
 """Values at which the curves of other signs bend."""
 RIDGE = 0.3
 """Weight of the curves' squares, against the logarithm of the likelihood of all grasps: a sign that
@@ -142,14 +138,14 @@ def print_report(verdicts: Verdicts) -> None:
 
 def print_half(title: str, verdicts: Sequence[Judged]) -> None:
     """The figures of some verdicts."""
-    said = [(v, confidence_of(v.engine, v.outcome, v.signs)) for v in verdicts]
+    said = [(v, confidence_from_signs(v.engine, v.outcome, v.signs)) for v in verdicts]
     known = [(v, p) for v, p in said if p is not None]
     if not known:
         print(f"{title}: no verdict has a confidence")
         return
     p = np.array([p for _, p in known])
     print(f"\n{title}: {len(known)} executed grasps of {len({v.object for v, _ in known})} objects")
-    print(f"  contested (below {CONTESTED:g}): {np.mean(p < CONTESTED):.1%}")
+    print(f"  contested (below {CONTESTED_CONFIDENCE:g}): {np.mean(p < CONTESTED_CONFIDENCE):.1%}")
     for who, ask in CONFIRMATIONS.items():
         y = np.array([ask(v) for v, _ in known])
         asked = np.isfinite(y)

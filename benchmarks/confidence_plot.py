@@ -8,9 +8,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from confidence_fit import CONFIRMATIONS, Judged, Verdicts
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.statistics import wilson_interval
-from burg_drake.simulation.confidence.calibration import confidence_of
+from burg_drake.core import Array, wilson_interval
+from burg_drake.simulation import confidence_from_signs
 
 WIDTH, HEIGHT, GAP = 290, 290, 40
 LEFT, TOP, BOTTOM, RIGHT = 48, 62, 66, 16
@@ -56,7 +55,9 @@ def reliability_diagram(verdicts: Verdicts, engine: str = "standard") -> str:
 
 def _panel(left: float, verdicts: Sequence[Judged], who: str, title: str) -> Iterator[str]:
     """One panel."""
-    said = np.array([confidence_of(v.engine, v.outcome, v.signs) or math.nan for v in verdicts])
+    said = np.array(
+        [confidence_from_signs(v.engine, v.outcome, v.signs) or math.nan for v in verdicts]
+    )
     seen = np.array([CONFIRMATIONS[who](v) for v in verdicts])
     known = np.isfinite(said) & np.isfinite(seen)
     said, seen = said[known], seen[known]

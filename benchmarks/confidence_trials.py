@@ -20,18 +20,18 @@ from oracle.hand import DEFAULT_PHASES
 from scipy.spatial.transform import Rotation
 
 import burg_drake as burg
-from burg_drake.core.arrays import Array
-from burg_drake.core.content import rng_from
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import make_pose
-from burg_drake.objects.library.document import load_library
-from burg_drake.pipeline.source import ObjectSource
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
-from burg_drake.simulation.confidence.grip_signs import GripLoad
-from burg_drake.simulation.mujoco.mujoco_trial import MujocoTrial
-from burg_drake.simulation.mujoco.trial_of_engine import hand_trial_of
-from burg_drake.simulation.trials.hand_trial import HandTrial
-from burg_drake.simulation.trials.trial_settings import DEFAULT_TRIAL, TrialSettings
+from burg_drake.core import Array, Pose, make_pose, rng_from
+from burg_drake.objects import load_library
+from burg_drake.pipeline import ObjectSource
+from burg_drake.scene import Instance, Scene, SceneDocument
+from burg_drake.simulation import (
+    DEFAULT_TRIAL,
+    GripLoad,
+    HandTrial,
+    MujocoTrial,
+    TrialSettings,
+    hand_trial_of,
+)
 
 FRICTION_SD, TRANSLATION_SD, ROTATION_SD = 0.05, 0.0005, np.deg2rad(0.5)
 """Of the perturbed worlds: friction in the logarithm, the hand's place [m] and turn [rad]."""

@@ -24,20 +24,19 @@ import numpy as np
 import trimesh
 
 import burg_drake as burg
-from burg_drake.core.arrays import Array
-from burg_drake.core.content import rng_from
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import MeshError
-from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.objects.collision.contact import contact_geometry
-from burg_drake.objects.library.document import ObjectLibrary, load_library
-from burg_drake.objects.library.entry import ContactGeometry
-from burg_drake.objects.library.obj_file import write_piece
-from burg_drake.objects.library.sdf import DEFAULT_CONTACT, model_sdf
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
-from burg_drake.simulation.trials.result import TrialResult
-from burg_drake.station.document.engine import ENGINES
+from burg_drake.core import Array, MeshError, Outcome, Pose, make_pose, rng_from
+from burg_drake.objects import (
+    DEFAULT_CONTACT,
+    ContactGeometry,
+    ObjectLibrary,
+    contact_geometry,
+    load_library,
+    model_sdf,
+    write_piece,
+)
+from burg_drake.scene import Instance, Scene, SceneDocument
+from burg_drake.simulation import TrialResult
+from burg_drake.station import ENGINES
 
 OBJECTS = ("box", "can", "marble", "mug", "bowl", "banana", "bottle", "screwdriver")
 KINDS = ("truth", "surface", "pieces", "compliant_pieces", "mesh", "primitive", "tets")

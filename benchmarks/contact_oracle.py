@@ -43,8 +43,8 @@ from oracle.catalogue import HELD_OUT, SPACING, TUNED
 from oracle.trial import DEFAULT_NUMERICS, Numerics
 from trial_journal import Row, TrialJournal
 
-from burg_drake.core.content import content_hash
-from burg_drake.objects.library.entry import ContactKind
+from burg_drake.core import content_hash
+from burg_drake.objects import ContactKind
 
 ENGINES = ("standard", "reference")
 ORACLE = "oracle"

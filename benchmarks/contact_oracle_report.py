@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from oracle.cases import Case
 
-from burg_drake.core.statistics import wilson_interval
+from burg_drake.core import wilson_interval
 
 ORACLE = "oracle"
 Rows = Mapping[tuple[str, str], dict[str, Any]]

@@ -15,17 +15,12 @@ from oracle.cases import Case
 from oracle.catalogue import HELD_OUT, TUNED, thing
 
 import burg_drake as burg
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import make_pose
-from burg_drake.core.paths.resources import resolve
-from burg_drake.objects.library.document import load_library
-from burg_drake.objects.library.entry import ContactKind
-from burg_drake.pipeline.source import ObjectSource
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
-from burg_drake.simulation.mujoco.mujoco_trial import MujocoTrial
-from burg_drake.simulation.mujoco.trial_of_engine import hand_trial_of
-from burg_drake.station.document.engine import ENGINES, Engine
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import Pose, make_pose, resolve_reference
+from burg_drake.objects import ContactKind, load_library
+from burg_drake.pipeline import ObjectSource
+from burg_drake.scene import Instance, Scene, SceneDocument
+from burg_drake.simulation import MujocoTrial, hand_trial_of
+from burg_drake.station import ENGINES, Engine, Station
 
 STATION = "panda_tabletop"
 MASS, FRICTION = 0.5, 0.5
@@ -88,7 +83,7 @@ def make_trial(library: str, object: str, pose: int, engine: str) -> burg.HandTr
 
 def damped(station: Station, folder: Path) -> Station:
     """The station with pads of ten times the dissipation, from a copy of the hand's model."""
-    model = resolve(station.hand.model)
+    model = resolve_reference(station.hand.model)
     if not folder.exists():
         beside = folder.with_name(f"{folder.name}_{os.getpid()}")
         shutil.copytree(model.parent, beside)

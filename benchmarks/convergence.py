@@ -29,17 +29,12 @@ from convergence_plot import Panel, plot
 from scipy.optimize import brentq
 
 import burg_drake as burg
-from burg_drake.core.arrays import Array
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import grasp_from_axes
-from burg_drake.core.paths.resources import resolve
-from burg_drake.objects.library.entry import ContactKind
-from burg_drake.pipeline.source import ObjectSource
-from burg_drake.scene.document.scene import Board, Instance, Scene, SceneDocument, save_scene
-from burg_drake.simulation.trials.trial_settings import TrialSettings
-from burg_drake.station.document.engine import ENGINES, Engine
-from burg_drake.station.document.gripper_document import load_hand
-from burg_drake.station.document.station_document import Station, StationDocument, Table
+from burg_drake.core import Array, Pose, grasp_from_axes, resolve_reference
+from burg_drake.objects import ContactKind
+from burg_drake.pipeline import ObjectSource
+from burg_drake.scene import Board, Instance, Scene, SceneDocument, save_scene
+from burg_drake.simulation import TrialSettings
+from burg_drake.station import ENGINES, Engine, Station, StationDocument, Table, load_hand
 from tools.robot_model.pad_mesh import pad_vtk, squares
 
 FORCE, GRAVITY = 40.0, 9.81
@@ -276,12 +271,14 @@ def make_station(hand_model: Path | None = None) -> Station:
     """The Panda hand over a table."""
     hand = load_hand("panda_hand")
     document = StationDocument(name="convergence", table=Table(center=(0.3, 0.2)))
-    return Station(document, hand, hand_model or resolve(hand.model), None, Path("convergence"))
+    return Station(
+        document, hand, hand_model or resolve_reference(hand.model), None, Path("convergence")
+    )
 
 
 def pad_model(folder: Path, n: int) -> Path:
     """A copy of the hand whose pads' fronts are divided into n x n squares."""
-    model = resolve(load_hand("panda_hand").model)
+    model = resolve_reference(load_hand("panda_hand").model)
     shutil.copytree(model.parent, folder)
     (folder / "meshes" / "pad.vtk").write_text(pad_vtk(PAD, front=squares(n)))
     return folder / model.name

@@ -22,13 +22,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import burg_drake as burg
-from burg_drake.core.arrays import Array
-from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.grasping.comparison.matching import coverage, nearest_grasps
-from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal
-from burg_drake.grasping.similarity.diversity import farthest_points, neighbour_distances
-from burg_drake.grasping.similarity.pose_distance import LEVER
+from burg_drake.core import Array, GraspSet, make_pose
+from burg_drake.grasping import (
+    DISTANCE_LEVER,
+    AntipodalSettings,
+    coverage,
+    farthest_points,
+    nearest_grasps,
+    neighbour_distances,
+    sample_antipodal,
+)
 
 PEER_SECONDS = 3.9
 """For 100,000 by 500; for other numbers in proportion to the pairs."""
@@ -107,7 +110,7 @@ def naive_distances(X_OG: Array, X_OF: Array) -> tuple[Array, Array, Array]:
     columns = np.einsum("nik,mik->nmk", X_OG[:, :3, :3], X_OF[:, :3, :3])
     trace = np.abs(columns[..., 0] + columns[..., 1]) + columns[..., 2]
     angle = np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))
-    return translation, angle, translation + LEVER * angle
+    return translation, angle, translation + DISTANCE_LEVER * angle
 
 
 def antipodal(name: str, n: int, seed: int) -> GraspSet:

@@ -27,14 +27,10 @@ import numpy as np
 from mixed_grasps import clear_grasps, frictions, hand_only
 
 import burg_drake as burg
-from burg_drake.core.arrays import Array
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps.outcome import Stage
-from burg_drake.scene.document.scene import Instance, Scene
-from burg_drake.simulation.trials.result import TrialResult
-from burg_drake.station.document.engine import as_engine
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import Array, Pose, Stage, make_pose
+from burg_drake.scene import Instance, Scene
+from burg_drake.simulation import TrialResult
+from burg_drake.station import Station, as_engine
 
 SCENES = ("tabletop_six", "tabletop_close")
 NEXT_BOARD = 0.44

@@ -21,17 +21,26 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from burg_drake.cameras.optics import Intrinsics
-from burg_drake.dataset.labels import InstanceLabel, LabelledGrasps
-from burg_drake.dataset.rendering import Images
-from burg_drake.dataset.samples import Dataset, DatasetDocument, Sample, load_dataset
-from burg_drake.dataset.samples.document import save_dataset_document
-from burg_drake.dataset.samples.grasps_file import decode_grasps, encode_grasps
-from burg_drake.dataset.samples.index import write_index
-from burg_drake.dataset.samples.png import decode_image_of, encode_image
-from burg_drake.dataset.samples.record import parse_record, record_text
-from burg_drake.dataset.samples.shard import write_shard
-from burg_drake.dataset.views import View
+from burg_drake.cameras import Intrinsics
+from burg_drake.dataset import (
+    Dataset,
+    DatasetDocument,
+    Images,
+    InstanceLabel,
+    LabelledGrasps,
+    Sample,
+    View,
+    decode_grasps,
+    decode_image_of,
+    encode_grasps,
+    encode_image,
+    load_dataset,
+    parse_record,
+    record_text,
+    save_dataset_document,
+    write_index,
+    write_shard,
+)
 
 BALLS = 6
 GRASPS = 200

@@ -25,7 +25,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from burg_drake import load_dataset
+from burg_drake.dataset import load_dataset
 
 SIZE = (64, 48)
 RECIPE = f"version: 1\nsensor: d435\nsize: [{SIZE[0]}, {SIZE[1]}]\nlooks: null\n"

@@ -16,9 +16,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from burg_drake.cameras.optics import Intrinsics
+from burg_drake.cameras import Intrinsics
 from burg_drake.core import inverse, make_pose
-from burg_drake.dataset.labels import (
+from burg_drake.dataset import (
     LabelledGrasps,
     depth_cloud,
     exact_tsdf,
@@ -27,7 +27,7 @@ from burg_drake.dataset.labels import (
     surface_cloud,
     volume_grasps,
 )
-from burg_drake.scene.document import load_scene
+from burg_drake.scene import load_scene
 
 CAMERA = Intrinsics(width=640, height=480, focal=(600.0, 600.0), center=(319.5, 239.5))
 LENS = replace(CAMERA, distortion=(-0.1, 0.02, 1e-4, 1e-4))

@@ -24,11 +24,16 @@ from concurrent.futures import wait
 from dataclasses import replace
 from pathlib import Path
 
-from burg_drake import load_scene, load_station
-from burg_drake.core.workers import Task, WorkerPool
-from burg_drake.dataset.appearance import AppearanceSettings
-from burg_drake.dataset.generating import DatasetRecipe
-from burg_drake.dataset.generating.work import DatasetInputs, SceneWork, make_scene
+from burg_drake.core import Task, WorkerPool
+from burg_drake.dataset import (
+    AppearanceSettings,
+    DatasetInputs,
+    DatasetRecipe,
+    SceneWork,
+    make_scene,
+)
+from burg_drake.scene import load_scene
+from burg_drake.station import load_station
 
 SCENES = ("tabletop_six", "tabletop_close")
 STATION = "panda_tabletop"

@@ -28,19 +28,15 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from burg_drake.core.arrays import Array, Bytes, Single
-from burg_drake.core.workers.processes import ONE_THREAD
+from burg_drake.core import SINGLE_THREAD_ENVIRONMENT, Array, Bytes, Single
 
-os.environ.update(ONE_THREAD)
+os.environ.update(SINGLE_THREAD_ENVIRONMENT)
 
 import cv2
 import numpy as np
 from scipy.stats import norm
 
-from burg_drake.cameras.noise.document import NOISES, DepthNoise
-from burg_drake.cameras.noise.measurement import noisy_depth
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.optics.sensors import sensor
+from burg_drake.cameras import NOISE_PRESETS, DepthNoise, Intrinsics, noisy_depth, sensor
 
 CAMERA = Intrinsics(width=640, height=480, focal=(600.0, 600.0), center=(319.5, 239.5))
 LONGEST, LONGEST_WITHOUT = 15.0, 20.0
@@ -97,7 +93,7 @@ def main() -> int:
     depth, normals, color = scene()
     wrong = []
     print("camera         ms  without normals  lost %")
-    for name, noise in NOISES.items():
+    for name, noise in NOISE_PRESETS.items():
         with_normals = milliseconds(images, depth, noise, normals, color)
         without = milliseconds(images, depth, noise, None, color)
         measured = noisy_depth(
@@ -136,7 +132,7 @@ def milliseconds(
 def measure(stated: Stated, depth: Single, seed: int) -> Array:
     """What the camera makes of a depth image of its size."""
     camera = sensor(stated.camera).depth_camera(stated.size)
-    noise, rng = NOISES[stated.camera], np.random.default_rng(seed)
+    noise, rng = NOISE_PRESETS[stated.camera], np.random.default_rng(seed)
     return noisy_depth(depth, noise, camera, rng).astype(float)
 
 

@@ -27,9 +27,8 @@ from mixed_grasps import clear_grasps, frictions, hand_only
 
 import burg_drake as burg
 from burg_drake.core import wilson_interval
-from burg_drake.simulation.mujoco.trial_of_engine import hand_trial_of
-from burg_drake.simulation.trials.result import TrialResult
-from burg_drake.station.document.engine import ENGINES
+from burg_drake.simulation import TrialResult, hand_trial_of
+from burg_drake.station import ENGINES
 
 ENOUGH = 0.95
 """Share of verdicts that two good engines should have alike."""

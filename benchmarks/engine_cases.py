@@ -16,13 +16,10 @@ from mixed_grasps import CONE, hand_only
 from scipy.spatial.transform import Rotation
 
 import burg_drake as burg
-from burg_drake.core.arrays import Array
-from burg_drake.core.content import rng_from
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import make_pose, transform_points
-from burg_drake.objects.library.document import load_library
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
-from burg_drake.station.document.engine import ENGINES, Engine
+from burg_drake.core import Array, Pose, make_pose, rng_from, transform_points
+from burg_drake.objects import load_library
+from burg_drake.scene import Instance, Scene, SceneDocument
+from burg_drake.station import ENGINES, Engine
 
 STATION = "panda_tabletop"
 POSES = 3

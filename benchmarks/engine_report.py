@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 from engine_cases import NOISE, PROBES, Case
 
-from burg_drake.core.grasps.outcome import Outcome, Stage
-from burg_drake.core.statistics import wilson_interval
-from burg_drake.station.document.engine import Engine
+from burg_drake.core import Outcome, Stage, wilson_interval
+from burg_drake.station import Engine
 
 TUNED = ("household/box", "household/can", "household/bottle", "household/mug", "household/bowl")
 """Objects, or such as these, with which the presets were chosen."""

@@ -47,9 +47,8 @@ from engine_report import print_report
 from trial_journal import Row, TrialJournal
 
 import burg_drake as burg
-from burg_drake.core.content import content_hash
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.station.document.engine import DRAKE_ENGINES, ENGINES, Engine
+from burg_drake.core import InvalidInputError, content_hash
+from burg_drake.station import DRAKE_ENGINES, ENGINES, Engine
 
 LIBRARY = "household"
 CHUNK = 8

@@ -21,15 +21,12 @@ from typing import Any
 import numpy as np
 
 import burg_drake as burg
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.projection.visibility import visible_from
-from burg_drake.cameras.rectification.top_view import board_picture
-from burg_drake.core.frames import make_pose
-from burg_drake.evaluation.stages.counts import count_grasps
-from burg_drake.evaluation.stages.scene_acceptance import clear_grasp_counts, within_reach
-from burg_drake.motion.workspace.reach_layer import reach_from_above, reach_without_objects
-from burg_drake.scene.document.scene import Board, Scene
-from burg_drake.station.document.station_document import Station
+from burg_drake.cameras import Intrinsics, board_picture, visible_from
+from burg_drake.core import make_pose
+from burg_drake.evaluation import clear_grasp_counts, count_grasps, within_reach
+from burg_drake.motion import reach_from_above, reach_without_objects
+from burg_drake.scene import Board, Scene
+from burg_drake.station import Station
 from tests.cameras.synthetic import FINE, board_image
 
 SHEETS = {"A3": (0.420, 0.297), "A2": (0.594, 0.420), "A0": (1.189, 0.841)}

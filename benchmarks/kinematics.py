@@ -15,12 +15,10 @@ import time
 
 import numpy as np
 
-from burg_drake.core.arrays import Array
-from burg_drake.motion.ik.numeric import solve_ik
-from burg_drake.motion.ik.panda import PandaIk, panda_forward
-from burg_drake.motion.reach.arm_reach import ArmReach
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import Array
+from burg_drake.motion import ArmReach, PandaIk, panda_forward, solve_ik
+from burg_drake.scene import load_scene
+from burg_drake.station import load_station
 
 TARGET = 1.0
 """Of a pair of pose and joint value [microseconds]."""

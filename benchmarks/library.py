@@ -22,9 +22,8 @@ import numpy as np
 import trimesh
 
 import burg_drake as burg
-from burg_drake.core.workers.processes import ONE_THREAD
-from burg_drake.pipeline.build import BuildReport
-from burg_drake.pipeline.source import ObjectSource
+from burg_drake.core import SINGLE_THREAD_ENVIRONMENT
+from burg_drake.pipeline import BuildReport, ObjectSource
 
 STAGES = ("mesh", "pieces", "fit", "mass", "visual", "stable_poses", "confirm")
 PEER_DECOMPOSITION = (24.0, 65.0)
@@ -38,7 +37,7 @@ def main() -> None:
     parser.add_argument("meshes", nargs="*", help="mesh files in metres")
     parser.add_argument("--no-parallel", action="store_true", help="leave out the two workers")
     arguments = parser.parse_args()
-    os.environ.update(ONE_THREAD)
+    os.environ.update(SINGLE_THREAD_ENVIRONMENT)
     household = burg.load_library("household")
     sources = [ObjectSource(name=n, mesh=household.surface(n)) for n in household.objects]
     sources += [ObjectSource.from_file(mesh) for mesh in arguments.meshes]

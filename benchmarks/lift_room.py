@@ -18,11 +18,9 @@ import numpy as np
 from reach import STEP, Grasps, cause_of, clear_grasps
 from reach_audit import Audit
 
-from burg_drake.motion.lines.reach_settings import ReachSettings
-from burg_drake.motion.reach.arm_reach import ArmReach
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.document.grasp_motion import GraspMotion
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.motion import ArmReach, ReachSettings
+from burg_drake.scene import Scene, load_scene
+from burg_drake.station import GraspMotion, Station, load_station
 
 STATIONS = Path(__file__).parent / "confined"
 MOTIONS = {

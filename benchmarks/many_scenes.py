@@ -21,23 +21,27 @@ from typing import TypeVar
 
 import numpy as np
 
-from burg_drake.core.grasps import MARGINS, Verdict
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.evaluation.candidates.candidates import Candidates
-from burg_drake.evaluation.records.identity import run_hash
-from burg_drake.evaluation.records.journal import encode
-from burg_drake.evaluation.records.ledger import Ledger, SceneState
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.records.shard import Shard
-from burg_drake.evaluation.run.many_scenes import _document
-from burg_drake.evaluation.run.request import Request
-from burg_drake.evaluation.run.scene_list import read_scenes
-from burg_drake.evaluation.store.campaign_folder import Campaign, load_campaign, save_campaign
-from burg_drake.evaluation.store.part_writer import PartWriter
-from burg_drake.evaluation.store.run_folder import JOURNAL_FILE, create_run
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import GraspSet, MarginNames, Outcome, Verdict
+from burg_drake.evaluation import (
+    JOURNAL_FILE,
+    Campaign,
+    Candidates,
+    EvaluationSettings,
+    Ledger,
+    PartWriter,
+    Request,
+    SceneState,
+    Shard,
+    _campaign_document,
+    create_run,
+    encode_verdict,
+    load_campaign,
+    read_scenes,
+    run_hash,
+    save_campaign,
+)
+from burg_drake.scene import Scene, load_scene
+from burg_drake.station import load_station
 
 T = TypeVar("T")
 OUTCOMES = (Outcome.LIFTED, Outcome.SLIPPED, Outcome.COLLISION_TABLE, Outcome.LIFT_LINE)
@@ -87,7 +91,7 @@ def write(folder: Path, scenes: int, grasps: int, shard: Shard | None) -> Campai
     loaded = scenes_of(scenes)
     found = read_scenes(loaded)
     folder.mkdir(parents=True)
-    campaign = save_campaign(Campaign(folder, _document(found, request)))
+    campaign = save_campaign(Campaign(folder, _campaign_document(found, request)))
     by_name = dict(zip((entry.name for entry in found.entries), loaded, strict=True))
     ledger = Ledger(folder)
     writer = PartWriter(folder, campaign.places, campaign.document.instances)
@@ -105,7 +109,7 @@ def write(folder: Path, scenes: int, grasps: int, shard: Shard | None) -> Campai
         document = replace(document, hash=run_hash(document))
         run = create_run(run_folder, document, scene, station, candidates)
         names = list(scene.instances)
-        lines = [encode(id, verdict(rng, names)) for id in candidates.id]
+        lines = [encode_verdict(id, verdict(rng, names)) for id in candidates.id]
         (run_folder / JOURNAL_FILE).write_bytes(b"".join(lines))
         size = sum(map(len, lines))
         state = SceneState(scene=name, state="done", run=document.hash, grasps=grasps, mine=grasps)
@@ -118,13 +122,13 @@ def write(folder: Path, scenes: int, grasps: int, shard: Shard | None) -> Campai
 def verdict(rng: np.random.Generator, names: list[str]) -> Verdict:
     """A random verdict."""
     outcome = OUTCOMES[rng.integers(len(OUTCOMES))]
-    values = rng.random(len(MARGINS) + 20)
+    values = rng.random(len(MarginNames.all) + 20)
     executed = outcome in (Outcome.LIFTED, Outcome.SLIPPED)
     return Verdict(
         outcome,
         outcome.stage,
         blocker="" if executed else "table",
-        margins=dict(zip(MARGINS, values.tolist(), strict=False)),
+        margins=dict(zip(MarginNames.all, values.tolist(), strict=False)),
         displacements=dict(zip(names, values.tolist(), strict=False)) if executed else {},
         q_grasp=tuple(values[-7:].tolist()) if executed else (),
         q_pregrasp=tuple(values[-14:-7].tolist()) if executed else (),
@@ -144,8 +148,7 @@ def timed(what: str, work: Callable[[], T]) -> T:
 
 def ask(folder: Path) -> None:
     """What a fresh process is asked for."""
-    from burg_drake.evaluation.results.summary import summarize
-    from burg_drake.evaluation.store.loading import read_results
+    from burg_drake.evaluation import read_results, summarize
 
     campaign = timed("open", lambda: load_campaign(folder))
     summary = timed("summarise", lambda: summarize(campaign))
@@ -180,7 +183,7 @@ def main() -> None:
     subprocess.run(command, check=True)
     if not arguments.merge:
         return
-    from burg_drake.evaluation.merge.runs import merge_runs
+    from burg_drake.evaluation import merge_runs
 
     merged = arguments.output / "merged"
     shutil.rmtree(merged, ignore_errors=True)

@@ -7,13 +7,10 @@ import dataclasses
 import numpy as np
 
 import burg_drake as burg
-from burg_drake.core.arrays import Array
-from burg_drake.core.content import rng_from
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import make_pose, rot_z
-from burg_drake.scene.document.scene import Scene
-from burg_drake.simulation.mujoco.mujoco_trial import MujocoTrial
-from burg_drake.station.document.station_document import Station, Table
+from burg_drake.core import Array, Pose, make_pose, rng_from, rot_z
+from burg_drake.scene import Scene
+from burg_drake.simulation import MujocoTrial
+from burg_drake.station import Station, Table
 
 CONE = np.deg2rad(75.0)
 """Grasps approach from above, within this angle."""

@@ -18,13 +18,10 @@ from reach import STEP, Grasps, clear_grasps
 from reach_audit import Audit
 from reach_judges import Plain, World
 
-from burg_drake.core.frames import inverse
-from burg_drake.motion.ik.routine import IkRoutine
-from burg_drake.motion.lines.reach_settings import ReachSettings
-from burg_drake.motion.reach.arm_reach import ArmReach, Reach
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.document.grasp_motion import GraspMotion
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.core import inverse
+from burg_drake.motion import ArmReach, IkRoutine, Reach, ReachSettings
+from burg_drake.scene import Scene, load_scene
+from burg_drake.station import GraspMotion, Station, load_station
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "motion"))
 import ur_ik

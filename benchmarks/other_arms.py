@@ -14,9 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from burg_drake.core.documents.schema import Pose, save_document
-from burg_drake.core.paths.resources import data_root
-from burg_drake.station.document.station_document import Arm, StationDocument, load_station
+from burg_drake.core import Pose, data_root, save_document
+from burg_drake.station import Arm, StationDocument, load_station
 
 IIWA = (
     # origin in the frame before, its roll, pitch and yaw, end of the link, radius; range [deg],

@@ -18,10 +18,9 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from burg_drake.core.arrays import Array, Bytes
-from burg_drake.core.workers.processes import ONE_THREAD
+from burg_drake.core import SINGLE_THREAD_ENVIRONMENT, Array, Bytes
 
-os.environ.update(ONE_THREAD)
+os.environ.update(SINGLE_THREAD_ENVIRONMENT)
 
 import cv2
 import numpy as np
@@ -30,16 +29,20 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 import burg_drake as burg
-from burg_drake.cameras.optics.field_of_view import FieldOfView
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.overlay.renderer import Overlay, instance_labels
-from burg_drake.cameras.overlay.style import OverlayStyle
-from burg_drake.cameras.projection.line_drawing import OUTLINE, visible_lines
-from burg_drake.cameras.projection.scene_mesh import SceneMesh, build_scene_mesh
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import make_pose
-from burg_drake.pipeline.source import ObjectSource
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
+from burg_drake.cameras import (
+    OUTLINE_KIND,
+    FieldOfView,
+    Intrinsics,
+    Overlay,
+    OverlayStyle,
+    SceneMesh,
+    build_scene_mesh,
+    instance_labels,
+    visible_lines,
+)
+from burg_drake.core import Pose, make_pose
+from burg_drake.pipeline import ObjectSource
+from burg_drake.scene import Instance, Scene, SceneDocument
 
 LENS = (-0.25, 0.08, 0.0004, -0.0003, 0.0)
 """Distortion of a webcam's wide lens: 20 pixels in the corners of 640 x 480."""
@@ -80,7 +83,7 @@ def report(scene: Scene, intrinsics: Intrinsics) -> None:
     for X_SC in views():
         points, normals, alone = borders(scene, shape, intrinsics, X_SC)
         lines = visible_lines(shape, FieldOfView(intrinsics), X_SC)
-        projected.append(distances(points, lines.ends[lines.kind == OUTLINE]))
+        projected.append(distances(points, lines.ends[lines.kind == OUTLINE_KIND]))
         drawn.append(np.abs(line_middles(overlay, X_SC, points[alone], normals[alone])))
     lens = "lens" if intrinsics.distortion else "pinhole"
     print(
@@ -153,7 +156,7 @@ def borders(
         normals[i] = vectors[:, 0]
         alone[i] = values[0] < 0.01 * len(near)  # all on one line
     inner = visible_lines(shape, FieldOfView(intrinsics), X_SC)
-    others = inner.ends[inner.kind != OUTLINE].mean(axis=1)
+    others = inner.ends[inner.kind != OUTLINE_KIND].mean(axis=1)
     if len(others):
         alone &= np.linalg.norm(found[:, None] - others[None], axis=2).min(axis=1) > NEAREST
     edge = (found > NEAREST) & (found < np.array(labels.shape)[::-1] - 1 - NEAREST)

@@ -21,12 +21,9 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import make_pose, quaternion_from_rotation
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import Array, InvalidInputError, Outcome, make_pose, quaternion_from_rotation
+from burg_drake.scene import Scene
+from burg_drake.station import Station
 
 STEP = 1.0 / 240.0
 FORCE = 40.0

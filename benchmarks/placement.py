@@ -20,14 +20,16 @@ from collections import Counter, defaultdict
 import cv2
 import numpy as np
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.placement.alignment.pinhole import PinholeView
-from burg_drake.cameras.placement.alignment.shape import TargetShape, target_shapes
-from burg_drake.cameras.placement.check import check_placement
-from burg_drake.cameras.placement.document import Placement
-from burg_drake.core.arrays import Array
-from burg_drake.core.frames import make_pose
-from burg_drake.scene.document.scene import load_scene
+from burg_drake.cameras import (
+    Intrinsics,
+    PinholeView,
+    Placement,
+    TargetShape,
+    check_placement,
+    target_shapes,
+)
+from burg_drake.core import Array, make_pose
+from burg_drake.scene import load_scene
 from tests.cameras.placement_photo import ScenePhotographer
 
 SEEN = 0.5

@@ -20,11 +20,9 @@ import numpy as np
 import pypdfium2
 from numpy.typing import NDArray
 
-from burg_drake.core.arrays import Array
-from burg_drake.printout.board_printout import Printout, PrintSettings, print_board
-from burg_drake.printout.relief import height_map
-from burg_drake.scene.document.markers import MarkerLayout, Markers, marker_dictionary
-from burg_drake.scene.document.scene import Board, Scene, load_scene
+from burg_drake.core import Array
+from burg_drake.printout import Printout, PrintSettings, height_map, print_board
+from burg_drake.scene import Board, MarkerLayout, Markers, Scene, load_scene, marker_dictionary
 
 SCENES = ("tabletop_six", "tabletop_twelve")
 PAGES = ("A4", "A3", "A2", "letter")

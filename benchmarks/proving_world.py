@@ -22,9 +22,9 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import DiagramBuilder
 
-from burg_drake.core.paths.resources import data_root
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import data_root
+from burg_drake.scene import Scene
+from burg_drake.station import Station
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@
 Scores antipodal grasps on a mesh (default: a lumpy surface of 20,480 faces) and computes epsilon
 and volume of some of them with scipy's ConvexHull in six dimensions as well, for the friction
 ellipsoid of each contact as a polytope of 12 and of 42 corners. One core; the errors are relative
-to the epsilon of `reaches`, and to the volume with polytopes of 1,280 faces.
+to the epsilon of `wrench_reaches`, and to the volume with polytopes of 1,280 faces.
 """
 
 from __future__ import annotations
@@ -18,14 +18,22 @@ import numpy as np
 import trimesh
 from scipy.spatial import ConvexHull
 
-from burg_drake.core.arrays import Array
-from burg_drake.geometry.surface import Surface
-from burg_drake.grasping.quality.contacts import friction_needed, grasp_contacts
-from burg_drake.grasping.quality.metrics import Payload, grasp_quality
-from burg_drake.grasping.quality.triangulation import triangulated_ball
-from burg_drake.grasping.quality.wrench_margins import ANY_WRENCH, epsilon_bracket, reaches
-from burg_drake.grasping.quality.wrench_space import WrenchSpace, hull_volume
-from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal
+from burg_drake.core import Array
+from burg_drake.geometry import Surface
+from burg_drake.grasping import (
+    ANY_WRENCH,
+    AntipodalSettings,
+    Payload,
+    WrenchSpace,
+    epsilon_bracket,
+    friction_needed,
+    grasp_contacts,
+    grasp_quality,
+    hull_volume,
+    sample_antipodal,
+    triangulated_ball,
+    wrench_reaches,
+)
 
 FRICTION = 0.4
 TARGET = 5.0
@@ -86,7 +94,7 @@ def wrench_spaces(mesh: trimesh.Trimesh, X_OG: Array, center: Array) -> WrenchSp
 def compare(space: WrenchSpace, seconds: float, count: int) -> None:
     """Prints errors and times of qhull next to ours."""
     some = space.select(np.linspace(0, len(space) - 1, count).astype(int))
-    (epsilon,) = reaches(some, [ANY_WRENCH])
+    (epsilon,) = wrench_reaches(some, [ANY_WRENCH])
     lower, _ = epsilon_bracket(some, 2)
     volume = hull_volume(some, triangulated_ball(3, of_volume=True))
     ours = np.abs(hull_volume(some, triangulated_ball(1, of_volume=True)) / volume - 1.0)

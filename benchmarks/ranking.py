@@ -20,17 +20,11 @@ from numpy.typing import NDArray
 from scipy.stats import rankdata
 
 import burg_drake as burg
-from burg_drake.core.arrays import Array
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.evaluation.candidates.candidates import INSTANCE
-from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
-from burg_drake.evaluation.grasp_sets.sampled import sample_grasps
-from burg_drake.evaluation.grasp_sets.scored import scored_set
-from burg_drake.grasping.quality.metrics import METRICS, score_of
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.engine import as_engine
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import Array, GraspSet, Outcome
+from burg_drake.evaluation import INSTANCE_COLUMN, SamplingSettings, sample_grasps, scored_set
+from burg_drake.grasping import METRICS, score_of
+from burg_drake.scene import Scene
+from burg_drake.station import Station, as_engine
 
 SAMPLER = "sampler's score"
 RESAMPLED = 1000
@@ -57,7 +51,7 @@ def main() -> None:
         outcomes = execute(grasps, scene, station, factor)
         judged = outcomes != Outcome.SIMULATION_FAILED
         held = np.array([Outcome(outcome).held for outcome in outcomes.tolist()])[judged]
-        on = grasps.column(INSTANCE)[judged]
+        on = grasps.column(INSTANCE_COLUMN)[judged]
         seconds = time.process_time() - start
         print(f"{factor:g} times the mass: {len(held)} trials in {seconds:.0f} s")
         for name in dict.fromkeys(on.tolist()):
@@ -71,7 +65,7 @@ def execute(grasps: GraspSet, scene: Scene, station: Station, factor: float) -> 
     """Outcomes (N,) with so many times the mass."""
     trial = burg.HandTrial(scene, station, engine=as_engine("screening"))
     outcomes = []
-    for name, X_OG in zip(grasps.column(INSTANCE).tolist(), grasps.X_OG, strict=True):
+    for name, X_OG in zip(grasps.column(INSTANCE_COLUMN).tolist(), grasps.X_OG, strict=True):
         mass = factor * scene.entry(name).mass_properties.mass
         outcomes.append(trial.run(name, X_OG, mass=mass).outcome.value)
     return np.array(outcomes)

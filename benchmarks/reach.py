@@ -25,18 +25,11 @@ from reach_audit import Audit
 from reach_judges import Exhaustive, Plain, PlainWorld, World
 from reach_recall import Recall, recall
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.content import rng_from
-from burg_drake.core.statistics import wilson_interval
-from burg_drake.grasping.clearance.hand_clearance import HandClearance
-from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal
-from burg_drake.motion.ik.panda import PandaIk
-from burg_drake.motion.lines.reach_settings import ReachSettings
-from burg_drake.motion.reach.arm_reach import ArmReach, Reach
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.grasp_motion import GraspMotion
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.core import Array, rng_from, wilson_interval
+from burg_drake.grasping import AntipodalSettings, HandClearance, sample_antipodal
+from burg_drake.motion import ArmReach, PandaIk, Reach, ReachSettings
+from burg_drake.scene import Scene, load_scene
+from burg_drake.station import GraspMotion, Station, build_station_diagram, load_station
 
 STEP = 0.005
 """Of the audit [m]."""

@@ -15,12 +15,10 @@ import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import BodyIndex
 
-from burg_drake.core.arrays import Array
-from burg_drake.motion.reach.witness import Witness
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.diagram.mesh_replacement import mesh_by_pieces
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import Array
+from burg_drake.motion import Witness
+from burg_drake.scene import Scene
+from burg_drake.station import Station, build_station_diagram, replace_meshes_by_pieces
 
 DEEPER = 1e-3
 """What the target touches at rest counts where it gets deeper by more than that [m]."""
@@ -59,7 +57,7 @@ class Audit:
         self._built = build_station_diagram(scene, station, robot="arm")
         plant = self._built.plant
         self._context = self._built.diagram.CreateDefaultContext()
-        mesh_by_pieces(self._built, self._context)
+        replace_meshes_by_pieces(self._built, self._context)
         self._state = plant.GetMyMutableContextFromRoot(self._context)
         self._arm = plant.GetModelInstanceByName("arm")
         self._hand = plant.GetModelInstanceByName("hand")

@@ -25,15 +25,10 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 from pydrake.solvers import SnoptSolver
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.content import rng_from
-from burg_drake.core.frames import inverse, swap_fingers
-from burg_drake.motion.collision.checker import ArmCollision
-from burg_drake.motion.ik.numeric import ArmKinematics
-from burg_drake.motion.ik.panda import PandaIk
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import Array, inverse, rng_from, swap_fingers
+from burg_drake.motion import ArmCollision, ArmKinematics, PandaIk
+from burg_drake.scene import Scene
+from burg_drake.station import Station, build_station_diagram
 
 LAYER = 0.025
 """Distance between the hand poses of the exhaustive judge [m]."""

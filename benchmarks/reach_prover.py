@@ -19,8 +19,8 @@ import numpy as np
 from proving_tree import RandomTrees
 from proving_world import Array, ProvingWorld, RobotKinematics
 
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.station_document import Station
+from burg_drake.scene import Scene
+from burg_drake.station import Station
 
 STEP = 0.02
 """From pose to pose of the search along the hand's way [m]."""

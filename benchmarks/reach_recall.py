@@ -16,15 +16,10 @@ import numpy as np
 from reach_audit import Audit
 from reach_prover import Prover
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.statistics import wilson_interval
-from burg_drake.motion.lines.reach_settings import ReachSettings
-from burg_drake.motion.reach.arm_reach import ArmReach
-from burg_drake.motion.reach.verdict import Reach
-from burg_drake.motion.reach.witness import Witness
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.grasp_motion import GraspMotion
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import Array, wilson_interval
+from burg_drake.motion import ArmReach, Reach, ReachSettings, Witness
+from burg_drake.scene import Scene
+from burg_drake.station import GraspMotion, Station
 
 STEP = 0.003
 """Of the audit of motions that we have missed [m]."""

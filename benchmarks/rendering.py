@@ -21,12 +21,9 @@ from pydrake.geometry import QueryObject
 from pydrake.math import RigidTransform
 
 import burg_drake as burg
-from burg_drake.core.frames import make_pose
-from burg_drake.dataset.labels import label_instances
-from burg_drake.dataset.rendering import SceneRenderer, station_view
-from burg_drake.dataset.views import View
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.world.camera_sensors import render_cameras
+from burg_drake.core import make_pose
+from burg_drake.dataset import SceneRenderer, View, label_instances, station_view
+from burg_drake.station import build_station_diagram, render_cameras
 
 os.environ["LP_NUM_THREADS"] = "0"  # one thread in Mesa's renderer, as in workers
 PEER = 0.080

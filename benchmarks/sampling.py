@@ -22,10 +22,9 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from burg_drake.core.arrays import Array
-from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal
-from burg_drake.grasping.sampling.approach import ApproachCone
-from burg_drake.objects.library.document import load_library
+from burg_drake.core import Array
+from burg_drake.grasping import AntipodalSettings, ApproachCone, sample_antipodal
+from burg_drake.objects import load_library
 
 PEER = {"sugar": 97.0, "screwdriver": 344.0, "mug": 1423.0, "can": 1636.0, "cylinder": 1636.0}
 PEER_FASTEST = 1957.0
@@ -119,8 +118,8 @@ def household() -> dict[str, trimesh.Trimesh]:
 
 def household_screens() -> dict[str, Callable[[Array], Array]]:
     """For each object, which grasps the Panda's open hand can take of the object alone."""
-    from burg_drake.grasping.clearance.hand_clearance import hand_clearance_alone
-    from burg_drake.station.document.station_document import load_station
+    from burg_drake.grasping import hand_clearance_alone
+    from burg_drake.station import load_station
 
     library, station = load_library("household"), load_station("panda_tabletop")
 

@@ -16,10 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from burg_drake.core.grasps import CPU_COLUMNS
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.store.loading import read_results
+from burg_drake.core import CPU_COLUMNS
+from burg_drake.evaluation import EvaluationSettings, evaluate, read_results
 
 
 def main() -> None:

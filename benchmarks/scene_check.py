@@ -22,13 +22,10 @@ from pathlib import Path
 
 import numpy as np
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import make_pose, rot_z
-from burg_drake.objects.library.document import ObjectLibrary, load_library
-from burg_drake.scene.document.scene import Board, Instance, Scene, SceneDocument
-from burg_drake.station.checks.scene_check import SceneCheck
-from burg_drake.station.checks.scene_issues import check_scene
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import Pose, make_pose, rot_z
+from burg_drake.objects import ObjectLibrary, load_library
+from burg_drake.scene import Board, Instance, Scene, SceneDocument
+from burg_drake.station import SceneCheck, check_scene, load_station
 
 SPACING = 0.15
 """Of the grid [m]."""

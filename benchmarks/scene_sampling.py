@@ -19,14 +19,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from burg_drake.generation.many import sample_scenes
-from burg_drake.generation.sample import SampledScene, SceneSampler
-from burg_drake.objects.library.document import load_library
-from burg_drake.scene.document.board import Board
-from burg_drake.scene.document.layout import LAYOUTS, LayoutName
-from burg_drake.scene.document.recipe import SceneRecipe
-from burg_drake.simulation.rest.still_check import is_still, stillness
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.generation import SampledScene, SceneSampler, sample_scenes
+from burg_drake.objects import load_library
+from burg_drake.scene import LAYOUTS, Board, LayoutName, SceneRecipe
+from burg_drake.simulation import is_still, stillness
+from burg_drake.station import Station, load_station
 
 A2, A3 = Board(), Board(size=(0.42, 0.297))
 

@@ -27,11 +27,9 @@ import numpy as np
 from pydrake.geometry import HydroelasticContactRepresentation
 
 import burg_drake as burg
-from burg_drake.core.arrays import Array
-from burg_drake.core.content import rng_from
-from burg_drake.grasping.clearance.hand_clearance import HandClearance
-from burg_drake.grasping.clearance.verdict import ClearanceBatch
-from burg_drake.simulation.trials.hand_trial import HandTrial
+from burg_drake.core import Array, rng_from
+from burg_drake.grasping import ClearanceBatch, HandClearance
+from burg_drake.simulation import HandTrial
 
 PEER_FILTER = (2400.0, 8800.0)
 PEER_REJECTED = 0.07

@@ -20,21 +20,23 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import inverse
-from burg_drake.generation import heap as heaps
-from burg_drake.objects.library.document import ObjectLibrary, load_library
-from burg_drake.pipeline.build import build_library
-from burg_drake.pipeline.source import ObjectSource
-from burg_drake.scene.arrangement.arranging import arrange, choose
-from burg_drake.scene.arrangement.object_shapes import ObjectShapes
-from burg_drake.scene.document.layout import LayoutName
-from burg_drake.scene.document.scene import Board, Instance, Scene, SceneDocument, save_scene
-from burg_drake.simulation.rest.still_check import stillness
-from burg_drake.simulation.settling import settled_scene as settling
-from burg_drake.station.checks.scene_check import SceneCheck
-from burg_drake.station.checks.scene_issues import check_scene
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.core import Pose, inverse
+from burg_drake.generation import heap_settling as heaps
+from burg_drake.objects import ObjectLibrary, load_library
+from burg_drake.pipeline import ObjectSource, build_library
+from burg_drake.scene import (
+    Board,
+    Instance,
+    LayoutName,
+    ObjectShapes,
+    Scene,
+    SceneDocument,
+    arrange,
+    choose_objects,
+    save_scene,
+)
+from burg_drake.simulation import settled_scene as settling, stillness
+from burg_drake.station import SceneCheck, Station, check_scene, load_station
 from tools.household import household_shapes
 from tools.household.curves import ellipse
 from tools.household.solids import circles, hull, hulls, rings_along, sectors, tube, union
@@ -110,7 +112,7 @@ def lay_out(
         X_SB = X_SW @ box.X_WB.matrix()
         obstacles.append(corners * box.size @ X_SB[:3, :3].T + X_SB[:3, 3])
     for _ in range(100):  # until there is room for all
-        wanted = choose(library, count, rng)
+        wanted = choose_objects(library, count, rng)
         arranged = arrange(wanted, shapes, board, rng, layout=layout, obstacles=obstacles)
         if not arranged.missing:
             break

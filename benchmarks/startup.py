@@ -99,10 +99,9 @@ def command(scene: str, station: str, one: Path, environment: dict[str, str]) ->
 
 def ask(scene_name: str, station_name: str, grasps: str) -> dict[str, float]:
     """In a process of its own: CPU time since its start until it has a verdict, and so on."""
-    from burg_drake.motion.planner import Planner
-    from burg_drake.motion.reach.arm_reach import ArmReach
-    from burg_drake.scene.document.scene import load_scene
-    from burg_drake.station.document.station_document import load_station
+    from burg_drake.motion import ArmReach, Planner
+    from burg_drake.scene import load_scene
+    from burg_drake.station import load_station
 
     imported = time.process_time()
     scene, station = load_scene(scene_name), load_station(station_name)
@@ -147,10 +146,9 @@ def station_of(name: str, folder: Path) -> str:
 
 def sample(scene_name: str, station_name: str, count: int, grasps: Path, one: Path) -> None:
     """Writes grasps that the open hand is clear at, and the first of them as a file of grasps."""
-    from burg_drake.evaluation.grasp_sets.sampled import sample_grasps
-    from burg_drake.scene.document.scene import load_scene
-    from burg_drake.station.diagram.station_diagram import instance_pose
-    from burg_drake.station.document.station_document import load_station
+    from burg_drake.evaluation import sample_grasps
+    from burg_drake.scene import load_scene
+    from burg_drake.station import instance_pose, load_station
 
     scene, station = load_scene(scene_name), load_station(station_name)
     each = max(1, count // len(scene.instances))

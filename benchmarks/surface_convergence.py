@@ -21,14 +21,15 @@ import numpy as np
 from contact_oracle_trials import KNOWN, build, run_engine
 from oracle.cases import Case, load_cases
 
-from burg_drake.objects.collision.contact_surface import (
-    MOST_ANGLE,
-    MOST_DISTANCE,
+from burg_drake.objects import (
+    MAX_CONTACT_DISTANCE,
+    MAX_NORMAL_ANGLE,
+    ObjectLibrary,
     contact_surface,
-    excess,
+    load_library,
+    max_excess,
+    write_piece,
 )
-from burg_drake.objects.library.document import ObjectLibrary, load_library
-from burg_drake.objects.library.obj_file import write_piece
 
 FACTORS = (4.0, 2.0, 1.0, 0.5, 0.25)
 """Of the pipeline's bound on distance; that on angles has the square root of it."""
@@ -77,10 +78,13 @@ def resurfaced(
     for name in curved:
         entry = objects[name]
         mesh, fit = contact_surface(
-            library.surface(name), True, factor * MOST_DISTANCE, factor**0.5 * MOST_ANGLE
+            library.surface(name),
+            True,
+            factor * MAX_CONTACT_DISTANCE,
+            factor**0.5 * MAX_NORMAL_ANGLE,
         )
         write_piece(mesh, folder / entry.contact.mesh)
-        out = excess(mesh, [library.mesh(piece) for piece in entry.pieces])
+        out = max_excess(mesh, [library.mesh(piece) for piece in entry.pieces])
         objects[name] = replace(entry, contact=replace(entry.contact, fit=fit, excess=out))
     changed = ObjectLibrary(replace(library.document, objects=objects), folder.resolve())
     changed.save()
@@ -113,7 +117,7 @@ def show(rungs: dict[float, Rung], cases: list[Case]) -> None:
         both = lifted & np.array(finest.lifted)
         slip = 1e3 * np.abs(np.array(rung.slip) - np.array(finest.slip))[both]
         print(
-            f"{1e3 * factor * MOST_DISTANCE:10.3f} {np.mean(list(rung.faces.values())):6.0f}"
+            f"{1e3 * factor * MAX_CONTACT_DISTANCE:10.3f} {np.mean(list(rung.faces.values())):6.0f}"
             f" {np.sum(lifted != finest.lifted):11} of {len(cases)}"
             f" {np.sum(lifted != truth):12} of {len(cases)}"
             f" {np.median(slip):14.3f} {np.mean(rung.seconds):10.3f}"

@@ -25,10 +25,9 @@ import numpy as np
 from mixed_grasps import clear_grasps, frictions, hand_only
 
 import burg_drake as burg
-from burg_drake.core.arrays import Array
-from burg_drake.core.frames import swap_fingers
-from burg_drake.simulation.trials.result import TrialResult
-from burg_drake.station.document.engine import as_engine
+from burg_drake.core import Array, swap_fingers
+from burg_drake.simulation import TrialResult
+from burg_drake.station import as_engine
 
 SCENES = ("tabletop_six", "tabletop_close")
 PEER = {"swapped": 0.088, "turned": 0.056}

@@ -21,18 +21,19 @@ from pydrake.multibody.tree import MultibodyForces
 from pydrake.trajectories import PiecewisePolynomial
 from reach import Grasps, clear_grasps
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.paths.resources import data_root
-from burg_drake.motion.ik.limits import ArmLimits
-from burg_drake.motion.ik.numeric import ArmKinematics
-from burg_drake.motion.planner import Planner
-from burg_drake.motion.plans.grasp_plan import Plan
-from burg_drake.motion.plans.trajectory import Trajectory
-from burg_drake.motion.reach.arm_reach import ArmReach
-from burg_drake.motion.timing.grasp_timing import time_motion
-from burg_drake.motion.timing.line_path import line_error
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.core import Array, data_root
+from burg_drake.motion import (
+    ArmKinematics,
+    ArmLimits,
+    ArmReach,
+    Plan,
+    Planner,
+    Trajectory,
+    line_error,
+    time_motion,
+)
+from burg_drake.scene import load_scene
+from burg_drake.station import Station, load_station
 
 AUDITED = 40
 """Plans whose samples are asked to Drake, every `EVERY`th."""

@@ -25,13 +25,10 @@ import peer_pybullet
 from mixed_grasps import clear_grasps, frictions, hand_only, sampled_grasps
 
 import burg_drake as burg
-from burg_drake.core.arrays import Array
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.scene.document.scene import Scene
-from burg_drake.simulation.mujoco.mujoco_trial import MujocoTrial
-from burg_drake.simulation.mujoco.trial_of_engine import hand_trial_of
-from burg_drake.station.document.engine import ENGINES
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import Array, Outcome
+from burg_drake.scene import Scene
+from burg_drake.simulation import MujocoTrial, hand_trial_of
+from burg_drake.station import ENGINES, Station
 
 PUBLISHED_EXECUTED, PUBLISHED_REJECTED = 0.45, 0.07
 """BURG-Toolkit's CPU times [s]."""

@@ -1,68 +1,48 @@
 """Runs and campaigns: their documents and rows, judging on other machines, robustness of grasps."""
 
-from burg_drake.core.grasps import (
+from burg_drake.core import (
+    Listener as Listener,
     Mode as Mode,
+    Progress as Progress,
+    TimeLimit as TimeLimit,
     Verdict as Verdict,
 )
-from burg_drake.core.terminal import (
-    Listener as Listener,
-    Progress as Progress,
-)
-from burg_drake.core.workers import TimeLimit as TimeLimit
-from burg_drake.evaluation import judge_again as judge_again
-from burg_drake.evaluation.candidates import (
+from burg_drake.evaluation import (
+    CampaignDocument as CampaignDocument,
     Candidate as Candidate,
     Candidates as Candidates,
-)
-from burg_drake.evaluation.cluster import (
     DaskExecutor as DaskExecutor,
-    connect_cluster as connect_cluster,
-)
-from burg_drake.evaluation.merge import (
-    merge_runs as merge_runs,
-)
-from burg_drake.evaluation.records import (
-    CampaignDocument as CampaignDocument,
+    Decision as Decision,
+    Executor as Executor,
+    GraspRobustness as GraspRobustness,
     Grasps as Grasps,
+    GraspsLike as GraspsLike,
     Input as Input,
+    Job as Job,
+    JobFailed as JobFailed,
+    Judge as Judge,
     Library as Library,
+    LocalExecutor as LocalExecutor,
+    OnFailure as OnFailure,
+    ProbeAnswer as ProbeAnswer,
     RecordedTrial as RecordedTrial,
+    Robustness as Robustness,
+    RobustnessSettings as RobustnessSettings,
     RunDocument as RunDocument,
     SceneEntry as SceneEntry,
     SceneState as SceneState,
-    Shard as Shard,
-    TrialOrigin as TrialOrigin,
-    WorkSession as WorkSession,
-)
-from burg_drake.evaluation.results import (
-    Status as Status,
-    read_status as read_status,
-)
-from burg_drake.evaluation.robustness import (
-    GraspRobustness as GraspRobustness,
-    ProbeAnswer as ProbeAnswer,
-    Robustness as Robustness,
-    RobustnessSettings as RobustnessSettings,
-    assess_robustness as assess_robustness,
-)
-from burg_drake.evaluation.run import (
-    GraspsLike as GraspsLike,
-)
-from burg_drake.evaluation.stages import (
-    Decision as Decision,
-    Judge as Judge,
     Screen as Screen,
-)
-from burg_drake.evaluation.store import (
+    Shard as Shard,
+    Status as Status,
     StoredRows as StoredRows,
     StoredRun as StoredRun,
-    load_runs as load_runs,
-)
-from burg_drake.evaluation.workers import (
-    Executor as Executor,
-    Job as Job,
-    JobFailed as JobFailed,
-    LocalExecutor as LocalExecutor,
-    OnFailure as OnFailure,
+    TrialOrigin as TrialOrigin,
     WorkerLimits as WorkerLimits,
+    WorkSession as WorkSession,
+    assess_robustness as assess_robustness,
+    connect_cluster as connect_cluster,
+    judge_again as judge_again,
+    load_runs as load_runs,
+    merge_runs as merge_runs,
+    read_status as read_status,
 )

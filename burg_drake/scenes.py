@@ -1,19 +1,13 @@
 """Scenes: their documents, checks, sampling, settling, printing and export."""
 
-from burg_drake.core.documents import (
-    Pose as Pose,
-)
-from burg_drake.evaluation.stages import (
+from burg_drake.core import Pose as Pose
+from burg_drake.evaluation import (
     GraspCount as GraspCount,
     clear_grasp_counts as clear_grasp_counts,
     count_grasps as count_grasps,
     within_reach as within_reach,
 )
-from burg_drake.export import (
-    Exported as Exported,
-    Layout as Layout,
-    PlacedObject as PlacedObject,
-)
+from burg_drake.export import Exported as Exported, Layout as Layout, PlacedObject as PlacedObject
 from burg_drake.generation import (
     SampledFolder as SampledFolder,
     SampledScene as SampledScene,
@@ -28,7 +22,7 @@ from burg_drake.printout import (
     Tiling as Tiling,
     height_map as height_map,
 )
-from burg_drake.scene.document import (
+from burg_drake.scene import (
     Board as Board,
     Extent as Extent,
     Instance as Instance,
@@ -40,15 +34,11 @@ from burg_drake.scene.document import (
     SceneOrigin as SceneOrigin,
     validate_scene as validate_scene,
 )
-from burg_drake.simulation.rest import (
+from burg_drake.simulation import (
     BodySpeed as BodySpeed,
     Displacement as Displacement,
+    SettledScene as SettledScene,
     is_still as is_still,
     stillness as stillness,
 )
-from burg_drake.simulation.settling import (
-    SettledScene as SettledScene,
-)
-from burg_drake.station.checks import (
-    SceneCheck as SceneCheck,
-)
+from burg_drake.station import SceneCheck as SceneCheck

@@ -16,33 +16,39 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-GLIB = "libglib-2.0.so.0"
-EGL = "libEGL.so.1"
-MESA_EGL = "libEGL_mesa.so.0"
-MESA_DRIVER = "swrast_dri.so"
-ATOMIC = "libatomic.so.1"
+
+class SystemLibrary:
+    """System library."""
+
+    glib = "libglib-2.0.so.0"  # Needed to import pydrake.
+    egl = "libEGL.so.1"  # Needed to render.
+    mesa_egl = "libEGL_mesa.so.0"
+    mesa_driver = "swrast_dri.so"
+    atomic = "libatomic.so.1"  # Lets a faster memory allocator load.
+
 
 # Debian's and Ubuntu's package for each of them.
-_PACKAGES = {
-    GLIB: "libglib2.0-0",
-    EGL: "libegl1",
-    MESA_EGL: "libegl-mesa0",
-    MESA_DRIVER: "libgl1-mesa-dri",
-    ATOMIC: "libatomic1",
+_DEBIAN_PACKAGES = {
+    SystemLibrary.glib: "libglib2.0-0",
+    SystemLibrary.egl: "libegl1",
+    SystemLibrary.mesa_egl: "libegl-mesa0",
+    SystemLibrary.mesa_driver: "libgl1-mesa-dri",
+    SystemLibrary.atomic: "libatomic1",
 }
+"""Packages of Debian and Ubuntu by library."""
 # Releases with at least this glibc (Ubuntu 24.04, Debian 13) have the 64-bit time_t names.
-_T64_GLIBC = (2, 39)
-_T64_PACKAGES = _PACKAGES | {GLIB: "libglib2.0-0t64"}
+_DEBIAN_T64_PACKAGES = _DEBIAN_PACKAGES | {
+    SystemLibrary.glib: "libglib2.0-0t64"
+}  # Packages of releases with 64-bit time.
 
 # EGL implementations of graphics drivers that need nothing of Mesa.
-_VENDOR_EGL = ("libEGL_nvidia.so.0",)
 
 
 def missing_import_libraries() -> list[str]:
     """System libraries without which `import pydrake` fails; empty if all is well."""
-    if sys.platform != "linux" or _loads(GLIB):
+    if sys.platform != "linux" or _can_load(SystemLibrary.glib):
         return []
-    return [GLIB]
+    return [SystemLibrary.glib]
 
 
 def missing_render_libraries() -> list[str]:
@@ -55,28 +61,33 @@ def missing_render_libraries() -> list[str]:
     if sys.platform != "linux":
         return []
     missing = missing_import_libraries()
-    if not _loads(EGL):
-        missing.append(EGL)
-    if any(_loads(vendor) for vendor in _VENDOR_EGL):
+    if not _can_load(SystemLibrary.egl):
+        missing.append(SystemLibrary.egl)
+    if any(_can_load(vendor) for vendor in ("libEGL_nvidia.so.0",)):
         return missing
-    if not _loads(MESA_EGL):
-        missing.append(MESA_EGL)
+    if not _can_load(SystemLibrary.mesa_egl):
+        missing.append(SystemLibrary.mesa_egl)
     if not _has_mesa_driver():
-        missing.append(MESA_DRIVER)
+        missing.append(SystemLibrary.mesa_driver)
     return missing
 
 
 def missing_useful_libraries() -> list[str]:
     """System libraries that nothing needs, but for which trials run faster: without libatomic the
     allocator of the package cmeel-mimalloc cannot be loaded."""
-    return [ATOMIC] if sys.platform == "linux" and not _loads(ATOMIC) else []
+    return (
+        [SystemLibrary.atomic]
+        if sys.platform == "linux" and not _can_load(SystemLibrary.atomic)
+        else []
+    )
 
 
 def apt_packages(missing: Sequence[str]) -> list[str]:
     """Debian and Ubuntu packages, named as in this release, that bring the `missing` libraries."""
+    t64_glibc = (2, 39)  # First glibc of releases with 64-bit time.
     version = platform.libc_ver()[1] or "0"
     glibc = tuple(int(part) for part in version.split(".")[:2])
-    names = _T64_PACKAGES if glibc >= _T64_GLIBC else _PACKAGES
+    names = _DEBIAN_T64_PACKAGES if glibc >= t64_glibc else _DEBIAN_PACKAGES
     return [names[library] for library in missing]
 
 
@@ -95,7 +106,11 @@ def apt_command(missing: Sequence[str] | None = None) -> str:
 
 def describe_missing(missing: Sequence[str]) -> str:
     """One line: which libraries are missing, what cannot be done without them, what to run."""
-    effect = "pydrake cannot be imported" if GLIB in missing else "Drake cannot render images"
+    effect = (
+        "pydrake cannot be imported"
+        if SystemLibrary.glib in missing
+        else "Drake cannot render images"
+    )
     pronoun = "it" if len(missing) == 1 else "them"
     remedy = (
         f"run: {apt_command(missing)}"
@@ -105,7 +120,7 @@ def describe_missing(missing: Sequence[str]) -> str:
     return f"{effect} without {', '.join(missing)}; {remedy}"
 
 
-def _loads(soname: str) -> bool:
+def _can_load(soname: str) -> bool:
     """Whether the dynamic linker finds and opens a shared library."""
     try:
         ctypes.CDLL(soname)
@@ -125,7 +140,7 @@ def _has_mesa_driver() -> bool:
         if any(root.glob("libgallium-*.so")) or any(root.glob("*/libgallium-*.so")):
             return True
         folders += [root / "dri", *root.glob("*/dri")]
-    return any((folder / MESA_DRIVER).exists() for folder in folders)
+    return any((folder / SystemLibrary.mesa_driver).exists() for folder in folders)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -143,7 +158,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(describe_missing(missing))
     if not missing:
         return 0
-    return 2 if GLIB in missing else 1
+    return 2 if SystemLibrary.glib in missing else 1
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from burg_drake.documents import DOCUMENT_KINDS, json_schema, write_schemas
+from burg_drake.core import DOCUMENT_KINDS, json_schema, write_schemas
 
 PAGE = "reference/documents"
 

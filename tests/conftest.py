@@ -122,8 +122,7 @@ def measured_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     workers of a run share what was found."""
     import numpy as np
 
-    from burg_drake.objects.collision import contact, decomposition, fit
-    from burg_drake.objects.physics.symmetry import SymmetrySearch
+    from burg_drake.objects import SymmetrySearch, contact, convex_decomposition, shape_fit
 
     folder = tmp_path_factory.getbasetemp()
     known = (folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder) / "measured"
@@ -142,8 +141,12 @@ def measured_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
             made.replace(path)
         return pickle.loads(path.read_bytes())
 
-    farthest, find, surface_of = fit._farthest, SymmetrySearch.find, contact.contact_surface
-    cut = decomposition.run_coacd
+    farthest, find, surface_of = (
+        shape_fit._max_distance,
+        SymmetrySearch.find,
+        contact.contact_surface,
+    )
+    cut = convex_decomposition.run_coacd
 
     def find_once(search: SymmetrySearch) -> Any:
         key = (search._triangles, search.tolerance, search._covered)
@@ -161,25 +164,22 @@ def measured_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         return once(lambda: cut(*arguments), "pieces", *arguments)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fit, "_farthest", farthest_once)
+        patch.setattr(shape_fit, "_max_distance", farthest_once)
         patch.setattr(SymmetrySearch, "find", find_once)
         patch.setattr(contact, "contact_surface", surface_once)
-        patch.setattr(decomposition, "run_coacd", cut_once)
+        patch.setattr(convex_decomposition, "run_coacd", cut_once)
         yield
 
 
 @pytest.fixture(scope="module")
 def judged_here() -> Iterator[None]:
     """What asks for one worker gets this process in its place, for the work beside judging too."""
-    from burg_drake.evaluation.run import scene_processes
-    from burg_drake.evaluation.workers import JudgePool
+    from burg_drake.evaluation import JudgePool, scene_tasks
 
-    preparers = scene_processes.preparers
+    preparers = scene_tasks.preparer_count
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(scene_processes, "preparers", lambda n: 0 if n == 1 else preparers(n))
-        patch.setattr(
-            "burg_drake.evaluation.workers.executor.JudgePool", _pool_or_this_process(JudgePool)
-        )
+        patch.setattr(scene_tasks, "preparer_count", lambda n: 0 if n == 1 else preparers(n))
+        patch.setattr("burg_drake.evaluation.executor.JudgePool", _pool_or_this_process(JudgePool))
         yield
 
 
@@ -196,8 +196,7 @@ def no_pose_mistakes() -> Iterator[None]:
 
 def _pool_or_this_process(pool: type) -> Any:
     from burg_drake.core import BurgError
-    from burg_drake.evaluation.stages.judge import ScreenAnswers, judge_grasp, screen_grasps
-    from burg_drake.evaluation.workers import JobFailed
+    from burg_drake.evaluation import JobFailed, ScreenAnswers, judge_grasp, screen_grasps
 
     class ThisProcess:
         """Judges the grasps of one job after the other, in their order, without limits of time."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import gc
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -82,7 +82,7 @@ class Package:
     def statements(self) -> dict[str, list[ast.Import | ast.ImportFrom]]:
         """Their imports, those within functions, too."""
         return {
-            name: [x for x in all_statements(tree) if isinstance(x, (ast.Import, ast.ImportFrom))]
+            name: [x for x in all_statements(tree) if _is_import(x)]
             for name, tree in self.trees.items()
         }
 
@@ -103,7 +103,11 @@ class Package:
     @cached_property
     def imports(self) -> list[Import]:
         """All imports of the package's own names, those within functions, too."""
-        return [found for module in self.files for found in self._imports(module)]
+        return [
+            found
+            for module in self.files
+            for found in self._imports(module, self.statements[module])
+        ]
 
     @cached_property
     def graph(self) -> dict[str, dict[str, Import]]:
@@ -136,16 +140,28 @@ class Package:
         groups = [_reached(module, lambda m: backwards[m], seen) for module in reversed(order)]
         return [sorted(group) for group in groups if len(group) > 1]
 
-    def _imports(self, module: str) -> Iterator[Import]:
+    def imports_of(self, folder: Path) -> list[Import]:
+        """Imports of the package's names by the files in another folder, such as tests."""
+        return [
+            found
+            for path in sorted(folder.rglob("*.py"))
+            for found in self._imports(
+                ".".join(path.relative_to(folder.parent).with_suffix("").parts),
+                [x for x in all_statements(ast.parse(path.read_text("utf-8"))) if _is_import(x)],
+            )
+        ]
+
+    def _imports(self, module: str, statements: Iterable[ast.AST]) -> Iterator[Import]:
         inside = f"{self.name}."
-        for node in self.statements[module]:
+        for node in statements:
             if isinstance(node, ast.Import):
                 for alias in node.names:
                     if f"{alias.name}.".startswith(inside):
                         yield Import(module, alias.name, "", node.lineno)
-            else:
-                assert node.level == 0, f"{module}:{node.lineno}: relative import"
-                if f"{node.module}.".startswith(inside):
+            elif isinstance(node, ast.ImportFrom):
+                if module.startswith(inside) and node.level:
+                    raise ValueError(f"{module}:{node.lineno}: relative import")
+                if node.level == 0 and f"{node.module}.".startswith(inside):
                     for alias in node.names:
                         yield Import(module, str(node.module), alias.name, node.lineno)
 
@@ -158,6 +174,10 @@ def all_statements(node: ast.AST) -> Iterator[ast.AST]:
         for child in children if isinstance(children, list) else ():
             yield child
             yield from all_statements(child)
+
+
+def _is_import(node: ast.AST) -> bool:
+    return isinstance(node, (ast.Import, ast.ImportFrom))
 
 
 def _reached(start: str, following, seen: set[str]) -> list[str]:

@@ -6,9 +6,9 @@ import ast
 import re
 import sys
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
-from tests.imports import Package
+from tests.imports import Import, Package
 
 MOST_PARAMETERS = 9
 """Of a function; what takes more takes a settings object."""
@@ -28,52 +28,37 @@ EXTRAS = {
 """Packages that need not be there, and where modules may import them at their top."""
 
 
-def orders(rooms: dict[str, str], within: dict[str, str]) -> dict[str, list[str]]:
-    """By package, relative to the whole: its packages in their order."""
-    found = {"": list(rooms)} | {room: subs.split() for room, subs in rooms.items()}
-    return found | {package: subs.split() for package, subs in within.items()}
+def unplaced(house: Package, rooms: list[str]) -> list[str]:
+    """Packages directly in the house that are not in the list of rooms, and rooms without one."""
+    found = {_room(house, package) for package in house.packages if package != house.name}
+    return sorted(found ^ set(rooms))
 
 
-def unplaced(house: Package, order: dict[str, list[str]]) -> list[str]:
-    """Packages that have no place in the order; an only one needs none."""
+def upward(house: Package, rooms: list[str]) -> list[str]:
+    """Imports from a room that comes later in the list."""
+    return [
+        str(step)
+        for module, sources in house.graph.items()
+        for source, step in sources.items()
+        if (a := _room(house, module)) in rooms
+        and (b := _room(house, source)) in rooms
+        and rooms.index(b) > rooms.index(a)
+    ]
+
+
+def beside_faces(house: Package, imports: Iterable[Import] | None = None) -> list[str]:
+    """Imports from a module of another room, or of a name that the room's face does not show.
+
+    Modules may be imported as a whole, for tests that replace something in them.
+    """
     found = []
-    for package, names in _children(house).items():
-        placed = order.get(package[len(house.name) + 1 :], [])
-        if set(names) != set(placed) and (placed or len(names) > 1):
-            found.append(f"{package}: {sorted(set(names) ^ set(placed))}")
-    return found
-
-
-def upward(house: Package, order: dict[str, list[str]]) -> list[str]:
-    """Imports of what comes later. Modules that lie directly in a package either import nothing of
-    its sub-packages, or are imported by none of them."""
-    found = []
-    for package in house.packages:
-        placed = order.get(package[len(house.name) + 1 :]) or _children(house)[package]
-        edges = [
-            (_child(package, module), _child(package, source), step)
-            for module, sources in house.graph.items()
-            for source, step in sources.items()
-            if module.startswith(f"{package}.") and source.startswith(f"{package}.")
-        ]
-        top = {a for a, b, _ in edges if a not in placed and b in placed}
-        for a, b, step in edges:
-            if (a in placed and b in top) or (
-                {a, b} <= set(placed) and placed.index(b) > placed.index(a)
-            ):
-                found.append(str(step))
-    return found
-
-
-def beside_faces(house: Package) -> list[str]:
-    """Imports that go past the face of a package that the importing module does not lie in."""
-    found = []
-    for step in house.imports:
-        package = step.source if step.source in house.packages else step.source.rpartition(".")[0]
-        if f"{step.module}.".startswith(f"{package}."):
+    for step in house.imports if imports is None else imports:
+        room = f"{house.name}.{_room(house, step.source)}"
+        if room not in house.packages or f"{step.module}.".startswith(f"{room}."):
             continue
-        shown = step.name in house.faces[package] or f"{package}.{step.name}" in house.packages
-        if package != step.source or not shown:
+        shown = step.source == room and step.name in house.faces[room]
+        whole = f"{step.source}.{step.name}".rstrip(".") in house.files
+        if not shown and (imports is None or not whole):
             found.append(str(step))
     return found
 
@@ -90,19 +75,22 @@ def wrong_faces(house: Package) -> list[str]:
     return found
 
 
-def unasked(house: Package) -> list[str]:
-    """Names of faces that nothing outside of the package imports; public faces are for users."""
+def unasked(house: Package, outside: Iterable[Import] = ()) -> list[str]:
+    """Names of faces that nothing outside of the room imports; public names are for users."""
     top = house.faces[house.name]
     public = {house.name, *(f"{house.name}.{n}" for n, (at, _) in top.items() if at == house.name)}
-    taken = {(x.source, x.name) for x in house.imports if not x.module.startswith(f"{x.source}.")}
+    taken = {
+        (x.source, x.name)
+        for x in (*house.imports, *outside)
+        if not x.module.startswith(f"{x.source}.")
+    }
     taken |= {place for names in house.faces.values() for place in names.values()}
-    whole = {f"{x.source}.{x.name}" for x in house.imports}
     return [
         f"{package} shows {name}, which nobody imports"
         for package, names in house.faces.items()
-        if package not in public | whole
         for name in names
         if (package, name) not in taken
+        and not (package in public and name in _listed(house.trees[package], name))
     ]
 
 
@@ -188,20 +176,17 @@ def loaded_with(house: Package, start: str) -> set[str]:
     return found - sys.stdlib_module_names
 
 
-def _children(house: Package) -> dict[str, list[str]]:
-    """By package: the packages directly in it."""
-    found: dict[str, list[str]] = {package: [] for package in house.packages}
-    for package in house.packages:
-        above, _, name = package.rpartition(".")
-        if above:
-            found[above].append(name)
-    return found
+def _room(house: Package, module: str) -> str:
+    """The room that a module lies in; of a module directly in the house, its name."""
+    return module[len(house.name) + 1 :].partition(".")[0]
 
 
-def _child(package: str, module: str) -> str:
-    """What of a package a module lies in or is: the name of a sub-package, or its own."""
-    first, *rest = module[len(package) + 1 :].split(".")
-    return first if rest else f"{first}.py"
+def _listed(tree: ast.Module, name: str) -> list[str]:
+    """`__all__` of a public face; where it has no such list, all names are public."""
+    for node in tree.body:
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
+            return [ast.literal_eval(element) for element in node.value.elts]
+    return [name]
 
 
 def _bound(house: Package, module: str) -> set[str]:

@@ -14,56 +14,58 @@ import numpy as np
 import pytest
 
 import burg_drake as burg
-from burg_drake.cameras.live import FrameProcessor
-from burg_drake.cameras.optics import Intrinsics
-from burg_drake.cameras.overlay.renderer import Overlay, instance_labels
-from burg_drake.cameras.placement import check_placement
-from burg_drake.cameras.pose import BoardEstimate, locate_camera
-from burg_drake.cameras.projection import visible_from
-from burg_drake.cameras.sources import open_source
-from burg_drake.cameras.systems.board_loop import build_board_loop
-from burg_drake.cameras.systems.scene_overlay import SceneOverlay
+from burg_drake.cameras import (
+    BoardEstimate,
+    FrameProcessor,
+    Intrinsics,
+    Overlay,
+    SceneOverlay,
+    build_board_loop,
+    check_placement,
+    instance_labels,
+    locate_camera,
+    open_source,
+    visible_from,
+)
 from burg_drake.compose import ComposeSession
-from burg_drake.core import BurgError
-from burg_drake.core.grasps import GraspSet
-from burg_drake.evaluation.grasp_sets import read_grasps, scored_set
-from burg_drake.evaluation.grasp_sets.sampled import sample_grasps
-from burg_drake.evaluation.stages import clear_grasp_counts, within_reach
-from burg_drake.evaluation.stages.counts import count_grasps
+from burg_drake.core import BurgError, GraspSet
+from burg_drake.evaluation import (
+    clear_grasp_counts,
+    count_grasps,
+    read_grasps,
+    sample_grasps,
+    scored_set,
+    within_reach,
+)
 from burg_drake.export import export_scene
-from burg_drake.formats.grasp_files import write_grasp_file
-from burg_drake.generation import sample_scenes
-from burg_drake.generation.sample import sample_scene
-from burg_drake.grasping.clearance import hand_clearance_alone
-from burg_drake.motion.ik import ArmKinematics
-from burg_drake.motion.planner import plan
-from burg_drake.motion.plans import Plan
-from burg_drake.motion.plans.grasp_plan import load_plan
-from burg_drake.motion.reach import ArmReach
-from burg_drake.motion.workspace import (
+from burg_drake.formats import write_grasp_file
+from burg_drake.generation import sample_scene, sample_scenes
+from burg_drake.grasping import hand_clearance_alone
+from burg_drake.motion import (
+    ArmKinematics,
+    ArmReach,
     ArmSpan,
+    Plan,
     ReachabilitySettings,
     inspect_station,
+    load_plan,
     map_reachability,
+    plan,
     reach_from_above,
 )
-from burg_drake.objects.library import load_library
-from burg_drake.printout import print_board
-from burg_drake.printout.relief import height_map
-from burg_drake.scene.document import (
-    Scene,
-    SceneLike,
-    SceneRecipe,
-    as_scene,
-    load_scene,
-    validate_scene,
+from burg_drake.objects import load_library
+from burg_drake.printout import height_map, print_board
+from burg_drake.scene import Scene, SceneLike, SceneRecipe, as_scene, load_scene, validate_scene
+from burg_drake.simulation import ArmTrial, HandTrial, settle_scene, stillness
+from burg_drake.station import (
+    SceneCheck,
+    Station,
+    StationLike,
+    as_station,
+    build_station_diagram,
+    check_scene,
+    load_station,
 )
-from burg_drake.simulation.rest.still_check import stillness
-from burg_drake.simulation.settling import settle_scene
-from burg_drake.simulation.trials import ArmTrial, HandTrial
-from burg_drake.station.checks import SceneCheck, check_scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.document import Station, StationLike, as_station, load_station
 
 STATION = "panda_tabletop"
 X_OG = np.diag([1.0, -1.0, -1.0, 1.0])

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.evaluation.workers import LocalExecutor
+from burg_drake.apps import main
+from burg_drake.evaluation import LocalExecutor
 from burg_drake.system_libraries import missing_render_libraries
 from tests.evaluation.inline_executor import Inline
 from tests.pages import PAGES, ROOT, blocks
@@ -35,7 +35,7 @@ def test_blocks_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.chdir(tmp_path)
     Path("small.yaml").write_text(SMALL)
     monkeypatch.setattr(LocalExecutor, "judge", lambda self, *jobs: Inline().judge(*jobs))
-    monkeypatch.setattr("burg_drake.evaluation.run.scene_processes.preparers", lambda workers: 0)
+    monkeypatch.setattr("burg_drake.evaluation.scene_tasks.preparer_count", lambda workers: 0)
     names: dict[str, Any] = {}
     for block in blocks(page):
         if not block.runs:

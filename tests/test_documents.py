@@ -17,16 +17,14 @@ from typing import Any
 
 import pytest
 
-from burg_drake.apps.cli import build_parser
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.core.documents.kinds import DOCUMENT_KINDS, document_class
-from burg_drake.core.documents.schema import parse_document
-from burg_drake.evaluation.cluster.document import ClusterDocument
-from burg_drake.experiment.trials.sheet import TrialSheet
-from burg_drake.pipeline.recipe import RecipeDocument
-from burg_drake.scene.document.scene import SceneDocument
-from burg_drake.station.document.gripper_document import Hand
-from burg_drake.station.document.station_document import StationDocument
+from burg_drake.apps import build_parser
+from burg_drake.cameras import Intrinsics
+from burg_drake.core import DOCUMENT_KINDS, document_class, parse_document
+from burg_drake.evaluation import ClusterDocument
+from burg_drake.experiment import TrialSheet
+from burg_drake.pipeline import RecipeDocument
+from burg_drake.scene import SceneDocument
+from burg_drake.station import Hand, StationDocument
 from tests.pages import PAGES, ROOT, Block, blocks
 from tests.test_faces import public_names
 from tools.site import generated_pages, picture_script

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import burg_drake as burg
-from burg_drake.scene.arrangement import ObjectShapes
+from burg_drake.scene import ObjectShapes
 from tests.pages import PAGES, ROOT, blocks
 from tests.public_types import project_types
 from tools import site

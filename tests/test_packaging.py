@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 import burg_drake
-from burg_drake.core.paths.resources import data_root
+from burg_drake.core import data_root
 from tests.hang_guard import HANG_GUARD
 from tests.imports import HOUSE
 
@@ -157,8 +157,7 @@ def test_light_imports(statement: str) -> None:
 def test_workers_start_without_scipys_rotations() -> None:
     """Half of the time that importing them takes would go there."""
     run_python(
-        "import sys, burg_drake.evaluation.workers.single_job\n"
-        "assert 'scipy.spatial' not in sys.modules"
+        "import sys, burg_drake.evaluation.executor\nassert 'scipy.spatial' not in sys.modules"
     )
 
 

@@ -30,8 +30,8 @@ query.RenderColorImage(
 
 def pretend_only(monkeypatch: pytest.MonkeyPatch, *present: str) -> None:
     monkeypatch.setattr(sys, "platform", "linux")
-    monkeypatch.setattr(system_libraries, "_loads", lambda soname: soname in present)
-    driver = system_libraries.MESA_DRIVER in present
+    monkeypatch.setattr(system_libraries, "_can_load", lambda soname: soname in present)
+    driver = system_libraries.SystemLibrary.mesa_driver in present
     monkeypatch.setattr(system_libraries, "_has_mesa_driver", lambda: driver)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from burg_drake.core.grasps import Outcome, Stage
+from burg_drake.core import Outcome, Stage
 
 OUT = Path(__file__).parents[1] / "docs" / "images" / "cascade.svg"
 QUESTIONS = {

@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from burg_drake.pipeline.build import build_library
-from burg_drake.pipeline.source import ObjectSource
+from burg_drake.pipeline import ObjectSource, build_library
 
 DEFAULT_OUT = Path(__file__).resolve().parents[1] / "models" / "clutter"
 DENSITY = 600.0  # of wood [kg/m3]

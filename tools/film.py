@@ -18,9 +18,9 @@ if __package__ in (None, ""):
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import burg_drake as burg
-from burg_drake.cameras.overlay.renderer import Overlay
-from burg_drake.core.documents.schema import Pose
-from burg_drake.station.document.station_document import Camera
+from burg_drake.cameras import Overlay
+from burg_drake.core import Pose
+from burg_drake.station import Camera
 
 FILE = Path(__file__).resolve().parents[1] / "docs" / "images" / "film.webp"
 TARGET = "mug"

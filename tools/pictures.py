@@ -29,20 +29,14 @@ if __package__ in (None, ""):
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import burg_drake as burg
-from burg_drake import build_station_diagram, load_library, load_scene, load_station
-from burg_drake.apps.cli import main as burg_drake
-from burg_drake.cameras.optics.intrinsics_file import save_intrinsics
-from burg_drake.cameras.overlay.renderer import Overlay
-from burg_drake.cameras.placement.check import check_placement
-from burg_drake.cameras.systems.board_loop import build_board_loop
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import rot_z
-from burg_drake.evaluation.store.run_folder import load_run
-from burg_drake.generation.sample import sample_scene
-from burg_drake.scene.document.layout import LayoutName
-from burg_drake.scene.document.recipe import SceneRecipe
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
-from burg_drake.station.document.station_document import Camera, Station
+from burg_drake.apps import main as burg_drake
+from burg_drake.cameras import Overlay, build_board_loop, check_placement, save_intrinsics
+from burg_drake.core import Pose, rot_z
+from burg_drake.evaluation import load_run
+from burg_drake.generation import sample_scene
+from burg_drake.objects import load_library
+from burg_drake.scene import Instance, LayoutName, Scene, SceneDocument, SceneRecipe, load_scene
+from burg_drake.station import Camera, Station, build_station_diagram, load_station
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
 PLACES = {

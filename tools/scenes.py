@@ -11,16 +11,20 @@ import dataclasses
 import numpy as np
 from pydrake.systems.analysis import Simulator
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.documents.schema import Pose, save_document
-from burg_drake.core.frames import inverse, make_pose, rot_z, rotation_angle, transform_points
-from burg_drake.core.paths.resources import data_root
-from burg_drake.objects.library.document import ObjectLibrary, load_library
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
-from burg_drake.scene.document.validation import read_vertices
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.engine import ENGINES
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import (
+    Array,
+    Pose,
+    data_root,
+    inverse,
+    make_pose,
+    rot_z,
+    rotation_angle,
+    save_document,
+    transform_points,
+)
+from burg_drake.objects import ObjectLibrary, load_library
+from burg_drake.scene import Instance, Scene, SceneDocument, read_vertices
+from burg_drake.station import ENGINES, build_station_diagram, load_station
 
 LIBRARY = "household"
 STATION = "panda_tabletop"

@@ -16,14 +16,11 @@ import numpy as np
 from PIL import Image
 from playwright.sync_api import sync_playwright
 
-from burg_drake import build_station_diagram, load_scene, load_station
-from burg_drake.compose.commands.board import SetBoard
-from burg_drake.compose.commands.moving import MoveObjects, SetPose
-from burg_drake.compose.commands.placing import AddObject
-from burg_drake.compose.session import ComposeSession
-from burg_drake.core.frames import make_pose, rot_z
-from burg_drake.ui.server.door import serve
-from burg_drake.ui.setup_page import SetupPage
+from burg_drake.compose import AddObject, ComposeSession, MoveObjects, SetBoard, SetPose
+from burg_drake.core import make_pose, rot_z
+from burg_drake.scene import load_scene
+from burg_drake.station import build_station_diagram, load_station
+from burg_drake.ui import SetupPage, serve_page
 
 SIZE = {"width": 1360, "height": 850}
 ARGUMENTS = (
@@ -88,7 +85,7 @@ def opened(reference: str, station: str) -> Iterator[Open]:
     with (
         tempfile.TemporaryDirectory() as folder,
         ComposeSession.open(reference, load_station(station), folder=folder) as session,
-        serve(port=0) as door,
+        serve_page(port=0) as door,
         sync_playwright() as playwright,
     ):
         page = SetupPage(door.server, session)

@@ -28,9 +28,8 @@ if __package__ in (None, ""):
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import burg_drake as burg
-from burg_drake.apps.cli import build_parser, main as command
-from burg_drake.core.grasps.column_meanings import FAMILIES, GROUPS
-from burg_drake.core.grasps.outcome import Outcome, Stage
+from burg_drake.apps import build_parser, main as command
+from burg_drake.core import COLUMN_FAMILIES, COLUMN_GROUPS, Outcome, Stage
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -350,7 +349,10 @@ def _columns_page() -> str:
         " without a unit, `g` is 9.81 m/s², and `weights` are those of the object."
         " [Files of a run](results.md) tells how files carry this along.\n"
     )
-    for title, columns in {**GROUPS, "Names with a part that differs": FAMILIES}.items():
+    for title, columns in {
+        **COLUMN_GROUPS,
+        "Names with a part that differs": COLUMN_FAMILIES,
+    }.items():
         rows = (f"`{n}` | {c.unit} | {c.description}" for n, c in columns.items())
         text += f"\n## {title}\n\n{_table('column | unit | meaning', rows)}"
     return text

@@ -1,5 +1,9 @@
-"""The command line: thin verbs over the library, which hold no logic.
+"""The command line and the local web pages.
 
-Begin with `cli`; each group of verbs is a package whose `verbs` add the others, and what they share
-is in `options`, `terminal` and `web`.
+`cli` lists the commands. Their modules in `commands` parse options, call the library and print the
+results; they share `options` and `terminal`.
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,51 +1,31 @@
-"""The command `burg-drake`: its parser, and how it ends.
+"""The command `burg-drake`: the table of its commands, the parser, exit codes and error messages.
 
-Exit codes: 0 all went well; 1 finished, with failures to report; 2 the input cannot be used;
-130 interrupted by Ctrl-C. Everything heavy is imported by the verbs when they run, so that
-`burg-drake --help` answers in a moment.
+Exit codes: 0 success; 1 finished, with failures to report; 2 the input cannot be used; 130
+interrupted by Ctrl-C. Only the module of the command that is asked for is imported.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+import importlib
 import io
 import os
 import select
 import signal
 import sys
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, partial
+from typing import NamedTuple
 
 from burg_drake import __version__
-from burg_drake.apps import (
-    ar,
-    camera,
-    completion,
-    dataset,
-    doctor,
-    grasps,
-    hand,
-    library,
-    ros,
-    scene,
-    schema,
-    station,
-    trials,
-)
-from burg_drake.apps.comparison import compare, gap
-from burg_drake.apps.dataset import render
-from burg_drake.apps.grasps import frames
-from burg_drake.apps.options import Parser, VerbGroup, examples, with_given_names
-from burg_drake.apps.runs import demo, evaluate, merge, reach, replay, report, robustness, status
-from burg_drake.apps.scene import printout, setup
-from burg_drake.apps.terminal import terminated_as_interrupted
-from burg_drake.core import BurgError, shown
+from burg_drake.apps.options.arguments import CommandGroup, Parser, examples_text
+from burg_drake.apps.options.values import restore_pipe_names
+from burg_drake.apps.terminal import sigterm_as_interrupt
+from burg_drake.core import BurgError, shorten_text
 
-INPUT_ERROR = 2
-INTERRUPTED = 130
 DEBUG_VARIABLE = "BURG_DEBUG"
-OPTIONS_OF = {
+OPTION_DESTINATIONS = {
     "X_SF": ("camera_pose",),
     "objects": ("grasps_object", "rename"),
     "format": ("grasps_format", "source"),
@@ -55,20 +35,135 @@ OPTIONS_OF = {
     "out": ("output",),
     "folder": ("output",),
 }
-"""What the parsed arguments call those of the library that have another name there."""
-LONGEST_WORD = 300
-"""Of a message, paths included; what is longer was not written by people."""
+"""Names in the parsed arguments of library arguments that are called differently there."""
 
-VERBS = {
-    "start": (demo, doctor, completion),
-    "objects and scenes": (library, scene, setup),
-    "grasps": (grasps, frames),
-    "evaluate": (reach, evaluate, status, report, replay, robustness, merge),
-    "real robot": (printout, camera, ar, ros, trials, compare, gap),
-    "training data": (render, dataset),
-    "robot cells, files": (station, hand, schema),
+
+class Verb(NamedTuple):
+    """A command, or a group of commands, as the help lists it.
+
+    `burg-drake grasps sample` has the functions `add_grasps_sample_options` and `run_grasps_sample`
+    in its module.
+    """
+
+    words: str
+    module: str | None
+    """Module of `burg_drake.apps.commands`; None for a group."""
+    summary: str
+
+
+COMMANDS = {
+    "start": (
+        Verb("demo", "demo", "evaluate grasps on a built-in scene and replay the best one"),
+        Verb("doctor", "doctor", "show what is installed, what is missing, and how to get it"),
+        Verb("completion", "completion", "print the script by which your shell completes commands"),
+    ),
+    "objects and scenes": (
+        Verb("library", None, "make objects from meshes; check and show them"),
+        Verb("library build", "library", "make objects for simulation from meshes"),
+        Verb("library add", "library", "add one object, or build it again"),
+        Verb("library import-burg", "library", "build a library from BURG-Toolkit's"),
+        Verb("library import-ycb", "library", "build a library from a download of the YCB objects"),
+        Verb("library list", "library", "list the objects of a library"),
+        Verb("library check", "library", "look for mistakes in a library"),
+        Verb(
+            "library show", "library", "show objects in 3D: pieces, contact surfaces, stable poses"
+        ),
+        Verb("scene", None, "show, check, settle, sample, export, import scenes"),
+        Verb("scene show", "scene", "show a scene in 3D, on its station"),
+        Verb("scene validate", "scene", "check a scene: off the board, in the air, overlaps"),
+        Verb("scene settle", "scene", "let objects fall and come to rest; write the new scene"),
+        Verb("scene sample", "scene_sampling", "make random scenes from the objects of a library"),
+        Verb("scene export", "scene", "write a scene for Gazebo, Drake, MuJoCo or Isaac Sim"),
+        Verb("scene import-burg", "scene", "import a scene of BURG-Toolkit"),
+        Verb("setup", "setup", "arrange a scene in the browser: place, check, save, print"),
+    ),
+    "grasps": (
+        Verb("grasps", None, "sample, score, show, convert and compare grasps"),
+        Verb("grasps sample", "grasp_sampling", "sample antipodal grasps on objects"),
+        Verb(
+            "grasps score",
+            "grasp_sampling",
+            "score grasps by formulas: force closure, epsilon, load",
+        ),
+        Verb("grasps show", "grasp_display", "show grasps in 3D, coloured by outcome or score"),
+        Verb("grasps convert", "grasp_formats", "convert grasps between formats"),
+        Verb(
+            "grasps stats",
+            "grasp_stats",
+            "print statistics of a set of grasps, or compare two sets",
+        ),
+        Verb("frames", "grasp_formats", "show frames and the grasp frames of other projects"),
+    ),
+    "evaluate": (
+        Verb("reach", "reach", "find which grasps the arm can reach, and what stops it"),
+        Verb("evaluate", "evaluate", "evaluate grasps: clear hand, reach of the arm, lift"),
+        Verb("status", "runs", "print the progress of a run"),
+        Verb("report", "runs", "print what a run found so far; write its report again"),
+        Verb("replay", "replay", "simulate one grasp again and show it in 3D"),
+        Verb("robustness", "robustness", "test lifted grasps: tug, shake, friction, noise"),
+        Verb("merge", "runs", "join the shards of a run"),
+    ),
+    "real robot": (
+        Verb("printout", "printout", "write the board of a scene as PDF, to print at true scale"),
+        Verb("camera", None, "find, calibrate and locate cameras; measure photos"),
+        Verb("camera list", "camera", "list the cameras of this machine that give images"),
+        Verb("camera target", "printout", "write a calibration board (ChArUco) as PDF"),
+        Verb("camera calibrate", "camera", "find the intrinsics of a camera, from photos or live"),
+        Verb("camera show", "camera", "print intrinsics, field of view and distortion"),
+        Verb("camera convert", "camera", "convert intrinsics to or from ROS and OpenCV"),
+        Verb(
+            "camera locate",
+            "camera_placement",
+            "find the pose of a fixed camera from photos of the board",
+        ),
+        Verb(
+            "camera placement",
+            "camera_placement",
+            "measure on a photo how far objects stand from their targets",
+        ),
+        Verb("ar", "ar", "show where objects belong, live in the camera picture"),
+        Verb("ros", "ros", "run a ROS node: overlay, camera pose, board on tf"),
+        Verb("trials", None, "plan, export and record trials on your robot"),
+        Verb(
+            "trials plan", "trial_preparation", "choose grasps to try on the robot, in random order"
+        ),
+        Verb(
+            "trials sheet",
+            "trial_preparation",
+            "write a paper form: order, pictures, boxes to tick",
+        ),
+        Verb(
+            "trials export", "trial_preparation", "write the robot motion of each trial to a file"
+        ),
+        Verb(
+            "trials serve", "trial_page", "serve a page for the lab: next trial, picture, buttons"
+        ),
+        Verb("trials record", "trial_records", "record the outcome of a trial"),
+        Verb("trials show", "trial_records", "print the progress of the trials"),
+        Verb("trials restore", "trial_records", "restore recorded outcomes that the file has lost"),
+        Verb("compare", "compare", "compare a run with trials on the robot, or another run"),
+        Verb("gap", "gap", "find what costs grasps: reach, the arm, misplaced objects"),
+    ),
+    "training data": (
+        Verb("render", "render", "render what a camera of the station sees"),
+        Verb("dataset", None, "make training data: images, labels, grasps"),
+        Verb("dataset generate", "dataset", "render images with labels of many scenes"),
+        Verb("dataset check", "dataset", "look for damaged files and wrong depth or labels"),
+        Verb("dataset show", "dataset", "show a sample in 3D, or many on a sheet"),
+        Verb("dataset export", "dataset", "convert to BOP, COCO, GraspNet or WebDataset"),
+    ),
+    "robot cells, files": (
+        Verb("station", None, "list, check and show robot cells: arm, board, cameras"),
+        Verb("station list", "station", "list the built-in stations"),
+        Verb("station check", "station", "check a station: base, home, reach, cameras"),
+        Verb("station show", "station", "show a station in 3D with the reach of its arm"),
+        Verb("hand", None, "list and check hands"),
+        Verb("hand list", "station", "list the built-in hands"),
+        Verb("hand check", "station", "check a hand file against its model"),
+        Verb("schema", "schema", "list kinds of YAML files; write their JSON Schemas"),
+    ),
 }
-"""By what people want to do, each in the order of use."""
+"""All commands by heading of the help, in the order of use."""
 
 
 @cache
@@ -78,7 +173,7 @@ def build_parser() -> Parser:
         prog="burg-drake",
         description="Find out which grasps a robot can execute: in simulation, on a printed board,"
         " on your robot.",
-        epilog=examples(
+        epilog=examples_text(
             "burg-drake demo",
             "burg-drake library build scans/*.obj -o my_library",
             "burg-drake setup my_library",
@@ -91,12 +186,25 @@ def build_parser() -> Parser:
     parser.add_argument(
         "--version", action="version", version=f"burg-drake {__version__}", help="print the version"
     )
-    verbs = VerbGroup(parser)
-    for title, modules in VERBS.items():
-        verbs.heading(title)
-        for module in modules:
-            module.add_to(verbs)
+    groups = {"": CommandGroup(parser)}
+    for title, commands in COMMANDS.items():
+        groups[""].heading(title)
+        for command in commands:
+            group, _, name = command.words.rpartition(" ")
+            command_parser = groups[group].add_parser(name, command.summary)
+            if command.module is None:
+                groups[command.words] = CommandGroup(command_parser)
+            else:
+                command_parser.defer_options(partial(_add_options, command))
     return parser
+
+
+def _add_options(command: Verb, parser: Parser) -> None:
+    """Imports the module of a command, and adds the options of the command to its parser."""
+    module = importlib.import_module(f"burg_drake.apps.commands.{command.module}")
+    name = command.words.replace(" ", "_").replace("-", "_")
+    getattr(module, f"add_{name}_options")(parser)
+    parser.set_defaults(run=getattr(module, f"run_{name}"))
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -105,42 +213,51 @@ def main(argv: Sequence[str] | None = None) -> int:
     Args:
         argv: arguments without the program's name; those of the process if None.
     """
+    input_error_code = 2
+    interrupted_code = 130
     if argv is None:
-        completion.complete_if_asked(build_parser)
-        _print_any_name()
+        if "_ARGCOMPLETE" in os.environ:
+            from burg_drake.apps.commands.completion import complete_line
+
+            complete_line(build_parser())
+        _escape_unprintable_output()
     # pyarrow's own allocator gives memory back again and again, which costs more than the reading
     os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
     arguments = build_parser().parse_args(argv)
     try:
-        return _run(arguments)
+        return _run_command(arguments)
     except KeyboardInterrupt:
         if argv is None:  # the process ends: further Ctrl-C, of an impatient user, change nothing
             signal.signal(signal.SIGINT, signal.SIG_IGN)
-        return _end("interrupted" + getattr(arguments, "after_interrupt", ""), INTERRUPTED)
+        return _print_error(
+            "interrupted" + getattr(arguments, "after_interrupt", ""), interrupted_code
+        )
     except BurgError as error:
         if os.environ.get(DEBUG_VARIABLE):
             raise
-        return _end(f"error: {error}{_options(error, arguments)}", INPUT_ERROR)
+        return _print_error(f"error: {error}{_option_names(error, arguments)}", input_error_code)
     except MemoryError as error:
         if os.environ.get(DEBUG_VARIABLE):
             raise
-        return _end(f"error: there is not enough memory for this input. {error}", INPUT_ERROR)
+        return _print_error(
+            f"error: there is not enough memory for this input. {error}", input_error_code
+        )
     except ImportError as error:
         if os.environ.get(DEBUG_VARIABLE) or "cannot open shared object file" not in str(error):
             raise
-        return _end(f"error: {_missing_library(error)}", INPUT_ERROR)
+        return _print_error(f"error: {_describe_missing_library(error)}", input_error_code)
     except BrokenPipeError:
         if not _drop_unread_output():
             raise
         return 0
 
 
-def _run(arguments: argparse.Namespace) -> int:
+def _run_command(arguments: argparse.Namespace) -> int:
     """Runs a verb. Whatever an interrupt turned into on its way up is an interrupt again; for verbs
     that go on later SIGTERM, which batch systems send, is one, too."""
     goes_on = hasattr(arguments, "after_interrupt")
     try:
-        with terminated_as_interrupted() if goes_on else contextlib.nullcontext():
+        with sigterm_as_interrupt() if goes_on else contextlib.nullcontext():
             code = int(arguments.run(arguments))
         sys.stdout.flush()
         return code
@@ -153,18 +270,21 @@ def _run(arguments: argparse.Namespace) -> int:
         raise
 
 
-def _options(error: BurgError, arguments: argparse.Namespace) -> str:
+def _option_names(error: BurgError, arguments: argparse.Namespace) -> str:
     """The verb's options of the arguments that an error is about, in brackets."""
-    names = (OPTIONS_OF.get(name, (name,)) for name in error.arguments)
+    names = (OPTION_DESTINATIONS.get(name, (name,)) for name in error.arguments)
     flags = [arguments.flags[n] for several in names for n in several if n in arguments.flags]
     return f" ({', '.join(flags)})" if flags else ""
 
 
-def _end(message: str, code: int) -> int:
+def _print_error(message: str, code: int) -> int:
     """Says in one line of printable text how it ended."""
+    max_word_length = 300  # Characters. Longer words, such as paths, are shortened.
     _drop_unread_output()
     sys.stdout.flush()
-    words = " ".join(shown(word, LONGEST_WORD) for word in with_given_names(message).split())
+    words = " ".join(
+        shorten_text(word, max_word_length) for word in restore_pipe_names(message).split()
+    )
     line = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in words)
     print(f"burg-drake: {line}", file=sys.stderr)
     return code
@@ -187,13 +307,13 @@ def _drop_unread_output() -> bool:
     return True
 
 
-def _print_any_name() -> None:
+def _escape_unprintable_output() -> None:
     """Names of files need not be text, and not every terminal knows all characters."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
 
 
-def _missing_library(error: ImportError) -> str:
+def _describe_missing_library(error: ImportError) -> str:
     """What to do about a system library that a package could not load."""
     from burg_drake.system_libraries import describe_missing, missing_render_libraries
 

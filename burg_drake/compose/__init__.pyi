@@ -1,55 +1,59 @@
-from .background.process import BackgroundJob as BackgroundJob
-from .background.settling import SettlingProposal as SettlingProposal
-from .commands.arranging import (
-    Align as Align,
-    Distribute as Distribute,
+from .background_tasks import (
+    SettlingProposal as SettlingProposal,
+    names_of_moved_instances as names_of_moved_instances,
 )
-from .commands.board import (
+from .background_worker import BackgroundJob as BackgroundJob, BackgroundWorker as BackgroundWorker
+from .commands import (
+    BOARD_SIZES as BOARD_SIZES,
+    Command as Command,
     SetBoard as SetBoard,
     board_size as board_size,
     board_size_name as board_size_name,
 )
-from .commands.command import Command as Command
-from .commands.contact import (
-    PutDown as PutDown,
-    SnapToContact as SnapToContact,
-)
-from .commands.moving import (
+from .editor import Drag as Drag, DragOwner as DragOwner, Editor as Editor
+from .journal import journal_path as journal_path, recover_journal as recover_journal
+from .moving_commands import (
+    Align as Align,
+    Direction as Direction,
+    Distribute as Distribute,
     MoveObjects as MoveObjects,
+    PutDown as PutDown,
     SetPose as SetPose,
+    SnapToContact as SnapToContact,
     SnapToGrid as SnapToGrid,
     Turn as Turn,
 )
-from .commands.placing import (
+from .opening import OpenedScene as OpenedScene
+from .placing_commands import (
+    MAX_RANDOM_OBJECTS as MAX_RANDOM_OBJECTS,
     AddObject as AddObject,
     Clear as Clear,
     Delete as Delete,
     Duplicate as Duplicate,
+    RandomConfiguration as RandomConfiguration,
     Rename as Rename,
     SetFixed as SetFixed,
 )
-from .commands.random_configuration import RandomConfiguration as RandomConfiguration
-from .document.checker import SceneChecker as SceneChecker
-from .document.history import (
-    History as History,
-    HistoryStep as HistoryStep,
+from .scene_checker import (
+    SceneChecker as SceneChecker,
+    Surroundings as Surroundings,
+    instance_bounds as instance_bounds,
+    missing_objects as missing_objects,
+    nearest_stable_pose as nearest_stable_pose,
+    scene_of_known_objects as scene_of_known_objects,
 )
-from .document.state import State as State
-from .document.surroundings import Surroundings as Surroundings
-from .editing.drag import (
-    Drag as Drag,
-    DragOwner as DragOwner,
-)
-from .editing.editor import Editor as Editor
-from .editing.view import SessionView as SessionView
-from .session import ComposeSession as ComposeSession
-from .storage.opening import Opened as Opened
-from .storage.scene_file import (
+from .scene_storage import (
     FileChanged as FileChanged,
-    UnsavedChanges as UnsavedChanges,
-)
-from .storage.scene_lock import (
     SceneInUse as SceneInUse,
     SceneLock as SceneLock,
+    SceneStorage as SceneStorage,
+    UnsavedChanges as UnsavedChanges,
 )
-from .storage.scene_storage import Storage as Storage
+from .session import ComposeSession as ComposeSession
+from .session_view import STATUS_OF_ISSUE as STATUS_OF_ISSUE, SessionView as SessionView
+from .state import (
+    History as History,
+    HistoryStep as HistoryStep,
+    State as State,
+    instance_name as instance_name,
+)

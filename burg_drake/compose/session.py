@@ -1,37 +1,132 @@
-"""A session: a scene that is being composed, by commands, from one or several pages."""
+"""A session: one scene that one or several pages edit by commands."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from burg_drake.compose.document import HistoryStep, State, known_scene
-from burg_drake.compose.editing import (
-    BackgroundEditor,
-    LibraryWatch,
-    SessionView,
-    UseLibrary,
-    changes_notice,
+from burg_drake.compose.background_editor import BackgroundEditor
+from burg_drake.compose.opening import OpenedScene, new_scene, open_reference, open_scene_file
+from burg_drake.compose.scene_checker import Surroundings, scene_of_known_objects
+from burg_drake.compose.scene_storage import UnsavedChanges, file_fingerprint, scene_path
+from burg_drake.compose.session_view import SessionView
+from burg_drake.compose.state import HistoryStep, State, instance_name
+from burg_drake.core import (
+    BurgError,
+    InvalidInputError,
+    UnknownNameError,
+    builtin_names,
+    list_names,
+    portable_reference,
+    suggest_names,
 )
-from burg_drake.compose.storage import (
-    Opened,
-    UnsavedChanges,
-    fingerprint,
-    new_scene,
-    open_reference,
-    open_scene_file,
-    scene_path,
-)
-from burg_drake.core import BurgError, InvalidInputError, UnknownNameError, nearest
-from burg_drake.core.paths import builtin_names, portable_reference
-from burg_drake.objects.library import LIBRARY_FILE, load_library
-from burg_drake.scene.document import load_scene
-from burg_drake.station.document import StationLike, as_station
+from burg_drake.objects import LIBRARY_FILE, ObjectLibrary, load_library
+from burg_drake.scene import load_scene
+from burg_drake.station import StationLike, as_station
 
 if TYPE_CHECKING:
     from burg_drake.printout import Printout, PrintSettings
+
+Stamp = tuple[int, int, int] | None
+
+
+class LibraryWatch:
+    """Looks at a library's document now and then; without a change that costs nothing.
+
+    Args:
+        library: as it is now.
+    """
+
+    def __init__(self, library: ObjectLibrary) -> None:
+        self.library = library
+        self._stamp = _library_stamp(library.root)
+
+    def reload_if_changed(self) -> ObjectLibrary | None:
+        """The library, if it was changed since; None if not.
+
+        Raises:
+            BurgError: it cannot be loaded. It is tried again when it has changed once more.
+        """
+        stamp = _library_stamp(self.library.root)
+        if stamp == self._stamp:
+            return None
+        self._stamp = stamp
+        library = load_library(self.library.root)
+        if library.document == self.library.document and library.content == self.library.content:
+            return None
+        self.library = library
+        return library
+
+
+def library_change_notice(state: State, library: ObjectLibrary) -> str:
+    """One line on what a changed library means for a scene."""
+    placed = [*state.document.instances, *state.document.background]
+    used = list(dict.fromkeys(i.object for i in placed))
+    missing = [instance_name(i) for i in placed if i.object not in library.objects]
+    other = [
+        name
+        for name in used
+        if name in library.objects and library.content[name] != state.library.content.get(name)
+    ]
+    parts = []
+    if missing:
+        parts.append(f"it no longer has the objects of {list_names(missing)}")
+    if other:
+        parts.append(f"{list_names(other)} {'was' if len(other) == 1 else 'were'} built again")
+    return f"library {library.root} has changed: {'; '.join(parts) or 'no object of this scene'}"
+
+
+def require_objects_of_scene(state: State, library: ObjectLibrary) -> None:
+    """Refuses a library that lacks objects of a scene.
+
+    Raises:
+        UnknownNameError: it does; the message lists them.
+        InvalidInputError: it gives a free instance no mass.
+    """
+    placed = (*state.document.instances, *state.document.background)
+    missing = sorted({i.object for i in placed if i.object not in library.objects})
+    if missing:
+        raise UnknownNameError(
+            f"library {library.root} has no {list_names([repr(m) for m in missing])}; delete their"
+            " instances first, or choose a library that has them"
+        )
+    heavy = [instance_name(i) for i in state.document.instances if library.entry(i.object).is_fixed]
+    if heavy:
+        raise InvalidInputError(
+            f"library {library.root} has no mass for {list_names(heavy)}; make them background first"
+        )
+
+
+@dataclass(frozen=True)
+class UseLibrary:
+    """Takes the objects from another library.
+
+    Attributes:
+        library: which must have all objects of the scene.
+        reference: how the scene's document refers to it.
+    """
+
+    library: ObjectLibrary
+    reference: str
+
+    @property
+    def label(self) -> str:
+        return f"use library {self.library.name}"
+
+    def apply(self, state: State, surroundings: Surroundings) -> State:
+        require_objects_of_scene(state, self.library)
+        document = replace(state.document, library=self.reference)
+        return replace(state, document=document, library=self.library)
+
+
+def _library_stamp(root: Path) -> Stamp:
+    try:
+        stat = (root / LIBRARY_FILE).stat()
+    except OSError:
+        return None
+    return stat.st_mtime_ns, stat.st_size, stat.st_ino
 
 
 class ComposeSession(BackgroundEditor):
@@ -47,7 +142,7 @@ class ComposeSession(BackgroundEditor):
     """
 
     def __init__(
-        self, opened: Opened, station: StationLike, folder: Path, address: str = ""
+        self, opened: OpenedScene, station: StationLike, folder: Path, address: str = ""
     ) -> None:
         self.folder = folder
         self._address = address
@@ -151,7 +246,7 @@ class ComposeSession(BackgroundEditor):
             self._require_saved(discard=discard)
             if path != self._storage.path:
                 return self._change(open_scene_file(path, self._address))
-            known = fingerprint(path)
+            known = file_fingerprint(path)
             scene = load_scene(path)
             self._drag = None
             self._add_step(HistoryStep(f"load {path.name}", State(scene.document, scene.library)))
@@ -186,7 +281,9 @@ class ComposeSession(BackgroundEditor):
         """
         from burg_drake.printout import print_board
 
-        return print_board(known_scene(self._history.state, self._storage.place), settings)
+        return print_board(
+            scene_of_known_objects(self._history.state, self._storage.place), settings
+        )
 
     def libraries(self) -> tuple[str, ...]:
         """References of libraries that a page may offer: built-in ones, and folders of the folder
@@ -223,7 +320,7 @@ class ComposeSession(BackgroundEditor):
         if reference not in self.libraries():
             raise UnknownNameError(
                 f"{reference!r} is neither a library of this folder nor built in;"
-                f" {nearest(reference, self.libraries())}"
+                f" {suggest_names(reference, self.libraries())}"
             )
         return reference if reference in builtin_names("models") else self.folder / reference
 
@@ -234,7 +331,7 @@ class ComposeSession(BackgroundEditor):
             self._update_surroundings()
             return self._view
 
-    def _change(self, opened: Opened) -> SessionView:
+    def _change(self, opened: OpenedScene) -> SessionView:
         """Goes over to another scene."""
         self._drop_settling()
         self._storage.close(keep=False)
@@ -259,7 +356,7 @@ class ComposeSession(BackgroundEditor):
             return
         if changed is None:
             return
-        self.notify(changes_notice(self._history.state, changed))
+        self.notify(library_change_notice(self._history.state, changed))
         self._history.replace_library(changed)
         self._revision += 1
         self._show(replace(self._state, library=changed))
@@ -270,7 +367,7 @@ class ComposeSession(BackgroundEditor):
         if path is None:
             return
         try:
-            found = fingerprint(path)
+            found = file_fingerprint(path)
         except InvalidInputError:
             return  # saving tells
         if found not in (self._storage.known, self._seen):

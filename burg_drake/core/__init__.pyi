@@ -1,3 +1,18 @@
+from .array_files import (
+    NUMBER_KINDS as NUMBER_KINDS,
+    ArrayShape as ArrayShape,
+    Hdf5File as Hdf5File,
+    NpzFile as NpzFile,
+    ReadBudget as ReadBudget,
+    is_hdf5 as is_hdf5,
+    npy_shape as npy_shape,
+    open_hdf5 as open_hdf5,
+    open_npy as open_npy,
+    open_npz as open_npz,
+    require_grasp_count as require_grasp_count,
+    text_array as text_array,
+    write_npy as write_npy,
+)
 from .arrays import (
     Array as Array,
     Booleans as Booleans,
@@ -5,14 +20,57 @@ from .arrays import (
     Indices as Indices,
     Single as Single,
 )
-from .cache import (
-    Arrays as Arrays,
-    cache_folder as cache_folder,
-    cached as cached,
+from .cache import Arrays as Arrays, cache_folder as cache_folder, cached as cached
+from .colors import (
+    CATEGORY_COLORS as CATEGORY_COLORS,
+    Rgb as Rgb,
+    Rgba as Rgba,
+    distinct_colors as distinct_colors,
+    linear_levels as linear_levels,
+    linear_to_srgb as linear_to_srgb,
+    srgb_to_linear as srgb_to_linear,
 )
-from .content import (
-    content_hash as content_hash,
-    rng_from as rng_from,
+from .column_descriptions import (
+    COLUMN_FAMILIES as COLUMN_FAMILIES,
+    COLUMN_GROUPS as COLUMN_GROUPS,
+    INPUT_PREFIX as INPUT_PREFIX,
+    column_axis_label as column_axis_label,
+    column_metadata as column_metadata,
+    column_title as column_title,
+    csv_metadata as csv_metadata,
+    describe_column as describe_column,
+    display_unit as display_unit,
+    format_column_value as format_column_value,
+    format_column_values as format_column_values,
+    metadata_path as metadata_path,
+)
+from .columns import (
+    DIMENSIONLESS as DIMENSIONLESS,
+    TEXT_UNIT as TEXT_UNIT,
+    Column as Column,
+    TableShape as TableShape,
+    TextField as TextField,
+    VerdictPart as VerdictPart,
+)
+from .document_kinds import (
+    DOCUMENT_KINDS as DOCUMENT_KINDS,
+    SCHEMA_URL as SCHEMA_URL,
+    document_class as document_class,
+)
+from .documents import (
+    Pose as Pose,
+    Reader as Reader,
+    document_text as document_text,
+    dump_document as dump_document,
+    empty_document_message as empty_document_message,
+    json_schema as json_schema,
+    load_document as load_document,
+    parse_document as parse_document,
+    plain_data as plain_data,
+    read_document as read_document,
+    save_document as save_document,
+    schema_text as schema_text,
+    write_schemas as write_schemas,
 )
 from .errors import (
     BurgError as BurgError,
@@ -27,11 +85,34 @@ from .errors import (
     UnknownNameError as UnknownNameError,
     WorkerDied as WorkerDied,
     did_you_mean as did_you_mean,
-    listing as listing,
-    nearest as nearest,
+    list_names as list_names,
     one_line as one_line,
-    quoted as quoted,
-    shown as shown,
+    quote_value as quote_value,
+    shorten_text as shorten_text,
+    suggest_names as suggest_names,
+)
+from .files import (
+    READ_ERRORS as READ_ERRORS,
+    UNFINISHED_FILE as UNFINISHED_FILE,
+    FileLimits as FileLimits,
+    FolderLock as FolderLock,
+    Limits as Limits,
+    atomic_write as atomic_write,
+    atomic_write_all as atomic_write_all,
+    copy_permissions as copy_permissions,
+    ensure_writable_folder as ensure_writable_folder,
+    missing_locks_error as missing_locks_error,
+    open_regular as open_regular,
+    read_bytes as read_bytes,
+    read_pipe as read_pipe,
+    read_rows as read_rows,
+    read_text as read_text,
+    remove_unfinished as remove_unfinished,
+    report_read_errors as report_read_errors,
+    require_writable as require_writable,
+    short_message as short_message,
+    suppress_numpy_warnings as suppress_numpy_warnings,
+    try_lock as try_lock,
 )
 from .frames import (
     canonical_fingers as canonical_fingers,
@@ -39,7 +120,7 @@ from .frames import (
     grasp_from_axes as grasp_from_axes,
     inverse as inverse,
     make_pose as make_pose,
-    perpendicular as perpendicular,
+    perpendicular_axes as perpendicular_axes,
     pregrasp as pregrasp,
     quaternion_from_rotation as quaternion_from_rotation,
     rot_z as rot_z,
@@ -50,21 +131,84 @@ from .frames import (
     swap_fingers as swap_fingers,
     transform_points as transform_points,
 )
-from .light import (
-    even_levels as even_levels,
-    levels_of_light as levels_of_light,
-    photo_light as photo_light,
+from .grasp_set import (
+    FIXED_COLUMNS as FIXED_COLUMNS,
+    GraspSet as GraspSet,
+    GraspSetFormat as GraspSetFormat,
+)
+from .number_rows import (
+    DecimalGrid as DecimalGrid,
+    format_rows as format_rows,
+    round_to_grid as round_to_grid,
+)
+from .number_text import (
+    MISSING_NUMBER as MISSING_NUMBER,
+    format_count as format_count,
+    format_duration as format_duration,
+    format_number as format_number,
+    format_percent as format_percent,
+)
+from .outcomes import (
+    DECIDED_STAGES as DECIDED_STAGES,
+    MODES as MODES,
+    UNTRIED_OUTCOMES as UNTRIED_OUTCOMES,
+    Among as Among,
+    Mode as Mode,
+    Outcome as Outcome,
+    RealOutcome as RealOutcome,
+    Stage as Stage,
+    outcome_label as outcome_label,
+)
+from .paths import (
+    MAX_NAME_BYTES as MAX_NAME_BYTES,
+    MESH_FILE as MESH_FILE,
+    NO_PACKAGES as NO_PACKAGES,
+    PACKAGE_URI as PACKAGE_URI,
+    Packages as Packages,
+    builtin_names as builtin_names,
+    data_root as data_root,
+    drake_models_folder as drake_models_folder,
+    expand_home as expand_home,
+    is_resolved as is_resolved,
+    make_name as make_name,
+    may_reference_packages as may_reference_packages,
+    package_file as package_file,
+    portable_reference as portable_reference,
+    referenced_files as referenced_files,
+    referenced_packages as referenced_packages,
+    require_name as require_name,
+    require_names as require_names,
+    resolve_reference as resolve_reference,
+    shareable_reference as shareable_reference,
+    with_resolved_references as with_resolved_references,
+    with_shareable_references as with_shareable_references,
+)
+from .progress import (
+    STARTING_PHASE as STARTING_PHASE,
+    Listener as Listener,
+    Progress as Progress,
+    ProgressMeter as ProgressMeter,
+    Reporter as Reporter,
+)
+from .provenance import (
+    JUDGING_PACKAGES as JUDGING_PACKAGES,
+    content_hash as content_hash,
+    provenance_parts as provenance_parts,
+    rng_from as rng_from,
+    software_versions as software_versions,
 )
 from .settings import (
-    DEGREES as DEGREES,
-    LARGEST_SEED as LARGEST_SEED,
-    MILLIMETRES as MILLIMETRES,
-    PERCENT as PERCENT,
-    THOUSANDTHS as THOUSANDTHS,
+    MAX_DOCUMENT_SEED as MAX_DOCUMENT_SEED,
+    DisplayUnit as DisplayUnit,
+    Ranges as Ranges,
     Setting as Setting,
-    ShownUnit as ShownUnit,
-    declared as declared,
-    option_of as option_of,
+    Units as Units,
+    Vector3 as Vector3,
+    declared_fields as declared_fields,
+    option_name as option_name,
+    require_ascending as require_ascending,
+    require_finite as require_finite,
+    require_ranges as require_ranges,
     setting as setting,
 )
 from .statistics import (
@@ -72,16 +216,64 @@ from .statistics import (
     clustered_interval as clustered_interval,
     wilson_interval as wilson_interval,
 )
-from .versions import (
-    JUDGING as JUDGING,
-    software_versions as software_versions,
+from .structured_text import (
+    MAX_INTEGER_DIGITS as MAX_INTEGER_DIGITS,
+    STANDARD_TAGS as STANDARD_TAGS,
+    Tree as Tree,
+    checked_yaml_events as checked_yaml_events,
+    load_json as load_json,
+    load_plain_yaml as load_plain_yaml,
+    load_yaml_node as load_yaml_node,
+    parse_json as parse_json,
+    parse_plain_yaml as parse_plain_yaml,
+    parse_yaml_node as parse_yaml_node,
+)
+from .text_table import TextTable as TextTable
+from .verdict import (
+    CONTESTED_CONFIDENCE as CONTESTED_CONFIDENCE,
+    CPU_COLUMNS as CPU_COLUMNS,
+    INSTANCE_PREFIXES as INSTANCE_PREFIXES,
+    MOVED_PREFIX as MOVED_PREFIX,
+    PUSHED_PREFIX as PUSHED_PREFIX,
+    TURNED_PREFIX as TURNED_PREFIX,
+    Findings as Findings,
+    MarginNames as MarginNames,
+    Margins as Margins,
+    RecordedFields as RecordedFields,
+    TrialFindings as TrialFindings,
+    Verdict as Verdict,
+    display_order as display_order,
+    fields_of_part as fields_of_part,
+    merge_findings as merge_findings,
 )
 from .web_access import (
-    HEADERS as HEADERS,
-    LOCALHOST as LOCALHOST,
+    SECURITY_HEADERS as SECURITY_HEADERS,
+    BrowserToken as BrowserToken,
     RequestError as RequestError,
     address_in_use_error as address_in_use_error,
     page_url as page_url,
     require_local_host as require_local_host,
 )
-from .web_token import BrowserToken as BrowserToken
+from .worker import (
+    Session as Session,
+    Task as Task,
+    TimeLimit as TimeLimit,
+    WorkerFuture as WorkerFuture,
+    report_progress as report_progress,
+)
+from .worker_pool import (
+    Prefetcher as Prefetcher,
+    WorkerPool as WorkerPool,
+    map_unordered as map_unordered,
+)
+from .worker_processes import (
+    SINGLE_THREAD_ENVIRONMENT as SINGLE_THREAD_ENVIRONMENT,
+    AllocatorSettings as AllocatorSettings,
+    default_workers as default_workers,
+    exit_cause as exit_cause,
+    installed_allocators as installed_allocators,
+    start_worker as start_worker,
+    was_ended_from_outside as was_ended_from_outside,
+    worker_count as worker_count,
+    worker_preload as worker_preload,
+)

@@ -1,4 +1,7 @@
-"""Types of arrays by what they hold; shapes are in the docstrings."""
+"""Types of arrays by what they hold.
+
+Shapes are stated in the docstrings.
+"""
 
 from __future__ import annotations
 

@@ -1,12 +1,11 @@
-"""What takes long to compute and follows from content alone, kept from one process to the next.
+"""Cache of arrays that are slow to compute and depend on content only.
 
-A folder of the user's has one `.npz` file an entry, named by what its arrays were computed from,
-with a hash of the code that has computed them and of the versions of numpy, scipy and Drake: an
-entry of another version is not used. Whatever is wrong with an entry, its arrays are computed
-again, to the same bits, and take its place; whatever is wrong with the folder, they are computed
-each time.
+The cache folder has one `.npz` file per entry. Its name is the hash of what its arrays were
+computed from. It also records a hash of the code that computed them and the versions of numpy,
+scipy and Drake: an entry of another version is not used. A damaged entry is computed again, to the
+same bits, and replaced. If the folder cannot be used, arrays are computed each time.
 
-The folder is `BURG_DRAKE_CACHE`, if that is set (`off`: none); else `burg_drake` in
+The folder is `BURG_DRAKE_CACHE` if that is set (`off`: no cache), otherwise `burg_drake` in
 `XDG_CACHE_HOME`, `~/Library/Caches` on macOS, or `~/.cache`. It may be deleted at any time.
 """
 
@@ -27,35 +26,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core.content import content_hash
+from burg_drake.core.array_files import NUMBER_KINDS, NpzFile, open_npz
 from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.files import (
-    NUMBERS,
-    UNFINISHED,
-    NpzFile,
-    atomic_write,
-    open_npz,
-    reporting_read_errors,
-)
-from burg_drake.core.paths import expanded
+from burg_drake.core.files import UNFINISHED_FILE, atomic_write, report_read_errors
+from burg_drake.core.paths import expand_home
+from burg_drake.core.provenance import content_hash
 
-VARIABLE = "BURG_DRAKE_CACHE"
-OFF = "off"
-MOST_BYTES = 512 << 20
-"""Of all entries; those that nobody has asked for the longest are removed beyond it. A robot takes
-0.2 to 3 MB, a scene 10 to 25 MB."""
-TOUCHED = 86_400.0
-"""An entry in use is marked as such no more often than that [s]."""
-ABANDONED = 3_600.0
-"""A file that has not got its name for so long [s] is of a process that was killed."""
-TOLD = ".told-"
-"""What the name of an empty file begins with that says which version has told of other ones."""
-ROOMS = ("core", "geometry", "objects", "scene", "station", "grasping", "motion")
-"""Packages whose code decides about what is kept."""
+MAX_CACHE_BYTES = 512 << 20
+"""Size of the whole cache. A robot takes 0.2 to 3 MB, a scene 10 to 25 MB."""
 VERSIONED_PACKAGES = ("numpy", "scipy", "drake")
-"""Packages whose version does."""
-VERSION_KEY = "made_by"
-"""Name of the array that says what an entry was computed by, and from what."""
+"""Dependencies whose version affects cached arrays."""
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -68,14 +48,15 @@ def cache_folder() -> Path | None:
     Raises:
         InvalidInputError: the variable names a home folder that nobody has.
     """
-    given = os.environ.get(VARIABLE, "").strip()
-    if given.lower() == OFF:
+    variable = "BURG_DRAKE_CACHE"
+    given = os.environ.get(variable, "").strip()
+    if given.lower() == "off":
         return None
     if given:
         try:
-            return expanded(given)
+            return expand_home(given)
         except UnknownNameError as error:
-            raise InvalidInputError(f"{VARIABLE}: {error}") from error
+            raise InvalidInputError(f"{variable}: {error}") from error
     if base := os.environ.get("XDG_CACHE_HOME", ""):
         return Path(base) / "burg_drake"
     try:
@@ -99,23 +80,25 @@ def cached(kind: str, content: str, make: Callable[[], Arrays]) -> Arrays:
         return make()
     path = folder / f"{kind}-{content[:32]}.npz"
     made_by = content_hash(kind, content, *_code_version())
-    found = _read(path, made_by)
+    found = _read_entry(path, made_by)
     if found is None:
         found = make()
-        _write(path, found, made_by)
+        _write_entry(path, found, made_by)
     return found
 
 
-def _read(path: Path, made_by: str) -> Arrays | None:
+def _read_entry(path: Path, made_by: str) -> Arrays | None:
     """What an entry holds; None, and a line that says why, where it cannot be used."""
+    # Seconds between updates of the modification time of an entry in use.
+    refresh_interval = 86_400.0
     try:
         mark = path.stat().st_mtime
     except OSError:
         return None  # there is none
     try:
-        with reporting_read_errors(path, "an entry of the cache"), open_npz(path) as archive:
-            origin = archive.array(VERSION_KEY).read("U", ()).item()
-            found = _arrays(archive) if origin == made_by else None
+        with report_read_errors(path, "an entry of the cache"), open_npz(path) as archive:
+            origin = archive.array("made_by").read("U", ()).item()
+            found = _entry_arrays(archive) if origin == made_by else None
     except InvalidInputError as error:
         _log.warning(
             "burg-drake: %s; this was only a cached copy, so the result is computed again", error
@@ -123,7 +106,7 @@ def _read(path: Path, made_by: str) -> Arrays | None:
         return None
     if found is None:
         _log_other_version(path.parent)
-    elif time.time() - mark > TOUCHED:
+    elif time.time() - mark > refresh_interval:
         with contextlib.suppress(OSError):
             os.utime(path)
     return found
@@ -133,14 +116,15 @@ def _read(path: Path, made_by: str) -> Arrays | None:
 def _log_other_version(folder: Path) -> None:
     """One line, as after an update that is so of all entries: the first process that finds one
     leaves a mark for its workers and for those that come later."""
-    mark = folder / f"{TOLD}{content_hash(*_code_version())[:16]}"
+    marker_prefix = ".told-"  # Empty files that record which version has logged the warning.
+    mark = folder / f"{marker_prefix}{content_hash(*_code_version())[:16]}"
     try:
         mark.touch(exist_ok=False)
     except FileExistsError:
         return
     except OSError as error:
         _log.debug("%s", error)  # a folder that is read-only: each process tells it
-    for other in folder.glob(f"{TOLD}*"):
+    for other in folder.glob(f"{marker_prefix}*"):
         if other != mark:
             with contextlib.suppress(OSError):
                 other.unlink()
@@ -152,16 +136,16 @@ def _log_other_version(folder: Path) -> None:
     )
 
 
-def _arrays(archive: NpzFile) -> Arrays:
+def _entry_arrays(archive: NpzFile) -> Arrays:
     return {
-        name: archive.array(name).read(NUMBERS) for name in archive.names if name != VERSION_KEY
+        name: archive.array(name).read(NUMBER_KINDS) for name in archive.names if name != "made_by"
     }
 
 
-def _write(path: Path, arrays: Arrays, made_by: str) -> None:
+def _write_entry(path: Path, arrays: Arrays, made_by: str) -> None:
     """Writes an entry, if that is possible."""
     buffer = io.BytesIO()
-    every: dict[str, Any] = {VERSION_KEY: np.array(made_by), **arrays}
+    every: dict[str, Any] = {"made_by": np.array(made_by), **arrays}
     np.savez(buffer, **every)
     try:
         atomic_write(path, buffer.getvalue())
@@ -169,23 +153,24 @@ def _write(path: Path, arrays: Arrays, made_by: str) -> None:
         _log.debug("%s", error)  # a folder that is full or read-only: nothing is lost but time
         return
     with contextlib.suppress(OSError):
-        _limit(path.parent)
+        _remove_old_entries(path.parent)
 
 
-def _limit(folder: Path) -> None:
-    """Removes the entries longest unused beyond `MOST_BYTES`, and what killed processes left."""
+def _remove_old_entries(folder: Path) -> None:
+    """Removes the entries longest unused beyond `MAX_CACHE_BYTES`, and what killed processes left."""
+    max_write_time = 3_600.0  # Seconds after which an unfinished file must be of a killed process.
     entries, now = [], time.time()
     for path in folder.iterdir():
         with contextlib.suppress(OSError):  # another process has removed it
             found = path.stat()
             if path.suffix == ".npz" and not path.name.startswith("."):
                 entries.append((found.st_mtime, found.st_size, path))
-            elif UNFINISHED.fullmatch(path.name) and now - found.st_mtime > ABANDONED:
+            elif UNFINISHED_FILE.fullmatch(path.name) and now - found.st_mtime > max_write_time:
                 path.unlink()
     total = 0
     for _, size, path in sorted(entries, reverse=True):
         total += size
-        if total > MOST_BYTES:
+        if total > MAX_CACHE_BYTES:
             with contextlib.suppress(OSError):
                 path.unlink()
 
@@ -193,13 +178,15 @@ def _limit(folder: Path) -> None:
 @functools.cache
 def _code_version() -> tuple[str, ...]:
     """Hash of the code, and versions of what it computes with."""
+    # Packages whose code affects cached arrays.
+    rooms = ("core", "geometry", "objects", "scene", "station", "grasping", "motion")
     package = Path(__file__).parents[1]
-    files = [file for room in ROOMS for file in sorted((package / room).rglob("*.py"))]
+    files = [file for room in rooms for file in sorted((package / room).rglob("*.py"))]
     code = content_hash([file.relative_to(package).as_posix() for file in files], files)
-    return code, *(_version(name) for name in VERSIONED_PACKAGES)
+    return code, *(_package_version(name) for name in VERSIONED_PACKAGES)
 
 
-def _version(package: str) -> str:
+def _package_version(package: str) -> str:
     try:
         return metadata.version(package)
     except metadata.PackageNotFoundError:  # a Drake that was built from source has no metadata

@@ -1,6 +1,6 @@
-"""The error tree: everything that a user can cause derives from `BurgError`.
+"""The error tree: every error that a user can cause derives from `BurgError`.
 
-A grasp that slips and a pose out of reach are outcomes, not errors; see `core.grasps.outcome`.
+A grasp that slips and a pose out of reach are outcomes, not errors; see `core.outcomes`.
 """
 
 from __future__ import annotations
@@ -10,12 +10,7 @@ import reprlib
 from collections.abc import Iterable, Sequence
 from typing import Self
 
-MANY = 24
-FEW = 9
-"""More names than `MANY` are too many for a message; it then has the first `FEW`."""
-
-
-SHOWN = 60
+MAX_VALUE_LENGTH = 60
 """Characters of a value that a message repeats."""
 
 
@@ -107,25 +102,25 @@ def one_line(error: BaseException) -> str:
     return f"{type(error).__name__}: {message}" if message else type(error).__name__
 
 
-def quoted(value: object) -> str:
+def quote_value(value: object) -> str:
     """A value from outside as a message repeats it: in quotes if it is a text, never long.
 
     Of a long text the beginning and the end are shown, of a structure the first few items.
     """
-    return shown(_QUOTES.repr(value), 2 * SHOWN)
+    return shorten_text(_VALUE_REPR.repr(value), 2 * MAX_VALUE_LENGTH)
 
 
-def shown(text: str, length: int = SHOWN) -> str:
+def shorten_text(text: str, length: int = MAX_VALUE_LENGTH) -> str:
     """A text from outside as a message repeats it without quotes: the beginning of a long one."""
     return text if len(text) <= length else f"{text[: length - 3]}..."
 
 
-_QUOTES = reprlib.Repr()
-_QUOTES.maxlevel = 2
-_QUOTES.maxstring = _QUOTES.maxother = _QUOTES.maxlong = SHOWN
+_VALUE_REPR = reprlib.Repr()
+_VALUE_REPR.maxlevel = 2
+_VALUE_REPR.maxstring = _VALUE_REPR.maxother = _VALUE_REPR.maxlong = MAX_VALUE_LENGTH
 
 
-def nearest(name: str, known: Iterable[str], *, ordered: bool = False) -> str:
+def suggest_names(name: str, known: Iterable[str], *, ordered: bool = False) -> str:
     """Ends an error message about an unknown `name`: the nearest valid one and all that there are.
 
     Args:
@@ -138,7 +133,7 @@ def nearest(name: str, known: Iterable[str], *, ordered: bool = False) -> str:
     """
     names = list(known) if ordered else sorted(known)
     meant = did_you_mean(name, names)
-    return f"{meant} Known: {listing(names)}" if meant else f"known: {listing(names)}"
+    return f"{meant} Known: {list_names(names)}" if meant else f"known: {list_names(names)}"
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
@@ -150,8 +145,10 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     return f"did you mean {close[0]!r}?" if len(close) == 1 else ""
 
 
-def listing(names: Sequence[str]) -> str:
+def list_names(names: Sequence[str]) -> str:
     """Names for a message; of many the first few, and how many more there are."""
-    if len(names) <= MANY:
+    max_names = 24  # Longest list that a message has in full.
+    n_first = 9  # Names of a longer list that a message has.
+    if len(names) <= max_names:
         return ", ".join(names) or "(none)"
-    return f"{', '.join(names[:FEW])} and {len(names) - FEW} others"
+    return f"{', '.join(names[:n_first])} and {len(names) - n_first} others"

@@ -3,12 +3,12 @@
 A pose `X_AB` is a 4x4 homogeneous matrix, the pose of frame B measured and expressed in frame A;
 a batch has shape (..., 4, 4). Composition is `X_AB @ X_BC`. Quaternions are ordered wxyz.
 
-The grasp frame G sits midway between the finger pads (the tool centre point); +z is the approach
-direction and +x the closing direction. Turning G by 180 degrees about its z axis swaps the
+The grasp frame G is midway between the finger pads (the tool centre point); +z is the approach
+direction and +x the closing direction. A rotation of G by 180 degrees about its z axis swaps the
 fingers and is the same physical grasp.
 
-scipy loads its rotations when they are first used: a worker process without them starts in half the
-time.
+scipy loads its rotations on first use, which halves the start-up time of worker processes that
+do not need them.
 """
 
 from __future__ import annotations
@@ -22,11 +22,8 @@ from numpy.typing import ArrayLike, NDArray
 from burg_drake.core.arrays import Array
 from burg_drake.core.errors import InvalidInputError
 
-POSE_TOLERANCE = 1e-6
-"""Largest deviation from orthonormality that `check_pose` accepts."""
-
-FARTHEST = 1e6
-"""Largest coordinate that `check_pose` accepts [m]; squares of larger ones overflow some day."""
+MAX_POSE_COORDINATE = 1e6
+"""Largest coordinate of a pose, metres. Squares of larger ones might overflow."""
 
 
 def make_pose(R_AB: ArrayLike | None = None, p_AB: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
@@ -67,7 +64,7 @@ def transform_points(X_AB: ArrayLike, p_BQ: ArrayLike) -> Array:
 
 def rotation_from_rpy(rpy: ArrayLike) -> Array:
     """(..., 3) roll, pitch, yaw [rad] about fixed x, y, z axes -> (..., 3, 3) `Rz Ry Rx`."""
-    return _batch(
+    return _convert_vectors(
         rpy, 3, lambda v: scipy.spatial.transform.Rotation.from_euler("xyz", v).as_matrix(), (3, 3)
     )
 
@@ -76,12 +73,12 @@ def rpy_from_rotation(R_AB: ArrayLike) -> Array:
     """(..., 3, 3) -> (..., 3) roll, pitch, yaw [rad], pitch in [-pi/2, pi/2]."""
     with warnings.catch_warnings():  # at gimbal lock yaw 0 is a valid choice, nothing to warn of
         warnings.simplefilter("ignore", UserWarning)
-        return _batch_matrix(R_AB, lambda R: R.as_euler("xyz"), 3)
+        return _convert_rotations(R_AB, lambda R: R.as_euler("xyz"), 3)
 
 
 def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
     """(..., 4) wxyz quaternions, normalised here -> (..., 3, 3)."""
-    return _batch(
+    return _convert_vectors(
         quaternion,
         4,
         lambda v: scipy.spatial.transform.Rotation.from_quat(v, scalar_first=True).as_matrix(),
@@ -91,7 +88,7 @@ def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
 
 def quaternion_from_rotation(R_AB: ArrayLike) -> Array:
     """(..., 3, 3) -> (..., 4) wxyz unit quaternions with w >= 0."""
-    return _batch_matrix(R_AB, lambda R: R.as_quat(canonical=True, scalar_first=True), 4)
+    return _convert_rotations(R_AB, lambda R: R.as_quat(canonical=True, scalar_first=True), 4)
 
 
 def rotation_angle(R_AB: ArrayLike) -> Array:
@@ -124,9 +121,10 @@ def check_pose(X_AB: ArrayLike, name: str) -> Array:
         The poses as float array.
 
     Raises:
-        InvalidInputError: wrong shape, not finite, beyond `FARTHEST`, not a right-handed rotation,
+        InvalidInputError: wrong shape, not finite, beyond `MAX_POSE_COORDINATE`, not a right-handed rotation,
             or bad last row.
     """
+    tolerance = 1e-6  # Largest deviation from orthonormality.
     X = np.asarray(X_AB, dtype=float)
     if X.shape[-2:] != (4, 4):
         raise InvalidInputError(f"{name} has shape {X.shape}; expected (..., 4, 4)")
@@ -141,8 +139,8 @@ def check_pose(X_AB: ArrayLike, name: str) -> Array:
         "has NaN or infinite numbers; give finite metres and angles",
     )
     refuse(
-        (np.abs(X[..., :3, 3]) > FARTHEST).any(axis=-1),
-        f"is more than {FARTHEST:g} m from the origin; give metres",
+        (np.abs(X[..., :3, 3]) > MAX_POSE_COORDINATE).any(axis=-1),
+        f"is more than {MAX_POSE_COORDINATE:g} m from the origin; give metres",
     )
     R = X[..., :3, :3]
     with np.errstate(over="ignore", invalid="ignore"):  # numbers of any size
@@ -151,12 +149,12 @@ def check_pose(X_AB: ArrayLike, name: str) -> Array:
     off = np.where(np.isnan(off), np.inf, off)
     worst = f"{off.max(initial=0.0):.2g}"
     refuse(
-        off > POSE_TOLERANCE,
+        off > tolerance,
         f"is not a rigid transform: its rotation part is off by {worst} from orthonormal",
     )
     refuse(mirrored, "is not a rigid transform: its rotation part is a reflection (determinant -1)")
     last = np.abs(X[..., 3, :] - (0.0, 0.0, 0.0, 1.0)).max(axis=-1)
-    refuse(last > POSE_TOLERANCE, "has a last row that is not 0 0 0 1")
+    refuse(last > tolerance, "has a last row that is not 0 0 0 1")
     return X
 
 
@@ -210,18 +208,18 @@ def grasp_from_axes(closing: ArrayLike, approach: ArrayLike, p_AG: ArrayLike) ->
     return make_pose(np.stack([x, np.cross(z, x), z], axis=-1), p_AG)
 
 
-def _batch(values: ArrayLike, size: int, convert, shape: tuple[int, ...]) -> Array:  # type: ignore[no-untyped-def]
+def _convert_vectors(values: ArrayLike, size: int, convert, shape: tuple[int, ...]) -> Array:  # type: ignore[no-untyped-def]
     v = np.asarray(values, dtype=float)
     return np.asarray(convert(v.reshape(-1, size))).reshape(*v.shape[:-1], *shape)
 
 
-def _batch_matrix(R_AB: ArrayLike, convert, size: int) -> Array:  # type: ignore[no-untyped-def]
+def _convert_rotations(R_AB: ArrayLike, convert, size: int) -> Array:  # type: ignore[no-untyped-def]
     R = np.asarray(R_AB, dtype=float)
     rotations = scipy.spatial.transform.Rotation.from_matrix(R.reshape(-1, 3, 3))
     return np.asarray(convert(rotations)).reshape(*R.shape[:-2], size)
 
 
-def perpendicular(axis: Array) -> tuple[Array, Array]:
+def perpendicular_axes(axis: Array) -> tuple[Array, Array]:
     """Two unit vectors (..., 3) that make a right-handed frame with the unit vectors `axis`.
 
     Without branch or pole (Duff et al., "Building an orthonormal basis, revisited", JCGT 2017).

@@ -1,22 +1,26 @@
-"""Settings declared once: what a field of a settings dataclass says about itself.
+"""Settings dataclasses: units, command-line options and allowed ranges of their fields.
 
-The command line makes its options of it, see `apps.options`; so that name, unit, range and meaning
-of a setting are said in one place, beside the code that uses it.
+Name, unit, range and meaning of a setting are declared once, beside the code that uses it; the
+command line makes its options from them (see `apps.options`). Ranges bound the time that a
+document can ask for.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields
-from typing import Any
+from typing import Any, ClassVar, Protocol
 
-KEY = "setting"
-"""Of a field's metadata."""
+from burg_drake.core.errors import FieldError
+
+Vector3 = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
-class ShownUnit:
+class DisplayUnit:
     """A unit that people give, where a field has SI.
 
     Attributes:
@@ -30,14 +34,18 @@ class ShownUnit:
     from_si: Callable[[float], float]
 
 
-LARGEST_SEED = (1 << 64) - 1
-"""Documents have seeds of at most 64 bits."""
-MILLIMETRES = ShownUnit("mm", lambda x: 1e-3 * x, lambda x: 1e3 * x)
-THOUSANDTHS = ShownUnit("mm", lambda x: x / 1000.0, lambda x: 1000.0 * x)
-"""Millimetres by division, as motions and gaps have been written to files: it may differ from the
-product in the last digit, and hashes tell."""
-DEGREES = ShownUnit("deg", math.radians, math.degrees)
-PERCENT = ShownUnit("percent", lambda x: x / 100.0, lambda x: 100.0 * x)
+MAX_DOCUMENT_SEED = (1 << 64) - 1
+"""Seeds have at most 64 bits."""
+
+
+class Units:
+    """Units."""
+
+    millimetres = DisplayUnit("mm", lambda x: 1e-3 * x, lambda x: 1e3 * x)
+    # As in files of motions and gaps: differs from the product in the last digit.
+    millimetres_by_division = DisplayUnit("mm", lambda x: x / 1000.0, lambda x: 1000.0 * x)
+    degrees = DisplayUnit("deg", math.radians, math.degrees)
+    percent = DisplayUnit("percent", lambda x: x / 100.0, lambda x: 100.0 * x)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +67,7 @@ class Setting:
     """
 
     help: str
-    unit: ShownUnit | None = None
+    unit: DisplayUnit | None = None
     name: str = ""
     flags: tuple[str, ...] = ()
     metavar: str | tuple[str, ...] = ""
@@ -83,14 +91,86 @@ def setting(default: Any = MISSING, help: str = "", **more: Any) -> Any:
         default: its value unless another one is given.
         help: see `Setting`, which has all the rest.
     """
-    return field(default=default, metadata={KEY: Setting(help=help, **more)})
+    return field(default=default, metadata={"setting": Setting(help=help, **more)})
 
 
-def declared(settings: type) -> dict[str, tuple[Field[Any], Setting]]:
+def declared_fields(settings: type) -> dict[str, tuple[Field[Any], Setting]]:
     """The fields of a settings dataclass that say something about themselves, by name."""
-    return {f.name: (f, f.metadata[KEY]) for f in fields(settings) if KEY in f.metadata}
+    return {f.name: (f, f.metadata["setting"]) for f in fields(settings) if "setting" in f.metadata}
 
 
-def option_of(settings: type, name: str) -> str:
+def option_name(settings: type, name: str) -> str:
     """The long option of a declared field, such as `--lift-mm`."""
-    return declared(settings)[name][1].option(name)
+    return declared_fields(settings)[name][1].option(name)
+
+
+Ranges = Mapping[str, tuple[float, float]]
+"""Smallest and largest value by name of the field."""
+
+
+class WithRanges(Protocol):
+    """A dataclass that says which values its fields may have; schemas say it, too."""
+
+    RANGES: ClassVar[Ranges]
+
+
+def require_ranges(settings: WithRanges, what: str = "") -> None:
+    """Refuses values outside of their range. None passes; in a tuple, each value has to be inside.
+
+    Args:
+        settings: dataclass with the fields.
+        what: the settings are of, for messages; nothing where the field's name says enough.
+
+    Raises:
+        FieldError: a value is outside, or not a number.
+    """
+    of = f" of {what}" if what else ""
+    for name, (low, high) in settings.RANGES.items():
+        given = getattr(settings, name)
+        several = isinstance(given, tuple)
+        for value in given if several else (given,):
+            if value is not None and not low <= value <= high:
+                verb = "has" if several else "is"
+                raise FieldError(
+                    f"{name}{of} {verb} {value:g}; it must be {low:g} to {high:g}", name
+                )
+
+
+def require_ascending(pair: tuple[float, float], name: str) -> None:
+    """Refuses a range that falls.
+
+    Raises:
+        FieldError: the first value is above the second.
+    """
+    if pair[0] > pair[1]:
+        raise FieldError(f"{name} is {pair[0]:g} to {pair[1]:g}; it must rise", name)
+
+
+def require_finite(document: object) -> None:
+    """Refuses numbers that are NaN or infinite, of a document that a program has made: `min`, `max`
+    and comparisons let some of them pass. Those of a file are checked when it is read.
+
+    Raises:
+        FieldError: names the first one by its key.
+    """
+    for place, number in _numbers_with_places(document, ()):
+        if not math.isfinite(number):
+            key = "".join(f"[{k}]" if isinstance(k, int) else f".{k}" for k in place)
+            raise FieldError(f"{key.lstrip('.')} is {number}; it must be a finite number", *place)
+
+
+def _numbers_with_places(
+    value: object, place: tuple[str | int, ...]
+) -> Iterable[tuple[tuple[str | int, ...], float]]:
+    """All numbers of a document with their places in it."""
+    parts: Iterable[tuple[str | int, object]] = ()
+    if isinstance(value, float):
+        yield place, value
+    elif dataclasses.is_dataclass(value):
+        parts = ((f.name, getattr(value, f.name)) for f in dataclasses.fields(value))
+    elif isinstance(value, Mapping):
+        parts = value.items()
+    elif isinstance(value, (list, tuple)):
+        parts = enumerate(value)
+    for key, part in parts:
+        yield from _numbers_with_places(part, (*place, key))

@@ -1,4 +1,4 @@
-"""Intervals for shares that are estimated from counts."""
+"""Confidence intervals for proportions that are estimated from counts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from burg_drake.core.arrays import Array
 
 Z_95 = 1.959963984540054
-"""Quantile of the normal distribution that leaves 2.5 % on either side."""
+"""97.5 % quantile of the normal distribution."""
 
 
 def wilson_interval(successes: float, trials: float, z: float = Z_95) -> tuple[float, float]:
@@ -53,18 +53,18 @@ def clustered_interval(successes: Sequence[int], trials: Sequence[int]) -> tuple
     if len(n) < 2:
         return low, high
     share = float(k.sum()) / whole
-    half = _student_95(len(n) - 1) * _ratio_error(k, n, share)
+    half = _student_quantile(len(n) - 1) * _ratio_standard_error(k, n, share)
     return max(0.0, min(low, share - half)), min(1.0, max(high, share + half))
 
 
-def _ratio_error(k: Array, n: Array, share: float) -> float:
+def _ratio_standard_error(k: Array, n: Array, share: float) -> float:
     """Standard error of a ratio of totals over clusters."""
     clusters = len(n)
     spread = float(((k - share * n) ** 2).sum()) * clusters / (clusters - 1)
     return math.sqrt(spread) / float(n.sum())
 
 
-def _student_95(freedom: int) -> float:
+def _student_quantile(freedom: int) -> float:
     from scipy.special import stdtrit
 
     return float(stdtrit(freedom, 0.975))

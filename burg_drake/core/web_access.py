@@ -1,31 +1,26 @@
-"""Who may talk to a page that this machine serves: what all small servers share.
-
-Any web site that the user has open can send requests to servers of this machine. Requests must
-therefore name this machine as their host, which stops DNS rebinding, and must not come from another
-site. Nothing here trusts the sender.
-"""
+"""Access to the pages that this machine serves: host checks, tokens and session cookies."""
 
 from __future__ import annotations
 
+import hmac
 import ipaddress
 import re
+import secrets
 import socket
+import threading
 from collections.abc import Callable, Mapping
 from http import HTTPStatus
 
-from burg_drake.core.errors import shown
+from burg_drake.core.errors import shorten_text
 
-LOCALHOST = "127.0.0.1"
-EVERYWHERE = ("0.0.0.0", "::", "")
-HEADERS: Mapping[str, str] = {
+SECURITY_HEADERS: Mapping[str, str] = {
     "Cache-Control": "no-store",
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
 }
-"""Of every answer, beside a Content-Security-Policy that fits the page."""
-_HOST = re.compile(r"(?P<name>[^\s@/?#\[\]:]+|\[[0-9a-fA-F:.]+\])(:[0-9]{1,5})?")
+"""Headers of every answer; each page adds its own Content-Security-Policy."""
 
 
 class RequestError(Exception):
@@ -49,7 +44,9 @@ def is_local_host(name: str, served: str) -> bool:
         name: the header.
         served: the address that is listened on.
     """
-    match = _HOST.fullmatch(name)
+    match = re.compile(r"(?P<name>[^\s@/?#\[\]:]+|\[[0-9a-fA-F:.]+\])(:[0-9]{1,5})?").fullmatch(
+        name
+    )
     if match is None:
         return False
     host = match["name"].strip("[]").lower()
@@ -78,18 +75,20 @@ def require_local_host(header: Callable[[str], str | None], *, served: str, is_p
     if not is_local_host(host, served):
         raise RequestError(
             HTTPStatus.FORBIDDEN,
-            f"this server is not {shown(host) or 'a nameless host'}; open it by the address"
+            f"this server is not {shorten_text(host) or 'a nameless host'}; open it by the address"
             " that was printed",
         )
     if origin is not None and origin != f"http://{host}":
-        raise RequestError(HTTPStatus.FORBIDDEN, f"requests from {shown(origin)} are refused")
+        raise RequestError(
+            HTTPStatus.FORBIDDEN, f"requests from {shorten_text(origin)} are refused"
+        )
     if header("Sec-Fetch-Site") == "cross-site" and not is_page:
         raise RequestError(HTTPStatus.FORBIDDEN, "requests from other sites are refused")
 
 
 def page_url(host: str, port: int) -> str:
     """Address of the page for browsers, with the machine's name if it is served everywhere."""
-    name = socket.gethostname() if host in EVERYWHERE else host
+    name = socket.gethostname() if host in ("0.0.0.0", "::", "") else host
     name = f"[{name}]" if ":" in name else name
     return f"http://{name}:{port}/"
 
@@ -108,3 +107,53 @@ def address_in_use_error(host: str, ports: range, *, any_of_them: bool) -> str:
         f"port {ports[0]} of {host} is in use; choose another one, or leave it out to take"
         " the first free one"
     )
+
+
+TOKEN_BYTES = 24  # Random bytes of a token or session secret.
+
+
+class BrowserToken:
+    """Admits browsers; every method may be called from any thread.
+
+    Args:
+        cookie: name of the cookie.
+        secret: its value; a new one if None.
+    """
+
+    def __init__(self, cookie: str, secret: str | None = None) -> None:
+        self._cookie = cookie
+        self._secret = secret or secrets.token_urlsafe(TOKEN_BYTES)
+        self._lock = threading.Lock()
+        self._token = secrets.token_urlsafe(TOKEN_BYTES)
+
+    @property
+    def token(self) -> str:
+        """What the next browser has to bring."""
+        with self._lock:
+            return self._token
+
+    def use(self, given: str) -> bool:
+        """Whether a browser brings the token, which is used up then."""
+        with self._lock:
+            if not _constant_time_equal(given, self._token):
+                return False
+            self._token = secrets.token_urlsafe(TOKEN_BYTES)
+            return True
+
+    @property
+    def set_cookie(self) -> str:
+        """Header by which an admitted browser gets the cookie."""
+        return f"{self._cookie}={self._secret}; Path=/; HttpOnly; SameSite=Strict"
+
+    def admits(self, cookies: str) -> bool:
+        """Whether a browser with such a `Cookie` header was admitted."""
+        given = (cookie.strip().partition("=") for cookie in cookies.split(";"))
+        return any(
+            name == self._cookie and _constant_time_equal(value, self._secret)
+            for name, _, value in given
+        )
+
+
+def _constant_time_equal(given: str, expected: str) -> bool:
+    """Compares in a time that tells nothing; what servers could not decode is no part of tokens."""
+    return hmac.compare_digest(given.encode(errors="replace"), expected.encode())

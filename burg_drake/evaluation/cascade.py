@@ -1,8 +1,8 @@
-"""The main job: judges grasps of scenes on a station, stage by stage, and records it all.
+"""Judges grasps of scenes on a station, stage by stage, and writes a run.
 
-Every grasp goes candidate → clear → reachable → planned → executed, as far as the run's mode asks,
-and ends with exactly one outcome. What is judged is on disk at once; the same call on the same
-folder goes on where an earlier one stopped.
+Every grasp goes candidate → clear → reachable → planned → executed, as far as the mode of the run
+asks, and ends with exactly one outcome. Each verdict is written at once; the same call on the same
+folder continues where an earlier one stopped.
 """
 
 from __future__ import annotations
@@ -15,21 +15,29 @@ from dataclasses import replace
 from pathlib import Path
 from typing import overload
 
-from burg_drake.core import InvalidInputError
-from burg_drake.core.files import remove_unfinished, writable_folder
-from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
-from burg_drake.evaluation.candidates import given_candidates
-from burg_drake.evaluation.grasp_sets import given_hints
-from burg_drake.evaluation.records import (
-    EvaluationSettings,
-    Journal,
-    begun_now,
-    require_writer,
+from burg_drake.core import (
+    STARTING_PHASE,
+    InvalidInputError,
+    Listener,
+    Progress,
+    ProgressMeter,
+    Reporter,
+    ensure_writable_folder,
+    remove_unfinished,
 )
-from burg_drake.evaluation.run import (
+from burg_drake.evaluation.campaign_folder import Campaign
+from burg_drake.evaluation.candidates import given_candidates
+from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
+from burg_drake.evaluation.grasp_sets.mistake_search import given_hints
+from burg_drake.evaluation.journal import JOURNAL_FILE, Journal
+from burg_drake.evaluation.judge import StationJudgeFactory
+from burg_drake.evaluation.many_scenes import evaluate_scenes
+from burg_drake.evaluation.part_store import keep_parts
+from burg_drake.evaluation.run_document import begin_session
+from burg_drake.evaluation.run_folder import RUN_FILE, Run, require_run_folder, save_run
+from burg_drake.evaluation.run_preparation import (
     GraspsLike,
     Request,
-    evaluate_scenes,
     extend_run,
     finish_run,
     next_round,
@@ -38,19 +46,10 @@ from burg_drake.evaluation.run import (
     require_judged,
     require_sound,
 )
-from burg_drake.evaluation.stages import StationJudgeFactory
-from burg_drake.evaluation.store import (
-    JOURNAL_FILE,
-    RUN_FILE,
-    Campaign,
-    Run,
-    keep_parts,
-    require_run_folder,
-    save_run,
-)
-from burg_drake.evaluation.workers import Executor, Job, LocalExecutor
-from burg_drake.scene.document import Scene, SceneLike, as_scene
-from burg_drake.station.document import StationLike, as_station
+from burg_drake.evaluation.settings import EvaluationSettings
+from burg_drake.evaluation.table_file import require_writer
+from burg_drake.scene import Scene, SceneLike, as_scene
+from burg_drake.station import StationLike, as_station
 
 
 @overload
@@ -182,7 +181,7 @@ def _evaluate_one(
         require_sound(scene, station, mode, request.engine)
     if given is not None:
         given_candidates(scene, given)  # refuses what does not fit before the folder is made
-    writable_folder(folder)
+    ensure_writable_folder(folder)
     with Reporter(progress) as reporter, Journal(folder / JOURNAL_FILE) as journal:
         run = open_run(folder, scene, request, given, lambda: reporter.show(Progress("sampling")))
         make_judge = StationJudgeFactory(scene, station, request.engine, mode, request.phases)
@@ -191,7 +190,9 @@ def _evaluate_one(
         while True:
             left = open_grasps(run, retry_failed=retry_failed)
             if left:
-                run = _judge(run, Job(scene.name, make_judge, left), journal, executor, reporter)
+                run = _judge_open_grasps(
+                    run, Job(scene.name, make_judge, left), journal, executor, reporter
+                )
                 require_judged(run)
                 hints = given_hints(run)
                 run = save_run(replace(run, document=replace(run.document, hints=hints)))
@@ -205,17 +206,19 @@ def _evaluate_one(
         return run
 
 
-def _judge(run: Run, job: Job, journal: Journal, executor: Executor, reporter: Reporter) -> Run:
+def _judge_open_grasps(
+    run: Run, job: Job, journal: Journal, executor: Executor, reporter: Reporter
+) -> Run:
     """Judges what is left and keeps each verdict at once; returns the run as it is then."""
     total = len(run.mine)
     done = total - len(job.candidates)
     again = {grasp.id for grasp in job.candidates}
     outcomes = Counter(v.outcome for id, v in run.verdicts.items() if id not in again)
     pace = ProgressMeter(
-        reporter.show, Progress(STARTING, done, total, outcomes=outcomes), "judging"
+        reporter.show, Progress(STARTING_PHASE, done, total, outcomes=outcomes), "judging"
     )
     sessions = run.document.stretches
-    session = begun_now(executor.workers, len(run.verdicts))
+    session = begin_session(executor.workers, len(run.verdicts))
     save_run(replace(run, document=replace(run.document, stretches=(*sessions, session))))
     begun = time.monotonic()
     judged = 0

@@ -1,38 +1,51 @@
-"""Which grasps of a set the arm can execute in a scene, and what hinders it at the others."""
+"""Which grasps of a set the arm can execute in a scene, what hinders it, and the folder of its plans."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from contextlib import closing
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from burg_drake.core import InvalidInputError, one_line, quaternion_from_rotation
-from burg_drake.core.grasps import (
-    ARM_SCREEN_MARGINS,
-    LIFT_HEIGHT,
+from burg_drake.core import (
+    STARTING_PHASE,
     GraspSet,
+    InvalidInputError,
+    Listener,
+    MarginNames,
     Outcome,
+    Progress,
+    ProgressMeter,
+    Reporter,
     Stage,
     TableShape,
     Verdict,
+    content_hash,
+    ensure_writable_folder,
+    load_document,
+    one_line,
+    quaternion_from_rotation,
+    remove_unfinished,
+    require_name,
+    save_document,
+    software_versions,
 )
-from burg_drake.core.paths import require_name
-from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
 from burg_drake.evaluation.candidates import (
-    INSTANCE,
+    INSTANCE_COLUMN,
     Candidate,
     Candidates,
     given_candidates,
 )
-from burg_drake.evaluation.grasp_sets import by_names, set_documents
-from burg_drake.evaluation.records import Columns, Journal, columns_of_verdicts, input_of, numbers
-from burg_drake.evaluation.stages import (
+from burg_drake.evaluation.executor import judge_all
+from burg_drake.evaluation.grasp_sets.given_grasps import group_by_names
+from burg_drake.evaluation.grasp_sets.input import set_documents
+from burg_drake.evaluation.journal import JOURNAL_FILE, Journal, read_journal
+from burg_drake.evaluation.judge import (
     Decide,
     Decision,
     arm_reach,
@@ -41,21 +54,206 @@ from burg_drake.evaluation.stages import (
     hand_alone,
     hand_screen,
 )
-from burg_drake.evaluation.store import PlanFolder, PlanOutput, plans_document
-from burg_drake.evaluation.workers import judge_all
-from burg_drake.motion.lines import ReachSettings
-from burg_drake.motion.plans import Plan
-from burg_drake.motion.reach import Witness
-from burg_drake.scene.document import Scene, SceneLike, as_scene
-from burg_drake.station.document import GraspMotion, Station, StationLike, as_station
+from burg_drake.evaluation.results_table import Columns, columns_of_verdicts
+from burg_drake.evaluation.run_document import (
+    HASH_DIGITS,
+    Input,
+    identity_differences,
+    input_difference,
+    input_of,
+    setting_differences,
+    settings_numbers,
+)
+from burg_drake.evaluation.trial_origin import motion_text, read_motion, without_motion
+from burg_drake.motion import Plan, ReachSettings, Witness
+from burg_drake.scene import Scene, SceneLike, as_scene
+from burg_drake.station import GraspMotion, Station, StationLike, as_station
 
-YES = Outcome.REACHABLE
-ANSWERS = tuple(outcome for outcome in Outcome if outcome is not Outcome.SIMULATION_FAILED)
-"""What becomes of a grasp, unless the computation itself fails."""
-MARGIN_COLUMNS = (
+PlanFormat = Literal["json", "csv"]
+PLANS_FILE = "plans.yaml"
+
+
+@dataclass(frozen=True)
+class PlanOutput:
+    """Where the plans of `reach` go, and how.
+
+    Attributes:
+        folder: gets the timed motion of each grasp that the arm can execute, as
+            `INSTANCE-GRASP.json`, see `plans.json_file`: a new or empty one, or that of an
+            interrupted call, which the same call goes on with. What is finished is kept, and
+            grasps are tried again whose worker process was ended from outside or whose plan is
+            missing.
+        format: `csv` for tables, with what their columns are beside them; see `plans.csv_file`.
+            `load_plan` reads both.
+        retry_failed: try all grasps again that an earlier call with this folder could not judge.
+    """
+
+    folder: str | Path
+    format: PlanFormat = "json"
+    retry_failed: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlansDocument:
+    """A folder of arm motions, one for each grasp (`plans.yaml`).
+
+    Attributes:
+        scene: the scene.
+        station: the station.
+        grasps: number of grasps.
+        content: hash of the grasps.
+        arm: settings of the search for arm motions, in SI units.
+        exact: whether Drake's collision checker confirmed each motion.
+        format: format of the motions.
+        versions: versions of the software and the machine.
+    """
+
+    version: int = 1
+    scene: Input
+    station: Input
+    grasps: int
+    content: str
+    arm: dict[str, float]
+    exact: bool
+    format: PlanFormat
+    versions: dict[str, str]
+
+
+@dataclass(frozen=True)
+class PlanFolder:
+    """A folder for plans.
+
+    Attributes:
+        path: its path.
+        document: what is asked.
+    """
+
+    path: Path
+    document: PlansDocument
+
+    def plan(self, id: str) -> Path:
+        """The file for the plan of a grasp."""
+        return self.path / f"{id}.{self.document.format}"
+
+    @contextmanager
+    def opened(self) -> Iterator[Journal]:
+        """Makes the folder, or goes on with it; one call at a time can.
+
+        Raises:
+            InvalidInputError: it cannot be written, holds something else, or plans of something
+                else; or another process is at it.
+        """
+        header = "Record of the plans in this folder; written by the program."
+        self._require_plans()
+        ensure_writable_folder(self.path)
+        with Journal(self.path / JOURNAL_FILE) as journal:
+            document = self.path / PLANS_FILE
+            if document.exists():
+                self._require_same(load_document(document, PlansDocument))
+            else:
+                save_document(self.document, document, header)
+            remove_unfinished(self.path)
+            yield journal
+
+    def verdicts(self) -> dict[str, Verdict]:
+        """What the journal holds, by grasp id."""
+        return read_journal(self.path / JOURNAL_FILE)
+
+    def finished(self, *, retry_failed: bool = False) -> dict[str, Verdict]:
+        """Verdicts that stand: the plan of what is reachable is there.
+
+        Args:
+            retry_failed: see `Verdict.is_open`.
+        """
+        return {
+            id: verdict
+            for id, verdict in self.verdicts().items()
+            if not verdict.is_open(retry_failed=retry_failed)
+            and (verdict.outcome is not Outcome.REACHABLE or self.plan(id).is_file())
+        }
+
+    def _require_plans(self) -> None:
+        """Refuses a folder with anything but plans: they are not to be mixed up with others."""
+        if not self.path.is_dir() or (self.path / PLANS_FILE).exists():
+            return
+        held = sorted(item.name for item in self.path.iterdir() if not item.name.startswith("."))
+        journal = self.path / JOURNAL_FILE
+        begun = held == [JOURNAL_FILE] and journal.is_file() and journal.stat().st_size == 0
+        if held and not begun:
+            raise InvalidInputError(
+                f"folder {self.path} has {held[0]} in it, but no {PLANS_FILE}; plans"
+                " need a folder of their own: choose another one, or empty it"
+            )
+
+    def _require_same(self, there: PlansDocument) -> None:
+        here = self.document
+        counts = f"grasps are {there.grasps} there, {here.grasps} here"
+        words = {
+            "scene": [input_difference("scene", there.scene, here.scene, behind="objects")],
+            "station": [input_difference("station", there.station, here.station)],
+            "grasps": [
+                counts
+                if there.grasps != here.grasps
+                else ("the number of grasps is the same, but not the grasps")
+            ],
+            "settings of the arm": setting_differences(
+                _other_arm_settings(there), _other_arm_settings(here)
+            ),
+        }
+        found = identity_differences(_plans_identity(there), _plans_identity(here), words)
+        if found:
+            raise InvalidInputError(
+                f"folder {self.path} has plans of another evaluation ({'; '.join(found)}"
+                "); choose another one, or delete it"
+            )
+
+
+def plans_document(
+    scene: Input,
+    station: Input,
+    candidates: Candidates,
+    arm: dict[str, float],
+    *,
+    exact: bool,
+    format: PlanFormat,
+) -> PlansDocument:
+    """What a call asks for, with the versions that are installed."""
+    return PlansDocument(
+        scene=scene,
+        station=station,
+        grasps=len(candidates),
+        content=candidates.content,
+        arm=arm,
+        exact=exact,
+        format=format,
+        versions=software_versions(),
+    )
+
+
+def _plans_identity(document: PlansDocument) -> dict[str, str]:
+    """What two calls must have in common to work on the same plans, in words, by topic."""
+    return {
+        "scene": f"content {document.scene.content[:HASH_DIGITS]}",
+        "station": f"content {document.station.content[:HASH_DIGITS]}",
+        "grasps": f"{document.grasps}, content {document.content[:HASH_DIGITS]}",
+        "check": "exact" if document.exact else "screening",
+        "settings of the arm": content_hash(_other_arm_settings(document))[:HASH_DIGITS],
+        "motion": motion_text(read_motion(document.arm)),
+        "format": document.format,
+        "burg_drake": document.versions.get("burg_drake", ""),
+        "drake": document.versions.get("drake", ""),
+    }
+
+
+def _other_arm_settings(document: PlansDocument) -> dict[str, float]:
+    """Settings of the arm that are no topics of their own."""
+    return without_motion({k: v for k, v in document.arm.items() if k != "exact"})
+
+
+REACH_MARGIN_COLUMNS = (
     "clearance",
-    *(name for name in ARM_SCREEN_MARGINS if name != LIFT_HEIGHT),
-    LIFT_HEIGHT,
+    *(name for name in MarginNames.arm_screen if name != MarginNames.lift_height),
+    MarginNames.lift_height,
 )
 """Margins of a verdict that become columns; NaN where they are not defined."""
 
@@ -113,13 +311,13 @@ def reach(
         UnknownNameError: a reference, instance or object that does not exist.
         SimulationError: the worker processes die.
     """
-    from burg_drake.motion.workspace import require_usable_arm
+    from burg_drake.motion import require_usable_arm
 
     scene, station = as_scene(scene), as_station(station)
     if station.document.arm is None:
         raise InvalidInputError(f"station {station.name!r} has no arm; give a station with an arm")
     motion = motion or station.document.motion
-    given = by_names(scene, grasps) if isinstance(grasps, GraspSet) else grasps
+    given = group_by_names(scene, grasps) if isinstance(grasps, GraspSet) else grasps
     candidates = given_candidates(scene, given)
     require_usable_arm(scene, station)
     settings = arm_settings(motion, exact=exact)
@@ -127,13 +325,13 @@ def reach(
     with Reporter(progress) as reporter:
         if output is None:
             factory = ReachJudgeFactory(scene, station, motion, exact)
-            verdicts = _judged(candidates, factory, workers, reporter)
+            verdicts = _judge_grasps(candidates, factory, workers, reporter)
         else:
             document = plans_document(
                 input_of(scene, "scenes"),
                 input_of(station, "stations"),
                 candidates,
-                numbers(settings),
+                settings_numbers(settings),
                 exact=exact,
                 format=output.format,
             )
@@ -141,13 +339,13 @@ def reach(
             factory = ReachJudgeFactory(scene, station, motion, exact, folder)
             with folder.opened() as journal:
                 known = folder.finished(retry_failed=output.retry_failed)
-                _judged(candidates, factory, workers, reporter, known, journal)
+                _judge_grasps(candidates, factory, workers, reporter, known, journal)
                 verdicts = folder.verdicts()  # with the digits that a later call will find
     rows = [verdicts[id] for id in candidates.id]
-    return _with_columns(candidates, rows, scene, station, settings)
+    return _add_columns(candidates, rows, scene, station, settings)
 
 
-def _judged(
+def _judge_grasps(
     candidates: Candidates,
     factory: ReachJudgeFactory,
     workers: int | None,
@@ -160,7 +358,9 @@ def _judged(
     left = [candidate for candidate in candidates if candidate.id not in verdicts]
     outcomes = Counter(v.outcome for v in verdicts.values())
     done, total = len(candidates) - len(left), len(candidates)
-    event = Progress(STARTING, done, total, outcomes=outcomes, counted_outcome=YES)
+    event = Progress(
+        STARTING_PHASE, done, total, outcomes=outcomes, counted_outcome=Outcome.REACHABLE
+    )
     pace = ProgressMeter(reporter.show, event, "judging")
     with closing(judge_all(left, factory, workers=workers)) as judged:
         for candidate, verdict in judged:
@@ -192,7 +392,7 @@ class ReachJudge:
 
     def _plan(self, grasp: Candidate, motion: Witness | Plan | None) -> Decision:
         if self._planner is None or self._plans is None:
-            return Decision(YES)
+            return Decision(Outcome.REACHABLE)
         assert isinstance(motion, Witness)
         try:
             plan = self._planner.time(grasp.instance, motion, grasp.width)
@@ -200,8 +400,8 @@ class ReachJudge:
             path = self._plans.plan(grasp.id)
             (plan.to_csv if path.suffix == ".csv" else plan.to_json)(path)
         except Exception as error:  # the grasp is reachable, whatever becomes of its plan
-            return Decision(YES, reason=f"no plan: {one_line(error)}")
-        return Decision(YES, margins={"duration": plan.duration})
+            return Decision(Outcome.REACHABLE, reason=f"no plan: {one_line(error)}")
+        return Decision(Outcome.REACHABLE, margins={"duration": plan.duration})
 
 
 @dataclass(frozen=True)
@@ -224,22 +424,24 @@ class ReachJudgeFactory:
         return ReachJudge(self)
 
 
-def _with_columns(
+def _add_columns(
     candidates: Candidates,
     rows: Sequence[Verdict],
     scene: Scene,
     station: Station,
     settings: ReachSettings,
 ) -> GraspSet:
+    # What becomes of a grasp, unless the computation itself fails.
+    answers = tuple(outcome for outcome in Outcome if outcome is not Outcome.SIMULATION_FAILED)
     arm = station.document.arm
     assert arm is not None
     columns: dict[str, Any] = {
-        INSTANCE: candidates.instance,
-        "outcome": _texts([v.outcome.value if v.outcome in ANSWERS else "" for v in rows]),
-        "blocker": _texts([v.blocker for v in rows]),
-        "reason": _texts([v.reason for v in rows]),
+        INSTANCE_COLUMN: candidates.instance,
+        "outcome": _text_array([v.outcome.value if v.outcome in answers else "" for v in rows]),
+        "blocker": _text_array([v.blocker for v in rows]),
+        "reason": _text_array([v.reason for v in rows]),
     }
-    for name in MARGIN_COLUMNS:
+    for name in REACH_MARGIN_COLUMNS:
         columns[name] = np.array([v.margins.get(name, np.nan) for v in rows], dtype=float)
     if any("duration" in v.margins for v in rows):
         columns["duration"] = np.array([v.margins.get("duration", np.nan) for v in rows])
@@ -249,7 +451,7 @@ def _with_columns(
     provenance = {
         **candidates.grasps.provenance,
         **set_documents(scene.library, scene, station, objects),
-        "reach": {**numbers(settings), "exact": settings.exact},
+        "reach": {**settings_numbers(settings), "exact": settings.exact},
     }
     return replace(candidates.grasps, provenance=provenance).with_columns(**columns)
 
@@ -258,16 +460,16 @@ def reach_columns(grasps: GraspSet) -> Columns:
     """What `reach` returns as a table: ids as in runs, poses as quaternions, all its columns."""
     wxyz = quaternion_from_rotation(grasps.X_OG[:, :3, :3]) if len(grasps) else np.empty((0, 4))
     return {
-        "id": _texts(Candidates(grasps, grasps.column(INSTANCE)).id),
-        INSTANCE: grasps.column(INSTANCE),
+        "id": _text_array(Candidates(grasps, grasps.column(INSTANCE_COLUMN)).id),
+        INSTANCE_COLUMN: grasps.column(INSTANCE_COLUMN),
         "object": grasps.object,
         "width": grasps.width,
         "score": grasps.score,
         **{name: grasps.X_OG[:, k, 3] for k, name in enumerate("xyz")},
         **{name: wxyz[:, k] for k, name in enumerate(("qw", "qx", "qy", "qz"))},
-        **{name: values for name, values in grasps.columns.items() if name != INSTANCE},
+        **{name: values for name, values in grasps.columns.items() if name != INSTANCE_COLUMN},
     }
 
 
-def _texts(values: Sequence[str]) -> np.ndarray:
+def _text_array(values: Sequence[str]) -> np.ndarray:
     return np.array(values, dtype=np.str_)

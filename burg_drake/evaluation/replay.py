@@ -3,37 +3,140 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
 
-from burg_drake.core import JUDGING, software_versions
-from burg_drake.core.grasps import (
-    ARM_SCREEN_MARGINS,
-    LIFT_HEIGHT,
-    MARGINS,
-    PREFIXES,
-    TRIAL_MARGINS,
-    VERDICT_FIELDS,
+from burg_drake.core import (
+    INSTANCE_PREFIXES,
+    JUDGING_PACKAGES,
+    BurgError,
+    InvalidInputError,
+    MarginNames,
     Margins,
     Mode,
+    RecordedFields,
     Stage,
+    UnknownNameError,
     Verdict,
-    shown_figures,
+    format_column_values,
+    resolve_reference,
+    software_versions,
 )
-from burg_drake.evaluation.records import (
-    RecordedTrial,
-    TrialOrigin,
-    motion_text,
-)
-from burg_drake.evaluation.stages import build_judge, judge_grasp, mode_for
-from burg_drake.motion.plans import Plan
-from burg_drake.scene.document import Scene
-from burg_drake.simulation.trials import TrialResult
-from burg_drake.station.document import GraspMotion, Station
+from burg_drake.evaluation.judge import build_judge, judge_grasp, mode_for
+from burg_drake.evaluation.results_table import RecordedTrial
+from burg_drake.evaluation.run_document import HASH_DIGITS
+from burg_drake.evaluation.run_folder import RUN_FILE, load_run
+from burg_drake.evaluation.trial_origin import TrialOrigin, motion_text
+from burg_drake.motion import Plan
+from burg_drake.scene import Scene, load_scene
+from burg_drake.simulation import TrialResult
+from burg_drake.station import GraspMotion, Station, load_station
 
-MAX_ROUNDING_ERROR = 1e-14
-"""Relative difference that a table gets which a program wrote again with 15 digits, as
-spreadsheets do, or has read without care for the last bit."""
+Document = TypeVar("Document", Scene, Station)
+FilePlace = tuple[str, Callable[[], Document]]
+
+
+@dataclass(frozen=True)
+class TrialInputs:
+    """What a trial was executed on.
+
+    Attributes:
+        scene, station: as found.
+        notes: how they differ from what was asked for, for people; empty if they do not.
+    """
+
+    scene: Scene
+    station: Station
+    notes: tuple[str, ...] = ()
+
+
+def find_inputs(
+    origin: TrialOrigin,
+    where: str,
+    folder: Path,
+    *,
+    scene: str | None = None,
+    station: str | None = None,
+    force: bool = False,
+) -> TrialInputs:
+    """Loads the documents with the contents that the row asks for.
+
+    Args:
+        origin: what the row tells.
+        where: names the row in messages.
+        folder: of the table; if it is the folder of the row's run, its copies come first.
+        scene, station: where to look instead.
+        force: takes documents of another content, too.
+
+    Raises:
+        InvalidInputError: a document is not where it was, or has another content; the message
+            says which one is needed.
+    """
+    scenes: list[FilePlace[Scene]]
+    stations: list[FilePlace[Station]]
+    text, word = scene or origin.scene, station or origin.station
+    scenes = [(text, lambda: load_scene(_existing_file(text, "scenes")))]
+    stations = [(word, lambda: load_station(_existing_file(word, "stations")))]
+    if origin.run and (folder / RUN_FILE).exists():
+        run = load_run(folder)
+        if run.document.hash == origin.run:
+            scenes[:0] = [] if scene else [("the run's copy", run.scene)]
+            stations[:0] = [] if station else [("the run's copy", run.station)]
+    search = _InputSearch(origin, force)
+    first = search.find("scene", origin.scene_content, scenes)
+    second = search.find("station", origin.station_content, stations)
+    missing = [found for found in (first, second) if isinstance(found, str)]
+    if isinstance(first, str) or isinstance(second, str):
+        found = {"scene": first, "station": second}
+        kinds = [kind for kind, missed in found.items() if isinstance(missed, str)]
+        raise InvalidInputError(f"{where} needs {'; and '.join(missing)}").about(
+            *kinds, *(["force"] if any("by force" in text for text in missing) else [])
+        )
+    return TrialInputs(first[0], second[0], tuple(note for _, note in (first, second) if note))
+
+
+def _existing_file(reference: str, kind: str) -> Path:
+    """The file of a document; what else there is would not help here."""
+    try:
+        return resolve_reference(reference, kind)
+    except UnknownNameError as error:
+        raise UnknownNameError(f"{reference} does not exist") from error
+
+
+@dataclass(frozen=True)
+class _InputSearch:
+    origin: TrialOrigin
+    force: bool
+
+    def find(
+        self, kind: str, content: str, places: Sequence[FilePlace[Document]]
+    ) -> tuple[Document, str] | str:
+        """The first document that fits, and a note if it is taken though it does not fit; what is
+        needed if there is none."""
+        problems: list[str] = []
+        other: Document | None = None
+        for place, load in places:
+            try:
+                document = load()
+            except BurgError as error:
+                problems.append(str(error))
+                continue
+            if document.content.startswith(content):
+                return document, ""
+            problems.append(f"{place} has content {document.content[:HASH_DIGITS]}")
+            other = other or document
+        found = "; ".join(problems)
+        if other is not None and self.force:
+            return other, f"the {kind} is not the one of the trial (content {content}): {found}"
+        meant = "objects and their library count" if kind == "scene" else "robot models count"
+        copy = f"a copy is {kind}.yaml in the folder of run {self.origin.run}"
+        go_on = f", or replay on {other.path} by force" if other is not None else ""
+        return (
+            f"the {kind} with content {content} ({meant}), but {found}; give its file ("
+            f"{copy}){go_on}"
+        )
 
 
 @dataclass(frozen=True)
@@ -52,9 +155,10 @@ class Difference:
     @property
     def rounding(self) -> bool:
         """Whether a table that was written again by another program explains it."""
+        max_rounding_error = 1e-14  # Relative; a spreadsheet writes 15 digits.
         if isinstance(self.recorded, str) or isinstance(self.now, str):
             return False
-        return math.isclose(self.recorded, self.now, rel_tol=MAX_ROUNDING_ERROR)
+        return math.isclose(self.recorded, self.now, rel_tol=max_rounding_error)
 
     def __str__(self) -> str:
         return f"{self.name}: recorded {self.recorded!r}, now {self.now!r}"
@@ -93,22 +197,24 @@ def decisive_mode(trial: RecordedTrial, origin: TrialOrigin) -> Mode:
 
 def differences(recorded: Verdict, now: Verdict) -> list[Difference]:
     """Results that are not the same bits; times and arm configurations are not compared."""
-    there, here = _results(recorded), _results(now)
+    there, here = _compared_results(recorded), _compared_results(now)
     if "clearance" not in there:  # of a release that did not measure it
         here.pop("clearance", None)
-    if math.isnan(recorded.margins.get(LIFT_HEIGHT, math.nan)):  # likewise, or of a trial alone
-        here.pop(LIFT_HEIGHT, None)
+    if math.isnan(
+        recorded.margins.get(MarginNames.lift_height, math.nan)
+    ):  # likewise, or of a trial alone
+        here.pop(MarginNames.lift_height, None)
     if math.isnan(recorded.margins.get("others_turned", math.nan)):  # it watched centres of mass
-        there, here = (_but_motions_of_others(found) for found in (there, here))
+        there, here = (_drop_object_motions(found) for found in (there, here))
     # The arm may have passed a grasp on, and is not asked again.
-    for name in ARM_SCREEN_MARGINS:
+    for name in MarginNames.arm_screen:
         if name not in here:
             there.pop(name, None)
     found = []
     for name in {**there, **here}:
         empty = "" if isinstance(there.get(name, here.get(name)), str) else math.nan
         a, b = there.get(name, empty), here.get(name, empty)
-        if _bits(a) != _bits(b):
+        if _float_bits(a) != _float_bits(b):
             found.append(Difference(name, a, b))
     return found
 
@@ -121,7 +227,7 @@ def comparison(found: Sequence[Difference], origin: TrialOrigin) -> list[str]:
         names = ", ".join(difference.name for difference in found)
         return [f"as recorded, except for the last digits of {names}, which the table rounds"]
     there = origin.versions
-    here = software_versions({**JUDGING, **origin.engine.packages})
+    here = software_versions({**JUDGING_PACKAGES, **origin.engine.packages})
     changed = [
         f"{name} {there[name]}, now {here[name]}"
         for name in there
@@ -131,11 +237,11 @@ def comparison(found: Sequence[Difference], origin: TrialOrigin) -> list[str]:
     return [f"differs from what was recorded{versions}", *map(str, found)]
 
 
-def _results(verdict: Verdict) -> dict[str, float | str]:
+def _compared_results(verdict: Verdict) -> dict[str, float | str]:
     """What is compared, by the name that people read: texts first."""
     found = {
         name: value
-        for one in VERDICT_FIELDS
+        for one in RecordedFields.verdict
         for name, value in one.compared(getattr(verdict, one.name)).items()
     }
     if found.get("end_time") == 0.0:  # a trial that never began has an end at 0, or none
@@ -143,21 +249,23 @@ def _results(verdict: Verdict) -> dict[str, float | str]:
     return dict(sorted(found.items(), key=lambda one: not isinstance(one[1], str)))
 
 
-def _but_motions_of_others(found: Mapping[str, float | str]) -> dict[str, float | str]:
+def _drop_object_motions(found: Mapping[str, float | str]) -> dict[str, float | str]:
     """Results without what tells how far objects were moved and turned."""
     names = {"others_moved", "others_turned", "toppled", "pushed"}
-    of_each = tuple(prefix.replace("_", " ") for prefix in PREFIXES.values())
+    of_each = tuple(prefix.replace("_", " ") for prefix in INSTANCE_PREFIXES.values())
     return {k: v for k, v in found.items() if k not in names and not k.startswith(of_each)}
 
 
-def _bits(value: float | str) -> str:
+def _float_bits(value: float | str) -> str:
     return value if isinstance(value, str) else float(value).hex()
 
 
 def arm_figures(verdict: Verdict) -> list[str]:
     """What the screen of the arm has measured, as lines for people; none if it was not asked."""
-    of_arm = [n for n in MARGINS if n not in TRIAL_MARGINS and n != LIFT_HEIGHT]
-    figures = shown_figures(verdict.margins, of_arm)
+    of_arm = [
+        n for n in MarginNames.all if n not in MarginNames.trial and n != MarginNames.lift_height
+    ]
+    figures = format_column_values(verdict.margins, of_arm)
     return [figures] if figures else []
 
 
@@ -173,8 +281,6 @@ def motion_figures(trial: RecordedTrial, origin: TrialOrigin) -> list[str]:
 
 def as_result(verdict: Verdict) -> TrialResult:
     """A verdict as a trial returns it."""
-    margins = Margins(**{k: v for k, v in verdict.margins.items() if k in _OF_TRIALS})
+    trial_margins = Margins().of_trial().keys()
+    margins = Margins(**{k: v for k, v in verdict.margins.items() if k in trial_margins})
     return TrialResult(outcome=verdict.outcome, **verdict.of_trial() | {"margins": margins})
-
-
-_OF_TRIALS = Margins().of_trial().keys()

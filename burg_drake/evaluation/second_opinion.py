@@ -1,4 +1,4 @@
-"""Judges contested grasps of a run again, with another engine, whose verdicts then count."""
+"""Judges contested grasps of a run again with another engine, whose verdicts then count."""
 
 from __future__ import annotations
 
@@ -10,40 +10,40 @@ from pathlib import Path
 from typing import overload
 
 from burg_drake.core import (
+    STARTING_PHASE,
     InvalidInputError,
+    Listener,
+    Mode,
+    Outcome,
+    Progress,
+    ProgressMeter,
+    Reporter,
     UnknownNameError,
-    listing,
-    nearest,
+    Verdict,
+    list_names,
     software_versions,
+    suggest_names,
 )
-from burg_drake.core.grasps import Mode, Outcome, Verdict
-from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
-from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.records import Journal, Ledger, Lock, begun_now, origin_of
-from burg_drake.evaluation.report import renew_report
-from burg_drake.evaluation.results import summarize
-from burg_drake.evaluation.run import finish_run, is_finished
-from burg_drake.evaluation.stages import (
-    StationJudgeFactory,
-    require_engine_for,
-    require_scene_for,
-)
-from burg_drake.evaluation.store import (
-    JOURNAL_FILE,
-    LOCK_FILE,
-    REPORT_FILE,
+from burg_drake.evaluation.campaign_document import Ledger
+from burg_drake.evaluation.campaign_folder import (
+    CAMPAIGN_LOCK_FILE,
     Campaign,
-    PartWriter,
-    Run,
-    keep_parts,
     load_campaign,
-    load_run,
     open_results,
     save_campaign,
-    save_run,
 )
-from burg_drake.evaluation.workers import Executor, Job, LocalExecutor
-from burg_drake.station.document import ENGINES, Engine
+from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.executor import Executor, Job, LocalExecutor
+from burg_drake.evaluation.journal import JOURNAL_FILE, Journal, WriterLock
+from burg_drake.evaluation.judge import StationJudgeFactory, require_engine_for, require_scene_for
+from burg_drake.evaluation.part_store import PartWriter, keep_parts
+from burg_drake.evaluation.report.pages import renew_report
+from burg_drake.evaluation.run_document import begin_session, origin_of
+from burg_drake.evaluation.run_folder import REPORT_FILE, Run, load_run, save_run
+from burg_drake.evaluation.run_preparation import finish_run
+from burg_drake.evaluation.run_summary import summarize
+from burg_drake.evaluation.scene_tasks import is_finished
+from burg_drake.station import ENGINES, Engine
 
 
 @overload
@@ -135,7 +135,7 @@ def judge_again(
             keep_parts(settled_runs[-1])
 
         count = len(found.contested)
-        _judge([found], count, engine, executor, reporter, finish)
+        _judge_contested([found], count, engine, executor, reporter, finish)
         return settled_runs[0]
 
 
@@ -150,7 +150,7 @@ def _require_complete(found: Run | Campaign) -> None:
     else:
         ended = [n for n, s in found.states.items() if s.state in ("done", "empty", "failed")]
         left = [name for name in found.names if name not in ended]
-        complete, which = not left, f" ({listing(left)})"
+        complete, which = not left, f" ({list_names(left)})"
     if not complete:
         raise InvalidInputError(
             f"{found.path} is not complete{which}; finish it first with the command that"
@@ -173,7 +173,9 @@ def require_second_engine(engine: str, first: Engine, mode: Mode) -> None:
         MissingDependencyError: it is not installed.
     """
     if engine not in ENGINES:
-        raise UnknownNameError(f"engine {engine!r} does not exist; {nearest(engine, ENGINES)}")
+        raise UnknownNameError(
+            f"engine {engine!r} does not exist; {suggest_names(engine, ENGINES)}"
+        )
     second = ENGINES[engine]
     others = ", ".join(name for name, one in ENGINES.items() if _is_finer(one, first))
     if not _is_finer(second, first):
@@ -193,7 +195,7 @@ def _judge_scenes(
     campaign: Campaign, engine: str, executor: Executor, reporter: Reporter
 ) -> Campaign:
     """Judges again what is contested in each scene, and writes what is made of the verdicts."""
-    with Lock(campaign.path / LOCK_FILE):
+    with WriterLock(campaign.path / CAMPAIGN_LOCK_FILE):
         document, ledger = campaign.document, Ledger(campaign.path)
         done = {name for name, state in ledger.states.items() if state.state == "done"}
         contested = {g.name: g.contested for g in summarize(campaign).scenes if g.name in done}
@@ -211,8 +213,8 @@ def _judge_scenes(
             ledger.note(replace(ledger.states[name], size=size))
 
         runs = (load_run(campaign.folder(name)) for name in names)
-        session, begun = begun_now(executor.workers, sum(contested.values())), time.monotonic()
-        judged = _judge(runs, sum(contested.values()), engine, executor, reporter, finish)
+        session, begun = begin_session(executor.workers, sum(contested.values())), time.monotonic()
+        judged = _judge_contested(runs, sum(contested.values()), engine, executor, reporter, finish)
         if judged:
             seconds = round(time.monotonic() - begun, 3)
             sessions = (*document.stretches, replace(session, judged=judged, seconds=seconds))
@@ -232,7 +234,7 @@ def _is_finished(campaign: Campaign, ledger: Ledger, name: str, *, report: bool)
     return is_finished(campaign.folder(name), size, table, report=report)
 
 
-def _judge(
+def _judge_contested(
     runs: Iterable[Run],
     count: int,
     engine: str,
@@ -248,13 +250,13 @@ def _judge(
         engine, executor, reporter: see `judge_again`.
         finish: is given each run with all of its verdicts, once.
     """
-    opened: dict[str, _Settling] = {}
-    pace = ProgressMeter(reporter.show, Progress(STARTING, 0, count), "judging again")
+    opened: dict[str, _ContestedRun] = {}
+    pace = ProgressMeter(reporter.show, Progress(STARTING_PHASE, 0, count), "judging again")
     judged = 0
 
     def jobs() -> Iterator[Job]:
         for run in runs:
-            settling = _Settling(run, engine, executor.workers)
+            settling = _ContestedRun(run, engine, executor.workers)
             if settling.left:
                 opened[str(run.path)] = settling
                 yield settling.job
@@ -275,7 +277,7 @@ def _judge(
     return judged
 
 
-class _Settling:
+class _ContestedRun:
     """A run while its contested grasps are judged again.
 
     Attributes:
@@ -293,7 +295,7 @@ class _Settling:
         self._run, self._engine = run, engine
         self.left = [run.trial(id).candidate for id in run.contested]
         self.open = len(self.left)
-        self._session, self._begun = begun_now(workers, len(run.verdicts)), time.monotonic()
+        self._session, self._begun = begin_session(workers, len(run.verdicts)), time.monotonic()
         self._judged = 0
         if self.left:
             try:
@@ -318,7 +320,7 @@ class _Settling:
         if verdict.outcome is Outcome.SIMULATION_FAILED:
             return False
         before = self._run.verdicts[candidate.id]
-        self._journal.append(candidate.id, settled(before, verdict, self._engine))
+        self._journal.append(candidate.id, settle_verdict(before, verdict, self._engine))
         self._judged += 1
         return True
 
@@ -336,7 +338,7 @@ class _Settling:
         return save_run(Run(self._run.path, document))
 
 
-def settled(before: Verdict, verdict: Verdict, engine: str) -> Verdict:
+def settle_verdict(before: Verdict, verdict: Verdict, engine: str) -> Verdict:
     """A verdict in the place of another one.
 
     Args:

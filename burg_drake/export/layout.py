@@ -1,17 +1,17 @@
-"""What an export writes: the objects of a scene and the boxes of a station, placed in the world."""
+"""Objects and station boxes placed in the world, and their names in the target format."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from burg_drake.core import Array, InvalidInputError
-from burg_drake.core.paths import NO_PACKAGES, Packages
-from burg_drake.objects.library import ObjectEntry, ObjectLibrary
-from burg_drake.scene.document import Scene
-from burg_drake.station.document import Station
-from burg_drake.station.world import FixedBox, obstacle_boxes, table_box
+from burg_drake.core import NO_PACKAGES, Array, InvalidInputError, Packages
+from burg_drake.objects import ObjectEntry, ObjectLibrary
+from burg_drake.scene import Scene
+from burg_drake.station import FixedBox, Station, obstacle_boxes, table_box
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +68,9 @@ def lay_out(scene: Scene, station: Station | None = None) -> Layout:
         InvalidInputError: an instance is called as the table or an obstacle of the station.
     """
     if station is None:
-        return Layout(scene.name, scene.library, _placed(scene, np.eye(4)))
+        return Layout(scene.name, scene.library, _place_objects(scene, np.eye(4)))
     boxes = {"table": table_box(station), **obstacle_boxes(station)}
-    objects = _placed(scene, station.document.X_WS.matrix())
+    objects = _place_objects(scene, station.document.X_WS.matrix())
     for placed in objects:
         if placed.name in boxes:
             raise InvalidInputError(
@@ -80,7 +80,7 @@ def lay_out(scene: Scene, station: Station | None = None) -> Layout:
     return Layout(scene.name, scene.library, objects, boxes, station.packages)
 
 
-def _placed(scene: Scene, X_WS: Array) -> tuple[PlacedObject, ...]:
+def _place_objects(scene: Scene, X_WS: Array) -> tuple[PlacedObject, ...]:
     return tuple(
         PlacedObject(
             name,
@@ -91,3 +91,60 @@ def _placed(scene: Scene, X_WS: Array) -> tuple[PlacedObject, ...]:
         )
         for name in (*scene.instances, *scene.background)
     )
+
+
+_RESERVED_NAMES = re.compile(r"world|__.*__|(?:World|Default)ModelInstance")
+"""Names reserved by SDFormat and Drake; MuJoCo reserves `world`, too."""
+
+
+def legal_model_name(name: str) -> str:
+    """A name that SDFormat, Drake and MuJoCo have no use for themselves."""
+    return f"{name}_1" if _RESERVED_NAMES.fullmatch(name) else name
+
+
+@dataclass(frozen=True)
+class LegalNames:
+    """Names in a format by the names of instances and boxes.
+
+    Attributes:
+        by_name: the same where the format allows that.
+    """
+
+    by_name: dict[str, str]
+
+    def __getitem__(self, name: str) -> str:
+        return self.by_name[name]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Which names are others, one sentence each."""
+        return tuple(
+            f"{name!r} is called {legal!r} in the export, as the format does not allow the name"
+            for name, legal in self.by_name.items()
+            if legal != name
+        )
+
+    @classmethod
+    def of_sdf(cls, layout: Layout) -> LegalNames:
+        """Names of models in SDFormat and in Drake; those of bodies in MJCF are the same."""
+        return cls._unique(layout, legal_model_name)
+
+    @classmethod
+    def of_usd(cls, layout: Layout) -> LegalNames:
+        """Names of prims in USD: letters, digits and `_`, no digit in front."""
+        return cls._unique(layout, lambda name: re.sub(r"^(?=\d)|[^A-Za-z0-9_]", "_", name))
+
+    @classmethod
+    def _unique(cls, layout: Layout, legal: Callable[[str], str]) -> LegalNames:
+        """Legal names stay; the others get one that none has."""
+        names = [*(placed.name for placed in layout.objects), *layout.boxes]
+        by_name = {name: name for name in names if legal(name) == name}
+        for name in names:
+            if name in by_name:
+                continue
+            base, candidate, number = legal(name), legal(name), 1
+            while candidate in by_name.values():
+                number += 1
+                candidate = f"{base}_{number}"
+            by_name[name] = candidate
+        return cls({name: by_name[name] for name in names})

@@ -1,32 +1,40 @@
-"""Exports of scenes: which formats there are, and the folder that holds one."""
+"""Exports scenes to other simulators: the formats, and the folder that holds an export."""
 
 from __future__ import annotations
 
 import importlib
 import importlib.util
-from collections.abc import Callable
-from dataclasses import dataclass
+import os
+import secrets
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import burg_drake
-from burg_drake.core import InvalidInputError, MissingDependencyError, UnknownNameError, nearest
-from burg_drake.export.folder import (
-    ExportRecord,
-    replaced_folder,
-    require_own_folder,
-    write_record,
+from burg_drake.core import (
+    DocumentError,
+    InvalidInputError,
+    MissingDependencyError,
+    UnknownNameError,
+    ensure_writable_folder,
+    list_names,
+    load_document,
+    save_document,
+    suggest_names,
 )
-from burg_drake.scene.document import SceneLike, as_scene
-from burg_drake.station.document import StationLike, as_station
+from burg_drake.scene import SceneLike, as_scene
+from burg_drake.station import StationLike, as_station
 
 if TYPE_CHECKING:
     from burg_drake.export.layout import Layout
 
 
 @dataclass(frozen=True)
-class Format:
+class SceneFormat:
     """A format that scenes are exported to.
 
     Attributes:
@@ -48,29 +56,29 @@ class Format:
     package: tuple[str, str] | None = None
 
 
-FORMATS = {
-    "sdf": Format(
-        module="sdf_world",
+SCENE_FORMATS = {
+    "sdf": SceneFormat(
+        module="sdf",
         writer="write_sdf",
         main="world.sdf",
         about="an SDFormat world, for Gazebo and Drake",
         hydroelastic=True,
     ),
-    "dmd": Format(
-        module="directives",
+    "dmd": SceneFormat(
+        module="sdf",
         writer="write_directives",
         main="scene.dmd.yaml",
         about="Drake's model directives",
         hydroelastic=True,
     ),
-    "mjcf": Format(
-        module="mjcf.writer",
+    "mjcf": SceneFormat(
+        module="mjcf_scene",
         writer="write_mjcf",
         main="scene.xml",
         about="MuJoCo's XML",
         with_hand=True,
     ),
-    "usd": Format(
+    "usd": SceneFormat(
         module="usd",
         writer="write_usd",
         main="scene.usda",
@@ -78,7 +86,7 @@ FORMATS = {
         package=("usd-core", "pxr"),
     ),
 }
-"""Formats by name."""
+"""Export formats by name."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +122,7 @@ def export_scene(
         scene: what stands on the board. The board itself, which is paper, is left out.
         folder: new, empty, or an earlier export, which is replaced as a whole when the new one is
             complete.
-        to: one of `FORMATS`.
+        to: one of `SCENE_FORMATS`.
         station: its table and obstacles are exported, too, and the world is the station's. Without
             one the world is the scene frame S, and nothing is under the objects.
         hand: `mjcf` alone: with the station's hand floating above the scene, as in grasp trials of
@@ -131,25 +139,25 @@ def export_scene(
 
     scene = as_scene(scene)
     station = None if station is None else as_station(station)
-    if to not in FORMATS:
-        raise UnknownNameError(f"format {to!r} does not exist; {nearest(to, FORMATS)}")
-    chosen = FORMATS[to]
+    if to not in SCENE_FORMATS:
+        raise UnknownNameError(f"format {to!r} does not exist; {suggest_names(to, SCENE_FORMATS)}")
+    chosen = SCENE_FORMATS[to]
     if hand and (station is None or not chosen.with_hand):
-        able = ", ".join(name for name, format in FORMATS.items() if format.with_hand)
+        able = ", ".join(name for name, format in SCENE_FORMATS.items() if format.with_hand)
         raise InvalidInputError(
             f"a hand can only be exported to {able}, not to {to}"
             if not chosen.with_hand
             else "a hand belongs to a station; name the station, too"
         )
-    write = _writer(to)
+    write = _load_writer(to)
     path = require_own_folder(folder)
     layout = lay_out(scene, station)
     if hand and station is not None:
-        from burg_drake.station.diagram import build_station_diagram, read_hand
+        from burg_drake.station import build_station_diagram, read_hand
 
         parts = read_hand(build_station_diagram(scene, station, robot="hand"))
         write = partial(write, hand=parts)
-    with replaced_folder(path) as fresh:
+    with replace_folder(path) as fresh:
         notes = write(layout, fresh)
         write_record(
             fresh,
@@ -167,8 +175,8 @@ def export_scene(
     return Exported(path / chosen.main, layout, notes)
 
 
-def _writer(to: str) -> Callable[..., tuple[str, ...]]:
-    chosen = FORMATS[to]
+def _load_writer(to: str) -> Callable[..., tuple[str, ...]]:
+    chosen = SCENE_FORMATS[to]
     if chosen.package is not None and importlib.util.find_spec(chosen.package[1]) is None:
         raise MissingDependencyError(
             f"exports to {to} need the package {chosen.package[0]}; install it with"
@@ -193,3 +201,123 @@ def _contact_notes(layout: Layout, to: str) -> list[str]:
         elif entry.contact.kind == "compliant_pieces":
             notes.append(f"{name!r} is compliant in Drake; {to} has no hydroelastic modulus")
     return notes
+
+
+EXPORT_RECORD_FILE = "export.yaml"
+"""Lists the files of an export; the next export replaces them."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExportRecord:
+    """An exported scene (`export.yaml`).
+
+    Attributes:
+        format: format of the export.
+        scene: name of the scene.
+        scene_content: hash of the scene and its objects.
+        station: name of the station; empty without one.
+        main: file to open.
+        software: name and version of the program that wrote it.
+        files: all other files, relative to the folder.
+    """
+
+    version: int = 1
+    format: str
+    scene: str
+    scene_content: str
+    station: str = ""
+    main: str
+    software: str
+    files: tuple[str, ...] = ()
+
+
+def require_own_folder(folder: str | Path) -> Path:
+    """Where an export goes.
+
+    Args:
+        folder: new, empty, or the outcome of an earlier export with nothing else in it.
+
+    Returns:
+        Its real path, through links.
+
+    Raises:
+        InvalidInputError: it is a file, or has anything else in it.
+    """
+    path = Path(os.path.realpath(folder))
+    if not os.path.lexists(path):
+        return path
+    if not path.is_dir():
+        raise InvalidInputError(f"{folder} is a file; name a folder for the export")
+    present = _list_files(path)
+    if not present and not any(path.iterdir()):
+        return path
+    try:
+        known = load_document(path / EXPORT_RECORD_FILE, ExportRecord).files
+    except DocumentError as error:
+        raise InvalidInputError(
+            f"{folder} has files in it and is not an earlier export; choose a new folder"
+        ) from error
+    foreign = sorted(set(present) - {*known, EXPORT_RECORD_FILE})
+    if foreign:
+        raise InvalidInputError(
+            f"{folder} is an earlier export, but has files in it that the export did not"
+            f" write ({list_names(foreign)}); move them away, or choose a new folder"
+        )
+    return path
+
+
+@contextmanager
+def replace_folder(path: Path) -> Iterator[Path]:
+    """A new folder beside `path`, which takes its place when the block ends without an error.
+
+    Args:
+        path: of `require_own_folder`.
+
+    Yields:
+        The folder to write into.
+
+    Raises:
+        InvalidInputError: the place cannot be written to; what was there is there still.
+    """
+    token = secrets.token_hex(8)
+    fresh, old = (path.with_name(f".{path.name}.{token}{end}") for end in ("", ".old"))
+    ensure_writable_folder(path.parent)
+    try:
+        fresh.mkdir()
+        yield fresh
+        _swap_folders(fresh, path, old)
+    except OSError as error:
+        raise InvalidInputError(
+            f"cannot write {path}: {error.strerror or error}; choose a writable place"
+        ) from error
+    finally:
+        shutil.rmtree(fresh, ignore_errors=True)
+
+
+def _swap_folders(fresh: Path, path: Path, old: Path) -> None:
+    """Puts `fresh` in the place of `path`, which is moved to `old` until that has worked."""
+    if path.exists():
+        path.rename(old)
+    try:
+        fresh.rename(path)
+    except OSError:
+        if old.exists():
+            old.rename(path)
+        raise
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def write_record(folder: Path, record: ExportRecord) -> None:
+    """Writes `export.yaml` with the names of all files that are in the folder.
+
+    Args:
+        folder: all else is written.
+        record: without files.
+    """
+    save_document(replace(record, files=tuple(_list_files(folder))), folder / EXPORT_RECORD_FILE)
+
+
+def _list_files(folder: Path) -> list[str]:
+    """What is in a folder and in those in it, relative to it."""
+    found = (p for p in folder.rglob("*") if p.is_symlink() or not p.is_dir())
+    return sorted(p.relative_to(folder).as_posix() for p in found)

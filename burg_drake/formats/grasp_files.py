@@ -1,59 +1,41 @@
-"""All kinds of grasp files: which there are, which one a file is of, reading and writing."""
+"""Reads and writes grasp files: the list of formats, recognition by content, burg_drake's own format."""
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
-from burg_drake.core import InvalidInputError, UnknownNameError, nearest
-from burg_drake.core.documents import checked_events, load_json
-from burg_drake.core.files import (
-    GRASP_FILE,
+from burg_drake.core import (
+    READ_ERRORS,
+    Array,
+    FileLimits,
+    GraspSet,
+    GraspSetFormat,
+    InvalidInputError,
+    UnknownNameError,
+    checked_yaml_events,
+    is_hdf5,
+    load_json,
+    make_pose,
     npy_shape,
+    open_hdf5,
+    open_npz,
     open_regular,
     read_text,
-    reporting_read_errors,
+    report_read_errors,
+    suggest_names,
 )
-from burg_drake.core.grasps import GraspSet
-from burg_drake.formats.common import PANDA, GraspFormat, Gripper, ImportedGrasps
-
-MODULES = {
-    "burg_drake": "burg_drake",
-    "acronym": "acronym",
-    "isaac_grasp": "isaac_grasp",
-    "graspgen": "graspgen",
-    "graspgen_yaml": "graspgen_yaml",
-    "graspnet": "graspnet",
-    "vgn": "vgn",
-    "burg": "burg_toolkit",
-}
-"""Module of each format in this package, in the order in which files are tried."""
-
-
-class _Formats(Mapping[str, GraspFormat]):
-    """Formats by name; each module is imported when it is first asked for."""
-
-    def __getitem__(self, name: str) -> GraspFormat:
-        if name not in MODULES:
-            raise UnknownNameError(f"there is no grasp format {name!r}; {nearest(name, MODULES)}")
-        module = importlib.import_module(f"burg_drake.formats.grasps.{MODULES[name]}")
-        found: GraspFormat = module.FORMAT
-        return found
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(MODULES)
-
-    def __len__(self) -> int:
-        return len(MODULES)
-
-
-FORMATS: Mapping[str, GraspFormat] = _Formats()
-"""Formats by name."""
+from burg_drake.formats.acronym import ACRONYM_FORMAT
+from burg_drake.formats.burg_grasps import BURG_TOOLKIT_FORMAT
+from burg_drake.formats.grasp_format import PANDA_GRIPPER, GraspFormat, Gripper, ImportedGrasps
+from burg_drake.formats.graspgen import GRASPGEN_FORMAT
+from burg_drake.formats.graspnet import GRASPNET_FORMAT
+from burg_drake.formats.isaac_grasp import GRASPGEN_YAML_FORMAT, ISAAC_GRASP_FORMAT
+from burg_drake.formats.vgn import VGN_FORMAT
 
 
 def read_grasp_file(
-    path: str | Path, format: str | None = None, gripper: Gripper = PANDA
+    path: str | Path, format: str | None = None, gripper: Gripper = PANDA_GRIPPER
 ) -> ImportedGrasps:
     """Reads grasps in any format.
 
@@ -71,8 +53,8 @@ def read_grasp_file(
         kind = "is a folder" if path.is_dir() else "does not exist"
         raise InvalidInputError(f"cannot read grasps: {path} {kind}; give a file")
     open_regular(path).close()  # formats are recognised by reading the file again and again
-    chosen = FORMATS[format] if format is not None else format_of(path)
-    with reporting_read_errors(path, f"a file of {chosen.title} that can be read"):
+    chosen = format_named(format) if format is not None else format_of(path)
+    with report_read_errors(path, f"a file of {chosen.title} that can be read"):
         return chosen.read(path, gripper)
 
 
@@ -83,14 +65,16 @@ def format_of(path: str | Path) -> GraspFormat:
         InvalidInputError: it is of none; of `.npz`, YAML and JSON that cannot be read, why.
     """
     path = Path(path)
-    for format in FORMATS.values():
+    for format in GRASP_FORMATS.values():
         if format.recognises(path):
             return format
     if path.suffix in (".yaml", ".yml"):
-        for _ in checked_events(read_text(path, GRASP_FILE), str(path), GRASP_FILE):
+        for _ in checked_yaml_events(
+            read_text(path, FileLimits.grasp_file), str(path), FileLimits.grasp_file
+        ):
             pass  # says what is wrong with a file that is damaged or beyond the limits
     if path.suffix == ".json":
-        load_json(path, GRASP_FILE)
+        load_json(path, FileLimits.grasp_file)
     if path.suffix.lower() == ".npz":
         GraspSet.load(path)
     shape = npy_shape(path) if path.suffix.lower() == ".npy" else None
@@ -101,13 +85,13 @@ def format_of(path: str | Path) -> GraspFormat:
         else ""
     )
     raise InvalidInputError(
-        f"{path} is not a file of grasps in a known format ({', '.join(FORMATS)});"
+        f"{path} is not a file of grasps in a known format ({', '.join(GRASP_FORMATS)});"
         f"{wanted} if it should be in one of them, name the format to see what is wrong"
     ).about("format")
 
 
 def write_grasp_file(
-    grasps: GraspSet, path: str | Path, format: str | None = None, gripper: Gripper = PANDA
+    grasps: GraspSet, path: str | Path, format: str | None = None, gripper: Gripper = PANDA_GRIPPER
 ) -> tuple[str, ...]:
     """Writes grasps in any format, whole or not at all.
 
@@ -127,7 +111,7 @@ def write_grasp_file(
         UnknownNameError: there is no such format.
     """
     path = Path(path)
-    chosen = FORMATS[format] if format is not None else format_by_suffix(path)
+    chosen = format_named(format) if format is not None else format_by_suffix(path)
     return chosen.write(grasps, path, gripper)
 
 
@@ -138,14 +122,82 @@ def format_by_suffix(path: str | Path) -> GraspFormat:
         InvalidInputError: none, or several that are not ours.
     """
     suffix = Path(path).suffix.lower()
-    fitting = [format for format in FORMATS.values() if suffix in format.suffixes]
+    fitting = [format for format in GRASP_FORMATS.values() if suffix in format.suffixes]
     if not fitting:
-        known = sorted({suffix for format in FORMATS.values() for suffix in format.suffixes})
+        known = sorted({suffix for format in GRASP_FORMATS.values() for suffix in format.suffixes})
         raise InvalidInputError(
             f"{path}: no format of grasps has the suffix {suffix!r}; give one of the"
-            f" formats {', '.join(FORMATS)}, or one of the suffixes {' '.join(known)}"
+            f" formats {', '.join(GRASP_FORMATS)}, or one of the suffixes {' '.join(known)}"
         )
     if len(fitting) > 1 and fitting[0].name != "burg_drake":
         names = " or ".join(format.name for format in fitting)
         raise InvalidInputError(f"{path}: the suffix {suffix} can mean {names}; give the format")
     return fitting[0]
+
+
+def _X_GF(gripper: Gripper) -> Array:
+    return make_pose()
+
+
+def _recognise(path: Path) -> bool:
+    try:
+        if is_hdf5(path):
+            with open_hdf5(path) as tree:
+                return bool(tree.attribute("format") == GraspSetFormat.name)
+        with open_npz(path) as file:
+            return {"header", "X_OG"} <= set(file.names)
+    except (OSError, *READ_ERRORS):
+        return False
+
+
+def _read(path: Path, gripper: Gripper) -> ImportedGrasps:
+    return ImportedGrasps(GraspSet.load(path), "object")
+
+
+def _write(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:
+    grasps.save(path)
+    return ()
+
+
+BURG_DRAKE_FORMAT = GraspFormat(
+    name="burg_drake",
+    title="burg_drake",
+    suffixes=(".h5", ".npz", ".hdf5"),
+    frame="object",
+    source="core/grasp_set.py of this project",
+    carries=("everything",),
+    cannot_carry=(),
+    X_GF=_X_GF,
+    recognises=_recognise,
+    read=_read,
+    write=_write,
+)
+"""The format of burg_drake's own files; see `core.grasps`."""
+
+GRASP_FORMATS: Mapping[str, GraspFormat] = {
+    format.name: format
+    for format in (
+        BURG_DRAKE_FORMAT,
+        ACRONYM_FORMAT,
+        ISAAC_GRASP_FORMAT,
+        GRASPGEN_FORMAT,
+        GRASPGEN_YAML_FORMAT,
+        GRASPNET_FORMAT,
+        VGN_FORMAT,
+        BURG_TOOLKIT_FORMAT,
+    )
+}
+"""Formats of grasp files by name, in the order in which a file is tried."""
+
+
+def format_named(name: str) -> GraspFormat:
+    """The format of a name.
+
+    Raises:
+        UnknownNameError: there is no such format.
+    """
+    if name not in GRASP_FORMATS:
+        raise UnknownNameError(
+            f"there is no grasp format {name!r}; {suggest_names(name, GRASP_FORMATS)}"
+        )
+    return GRASP_FORMATS[name]

@@ -1,13 +1,14 @@
-from .folder import SceneRow as SceneRow
-from .many import (
+from .heap_settling import settle_heap as settle_heap
+from .scene_folder import (
     SampledFolder as SampledFolder,
+    SceneRow as SceneRow,
     sample_scenes as sample_scenes,
 )
-from .reproduction import (
+from .scene_sampling import (
     ReproducedScene as ReproducedScene,
-    sample_again as sample_again,
-)
-from .sample import (
     SampledScene as SampledScene,
     SceneSampler as SceneSampler,
+    attempts_with_same_objects as attempts_with_same_objects,
+    sample_again as sample_again,
+    sample_scene as sample_scene,
 )

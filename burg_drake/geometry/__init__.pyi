@@ -1,35 +1,32 @@
-from .body import (
-    TOUCHING as TOUCHING,
+from .bodies import (
+    CONTACT_TOLERANCE as CONTACT_TOLERANCE,
+    SWEPT_CYLINDER_SIDES as SWEPT_CYLINDER_SIDES,
     Body as Body,
+    swept_body as swept_body,
+    swept_shape as swept_shape,
 )
-from .convex import (
+from .convex_distance import (
+    DISTANCE_TOLERANCE as DISTANCE_TOLERANCE,
+    ShapeBatch as ShapeBatch,
+    shape_distances as shape_distances,
+    triangle_distances as triangle_distances,
+)
+from .convex_shapes import (
     Ball as Ball,
     Boxes as Boxes,
+    Convex as Convex,
     Cylinder as Cylinder,
-)
-from .distance import (
-    Cores as Cores,
-    distances as distances,
+    Hull as Hull,
+    Shape as Shape,
+    penetration_depths as penetration_depths,
 )
 from .hand_screen import HandScreen as HandScreen
-from .hulls import (
+from .polytopes import (
+    Polytope as Polytope,
     convex_hull as convex_hull,
     hull_mesh as hull_mesh,
     reduced_hull as reduced_hull,
     thickness as thickness,
 )
-from .polytope import Polytope as Polytope
-from .poses import (
-    Poses as Poses,
-    rotate as rotate,
-)
-from .rays import (
-    RayCaster as RayCaster,
-)
-from .shape import Shape as Shape
-from .surface import Surface as Surface
-from .swept import (
-    swept_body as swept_body,
-    swept_shape as swept_shape,
-)
-from .triangles import triangle_distances as triangle_distances
+from .poses import Poses as Poses, rotate as rotate
+from .ray_casting import MAX_HITS as MAX_HITS, RayCaster as RayCaster, Surface as Surface

@@ -1,30 +1,211 @@
-"""The open hand against a scene at rest, for many grasps at once: overlaps and distances.
+"""Penetration depth and distance of the open hand in a scene at rest, for many grasps at once.
 
-For overlaps bodies are asked in order of priority, spheres about the parts of the hand against
-boxes around bodies first; see `geometry.body` for what follows, and `geometry.nearest_body` for
-distances.
-
-Nothing here depends on what else is in a batch, not in its last bit: see `geometry.convex`.
+Bounding boxes and spheres give lower bounds of distances; exact distances are computed only for
+pairs that may be the nearest.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from burg_drake.core import Array, Indices
-from burg_drake.geometry.body import Body, HandBodyPairs, HandParts
-from burg_drake.geometry.nearest_body import NearestBody
-from burg_drake.geometry.poses import Poses
-from burg_drake.geometry.shape import Shape
+from burg_drake.geometry.bodies import Body, HandBodyPairs, HandParts
+from burg_drake.geometry.convex_distance import ShapeBatch, shape_distances
+from burg_drake.geometry.convex_shapes import Shape
+from burg_drake.geometry.poses import Poses, rotate
 
-CHUNK = 2048
-"""Grasps that are looked at together, where the scene's bodies have few pieces."""
+Pairs = tuple[Indices, ...]
+"""Grasps, parts of the hand and bodies, (K,) each."""
 
-PAIRS = 2**20
-"""Bounding boxes that are looked at together; bounds the memory to some 100 MB."""
+
+class SceneBoxes:
+    """Spheres about the parts of a hand, and boxes around bodies and around their pieces.
+
+    Args:
+        hand: convex parts of the open hand.
+        bodies: at least one.
+
+    Attributes:
+        X_BW: (B,) poses of the world in the bodies.
+    """
+
+    def __init__(self, hand: HandParts, bodies: Sequence[Body]) -> None:
+        self._X_GH = hand.X_HG.inverse()
+        self._hand_half, self._radius = hand.half, hand.radius
+        inverses = [body.X_WB.inverse() for body in bodies]
+        self.X_BW = Poses(np.array([X.R for X in inverses]), np.array([X.p for X in inverses]))
+        self._low = np.array([body.low for body in bodies])
+        self._high = np.array([body.high for body in bodies])
+        self._size = np.array([body.size for body in bodies])
+        self._start = np.cumsum(self._size) - self._size
+        self._center = np.concatenate([body.center for body in bodies]).T.copy()
+        self._half = np.concatenate([body.half for body in bodies]).T.copy()
+
+    def around_bodies(self, X_WG: Poses) -> Array:
+        """Bounds (N, H, B) [m] for N grasps, H parts of the hand and B bodies: of the sphere about
+        the part and the box around the body."""
+        p_WH = (X_WG[:, None] @ self._X_GH[None]).p
+        p_B = self.X_BW.apply(p_WH[:, :, None])
+        gaps = np.maximum(self._low - p_B, p_B - self._high)
+        return (
+            _signed_box_distance(gaps[..., 0], gaps[..., 1], gaps[..., 2]) - self._radius[:, None]
+        )
+
+    def around_pieces(self, X_WG: Poses, pairs: Pairs) -> tuple[Indices, Indices, Array]:
+        """Bounds for all pieces of the bodies: of boxes along the axes of the bodies.
+
+        Args:
+            X_WG: (N,) grasps.
+            pairs: K grasps, parts and bodies.
+
+        Returns:
+            Places (T,) of the pairs, indices (T,) of the pieces of all bodies, and bounds (T,) [m].
+        """
+        grasp, part, body = pairs
+        X_BH = self.X_BW[body] @ X_WG[grasp] @ self._X_GH[part]
+        reach = rotate(np.abs(X_BH.R), self._hand_half[part])
+        count = self._size[body]
+        pair = np.repeat(np.arange(len(grasp)), count)
+        first = self._start[body] - (np.cumsum(count) - count)
+        piece = np.arange(len(pair)) + np.repeat(first, count)
+        x, y, z = (
+            np.abs(np.repeat(X_BH.p[:, k], count) - self._center[k, piece])
+            - np.repeat(reach[:, k], count)
+            - self._half[k, piece]
+            for k in range(3)
+        )
+        return pair, piece, _signed_box_distance(x, y, z)
+
+    def along_parts(self, X_WG: Poses, pairs: Pairs, piece: Indices) -> Array:
+        """Bounds (K,) for one piece each [m]: of boxes along the axes of the parts."""
+        grasp, part, body = pairs
+        X_HB = (self.X_BW[body] @ X_WG[grasp] @ self._X_GH[part]).inverse()
+        p_H = X_HB.apply(self._center[:, piece].T)
+        reach = rotate(np.abs(X_HB.R), self._half[:, piece].T)
+        x, y, z = (np.abs(p_H) - reach - self._hand_half[part]).T
+        return _signed_box_distance(x, y, z)
+
+
+def _signed_box_distance(x: Array, y: Array, z: Array) -> Array:
+    """Signed distance of two boxes with common axes from the gaps along these: negative is how deep
+    they overlap."""
+    far = np.maximum(x, 0.0), np.maximum(y, 0.0), np.maximum(z, 0.0)
+    distance = np.sqrt(far[0] * far[0] + far[1] * far[1] + far[2] * far[2])
+    return np.asarray(distance + np.minimum(np.maximum(np.maximum(x, y), z), 0.0))
+
+
+class NearestBody:
+    """Finds the body that is nearest to the open hand.
+
+    Args:
+        hand: convex parts of the open hand.
+        bodies: at least one.
+    """
+
+    def __init__(self, hand: HandParts, bodies: Sequence[Body]) -> None:
+        self._boxes = SceneBoxes(hand, bodies)
+        self._parts = ShapeBatch.of(hand.shapes)
+        self._pieces = ShapeBatch.of([piece for body in bodies for piece in body.pieces])
+
+    def measure(self, X_WG: Array) -> tuple[Indices, Array]:
+        """The nearest body at each grasp.
+
+        Args:
+            X_WG: (N, 4, 4) grasps at which the hand overlaps nothing.
+
+        Returns:
+            Indices (N,) of bodies and distances (N,) [m].
+        """
+        search = _NearestSearch(Poses.of(X_WG), self._boxes, self._parts, self._pieces)
+        bound = self._boxes.around_bodies(search.X_WG)
+        first = bound <= np.maximum(bound.min(axis=(1, 2), keepdims=True), 0.0)
+        search.go_on(np.nonzero(first))
+        search.go_on(np.nonzero(~first & (bound < search.distance[:, None, None])))
+        return search.nearest, search.distance
+
+
+class _NearestSearch:
+    """The nearest bodies (N,) of N grasps and their distances (N,) [m] as far as is known."""
+
+    def __init__(
+        self, X_WG: Poses, boxes: SceneBoxes, parts: ShapeBatch, pieces: ShapeBatch
+    ) -> None:
+        self.X_WG, self._boxes, self._parts, self._pieces = X_WG, boxes, parts, pieces
+        self.nearest = np.zeros(len(X_WG.p), dtype=np.intp)
+        self.distance = np.full(len(X_WG.p), np.inf)
+
+    def go_on(self, pairs: Pairs) -> None:
+        """Takes pairs of parts and bodies into account, in the order of the grasps."""
+        place, pieces, bound = self._boxes.around_pieces(self.X_WG, pairs)
+        grasp, part, body = pairs
+        left = _PartPiecePairs(grasp[place], part[place], body[place], pieces, bound)
+        left = self._measure_lowest(left)
+        left = left.above(self._boxes.along_parts(self.X_WG, left.pairs, left.piece))
+        left = self._measure_lowest(left)
+        self._measure(left)
+
+    def _measure_lowest(self, left: _PartPiecePairs) -> _PartPiecePairs:
+        """Measures those with the lowest bound of each grasp; returns the others that count."""
+        left = left[left.bound < self.distance[left.grasp]]
+        if not len(left.grasp):
+            return left
+        start = np.diff(left.grasp, prepend=-1) != 0
+        lowest = np.minimum.reduceat(left.bound, np.flatnonzero(start))
+        is_lowest = left.bound == lowest[np.cumsum(start) - 1]
+        self._measure(left[is_lowest])
+        return left[~is_lowest & (left.bound < self.distance[left.grasp])]
+
+    def _measure(self, asked: _PartPiecePairs) -> None:
+        asked = asked[asked.bound < self.distance[asked.grasp]]
+        if not len(asked.grasp):
+            return
+        grasp, body = asked.grasp, asked.body
+        X_BG = self._boxes.X_BW[body] @ self.X_WG[grasp]
+        found = shape_distances(
+            *(self._parts, asked.part, self._pieces, asked.piece, X_BG), self.distance[grasp]
+        )
+        order = np.lexsort((found, grasp))
+        best = order[np.diff(grasp[order], prepend=-1) != 0]
+        best = best[found[best] < self.distance[grasp[best]]]
+        self.nearest[grasp[best]], self.distance[grasp[best]] = body[best], found[best]
+
+
+@dataclass(frozen=True, eq=False)
+class _PartPiecePairs:
+    """T pairs of a part of the hand and a piece of a body, in the order of the grasps.
+
+    Attributes:
+        grasp, part, body, piece: (T,) indices; `piece` is one of all pieces.
+        bound: (T,) lower bounds of their distance [m].
+    """
+
+    grasp: Indices
+    part: Indices
+    body: Indices
+    piece: Indices
+    bound: Array
+
+    @property
+    def pairs(self) -> Pairs:
+        """Grasps, parts and bodies."""
+        return self.grasp, self.part, self.body
+
+    def __getitem__(self, chosen: NDArray[np.bool_]) -> _PartPiecePairs:
+        at = np.flatnonzero(chosen)
+        grasp, part, body, piece = (v[at] for v in (*self.pairs, self.piece))
+        return _PartPiecePairs(grasp, part, body, piece, self.bound[at])
+
+    def above(self, bound: Array) -> _PartPiecePairs:
+        """With further lower bounds (T,) [m]."""
+        return replace(self, bound=np.maximum(self.bound, bound))
+
+
+GRASP_CHUNK = 2048
+"""Grasps in a batch."""
 
 
 class HandScreen:
@@ -39,12 +220,13 @@ class HandScreen:
     """
 
     def __init__(self, hand: Sequence[Shape], bodies: Mapping[str, Body]) -> None:
+        max_pairs = 2**20  # Bounding boxes in a batch; bounds the memory to some 100 MB.
         self._hand = HandParts(hand)
         self.bodies = dict(bodies)
         self._nearest = NearestBody(self._hand, list(bodies.values())) if bodies else None
         sizes = [body.size for body in bodies.values()]
-        self._chunk = max(1, min(CHUNK, PAIRS // (len(hand) * max(sizes, default=1))))
-        self._chunk_of_all = max(1, min(CHUNK, PAIRS // (len(hand) * max(sum(sizes), 1))))
+        self._chunk = max(1, min(GRASP_CHUNK, max_pairs // (len(hand) * max(sizes, default=1))))
+        self._chunk_of_all = max(1, min(GRASP_CHUNK, max_pairs // (len(hand) * max(sum(sizes), 1))))
 
     def deepest(
         self, X_WG: Array, order: Sequence[str], *, faces_only: bool = False

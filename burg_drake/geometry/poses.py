@@ -1,7 +1,4 @@
-"""Poses in batches, by elementwise arithmetic: a pose does not depend on the batch that it is in.
-
-Matrix products do not promise that: their last bit may change with the number of matrices.
-"""
+"""Poses in batches by elementwise arithmetic: the result for a pose does not depend on its batch."""
 
 from __future__ import annotations
 

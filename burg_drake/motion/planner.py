@@ -1,4 +1,4 @@
-"""From a grasp to motions that an arm can run."""
+"""Plans grasps: finds the motion of a grasp and times it, so that an arm can run it."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from burg_drake.core import Array, check_pose
-from burg_drake.motion.ik import ArmLimits
-from burg_drake.motion.lines import ReachSettings
-from burg_drake.motion.plans import Plan, PlanOrigin
-from burg_drake.motion.reach import ArmReach, Reach, Witness
-from burg_drake.motion.timing import IsFree, PathChecks, TimingSettings, time_motion
-from burg_drake.scene.document import SceneLike, as_scene
-from burg_drake.station.document import StationLike, as_station
-
-GRIP_TIME = 0.2
-"""Time to build up the force, after the fingers had time to close [s]."""
+from burg_drake.motion.arm_reach import ArmReach
+from burg_drake.motion.grasp_timing import PathChecks, time_motion
+from burg_drake.motion.joint_limits import ArmLimits
+from burg_drake.motion.motion_settings import ReachSettings, TimingSettings
+from burg_drake.motion.plan_files import Plan
+from burg_drake.motion.polyline_timing import IsFree
+from burg_drake.motion.reach_verdict import Reach, Witness
+from burg_drake.motion.trajectory import PlanOrigin
+from burg_drake.scene import SceneLike, as_scene
+from burg_drake.station import StationLike, as_station
 
 
 class Planner:
@@ -79,6 +79,7 @@ class Planner:
             witness: its motion.
             width: distance between the pads that hold the target [m]; NaN if it is not known.
         """
+        grip_time = 0.2  # Seconds to build up the force after the fingers have closed.
         is_free, hand = self.reach.path_is_free, self.reach.diagram.station.hand
         if len(witness.transfer) > 2:
             witness = replace(witness, transfer=self.reach.shortcut(witness.transfer))
@@ -111,7 +112,7 @@ class Planner:
         finger_travel = high - (low if np.isnan(width) else min(width, high))
         return replace(
             plan,
-            close_time=finger_travel / 2.0 / hand.closing_speed + GRIP_TIME,
+            close_time=finger_travel / 2.0 / hand.closing_speed + grip_time,
             opening=high,
             width=width,
             origin=replace(self._origin, instance=instance, X_WG=witness.X_WG),

@@ -6,4 +6,21 @@ Read `library` first, which has what is known of an object in the end; `meshes`,
 
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, _, _ = lazy_loader.attach_stub(__name__, __file__)
+
+__all__ = [
+    "ContactGeometry",
+    "Decomposition",
+    "Fit",
+    "LibraryDocument",
+    "MassProperties",
+    "ObjectEntry",
+    "Primitive",
+    "Source",
+    "StablePose",
+    "unit_scale",
+]
+
+
+def __dir__() -> list[str]:
+    return __all__

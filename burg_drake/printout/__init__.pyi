@@ -1,29 +1,49 @@
-from . import page_frame as page_frame
 from .board_printout import (
     Printout as Printout,
     PrintSettings as PrintSettings,
+    draw_rulers as draw_rulers,
     print_board as print_board,
 )
-from .outlines import cell_outlines as cell_outlines
-from .paper import (
+from .object_drawings import (
+    BT601_LUMA_WEIGHTS as BT601_LUMA_WEIGHTS,
+    FIXED_HUE as FIXED_HUE,
+    HUES as HUES,
+    MIN_LUMA as MIN_LUMA,
+    OUTLINE_RESOLUTION as OUTLINE_RESOLUTION,
+    HeightMap as HeightMap,
+    ObjectDrawing as ObjectDrawing,
+    SheetGrid as SheetGrid,
+    SheetLayer as SheetLayer,
+    cell_outlines as cell_outlines,
+    height_at as height_at,
+    height_map as height_map,
+    lowest_surface as lowest_surface,
+    luma_at as luma_at,
+    mask_outlines as mask_outlines,
+    tint_colors as tint_colors,
+    visible_layers as visible_layers,
+)
+from .page_tiling import (
+    BLEED as BLEED,
+    MAX_FLAP_WIDTH as MAX_FLAP_WIDTH,
     PAPERS as PAPERS,
     Paper as Paper,
-    orientations as orientations,
-)
-from .pen import (
-    BLACK as BLACK,
-    BOLD as BOLD,
-    INK as INK,
-    POINT as POINT,
-    Pen as Pen,
-    rectangle as rectangle,
-)
-from .relief import (
-    HeightMap as HeightMap,
-    height_map as height_map,
-)
-from .sheet import frame_width as frame_width
-from .tiling import (
     Tile as Tile,
     Tiling as Tiling,
+    cut_axis as cut_axis,
+    page_orientations as page_orientations,
+    paper_size as paper_size,
+    tile_board as tile_board,
+)
+from .sheet import (
+    BLACK as BLACK,
+    BOLD_FONT as BOLD_FONT,
+    INK as INK,
+    POINT as POINT,
+    FreeSpace as FreeSpace,
+    Pen as Pen,
+    Sheet as Sheet,
+    draw_sheet as draw_sheet,
+    frame_width as frame_width,
+    rectangle as rectangle,
 )

@@ -1,4 +1,4 @@
-"""Prints a scene's board as a PDF: markers at true scale, objects from below, pages to assemble."""
+"""The printout of a scene's board as PDF: markers at true scale, objects, pages to assemble."""
 
 from __future__ import annotations
 
@@ -12,26 +12,361 @@ from typing import Any
 import numpy as np
 from reportlab.pdfgen.canvas import Canvas
 
-from burg_drake.core import MILLIMETRES, Array, InvalidInputError, setting
-from burg_drake.core.files import atomic_write
-from burg_drake.printout.board_edge import draw_edge, draw_origin
-from burg_drake.printout.drawings import Drawing, draw_arrows, draw_objects
+from burg_drake.core import Array, InvalidInputError, Units, atomic_write, setting
 from burg_drake.printout.guide import BoardFacts, Guide, draw_guide, guide_steps
-from burg_drake.printout.losses import lacking_white, margin_losses, printer_losses
-from burg_drake.printout.page_frame import Caption, draw_page_frame
-from burg_drake.printout.paper import PAPERS, Paper, orientations
-from burg_drake.printout.pen import POINT, WHITE, Pen, rectangle
-from burg_drake.printout.sheet import Sheet, alignment_marks, draw_sheet, place_names
-from burg_drake.printout.tiling import Tile, Tiling, tile_board
-from burg_drake.scene.document import MarkerLayout, Scene, SceneLike, as_scene, validate_scene
+from burg_drake.printout.object_drawings import (
+    FIXED_HUE,
+    MAX_TINT_HEIGHT,
+    ObjectDrawing,
+    draw_arrows,
+    draw_objects,
+    luma_at,
+    tint_colors,
+)
+from burg_drake.printout.page_tiling import (
+    BLEED,
+    BOTTOM_STRIP,
+    PAPERS,
+    Paper,
+    Tile,
+    Tiling,
+    page_orientations,
+    tile_board,
+)
+from burg_drake.printout.sheet import (
+    BOLD_FONT,
+    FAINT,
+    INK,
+    POINT,
+    WHITE,
+    Pen,
+    Sheet,
+    alignment_marks,
+    draw_board_edge,
+    draw_origin,
+    draw_sheet,
+    place_names,
+    rectangle,
+    text_width,
+)
+from burg_drake.scene import (
+    MARKER_EDGE_MARGIN,
+    MarkerLayout,
+    Scene,
+    SceneLike,
+    as_scene,
+    validate_scene,
+)
 
-MEASURED = (0.080, 0.125)
-"""What a printed ruler of 100 mm can measure [m]; else it was read in another unit."""
-FORM = "board"
-COVER = 2e-3
-"""Width of the white around what a page shows [m]."""
-MARGINS = (4e-3, 3e-3, 2e-3, 1e-3, 0.0)
-"""Smaller ones that are tried for a board that is spread over pages because of the margin [m]."""
+
+class PageFrameLayout:
+    """Page frame layout."""
+
+    ruler_length = 0.100  # Metres.
+    thin_line = 0.12e-3  # Metres.
+    map_size = (0.026, 0.011)  # Metres, width and height of the map of pages.
+    legend_width = 0.030  # Metres.
+
+
+@dataclass(frozen=True, kw_only=True)
+class Caption:
+    """Words at the foot of every page.
+
+    Attributes:
+        title: the scene's name.
+        board: its size and content.
+        facts: which markers there are and where, for those who look into it; small.
+        how: how to print, for everybody.
+    """
+
+    title: str
+    board: str
+    facts: str
+    how: str
+
+
+def draw_page_frame(
+    pen: Pen,
+    tile: Tile,
+    tiling: Tiling,
+    size: tuple[float, float],
+    caption: Caption,
+    *,
+    marks: Array,
+    tints: bool,
+) -> None:
+    """Draws what stands around the board on a page, with the page's origin lower left.
+
+    Args:
+        pen: draws in metres of the page.
+        tile: the page.
+        tiling: all pages.
+        size: extents of the board [m].
+        caption: words at the foot.
+        marks: (N, 2) middles of alignment marks in the scene frame [m], which words keep clear of.
+        tints: explain the tints of the height map.
+    """
+    paper = tiling.paper
+    draw_rulers(pen, paper)
+    right = paper.width - paper.margin
+    base = paper.margin
+    if len(tiling.tiles) > 1:
+        right -= PageFrameLayout.map_size[0]
+        _draw_map(pen, tile, tiling, size, (right, base))
+        right -= 4e-3
+    left = paper.lower[0] + PageFrameLayout.ruler_length + 8e-3
+    above = paper.lower[1] + PageFrameLayout.ruler_length + 8e-3
+    if tints and above + PageFrameLayout.legend_width < paper.upper[1]:
+        _draw_legend(pen, (paper.lower[0] - 2.1e-3, above), turned=True)
+    elif tints and right - left > 0.105:
+        right -= PageFrameLayout.legend_width
+        _draw_legend(pen, (right, base + 5.8e-3), turned=False)
+        right -= 6e-3
+    _draw_caption(pen, caption, tile, len(tiling.tiles), (left, right), base)
+    _draw_cuts(pen, tile, tiling, size, marks)
+
+
+def draw_rulers(pen: Pen, paper: Paper) -> None:
+    """One along x and one along y: printers scale both differently."""
+    x, y = paper.lower[0], paper.margin + BOTTOM_STRIP - 3e-3
+    _draw_ruler(pen, np.array([x, y]), turned=False)
+    _draw_ruler(pen, np.array([x - 3e-3, paper.lower[1]]), turned=True)
+
+
+def _draw_ruler(pen: Pen, start: Array, *, turned: bool) -> None:
+    """Draws a ruler from `start` [m] to the right, or turned upwards; ticks point down or, turned,
+    to the left."""
+    along = np.array([0.0, 1.0] if turned else [1.0, 0.0])
+    aside = np.array([-1.0, 0.0] if turned else [0.0, -1.0])
+
+    def at(length: float, off: float) -> tuple[float, float]:
+        x, y = (start + length * along + off * aside).tolist()
+        return x, y
+
+    pen.line(at(0.0, 0.0), at(PageFrameLayout.ruler_length, 0.0), width=PageFrameLayout.thin_line)
+    for millimetre in range(101):
+        tick = 2.4e-3 if millimetre % 50 == 0 else 1.7e-3 if millimetre % 10 == 0 else 0.9e-3
+        width = (
+            2 * PageFrameLayout.thin_line if millimetre in (0, 100) else PageFrameLayout.thin_line
+        )
+        pen.line(at(millimetre * 1e-3, 0.0), at(millimetre * 1e-3, tick), width=width)
+    for millimetre in (50, 100) if turned else (0, 50, 100):
+        words = f"{millimetre} mm" if millimetre == 100 else str(millimetre)
+        off = 2.6e-3 if turned else 4.3e-3  # baselines are on the other side of the letters
+        pen.text(*at(millimetre * 1e-3, off), words, 6, align=0.5, turned=turned)
+
+
+def _draw_caption(
+    pen: Pen, caption: Caption, tile: Tile, pages: int, span: tuple[float, float], base: float
+) -> None:
+    left, right = span
+    page = f"page {tile.number} of {pages}"
+    pen.text(right, base + 10.0e-3, page, 10, align=1.0)
+    room = right - left - text_width(page, 10) - 3e-3
+    pen.text(
+        left,
+        base + 10.0e-3,
+        caption.title,
+        _fitting_text_size(caption.title, room, 10, BOLD_FONT),
+        font=BOLD_FONT,
+    )
+    pen.text(
+        left, base + 6.8e-3, caption.board, _fitting_text_size(caption.board, right - left, 6.5)
+    )
+    start = left - PageFrameLayout.ruler_length - 8e-3  # below the ruler, too
+    pen.text(
+        start, base + 4.2e-3, caption.facts, _fitting_text_size(caption.facts, right - start, 6.5)
+    )
+    pen.text(start, base + 0.75e-3, caption.how, _fitting_text_size(caption.how, right - start, 10))
+
+
+def _fitting_text_size(text: str, room: float, size: float, font: str = "Helvetica") -> float:
+    """The size [points], at most `size`, at which a line fits into the room [m]."""
+    return size * min(1.0, room / max(text_width(text, size, font), 1e-9))
+
+
+def _draw_map(
+    pen: Pen, tile: Tile, tiling: Tiling, size: tuple[float, float], corner: tuple[float, float]
+) -> None:
+    """The board with its cuts, and this page filled."""
+    scale = min(PageFrameLayout.map_size[0] / size[0], PageFrameLayout.map_size[1] / size[1])
+    left, bottom = corner[0] + PageFrameLayout.map_size[0] - scale * size[0], corner[1] + 0.5e-3
+    xs = [0.0, *tiling.x_cuts, size[0]]
+    ys = [size[1], *tiling.y_cuts, 0.0]
+    for other in tiling.tiles:
+        lower = (left + scale * xs[other.column], bottom + scale * ys[other.row + 1])
+        upper = (left + scale * xs[other.column + 1], bottom + scale * ys[other.row])
+        here = other.number == tile.number
+        if here:
+            pen.area([rectangle(lower, upper)], INK)
+        pen.outline([rectangle(lower, upper)], PageFrameLayout.thin_line, INK)
+        text = min(6.0, 0.6 * (upper[1] - lower[1]) / POINT)
+        middle = (lower[0] + upper[0]) / 2, (lower[1] + upper[1]) / 2 - 0.35 * text * POINT
+        pen.text(*middle, str(other.number), text, align=0.5, color=WHITE if here else INK)
+
+
+def _draw_legend(pen: Pen, start: tuple[float, float], *, turned: bool) -> None:
+    """What the tints tell, in grey: from `start` [m] to the right, or turned upwards."""
+    along = np.array([0.0, 1.0] if turned else [1.0, 0.0])
+    up = np.array([-1.0, 0.0] if turned else [0.0, 1.0])
+
+    def at(length: float, off: float) -> tuple[float, float]:
+        x, y = (start + length * along + off * up).tolist()
+        return x, y
+
+    steps = 60
+    edges = PageFrameLayout.legend_width * np.arange(steps + 1) / steps
+    for k in range(steps):
+        luma = luma_at(MAX_TINT_HEIGHT * (k + 0.5) / steps)
+        r, g, b = tint_colors(FIXED_HUE, luma).tolist()
+        end = min(edges[k + 1] + 0.1e-3, edges[-1])  # over the next one, against hairs of white
+        corners = at(edges[k], 0.0), at(end, 0.0), at(end, 2.0e-3), at(edges[k], 2.0e-3)
+        pen.area([np.array(corners)], (r, g, b))
+    pen.text(*at(0.0, 2.8e-3), "height above the sheet", 6, turned=turned)
+    for k, millimetre in enumerate((0, 50, 100)):
+        words = f"{millimetre} mm" if millimetre == 100 else str(millimetre)
+        pen.text(
+            *at(k * PageFrameLayout.legend_width / 2, -2.0e-3), words, 6, align=k / 2, turned=turned
+        )
+
+
+def _draw_cuts(
+    pen: Pen, tile: Tile, tiling: Tiling, size: tuple[float, float], marks: Array
+) -> None:
+    """Dashed lines: to cut along on the left and above, to glue the next page up to on the right
+    and below."""
+    (x0, y0), (x1, y1) = tiling.paper.lower, tiling.paper.upper
+    columns = len(tiling.x_cuts) + 1
+    for cut, trimmed in ((tile.cut_left, True), (tile.cut_right, False)):
+        if cut is not None:
+            x = tile.p_PS[0] + cut
+            pen.line((x, y0), (x, y1), width=PageFrameLayout.thin_line, color=FAINT, dash=1.2e-3)
+            crossed = tile.p_PS[1] + np.array([0.0, size[1], *_mark_positions(marks, 0, cut)])
+            words = _cut_label(trimmed, tile.number + 1, tiling.flap)
+            _label_cut(pen, (x, y1), words, trimmed, crossed, turned=True)
+    for cut, trimmed in ((tile.cut_top, True), (tile.cut_bottom, False)):
+        if cut is not None:
+            y = tile.p_PS[1] + cut
+            pen.line((x0, y), (x1, y), width=PageFrameLayout.thin_line, color=FAINT, dash=1.2e-3)
+            crossed = tile.p_PS[0] + np.array([0.0, size[0], *_mark_positions(marks, 1, cut)])
+            words = _cut_label(trimmed, tile.number + columns, tiling.flap)
+            _label_cut(pen, (x1, y), words, trimmed, crossed, turned=False)
+
+
+def _mark_positions(marks: Array, axis: int, cut: float) -> list[float]:
+    """Where on a cut across `axis` alignment marks lie."""
+    here = np.abs(marks[:, axis] - cut) < 1e-5
+    return [float(p) for p in marks[here, 1 - axis]]
+
+
+def _cut_label(trimmed: bool, neighbour: int, flap: float) -> str:
+    if trimmed:
+        return "CUT"
+    return f"page {neighbour} " + ("is glued here" if flap else "joins here")
+
+
+def _label_cut(
+    pen: Pen,
+    end: tuple[float, float],
+    words: str,
+    trimmed: bool,
+    crossed: Array,
+    *,
+    turned: bool,
+) -> None:
+    """Says at the end of a cut line what to do there.
+
+    Args:
+        pen: draws in metres of the page.
+        end: the line runs towards it [m].
+        words: to write.
+        trimmed: words stand on the side that is cut off, or else on the strip that stays.
+        crossed: (N,) where along the line something is that words keep clear of [m].
+        turned: the line runs upwards.
+    """
+    text_size = 7.5  # Points.
+    mark_clearance = 4.5e-3  # Metres between text and an alignment mark or the board's edge.
+    length = text_width(words, text_size, BOLD_FONT)
+    along = end[1 if turned else 0] - 1e-3
+    for there in np.sort(crossed)[::-1]:
+        if along - length - mark_clearance < there < along + mark_clearance:
+            along = there - mark_clearance
+    off = BLEED + 1.0e-3 if trimmed else -(BLEED + 1.0e-3 + 0.72 * text_size * POINT)
+    at = (end[0] - off, along) if turned else (along, end[1] + off)
+    pen.text(*at, words, text_size, font=BOLD_FONT, align=1.0, turned=turned)
+
+
+def margin_losses(sheet: Sheet, tiling: Tiling) -> list[str]:
+    """What of the objects no page shows, by page; of those beyond the board something else was
+    said."""
+    min_loss = 0.5e-3  # Metres; smaller losses are not reported.
+    beyond = {arrow.name for arrow in sheet.arrows}
+    lost = []
+    for tile in tiling.tiles:
+        for drawing in sheet.drawings:
+            loops = [*drawing.outline, *drawing.raised]
+            if drawing.name in beyond or not loops:
+                continue
+            points = _between_cuts(np.concatenate(loops), tile)
+            if not len(points):
+                continue
+            below = np.array(tile.lower) - points.min(axis=0)
+            above = points.max(axis=0) - np.array(tile.upper)
+            most = float(max(below.max(), above.max()))
+            if most > min_loss:
+                lost.append(
+                    f"page {tile.number}: the outermost {1e3 * most:.1f} mm of {drawing.name!r} lie"
+                    " in the margin of the page; larger pages have room"
+                )
+    return lost
+
+
+def printer_losses(sheet: Sheet, tiling: Tiling) -> list[str]:
+    """What usual printers would cut off, by page, of pages whose margin is less than theirs."""
+    usual_margin = 4.23e-3  # Metres; most laser printers leave 1/6 inch white (estimate).
+    paper = tiling.paper
+    if paper.margin >= usual_margin:
+        return []
+    lower = np.full(2, usual_margin)
+    upper = np.array([paper.width, paper.height]) - usual_margin
+    corners = [c[:, :2] for c in sheet.layout.p_SQ]
+    outlines = [loop for d in sheet.drawings for loop in (*d.outline, *d.raised)]
+    lost = []
+    for tile in tiling.tiles:
+        shown = np.array([tile.lower, tile.upper]) + tile.p_PS
+        cut = []
+        for what, shapes in (("markers", corners), ("objects", outlines)):
+            parts = [p for shape in shapes if len(p := _between_cuts(shape, tile))]
+            if parts:
+                points = np.clip(np.concatenate(parts) + tile.p_PS, *shown)
+                most = max((lower - points).max(), (points - upper).max())
+                cut += [f"{1e3 * most:.1f} mm of {what}"] if most > 1e-4 else []
+        if cut:
+            lost.append(
+                f"page {tile.number}: a printer with a margin of {1e3 * usual_margin:.1f} mm, as"
+                f" most laser printers have, cuts off {' and '.join(cut)}"
+            )
+    return lost
+
+
+def markers_without_quiet_zone(size: tuple[float, float], layout: MarkerLayout) -> list[str]:
+    """Markers at the sheet's edge: detectors need white around them, about a cell wide."""
+    corners = layout.p_SQ[..., :2].reshape(-1, 2)
+    white = min(corners.min(), (np.array(size) - corners).min())
+    least = min(layout.side / layout.cells, MARKER_EDGE_MARGIN)
+    if white > least - 1e-9:
+        return []
+    return [
+        f"markers are {1e3 * white:.1f} mm from the edge of the board, but detectors need a white"
+        f" border of {1e3 * least:.1f} mm around them; give a larger board or smaller markers"
+    ]
+
+
+def _between_cuts(points: Array, tile: Tile) -> Array:
+    """Those of points (N, 2) of the board that belong on a page [m]."""
+    low = [-np.inf if c is None else c for c in (tile.cut_left, tile.cut_bottom)]
+    high = [np.inf if c is None else c for c in (tile.cut_right, tile.cut_top)]
+    return points[((points >= low) & (points <= high)).all(axis=1)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +374,7 @@ class PrintSettings:
     """How a board is printed.
 
     Attributes:
-        page: name of a paper, or `WxH` in millimetres; see `printout.paper`.
+        page: name of a paper, or `WxH` in millimetres; see `printout.page_tiling`.
         margin: that the printer leaves white on all sides of a page [m].
         measured: what the rulers of 100 mm along x and y of the page measured on paper [m]; all is
             drawn larger by as much as that is too little.
@@ -53,7 +388,9 @@ class PrintSettings:
         "paper: A4 to A0, letter, legal, tabloid, or WxH in mm",
         metavar="PAGE",
     )
-    margin: float = setting(5e-3, "unprintable margin of the printer", unit=MILLIMETRES, low=0)
+    margin: float = setting(
+        5e-3, "unprintable margin of the printer", unit=Units.millimetres, low=0
+    )
     measured: tuple[float, float] = (0.1, 0.1)
     height_map: bool = setting(
         True, "print only markers, not where objects stand", name="no_height_map"
@@ -62,13 +399,15 @@ class PrintSettings:
     instructions: bool = False
 
     def __post_init__(self) -> None:
+        # Metres of a printed ruler of 100 mm; otherwise it was read in another unit.
+        ruler_range = (0.080, 0.125)
         if not 0.0 <= self.margin <= 0.05:
             raise InvalidInputError(f"margin is {1e3 * self.margin:g} mm; it must be 0 to 50 mm")
         for value in self.measured:
-            if not MEASURED[0] <= value <= MEASURED[1]:
+            if not ruler_range[0] <= value <= ruler_range[1]:
                 raise InvalidInputError(
                     f"the measured length of the 100 mm ruler is {1e3 * value:g} mm; it must be"
-                    f" {1e3 * MEASURED[0]:g} to {1e3 * MEASURED[1]:g} mm"
+                    f" {1e3 * ruler_range[0]:g} to {1e3 * ruler_range[1]:g} mm"
                 )
 
 
@@ -136,9 +475,9 @@ def print_board(scene: SceneLike, settings: PrintSettings | None = None) -> Prin
     scene.require_markers()
     settings = settings or PrintSettings()
     size, layout = scene.board.size, scene.board.layout
-    orientations(settings.page, settings.margin, settings.measured)  # before the drawings
+    page_orientations(settings.page, settings.margin, settings.measured)  # before the drawings
     drawings = draw_objects(scene) if settings.height_map else []
-    tiling = _tiling(size, layout, drawings, settings)
+    tiling = _choose_tiling(size, layout, drawings, settings)
     sheet = Sheet(
         size=size,
         layout=layout,
@@ -152,31 +491,32 @@ def print_board(scene: SceneLike, settings: PrintSettings | None = None) -> Prin
     warnings = [issue.message for issue in validate_scene(scene)] if settings.height_map else []
     losses = [*margin_losses(sheet, tiling), *printer_losses(sheet, tiling)]
     warnings += losses
-    warnings += _spread(size, layout, drawings, settings, tiling)
-    warnings += lacking_white(size, layout)
+    warnings += _multiple_pages_warning(size, layout, drawings, settings, tiling)
+    warnings += markers_without_quiet_zone(size, layout)
     warnings += [f"there is no room to print {words}" for words in unplaced]
-    pdf, first = _document(scene, sheet, tiling, settings, losses)
+    pdf, first = _make_pdf(scene, sheet, tiling, settings, losses)
     return Printout(pdf, tiling, settings, tuple(warnings), first)
 
 
-def _tiling(
+def _choose_tiling(
     size: tuple[float, float],
     layout: MarkerLayout,
-    drawings: list[Drawing],
+    drawings: list[ObjectDrawing],
     settings: PrintSettings,
 ) -> Tiling:
-    papers = orientations(settings.page, settings.margin, settings.measured)
-    return tile_board(size, layout, _needed(size, layout, drawings, papers[0]), papers)
+    papers = page_orientations(settings.page, settings.margin, settings.measured)
+    return tile_board(size, layout, _required_points(size, layout, drawings, papers[0]), papers)
 
 
-def _spread(
+def _multiple_pages_warning(
     size: tuple[float, float],
     layout: MarkerLayout,
-    drawings: list[Drawing],
+    drawings: list[ObjectDrawing],
     settings: PrintSettings,
     tiling: Tiling,
 ) -> list[str]:
     """What would print on one page a board that is no larger than the page."""
+    smaller_margins = (4e-3, 3e-3, 2e-3, 1e-3, 0.0)  # Metres that are tried in turn.
     paper, pages = tiling.paper, len(tiling.tiles)
     sides = np.sort(size), np.sort([paper.width, paper.height])
     if pages == 1 or (sides[0] > sides[1] + 1e-6).any():
@@ -185,10 +525,10 @@ def _spread(
     def on_one(**changes: Any) -> bool:
         with contextlib.suppress(InvalidInputError):
             changed = dataclasses.replace(settings, **changes)
-            return len(_tiling(size, layout, drawings, changed).tiles) == 1
+            return len(_choose_tiling(size, layout, drawings, changed).tiles) == 1
         return False
 
-    margin = next((m for m in MARGINS if m < settings.margin and on_one(margin=m)), None)
+    margin = next((m for m in smaller_margins if m < settings.margin and on_one(margin=m)), None)
     page = next((name for name in PAPERS if on_one(page=name)), None)
     changes = [f"a margin of {1e3 * margin:g} mm"] if margin is not None else []
     changes += [f"page {page}"] if page else []
@@ -199,8 +539,8 @@ def _spread(
     ]
 
 
-def _needed(
-    size: tuple[float, float], layout: MarkerLayout, drawings: list[Drawing], paper: Paper
+def _required_points(
+    size: tuple[float, float], layout: MarkerLayout, drawings: list[ObjectDrawing], paper: Paper
 ) -> tuple[Array, Array]:
     """Corners of what has to be on paper: markers, and objects but for the rim that a page of the
     board's own size has no room for."""
@@ -219,7 +559,7 @@ def _scale_correction(settings: PrintSettings) -> Array:
     return 0.1 / np.array(settings.measured)
 
 
-def _document(
+def _make_pdf(
     scene: Scene, sheet: Sheet, tiling: Tiling, settings: PrintSettings, losses: list[str]
 ) -> tuple[bytes, int]:
     """The PDF, and how many pages of instructions it begins with."""
@@ -235,20 +575,20 @@ def _document(
     pen = Pen(canvas)
     first = 0
     if settings.instructions:
-        guide, (x, y) = _guide(scene, sheet, tiling, settings, losses), print_scale.tolist()
+        guide, (x, y) = _make_guide(scene, sheet, tiling, settings, losses), print_scale.tolist()
         first = draw_guide(pen, tiling.paper, guide, scale_page=(x, y))
-    canvas.beginForm(FORM, 0.0, 0.0, sheet.size[0] / POINT, sheet.size[1] / POINT)
+    canvas.beginForm("board", 0.0, 0.0, sheet.size[0] / POINT, sheet.size[1] / POINT)
     draw_sheet(pen, sheet)
     canvas.endForm()
     for tile in tiling.tiles:
         canvas.scale(*print_scale.tolist())
-        _draw_board(pen, sheet, tile)
+        _draw_tile(pen, sheet, tile)
         draw_page_frame(
             pen,
             tile,
             tiling,
             sheet.size,
-            _caption(scene, settings, len(tiling.tiles), tiling.flap),
+            _make_caption(scene, settings, len(tiling.tiles), tiling.flap),
             marks=sheet.marks,
             tints=bool(sheet.drawings),
         )
@@ -257,7 +597,7 @@ def _document(
     return stream.getvalue(), first
 
 
-def _guide(
+def _make_guide(
     scene: Scene, sheet: Sheet, tiling: Tiling, settings: PrintSettings, losses: list[str]
 ) -> Guide:
     facts = BoardFacts(
@@ -279,8 +619,9 @@ def _guide(
     )
 
 
-def _draw_board(pen: Pen, sheet: Sheet, tile: Tile) -> None:
+def _draw_tile(pen: Pen, sheet: Sheet, tile: Tile) -> None:
     """The tile's part of the board, and the board's edge where it is on the page."""
+    cover_width = 2e-3  # Metres of white around the part that a page shows.
     canvas = pen.canvas
     canvas.saveState()
     canvas.translate(tile.p_PS[0] / POINT, tile.p_PS[1] / POINT)
@@ -288,16 +629,16 @@ def _draw_board(pen: Pen, sheet: Sheet, tile: Tile) -> None:
     # the white frames of markers into hairs.
     lower, upper = np.array(tile.lower), np.array(tile.upper)
     canvas.saveState()
-    pen.clip([rectangle(lower - COVER / 2, upper + COVER / 2)])
-    canvas.doForm(FORM)
-    draw_edge(pen, tile, sheet.size)
+    pen.clip([rectangle(lower - cover_width / 2, upper + cover_width / 2)])
+    canvas.doForm("board")
+    draw_board_edge(pen, tile, sheet.size)
     draw_origin(pen, tile, float(sheet.layout.p_SQ[:, :, :2].reshape(-1, 2).min(axis=0).max()))
     canvas.restoreState()
-    pen.area([rectangle(lower - COVER, upper + COVER), rectangle(lower, upper)], WHITE)
+    pen.area([rectangle(lower - cover_width, upper + cover_width), rectangle(lower, upper)], WHITE)
     canvas.restoreState()
 
 
-def _caption(scene: Scene, settings: PrintSettings, pages: int, flap: float) -> Caption:
+def _make_caption(scene: Scene, settings: PrintSettings, pages: int, flap: float) -> Caption:
     layout, size = scene.board.layout, scene.board.size
     edge = layout.p_SQ[:, :, :2].reshape(-1, 2).min(axis=0)
     how = "Print at 100 %, not fitted to the page: both rulers must measure 100 mm."

@@ -1,65 +1,357 @@
-"""Draws a board: tints and outlines of its objects, markers, names, alignment marks.
-
-All in the scene frame, so that pages that show parts of it fit together when they are assembled.
-Markers come last, each in a white frame: tints stay below their black cells, and clear of the edges
-that detectors look for.
-"""
+"""The sheet as PDF: objects, markers, names, alignment marks, edge and origin of the board."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
+from reportlab.pdfbase.pdfmetrics import stringWidth
+from reportlab.pdfgen.canvas import FILL_EVEN_ODD, FILL_NON_ZERO, Canvas
 
-from burg_drake.core import Array
-from burg_drake.core.terminal import Rgb
-from burg_drake.printout.board_edge import ORIGIN
-from burg_drake.printout.drawings import Arrow, Drawing
-from burg_drake.printout.labels import STEP, FreeSpace
-from burg_drake.printout.outlines import cell_outlines
-from burg_drake.printout.pen import (
-    BLACK,
-    BOLD,
-    FAINT,
-    POINT,
-    WHITE,
-    Pen,
-    rectangle,
-    text_width,
+from burg_drake.core import Array, Rgb
+from burg_drake.printout.object_drawings import (
+    ObjectDrawing,
+    OutOfBoundsArrow,
+    SheetGrid,
+    SheetLayer,
+    cell_outlines,
 )
-from burg_drake.printout.tiling import BLEED, Tiling
-from burg_drake.scene.document import MarkerLayout
+from burg_drake.printout.page_tiling import BLEED, Tile, Tiling
+from burg_drake.scene import MarkerLayout
 
-FRAME = 3e-3
-"""Width of a marker's white frame [m], where the gap between markers is wide enough."""
-FRAME_SHARE = 0.2
-"""Most of a gap that one frame takes, so that objects are seen between markers."""
-SEAM = 0.8e-3
-"""Width of the white lines between the frames of neighbours [m]. Without them a detector took the
-outer edge of a frame of 2 mm, with tint all around, for the edge of the marker."""
+POINT = 0.0254 / 72
+"""Metres per point, the unit of PDF."""
+BLACK: Rgb = (0.0, 0.0, 0.0)
+INK: Rgb = (0.16, 0.18, 0.22)
+"""Colour of text and rulers."""
+FAINT: Rgb = (0.52, 0.55, 0.60)
+"""Colour of inconspicuous lines."""
+WHITE: Rgb = (1.0, 1.0, 1.0)
+REGULAR_FONT, BOLD_FONT = "Helvetica", "Helvetica-Bold"
+
+
+def to_printable(text: str) -> str:
+    """A text in the characters that a PDF's built-in fonts have; `?` for others."""
+    return text.encode("cp1252", "replace").decode("cp1252")
+
+
+def text_width(text: str, size: float, font: str = REGULAR_FONT) -> float:
+    """Length of a line of text [m]; `size` in points."""
+    return float(stringWidth(to_printable(text), font, size) * POINT)
+
+
+class Pen:
+    """Draws on a canvas in metres; widths of lines too, sizes of text in points."""
+
+    def __init__(self, canvas: Canvas) -> None:
+        self.canvas = canvas
+
+    def line(
+        self,
+        *points: tuple[float, float],
+        width: float = 0.15e-3,
+        color: Rgb = INK,
+        dash: float = 0.0,
+    ) -> None:
+        """Draws a line through points."""
+        self._stroke(width, color, dash)
+        self.canvas.drawPath(self._path([np.array(points)], closed=False), stroke=1, fill=0)
+
+    def outline(
+        self, polygons: Sequence[Array], width: float, color: Rgb, dash: float = 0.0
+    ) -> None:
+        """Draws around areas."""
+        if polygons:
+            self._stroke(width, color, dash)
+            self.canvas.drawPath(self._path(polygons), stroke=1, fill=0)
+
+    def area(self, polygons: Sequence[Array], color: Rgb, *, holes: bool = True) -> None:
+        """Fills areas, all as one shape.
+
+        Args:
+            polygons: (N, 2) each [m].
+            color: of the area.
+            holes: polygons inside others are holes; else it is those that run the other way round.
+        """
+        if polygons:
+            self.canvas.setFillColorRGB(*color)
+            rule = FILL_EVEN_ODD if holes else FILL_NON_ZERO
+            self.canvas.drawPath(self._path(polygons), stroke=0, fill=1, fillMode=rule)
+
+    def clip(self, polygons: Sequence[Array]) -> None:
+        """Draws only inside of areas until the canvas' state is restored."""
+        path = self._path(polygons)
+        self.canvas.clipPath(path, stroke=0, fill=0, fillMode=FILL_EVEN_ODD)
+
+    def circle(self, x: float, y: float, radius: float, color: Rgb, width: float) -> None:
+        """Draws a circle."""
+        self._stroke(width, color)
+        self.canvas.circle(x / POINT, y / POINT, radius / POINT, stroke=1, fill=0)
+
+    def text(
+        self,
+        x: float,
+        y: float,
+        text: str,
+        size: float,
+        *,
+        font: str = REGULAR_FONT,
+        color: Rgb = INK,
+        align: float = 0.0,
+        turned: bool = False,
+    ) -> None:
+        """Writes a line.
+
+        Args:
+            x, y: where its baseline begins [m]; with `align` 0.5 its middle, with 1 its end.
+            text: the line.
+            size: [points].
+            font: of a PDF's built-in ones.
+            color: of the text.
+            align: share of its length before x.
+            turned: reads upwards.
+        """
+        canvas = self.canvas
+        canvas.saveState()
+        canvas.translate(x / POINT, y / POINT)
+        if turned:
+            canvas.rotate(90)
+        canvas.setFillColorRGB(*color)
+        canvas.setFont(font, size)
+        shown = text if font == "ZapfDingbats" else to_printable(text)
+        canvas.drawString(-align * stringWidth(shown, font, size), 0.0, shown)
+        canvas.restoreState()
+
+    def _stroke(self, width: float, color: Rgb, dash: float = 0.0) -> None:
+        self.canvas.setStrokeColorRGB(*color)
+        self.canvas.setLineWidth(width / POINT)
+        self.canvas.setLineJoin(1)
+        self.canvas.setDash([dash / POINT, dash / POINT] if dash else [])
+
+    def _path(self, polygons: Iterable[Array], *, closed: bool = True) -> Any:
+        path = self.canvas.beginPath()
+        for polygon in polygons:
+            points = (np.asarray(polygon, dtype=float) / POINT).tolist()
+            path.moveTo(*points[0])
+            for point in points[1:]:
+                path.lineTo(*point)
+            if closed:
+                path.close()
+        return path
+
+
+def rectangle(lower: Sequence[float] | Array, upper: Sequence[float] | Array) -> Array:
+    """(4, 2) corners, counter-clockwise from the lower left."""
+    (x0, y0), (x1, y1) = lower, upper
+    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+
+
+EDGE_LABEL_SIZE = 6.5  # Points.
+EDGE_LABEL_HEIGHT = 0.72 * EDGE_LABEL_SIZE * POINT
+"""Metres, of a capital letter."""
+EDGE_LABEL_OFFSET = 1.0e-3
+"""Metres between the label and the edge."""
+ORIGIN_CORNER_SIZE = 14e-3
+"""Metres, side of the corner with the axes and label of the origin."""
+
+
+def draw_board_edge(pen: Pen, tile: Tile, size: tuple[float, float]) -> None:
+    """Draws the board's edge as far as it is on a page, and says what it is.
+
+    Args:
+        pen: draws in the scene frame.
+        tile: of the page.
+        size: extents of the board [m].
+    """
+    label = "edge of the board"  # Text along the edge.
+    # Metres needed outside the edge; otherwise the label is inside.
+    label_room = EDGE_LABEL_OFFSET + EDGE_LABEL_HEIGHT + 1.0e-3
+    pen.outline([rectangle((0.0, 0.0), size)], 0.2e-3, FAINT)
+    for axis in (0, 1):  # that runs across the edge
+        along = 1 - axis
+        start = max(tile.lower[along], 0.0) + ORIGIN_CORNER_SIZE + 4e-3
+        end = min(tile.upper[along], size[along])
+        if end - start < text_width(label, EDGE_LABEL_SIZE):
+            continue
+        for edge, outward, room in (
+            (0.0, -1.0, -tile.lower[axis]),
+            (size[axis], 1.0, tile.upper[axis] - size[axis]),
+        ):
+            if not tile.lower[axis] + 1e-3 < edge < tile.upper[axis] - 1e-3:
+                continue
+            side = outward if room >= label_room else -outward
+            # a baseline is below its letters; of words that read upwards it is on their right
+            above = 1.0 if axis == 1 else -1.0
+            base = edge + side * (
+                EDGE_LABEL_OFFSET if side == above else EDGE_LABEL_OFFSET + EDGE_LABEL_HEIGHT
+            )
+            at = (base, start) if axis == 0 else (start, base)
+            pen.text(*at, label, EDGE_LABEL_SIZE, turned=axis == 0)
+
+
+def draw_origin(pen: Pen, tile: Tile, clear: float) -> bool:
+    """Draws the scene frame's axes in the board's corner if that is on a page.
+
+    Args:
+        pen: draws in the scene frame.
+        tile: of the page.
+        clear: distance of the markers from the corner, along x or y, whichever is more [m].
+
+    Returns:
+        Whether it was drawn: the corner may be in the margin, or too close to a marker.
+    """
+    axis_length = 10e-3  # Metres.
+    if max(tile.lower) > 0.0 or min(tile.upper) < ORIGIN_CORNER_SIZE or clear < ORIGIN_CORNER_SIZE:
+        return False
+    for axis in (0, 1):
+        along = np.eye(2)[axis]
+        across = np.eye(2)[1 - axis]
+        tip, neck = axis_length * along, (axis_length - 2.5e-3) * along
+        pen.line((0.0, 0.0), (float(neck[0]), float(neck[1])), width=0.4e-3)
+        pen.area([np.array([tip, neck + 0.9e-3 * across, neck - 0.9e-3 * across])], INK)
+    pen.text(axis_length + 0.8e-3, 0.6e-3, "x", 8)
+    pen.text(0.8e-3, axis_length + 0.6e-3, "y", 8)
+    pen.text(1.5e-3, 1.7e-3, "origin", EDGE_LABEL_SIZE)
+    return True
+
+
+LABEL_CELL_SIZE = 0.5e-3
+"""Metres, side of a cell of the map of occupied areas."""
+
+
+class FreeSpace:
+    """The sheet, and what of it is taken.
+
+    Attributes:
+        grid: cells of the sheet.
+        taken: (H, W) cells with something on them.
+    """
+
+    def __init__(self, size: tuple[float, float]) -> None:
+        """A bare sheet.
+
+        Args:
+            size: its extents [m].
+        """
+        self.grid = SheetGrid(size, LABEL_CELL_SIZE)
+        self.taken: NDArray[np.bool_] = np.zeros(self.grid.shape, dtype=bool)
+
+    def take(self, lower: Iterable[float], upper: Iterable[float], clear: float = 0.0) -> None:
+        """Takes a rectangle, given by its corners, and `clear` around it [m]."""
+        rows, columns = self._cells(np.array([*lower]) - clear, np.array([*upper]) + clear)
+        self.taken[rows, columns] = True
+
+    def take_beyond(self, lower: Iterable[float], upper: Iterable[float]) -> None:
+        """Takes all but a rectangle."""
+        self.taken |= ~self.within(lower, upper)
+
+    def take_layer(self, layer: SheetLayer, clear: float) -> NDArray[np.bool_]:
+        """Takes what an instance covers and `clear` around it [m].
+
+        Returns:
+            (H, W) the cells that it covers.
+        """
+        points = layer.points()
+        covered = np.zeros_like(self.taken)
+        cells = np.rint(self.grid.pixels(points)).astype(int)
+        columns, rows = np.clip(cells, 0, np.array(covered.shape[::-1]) - 1).T
+        covered[rows, columns] = True
+        reach = 2 * round(clear / LABEL_CELL_SIZE) + 1
+        disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
+        self.taken |= cv2.dilate(covered.astype(np.uint8), disc) > 0
+        return covered
+
+    def cell(self, point: Iterable[float]) -> NDArray[np.bool_]:
+        """(H, W) only the cell at a point."""
+        at = np.zeros_like(self.taken)
+        column, row = np.rint(self.grid.pixels(np.array([*point]))).astype(int)
+        at[row, column] = True
+        return at
+
+    def within(self, lower: Iterable[float], upper: Iterable[float]) -> NDArray[np.bool_]:
+        """(H, W) the cells that a rectangle touches."""
+        inside = np.zeros_like(self.taken)
+        rows, columns = self._cells(np.array([*lower]), np.array([*upper]))
+        inside[rows, columns] = True
+        return inside
+
+    def place(
+        self,
+        extent: tuple[float, float],
+        beside: NDArray[np.bool_],
+        within: NDArray[np.bool_] | None = None,
+    ) -> Array | None:
+        """Places a box on free cells as close to something as possible, and takes its place.
+
+        Args:
+            extent: of the box along x and y [m].
+            beside: (H, W) cells of what it is to stand close to; not empty.
+            within: (H, W) cells that it may stand on; all if None.
+
+        Returns:
+            (2,) its lower left corner [m]; None if there is no room within `REACH`.
+        """
+        max_distance = 0.05  # Metres between a label and its object.
+        columns, rows = (max(1, int(np.ceil(e / LABEL_CELL_SIZE))) for e in extent)
+        window = _mask_window(beside, max(rows, columns) + round(max_distance / LABEL_CELL_SIZE))
+        taken, beside = self.taken[window], beside[window]
+        blocked = taken if within is None else taken | ~within[window]
+        if rows > taken.shape[0] or columns > taken.shape[1]:
+            return None
+        sums = cv2.integral(blocked.astype(np.uint8))
+        inside = sums[rows:, columns:] - sums[:-rows, columns:]
+        inside += sums[:-rows, :-columns] - sums[rows:, :-columns]
+        # Close by: the box's nearest cell, and among those alike its middle.
+        away = cv2.distanceTransform((~beside).astype(np.uint8), cv2.DIST_L2, 5)
+        near = cv2.erode(away, np.ones((rows, columns), np.uint8), anchor=(0, 0))
+        near = near[: inside.shape[0], : inside.shape[1]]
+        centre = np.argwhere(beside).mean(axis=0)
+        r, c = np.indices(inside.shape)
+        middle = np.hypot(r + rows / 2 - centre[0], c + columns / 2 - centre[1])
+        cost = np.where(inside == 0, near + 0.2 * middle, np.inf)
+        row, column = np.unravel_index(np.argmin(cost), cost.shape)
+        if not np.isfinite(cost[row, column]):
+            return None
+        taken[row : row + rows, column : column + columns] = True
+        corner = [window[1].start + column - 0.5, window[0].start + row + rows - 0.5]
+        return self.grid.points(np.array(corner))
+
+    def _cells(self, lower: Array, upper: Array) -> tuple[slice, slice]:
+        """Rows and columns that a rectangle touches."""
+        (height, width), y = self.taken.shape, self.grid.size[1]
+        left, right = np.floor(lower[0] / LABEL_CELL_SIZE), np.ceil(upper[0] / LABEL_CELL_SIZE)
+        top, bottom = (
+            np.floor((y - upper[1]) / LABEL_CELL_SIZE),
+            np.ceil((y - lower[1]) / LABEL_CELL_SIZE),
+        )
+        rows = slice(*np.clip([top, bottom], 0, height).astype(int).tolist())
+        return rows, slice(*np.clip([left, right], 0, width).astype(int).tolist())
+
+
+def _mask_window(mask: NDArray[np.bool_], reach: int) -> tuple[slice, slice]:
+    """Rows and columns of a mask's cells, and so many more on all sides."""
+    rows, columns = (np.flatnonzero(mask.any(axis=1 - axis)) for axis in (0, 1))
+    return (
+        slice(max(rows[0] - reach, 0), rows[-1] + reach + 1),
+        slice(max(columns[0] - reach, 0), columns[-1] + reach + 1),
+    )
+
+
 NAME_SIZE = 8.5
-"""Of names of objects [points]."""
-NAME_CLEAR = 1e-3
-"""Least distance of a name from objects [m]; from markers it is at least the width of a frame."""
-LEAST_PART = 0.5e-4
-"""Of an object on another page that has its name, too [m^2]."""
-OUTLINE_WIDTH, FOOTPRINT_WIDTH = 0.2e-3, 0.4e-3
-RAISED_DASH = 0.8e-3
-"""Of outlines of what lies above other objects [m]."""
-EDGE_CLEAR = 1.0e-3
-"""Distance of the objects' lines from the edges of markers [m], where gaps and cells are wide
-enough."""
-HATCHING = 3e-3
-"""Distance between the white lines over fixed objects [m]."""
-ALARM: Rgb = (0.80, 0.10, 0.10)
-"""Of what is out of bounds."""
-MARK_RADIUS = 2e-3
-"""Of alignment marks [m]."""
+"""Points."""
+OUT_OF_BOUNDS_COLOR: Rgb = (0.80, 0.10, 0.10)
+"""Colour of arrows and names of objects out of bounds."""
+ALIGNMENT_MARK_RADIUS = 2e-3
+"""Metres."""
 
 
 @dataclass(frozen=True)
-class Name:
+class ObjectName:
     """Words on the board.
 
     Attributes:
@@ -88,10 +380,10 @@ class Sheet:
 
     size: tuple[float, float]
     layout: MarkerLayout
-    drawings: list[Drawing]
-    arrows: list[Arrow]
+    drawings: list[ObjectDrawing]
+    arrows: list[OutOfBoundsArrow]
     marks: Array
-    names: tuple[Name, ...] = ()
+    names: tuple[ObjectName, ...] = ()
 
 
 def alignment_marks(layout: MarkerLayout, tiling: Tiling) -> Array:
@@ -117,46 +409,50 @@ def place_names(sheet: Sheet, tiling: Tiling) -> tuple[Sheet, list[str]]:
     Returns:
         The sheet with names, and those words for which there was no room, quoted, with the page.
     """
+    name_clearance = 1e-3  # Metres between a name and objects.
+    min_area = 0.5e-4  # Square metres of an object on a page that repeats its name.
     space, masks = FreeSpace(sheet.size), {}
     first, last = tiling.tiles[0], tiling.tiles[-1]
     on_paper = (first.lower[0], last.lower[1]), (last.upper[0], first.upper[1])
-    inner = np.array([[0.0, 0.0], sheet.size]) + 2 * NAME_CLEAR * np.array([[1.0], [-1.0]])
+    inner = np.array([[0.0, 0.0], sheet.size]) + 2 * name_clearance * np.array([[1.0], [-1.0]])
     space.take_beyond(np.maximum(on_paper[0], inner[0]), np.minimum(on_paper[1], inner[1]))
-    space.take((0.0, 0.0), (ORIGIN, ORIGIN))
-    clear = max(NAME_CLEAR, frame_width(sheet.layout))
+    space.take((0.0, 0.0), (ORIGIN_CORNER_SIZE, ORIGIN_CORNER_SIZE))
+    clear = max(name_clearance, frame_width(sheet.layout))
     for corners in sheet.layout.p_SQ[:, :, :2]:
         space.take(corners.min(axis=0), corners.max(axis=0), clear)
     for x in tiling.x_cuts:
-        space.take((x - BLEED, 0.0), (x + tiling.flap, sheet.size[1]), NAME_CLEAR)
+        space.take((x - BLEED, 0.0), (x + tiling.flap, sheet.size[1]), name_clearance)
     for y in tiling.y_cuts:
-        space.take((0.0, y - tiling.flap), (sheet.size[0], y + BLEED), NAME_CLEAR)
+        space.take((0.0, y - tiling.flap), (sheet.size[0], y + BLEED), name_clearance)
     for mark in sheet.marks:
-        space.take(mark, mark, MARK_RADIUS + NAME_CLEAR)
+        space.take(mark, mark, ALIGNMENT_MARK_RADIUS + name_clearance)
     for drawing in sheet.drawings:
-        masks[drawing.name] = space.take_layer(drawing.layer, NAME_CLEAR)
+        masks[drawing.name] = space.take_layer(drawing.layer, name_clearance)
     beyond = {arrow.name for arrow in sheet.arrows}
     wanted = [
         (d.words, d.footprint_color, masks[d.name]) for d in sheet.drawings if d.name not in beyond
     ]
     for arrow in sheet.arrows:
         box = np.sort(np.array([arrow.start, arrow.tip]), axis=0)
-        space.take(box[0], box[1], 2 * NAME_CLEAR)
-        wanted.append((arrow.words, ALARM, masks.get(arrow.name, space.cell(arrow.start))))
-    names: list[Name] = []
+        space.take(box[0], box[1], 2 * name_clearance)
+        wanted.append(
+            (arrow.words, OUT_OF_BOUNDS_COLOR, masks.get(arrow.name, space.cell(arrow.start)))
+        )
+    names: list[ObjectName] = []
     homeless: list[str] = []
     for words, color, beside in wanted:
-        extent = text_width(words, NAME_SIZE, BOLD) + 2 * NAME_CLEAR, NAME_SIZE * POINT
+        extent = text_width(words, NAME_SIZE, BOLD_FONT) + 2 * name_clearance, NAME_SIZE * POINT
         corner = space.place(extent, beside)
         if corner is None:
             homeless.append(repr(words))
             continue
         # a line's letters reach a fifth of its height below the baseline
-        shift = np.array([NAME_CLEAR, 0.22 * extent[1]])
+        shift = np.array([name_clearance, 0.22 * extent[1]])
         corners = [corner]
         for tile in tiling.tiles if len(tiling.tiles) > 1 else ():
             page = space.within(*tile.core)
             part = beside & page
-            if part.sum() * STEP**2 < LEAST_PART or page[_cell_at(space, corner)]:
+            if part.sum() * LABEL_CELL_SIZE**2 < min_area or page[_grid_cell(space, corner)]:
                 continue
             again = space.place(extent, part, page)
             if again is None:
@@ -165,13 +461,13 @@ def place_names(sheet: Sheet, tiling: Tiling) -> tuple[Sheet, list[str]]:
                 corners.append(again)
         for at in corners:
             x, y = (at + shift).tolist()
-            names.append(Name(words, (x, y), color))
+            names.append(ObjectName(words, (x, y), color))
     return dataclasses.replace(sheet, names=tuple(names)), homeless
 
 
-def _cell_at(space: FreeSpace, point: Array) -> tuple[int, int]:
+def _grid_cell(space: FreeSpace, point: Array) -> tuple[int, int]:
     """Row and column of the cell at a point."""
-    column, row = np.rint(space.grid.pixels(point + STEP)).astype(int)
+    column, row = np.rint(space.grid.pixels(point + LABEL_CELL_SIZE)).astype(int)
     return int(row), int(column)
 
 
@@ -184,15 +480,16 @@ def draw_sheet(pen: Pen, sheet: Sheet) -> None:
     _draw_markers(pen, sheet.layout)
     _draw_outlines(pen, sheet)
     for x, y in sheet.marks.tolist():
-        pen.circle(x, y, MARK_RADIUS, FAINT, 0.12e-3)
-        reach = 1.6 * MARK_RADIUS
+        pen.circle(x, y, ALIGNMENT_MARK_RADIUS, FAINT, 0.12e-3)
+        reach = 1.6 * ALIGNMENT_MARK_RADIUS
         pen.line((x - reach, y), (x + reach, y), width=0.12e-3, color=FAINT)
         pen.line((x, y - reach), (x, y + reach), width=0.12e-3, color=FAINT)
     for name in sheet.names:
-        pen.text(*name.position, name.words, NAME_SIZE, font=BOLD, color=name.color)
+        pen.text(*name.position, name.words, NAME_SIZE, font=BOLD_FONT, color=name.color)
 
 
-def _draw_tints(pen: Pen, drawing: Drawing) -> None:
+def _draw_tints(pen: Pen, drawing: ObjectDrawing) -> None:
+    hatch_spacing = 3e-3  # Metres between the white lines over fixed objects.
     for color, area in drawing.bands:
         pen.area(area, color)
     if drawing.fixed and drawing.outline:
@@ -201,18 +498,18 @@ def _draw_tints(pen: Pen, drawing: Drawing) -> None:
         high = upper[1] - lower[1]
         pen.canvas.saveState()
         pen.clip(drawing.outline)
-        for x in np.arange(lower[0] - high, upper[0], HATCHING).tolist():
+        for x in np.arange(lower[0] - high, upper[0], hatch_spacing).tolist():
             pen.line((x, lower[1]), (x + high, upper[1]), width=0.6e-3, color=WHITE)
         pen.canvas.restoreState()
 
 
-def _draw_arrow(pen: Pen, arrow: Arrow) -> None:
+def _draw_arrow(pen: Pen, arrow: OutOfBoundsArrow) -> None:
     start, tip = np.array(arrow.start), np.array(arrow.tip)
     along = (tip - start) / np.linalg.norm(tip - start)
     across = np.array([-along[1], along[0]])
     neck = tip - 4e-3 * along
-    pen.line(arrow.start, (neck[0], neck[1]), width=0.8e-3, color=ALARM)
-    pen.area([np.array([tip, neck + 2e-3 * across, neck - 2e-3 * across])], ALARM)
+    pen.line(arrow.start, (neck[0], neck[1]), width=0.8e-3, color=OUT_OF_BOUNDS_COLOR)
+    pen.area([np.array([tip, neck + 2e-3 * across, neck - 2e-3 * across])], OUT_OF_BOUNDS_COLOR)
 
 
 def _draw_markers(pen: Pen, layout: MarkerLayout) -> None:
@@ -221,7 +518,8 @@ def _draw_markers(pen: Pen, layout: MarkerLayout) -> None:
     White lines lead from the corners of a frame outwards: a tint all around it would else have a
     square edge, which a detector can take for that of the marker.
     """
-    gap, frame = _gap(layout), frame_width(layout)
+    seam_width = 0.8e-3  # Metres; without it detectors take the edge of a frame for a marker.
+    gap, frame = _marker_gap(layout), frame_width(layout)
     frames = []
     for corners in layout.p_SQ[:, :, :2]:
         lower, upper = corners.min(axis=0), corners.max(axis=0)
@@ -229,20 +527,24 @@ def _draw_markers(pen: Pen, layout: MarkerLayout) -> None:
         outer = rectangle(lower - 0.9 * frame, upper + 0.9 * frame)
         meeting = rectangle(lower - gap / 2, upper + gap / 2)
         for start, end in zip(outer.tolist(), meeting.tolist(), strict=True):
-            pen.line(start, end, width=SEAM, color=WHITE)
+            pen.line(start, end, width=seam_width, color=WHITE)
     pen.area(frames, WHITE)
-    pen.area(_black_cells(layout), BLACK, holes=False)
+    pen.area(_black_cell_outlines(layout), BLACK, holes=False)
 
 
 def _draw_outlines(pen: Pen, sheet: Sheet) -> None:
     """The objects' lines across everything, dark on white and light on black cells, but along the
     edges of markers, which detectors follow all around."""
+    outline_width = 0.2e-3  # Metres.
+    footprint_width = 0.4e-3  # Metres.
+    raised_dash = 0.8e-3  # Metres, for outlines above other objects.
+    edge_clearance = 1.0e-3  # Metres between objects' lines and the edges of markers.
     layout = sheet.layout
     corners = layout.p_SQ[:, :, :2]
     lower, upper = corners.min(axis=1), corners.max(axis=1)
     board = rectangle((0.0, 0.0), sheet.size)
-    cells = _black_cells(layout)
-    clear = min(EDGE_CLEAR, 0.4 * _gap(layout), 0.5 * layout.side / layout.cells)
+    cells = _black_cell_outlines(layout)
+    clear = min(edge_clearance, 0.4 * _marker_gap(layout), 0.5 * layout.side / layout.cells)
     outer = [rectangle(*c) for c in zip(lower - clear, upper + clear, strict=True)]
     inner = [rectangle(*c) for c in zip(lower + clear, upper - clear, strict=True)]
     for on_black in (False, True):
@@ -251,14 +553,14 @@ def _draw_outlines(pen: Pen, sheet: Sheet) -> None:
         pen.clip(cells if on_black else [board, *cells])
         for d in sheet.drawings:
             color = d.on_black if on_black else d.outline_color
-            pen.outline(d.outline, OUTLINE_WIDTH, color, d.dash)
+            pen.outline(d.outline, outline_width, color, d.dash)
             dark = d.on_black if on_black else d.footprint_color
-            pen.outline(d.raised, OUTLINE_WIDTH, dark, RAISED_DASH)
-            pen.outline(d.footprint, FOOTPRINT_WIDTH, dark)
+            pen.outline(d.raised, outline_width, dark, raised_dash)
+            pen.outline(d.footprint, footprint_width, dark)
         pen.canvas.restoreState()
 
 
-def _black_cells(layout: MarkerLayout) -> list[Array]:
+def _black_cell_outlines(layout: MarkerLayout) -> list[Array]:
     """Outlines of the black cells of all markers (N, 2) [m]; holes run the other way round."""
     flip = np.array([1.0, -1.0]) * layout.side / layout.cells
     return [
@@ -270,10 +572,12 @@ def _black_cells(layout: MarkerLayout) -> list[Array]:
 
 def frame_width(layout: MarkerLayout) -> float:
     """Width of the white frames around the markers, which tints keep clear of [m]."""
-    return min(FRAME, FRAME_SHARE * _gap(layout))
+    max_frame = 3e-3  # Metres, where the gap between markers is wide enough.
+    max_gap_share = 0.2  # Share of a gap for one frame, so that objects remain visible.
+    return min(max_frame, max_gap_share * _marker_gap(layout))
 
 
-def _gap(layout: MarkerLayout) -> float:
+def _marker_gap(layout: MarkerLayout) -> float:
     """Least distance between neighbouring markers [m]."""
     starts = [np.unique(np.round(layout.p_SQ[:, 0, axis], 9)) for axis in (0, 1)]
     pitches = [float(np.diff(s).min()) for s in starts if len(s) > 1]

@@ -1,14 +1,31 @@
-from .board_node import BoardNode as BoardNode
+from .board_node import BoardNode as BoardNode, Sighting as Sighting
+from .camera_messages import (
+    IMAGE_ENCODINGS as IMAGE_ENCODINGS,
+    decode_image_message as decode_image_message,
+    intrinsics_from_camera_info as intrinsics_from_camera_info,
+    jpeg_bytes as jpeg_bytes,
+)
 from .distribution import (
-    CLIENTS as CLIENTS,
+    CLIENT_LIBRARIES as CLIENT_LIBRARIES,
     ROS_1_HINT as ROS_1_HINT,
     ROS_2_HINT as ROS_2_HINT,
     SYSTEM_PACKAGES as SYSTEM_PACKAGES,
-    choose as choose,
-    connect as connect,
+    choose_distribution as choose_distribution,
+    start_ros_node as start_ros_node,
 )
-from .link import (
-    Names as Names,
-    Parent as Parent,
+from .loop import (
+    StatusLog as StatusLog,
+    StatusLogIntervals as StatusLogIntervals,
+    run_node as run_node,
 )
-from .loop import serve as serve
+from .ros_node import (
+    MessageClasses as MessageClasses,
+    NodeNames as NodeNames,
+    ParentFrame as ParentFrame,
+    Publications as Publications,
+    camera_pose_message as camera_pose_message,
+    compressed_message as compressed_message,
+    image_message as image_message,
+    status_message as status_message,
+    transform_message as transform_message,
+)

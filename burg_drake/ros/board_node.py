@@ -1,4 +1,4 @@
-"""Images and camera_info in, what is known about the board out; no ROS is needed for it."""
+"""Locate the board in images and draw the overlay. Needs no ROS."""
 
 from __future__ import annotations
 
@@ -8,13 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras.optics import Intrinsics
-from burg_drake.cameras.overlay import Overlay, notice
-from burg_drake.cameras.pose import BoardEstimate, BoardPose
+from burg_drake.cameras import BoardEstimate, BoardPose, Intrinsics, Overlay, draw_notice
 from burg_drake.core import InvalidInputError
-from burg_drake.ros.camera_info import intrinsics_of
-from burg_drake.ros.images import pixels
-from burg_drake.scene.document import Scene
+from burg_drake.ros.camera_messages import decode_image_message, intrinsics_from_camera_info
+from burg_drake.scene import Scene
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -88,7 +85,7 @@ class BoardNode:
         """
         rgb = intrinsics = None
         try:
-            rgb = pixels(image)
+            rgb = decode_image_message(image)
             intrinsics = self._intrinsics(camera_info, rgb)
             if self._board is None or self._board.intrinsics != intrinsics:
                 self._board = BoardPose(self._scene.board, intrinsics, self._print_scale)
@@ -110,7 +107,7 @@ class BoardNode:
         if image is None:
             return None
         if not sighting.estimate.valid or intrinsics is None:
-            return notice(image, sighting.estimate.reason)
+            return draw_notice(image, sighting.estimate.reason)
         if self._overlay is None or self._overlay.intrinsics != intrinsics:
             self._overlay = Overlay(self._scene, intrinsics)
         return self._overlay.draw(image, sighting.estimate.X_SC)
@@ -120,7 +117,7 @@ class BoardNode:
             found, source = self._given, "intrinsics are of"
         elif camera_info is not None:
             found, source = (
-                intrinsics_of(camera_info, rectified=self._rectified),
+                intrinsics_from_camera_info(camera_info, rectified=self._rectified),
                 "camera_info says",
             )
         else:

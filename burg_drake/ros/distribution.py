@@ -1,4 +1,4 @@
-"""Which ROS is here, and how to get one."""
+"""Choose between ROS 1 and ROS 2, and start the node."""
 
 from __future__ import annotations
 
@@ -12,14 +12,11 @@ from typing import TYPE_CHECKING
 from burg_drake.core import MissingDependencyError
 
 if TYPE_CHECKING:
-    from burg_drake.ros.link import Link, Names
+    from burg_drake.ros.ros_node import NodeNames, RosNode
 
-CLIENTS = {1: "rospy", 2: "rclpy"}
+CLIENT_LIBRARIES = {1: "rospy", 2: "rclpy"}  # Python client library of each version of ROS.
 SYSTEM_PACKAGES = Path("/usr/lib/python3/dist-packages")
-"""Where Debian and Ubuntu keep Python's packages, rospy among them; not seen from a virtual
-environment."""
-VERSION_VARIABLE = "ROS_VERSION"
-"""Set to 1 or 2 by the set-up scripts of a ROS installation."""
+"""Python packages of Debian and Ubuntu (rospy), which virtual environments do not see."""
 ROS_1_HINT = (
     "for ROS 1 source /opt/ros/noetic/setup.bash or, on Debian, run: sudo apt-get install"
     " python3-rospy python3-sensor-msgs python3-geometry-msgs python3-tf2-msgs"
@@ -31,7 +28,7 @@ ROS_2_HINT = (
 )
 
 
-def choose(wanted: int | None, environment: Mapping[str, str] = os.environ) -> int:
+def choose_distribution(wanted: int | None, environment: Mapping[str, str] = os.environ) -> int:
     """1 or 2: the ROS that is wanted, else the one whose set-up script was sourced, else the one
     whose client library can be imported.
 
@@ -45,42 +42,42 @@ def choose(wanted: int | None, environment: Mapping[str, str] = os.environ) -> i
     Raises:
         MissingDependencyError: it cannot be imported; says why, and what to install.
     """
-    version_variable = environment.get(VERSION_VARIABLE, "")
+    version_variable = environment.get("ROS_VERSION", "")
     order = (
         [wanted]
         if wanted
-        else sorted(CLIENTS, key=lambda version: str(version) != version_variable)
+        else sorted(CLIENT_LIBRARIES, key=lambda version: str(version) != version_variable)
     )
     failures = []
     for version in order:
-        failure = _import(CLIENTS[version])
+        failure = _try_import(CLIENT_LIBRARIES[version])
         if failure is None:
             return version
         failures.append(failure)
-    raise MissingDependencyError(f"{'; '.join(failures)}. {_advice(order)}")
+    raise MissingDependencyError(f"{'; '.join(failures)}. {_installation_hint(order)}")
 
 
-def connect(version: int, names: Names, *, with_camera_info: bool) -> Link:
-    """Starts the node; see `Ros1Link` and `Ros2Link` for what may go wrong.
+def start_ros_node(version: int, names: NodeNames, *, with_camera_info: bool) -> RosNode:
+    """Starts the node; see `Ros1Node` and `Ros2Node` for what may go wrong.
 
     Raises:
         MissingDependencyError: message packages are not installed.
     """
     try:
         if version == 1:
-            from burg_drake.ros.ros1 import Ros1Link
+            from burg_drake.ros.node_implementations import Ros1Node
 
-            return Ros1Link(names, with_camera_info=with_camera_info)
-        from burg_drake.ros.ros2 import Ros2Link
+            return Ros1Node(names, with_camera_info=with_camera_info)
+        from burg_drake.ros.node_implementations import Ros2Node
 
-        return Ros2Link(names, with_camera_info=with_camera_info)
+        return Ros2Node(names, with_camera_info=with_camera_info)
     except MissingDependencyError:
         raise
     except ImportError as error:
-        raise MissingDependencyError(f"{error}. {_advice([version])}") from error
+        raise MissingDependencyError(f"{error}. {_installation_hint([version])}") from error
 
 
-def _import(name: str) -> str | None:
+def _try_import(name: str) -> str | None:
     """Imports a module; what went wrong, or None."""
     try:
         importlib.import_module(name)
@@ -98,7 +95,7 @@ def _import(name: str) -> str | None:
         return str(error)
 
 
-def _advice(versions: Sequence[int]) -> str:
+def _installation_hint(versions: Sequence[int]) -> str:
     hints = {1: ROS_1_HINT, 2: ROS_2_HINT}
     text = "; ".join(hints[version] for version in versions)
     return text[0].upper() + text[1:]

@@ -1,4 +1,4 @@
-"""The node's loop: the latest image, what it says, and lines about how it goes."""
+"""The node's main loop: process the latest image, publish, and log the status."""
 
 from __future__ import annotations
 
@@ -6,17 +6,16 @@ import time
 from collections.abc import Mapping
 
 from burg_drake.ros.board_node import BoardNode, Sighting
-from burg_drake.ros.link import Link
+from burg_drake.ros.ros_node import RosNode
 
-PATIENCE = 0.5
-"""How long one look for an image may take [s]; Ctrl-C may wait for it."""
-HINT_AFTER = 5.0
-"""Without images for so long, a line says what may be the matter [s]."""
-REASON_AFTER, REASON_EVERY = 0.5, 5.0
-"""Why there is no pose is told once it has been so for this long, and at most so often [s]. While a
-camera changes its resolution, images and camera_info disagree for a moment."""
-RATE_EVERY = 30.0
-"""How often the rate is told [s]."""
+
+class StatusLogIntervals:
+    """Status log intervals."""
+
+    no_image = 5.0  # Seconds without images until a hint is logged.
+    no_pose = 0.5  # Seconds without a pose until the reason is logged.
+    repeat = 5.0  # Seconds between two logged reasons, at least.
+    rate = 30.0  # Seconds between two logged frame rates.
 
 
 class StatusLog:
@@ -32,7 +31,7 @@ class StatusLog:
         self._reason: str | None = None
         self._reason_since = now
         self._reported: str | None = None
-        self._reported_at = now - REASON_EVERY
+        self._reported_at = now - StatusLogIntervals.repeat
         self._since = now
         self._images = self._poses = 0
 
@@ -51,14 +50,17 @@ class StatusLog:
         if not reason:
             self._reported = reason
             return f"the board is in sight: {sighting.status}", False
-        if now - self._reason_since < REASON_AFTER or now - self._reported_at < REASON_EVERY:
+        if (
+            now - self._reason_since < StatusLogIntervals.no_pose
+            or now - self._reported_at < StatusLogIntervals.repeat
+        ):
             return None
         self._reported, self._reported_at = reason, now
         return sighting.status, True
 
     def record_silence(self, publishers: Mapping[str, int], now: float) -> str | None:
         """Without an image: a warning, once."""
-        if self._hinted or now - self._last_image < HINT_AFTER:
+        if self._hinted or now - self._last_image < StatusLogIntervals.no_image:
             return None
         self._hinted = True
         silent = [topic for topic, count in publishers.items() if not count]
@@ -73,7 +75,7 @@ class StatusLog:
         last one; and without images.
         """
         elapsed = now - self._since
-        if not self._images or elapsed <= 0.0 or not (last or elapsed >= RATE_EVERY):
+        if not self._images or elapsed <= 0.0 or not (last or elapsed >= StatusLogIntervals.rate):
             return None
         line = (
             f"{self._images / elapsed:.1f} images a second,"
@@ -83,21 +85,22 @@ class StatusLog:
         return line
 
 
-def serve(link: Link, node: BoardNode) -> None:
+def run_node(link: RosNode, node: BoardNode) -> None:
     """Answers every image until ROS or Ctrl-C ends it. While one is being worked at, newer ones
     replace each other: the latest is next."""
     account = StatusLog(time.monotonic())
     try:
-        _answer(link, node, account)
+        _process_next_image(link, node, account)
     finally:
         rate = account.rate(time.monotonic(), last=True)
         if rate:
             link.log(rate)
 
 
-def _answer(link: Link, node: BoardNode, account: StatusLog) -> None:
+def _process_next_image(link: RosNode, node: BoardNode, account: StatusLog) -> None:
+    image_timeout = 0.5  # Seconds to wait for an image; Ctrl-C may have to wait as long.
     while link.running():
-        image = link.next_image(PATIENCE)
+        image = link.next_image(image_timeout)
         if image is None:
             hint = account.record_silence(link.publishers(), time.monotonic())
             if hint:

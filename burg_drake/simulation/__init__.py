@@ -5,4 +5,39 @@ Read `trials` first; `settling` builds on `rest`, and `robustness` repeats trial
 
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, _, _ = lazy_loader.attach_stub(__name__, __file__)
+
+__all__ = [
+    "ArmLiftClearance",
+    "BodyContact",
+    "Carrier",
+    "ContactReader",
+    "Execution",
+    "FrictionSettings",
+    "Grip",
+    "GripLoad",
+    "HandLiftClearance",
+    "HandSegment",
+    "HoldForces",
+    "LiftPath",
+    "LoadSettings",
+    "Margins",
+    "MujocoTrial",
+    "MujocoWorld",
+    "Neighbours",
+    "Noise",
+    "PlacedRobot",
+    "SteppedWorld",
+    "SuccessRate",
+    "TrialWorld",
+    "friction_limit",
+    "hand_trial_of",
+    "shake",
+    "success_rate",
+    "take_grip",
+    "tug",
+]
+
+
+def __dir__() -> list[str]:
+    return __all__

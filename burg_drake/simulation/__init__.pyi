@@ -1,46 +1,98 @@
-from .confidence.grip_signs import GripLoad as GripLoad
-from .mujoco.mujoco_trial import MujocoTrial as MujocoTrial
-from .mujoco.mujoco_world import MujocoWorld as MujocoWorld
-from .mujoco.trial_of_engine import hand_trial_of as hand_trial_of
-from .rest.neighbours import Neighbours as Neighbours
-from .robustness.friction_search import (
-    friction_limit as friction_limit,
+from .arm_trial import ArmTrial as ArmTrial
+from .contacts import (
+    BodyContact as BodyContact,
+    ContactReader as ContactReader,
+    Neighbours as Neighbours,
+    RobotContactWatch as RobotContactWatch,
 )
-from .robustness.grip import (
+from .drift import (
+    StillnessLimits as StillnessLimits,
+    is_still as is_still,
+    predict_drift as predict_drift,
+    stillness as stillness,
+)
+from .grasp_trial import HandTrial as HandTrial
+from .grip_limits import (
+    SHAKE_AXES as SHAKE_AXES,
+    TUG_DIRECTIONS as TUG_DIRECTIONS,
     Grip as Grip,
-    take_grip as take_grip,
-)
-from .robustness.hold_force import (
     HoldForces as HoldForces,
+    friction_limit as friction_limit,
+    friction_to_carry as friction_to_carry,
+    largest_passing as largest_passing,
     shake as shake,
+    take_grip as take_grip,
     tug as tug,
 )
-from .robustness.perturbation import (
+from .hand_carrier import (
+    ArmLiftClearance as ArmLiftClearance,
+    HandLiftClearance as HandLiftClearance,
+    LiftPath as LiftPath,
+    PlacedRobot as PlacedRobot,
+)
+from .landing import (
+    BoardEdgeGuard as BoardEdgeGuard,
+    drop_onto_scene as drop_onto_scene,
+    placed_scene as placed_scene,
+    reduce_friction as reduce_friction,
+    reduce_friction_of as reduce_friction_of,
+)
+from .mujoco_trial import (
+    MujocoTrial as MujocoTrial,
+    check_objects as check_objects,
+    hand_trial_of as hand_trial_of,
+)
+from .mujoco_world import MujocoWorld as MujocoWorld, require_mujoco as require_mujoco
+from .object_motions import GripMotion as GripMotion, MotionTracker as MotionTracker
+from .perturbation import (
+    Perturbed as Perturbed,
     SuccessRate as SuccessRate,
+    perturb as perturb,
     success_rate as success_rate,
 )
-from .robustness.settings import (
+from .relaxation import (
+    RELAXING_ENGINE as RELAXING_ENGINE,
+    ROLLING_RESISTANCE as ROLLING_RESISTANCE,
+    relax as relax,
+    resist_rolling as resist_rolling,
+)
+from .rest_criterion import BodySpeed as BodySpeed, Displacement as Displacement, settle as settle
+from .settings import (
+    DEFAULT_TRIAL as DEFAULT_TRIAL,
+    NO_GRIP_LIMITS as NO_GRIP_LIMITS,
+    REFERENCE_LIFT_LENGTH as REFERENCE_LIFT_LENGTH,
+    SETTLING_ENGINE as SETTLING_ENGINE,
+    SETTLING_TIME as SETTLING_TIME,
     FrictionSettings as FrictionSettings,
     LoadSettings as LoadSettings,
     Noise as Noise,
+    TrialSettings as TrialSettings,
 )
-from .trials.carrier import (
+from .settled_scene import SettledScene as SettledScene, settle_scene as settle_scene
+from .stable_pose_drops import (
+    Confirmation as Confirmation,
+    DropSettings as DropSettings,
+    confirm_poses as confirm_poses,
+)
+from .trial_execution import (
     Carrier as Carrier,
-    HandSegment as HandSegment,
-)
-from .trials.contacts import (
-    BodyContact as BodyContact,
-    ContactReader as ContactReader,
-)
-from .trials.execution import (
     Execution as Execution,
+    HandSegment as HandSegment,
     SteppedWorld as SteppedWorld,
 )
-from .trials.lift_carrier import LiftPath as LiftPath
-from .trials.lift_clearance import (
-    ArmLiftClearance as ArmLiftClearance,
-    HandLiftClearance as HandLiftClearance,
-    PlacedRobot as PlacedRobot,
+from .trial_result import (
+    CALIBRATION_FILE as CALIBRATION_FILE,
+    MAX_LIMIT_DISTANCE as MAX_LIMIT_DISTANCE,
+    OUTCOMES_WITHOUT_VERDICT as OUTCOMES_WITHOUT_VERDICT,
+    PAD_FRICTION_LEVER as PAD_FRICTION_LEVER,
+    Curve as Curve,
+    Curves as Curves,
+    GripLoad as GripLoad,
+    Margins as Margins,
+    TrialResult as TrialResult,
+    calibration as calibration,
+    confidence as confidence,
+    confidence_from_signs as confidence_from_signs,
+    grip_signs as grip_signs,
 )
-from .trials.result import Margins as Margins
-from .trials.trial_world import TrialWorld as TrialWorld
+from .trial_world import TrialWorld as TrialWorld

@@ -1,8 +1,4 @@
-"""The setup page: composes a scene in the browser.
-
-It only puts together what the other files of this room show, and passes every view of the session
-on to all of them; whatever is decided is decided by the session.
-"""
+"""The setup page, on which a scene is composed in the browser."""
 
 from __future__ import annotations
 
@@ -11,42 +7,27 @@ from typing import Any, Protocol
 
 import viser
 
-from burg_drake.compose import ComposeSession
-from burg_drake.compose.editing import SessionView
-from burg_drake.objects.library import ObjectLibrary
-from burg_drake.ui.panels import (
-    ArrangePanel,
-    BackdropPanel,
-    BoardPanel,
-    CheckPanel,
-    DisplayPanel,
-    FilePanel,
-    FillPanel,
-    GraspPanel,
-    LibraryPanel,
-    ObjectPanel,
-    PosePanel,
-    ReachPanel,
-    SettlePanel,
-    SummaryPanel,
-)
-from burg_drake.ui.pointing import Gizmo, ObjectDrags, Picking, selection_calls
-from burg_drake.ui.view import (
-    BoardLayers,
-    BoardView,
-    GhostView,
+from burg_drake.compose import ComposeSession, SessionView
+from burg_drake.objects import ObjectLibrary
+from burg_drake.ui.background_pictures import ObjectPictures
+from burg_drake.ui.board_panels import BackdropPanel, BoardPanel, DisplayPanel
+from burg_drake.ui.board_view import BoardLayers, BoardView
+from burg_drake.ui.check_panels import CheckPanel, GraspPanel, ReachPanel, SettlePanel
+from burg_drake.ui.gizmo import Gizmo
+from burg_drake.ui.library_panels import FillPanel, LibraryPanel
+from burg_drake.ui.object_drags import ObjectDrags, Picking
+from burg_drake.ui.page_actions import PageActions
+from burg_drake.ui.scene_panels import FilePanel, SummaryPanel
+from burg_drake.ui.scene_view import (
     HeightView,
     ObjectMeshes,
-    ObjectPictures,
-    PageViews,
+    ProposalView,
     SceneView,
     ShownInstance,
 )
-from burg_drake.ui.widgets import ActionCall, KeysDialog, PageActions, register
-
-LEFT_WIDTH, RIGHT_WIDTH = 290, 330
-"""Of the panels [pixel]."""
-BRAND_COLOR = (34, 139, 230)
+from burg_drake.ui.selection_panels import ArrangePanel, ObjectPanel, PosePanel
+from burg_drake.ui.shortcuts import ActionCall, KeysDialog, register_shortcuts, selection_actions
+from burg_drake.ui.viewpoints import PageViews
 
 
 class _Panel(Protocol):
@@ -79,7 +60,7 @@ class SetupPage:
         self._drags = ObjectDrags(self.actions, self._gizmo)
         self._picking = Picking(server.scene, self.actions, self._drags)
         self._scene = SceneView(server.scene, self._shapes, self._attach)
-        self._ghosts = GhostView(server.scene)
+        self._ghosts = ProposalView(server.scene)
         self._heights = HeightView(server.scene)
         self._build()
         self.actions.on_refused = self._refresh
@@ -100,7 +81,10 @@ class SetupPage:
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
         gui.configure_theme(
-            show_share_button=False, show_logo=False, control_width="large", brand_color=BRAND_COLOR
+            show_share_button=False,
+            show_logo=False,
+            control_width="large",
+            brand_color=(34, 139, 230),
         )
         gui.set_panel_label("Setup")
         self._views = PageViews(self._server, lambda: self._session.view.document.board)
@@ -112,7 +96,7 @@ class SetupPage:
         with left.add_tab("Library", viser.Icon.PACKAGE):
             self._library = LibraryPanel(gui, actions)
         left.dock_left()
-        left.set_width(LEFT_WIDTH)
+        left.set_width(290)
         self._summary = SummaryPanel(gui, actions, self._keys)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Object", viser.Icon.CUBE):
@@ -132,7 +116,7 @@ class SetupPage:
             self._reach = ReachPanel(gui, actions, self._layers)
             self._backdrop = BackdropPanel(gui, actions, self._layers)
         gui.main_panel.dock_right()
-        gui.main_panel.set_width(RIGHT_WIDTH)
+        gui.main_panel.set_width(330)
         self._panels: tuple[_Panel, ...] = (
             self._summary,
             self._object,
@@ -146,7 +130,7 @@ class SetupPage:
             self._reach,
             self._backdrop,
         )
-        register(gui, actions, self._calls())
+        register_shortcuts(gui, actions, self._calls())
 
     def _calls(self) -> dict[str, ActionCall]:
         """What keys do; see `shortcuts`."""
@@ -154,7 +138,7 @@ class SetupPage:
         def anywhere(action: Callable[[], Any]) -> ActionCall:
             return lambda client: action()
 
-        calls = selection_calls(self._session)
+        calls = selection_actions(self._session)
         return {name: anywhere(action) for name, action in calls.items()} | {
             "none": self._release_drags,
             "save": self._files.save,
@@ -204,7 +188,7 @@ class SetupPage:
             self._scene.use(self._shapes)
         with self._server.atomic():
             self._board.show(view.document.board, markers=self._display.markers)
-            self._scene.show(_shown(view), self._display.coloring)
+            self._scene.show(_shown_instances(view), self._display.coloring)
             self._ghosts.show(view.proposal, self._shapes)
             self._heights.show(view)
             self._gizmo.show(view)
@@ -221,7 +205,7 @@ class SetupPage:
         self._views.drop(client.client_id)
 
 
-def _shown(view: SessionView) -> dict[str, ShownInstance]:
+def _shown_instances(view: SessionView) -> dict[str, ShownInstance]:
     fixed = {id(instance) for instance in view.document.background}
     return {
         name: ShownInstance(

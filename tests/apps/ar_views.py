@@ -7,10 +7,9 @@ from functools import cache
 
 import numpy as np
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.sources.frame import Frame, FrameSource
-from burg_drake.core.frames import make_pose
-from burg_drake.scene.document.scene import load_scene
+from burg_drake.cameras import Frame, FrameSource, Intrinsics
+from burg_drake.core import make_pose
+from burg_drake.scene import load_scene
 from tests.cameras.synthetic import board_image
 
 CAMERA = Intrinsics(width=320, height=240, focal=(300.0, 300.0), center=(159.5, 119.5))

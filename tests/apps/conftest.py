@@ -8,12 +8,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core.frames import grasp_from_axes, make_pose
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.station.document.engine import Engine
+from burg_drake.core import GraspSet, grasp_from_axes, make_pose
+from burg_drake.evaluation import EvaluationSettings, Run, evaluate
+from burg_drake.station import Engine
 
 SCENE = """\
 version: 1

@@ -12,20 +12,20 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.apps.ar import verb
-from burg_drake.apps.cli import main
-from burg_drake.apps.options.arguments import Parser
-from burg_drake.apps.terminal.interrupts import terminated_as_interrupted
-from burg_drake.cameras.live.actions import ViewActions
-from burg_drake.cameras.live.event_log import EventLog
-from burg_drake.cameras.live.frame_processing import FrameProcessor
-from burg_drake.cameras.live.recording_table import read_poses
-from burg_drake.cameras.live.session import LiveSession
-from burg_drake.cameras.live.snapshot import load_snapshot
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.optics.intrinsics_file import save_intrinsics
-from burg_drake.cameras.sources.opencv_log import quiet
-from burg_drake.scene.document.scene import load_scene
+from burg_drake.apps import build_parser, main, sigterm_as_interrupt
+from burg_drake.apps.commands import ar
+from burg_drake.cameras import (
+    EventLog,
+    FrameProcessor,
+    Intrinsics,
+    LiveSession,
+    ViewActions,
+    load_snapshot,
+    read_poses,
+    save_intrinsics,
+    silence_opencv,
+)
+from burg_drake.scene import load_scene
 from tests.apps.ar_views import CAMERA, Camera, photo
 from tests.hang_guard import HANG_GUARD
 
@@ -47,7 +47,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     cv2.imwrite(str(folder / "photo.png"), photo()[..., ::-1])
     cv2.imwrite(str(folder / "floor.png"), np.full((240, 320, 3), 90, np.uint8))
     path, codec = str(folder / "video.avi"), cv2.VideoWriter.fourcc(*"MJPG")
-    with quiet():
+    with silence_opencv():
         video = cv2.VideoWriter(path, codec, 20.0, (320, 240))
     for _ in range(4):
         video.write(np.ascontiguousarray(photo()[..., ::-1]))
@@ -169,7 +169,7 @@ def test_the_end_finishes_the_recording(files: Path, tmp_path: Path) -> None:
 def test_sigterm_is_as_ctrl_c(files: Path) -> None:
     """All that follows is the same, so that one of them is enough for the test above."""
     before = signal.getsignal(signal.SIGTERM)
-    with terminated_as_interrupted():
+    with sigterm_as_interrupt():
         for each in (signal.SIGTERM, signal.SIGINT):
             with pytest.raises(KeyboardInterrupt):
                 signal.raise_signal(each)
@@ -202,10 +202,8 @@ def test_the_end_waits_for_a_placement_check(tmp_path: Path) -> None:
     live = LiveSession(session, Camera(photo()), events=EventLog())
     actions = ViewActions(live, tmp_path)
     live.on_frame(lambda picture: actions.start_check())
-    parser = Parser()
-    verb.add_to(parser.add_subparsers())
-    arguments = parser.parse_args(["ar", "two", "--no-browser", "--frames", "1"])
-    assert verb._run(arguments, live, actions) == 0
+    arguments = build_parser().parse_args(["ar", "two", "--no-browser", "--frames", "1"])
+    assert ar._run_live_view(arguments, live, actions) == 0
     assert not actions.checking and live.placement is not None
 
 

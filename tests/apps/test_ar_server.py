@@ -17,17 +17,18 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.apps.ar.server import PAGES, ViewServer
-from burg_drake.apps.web.server import MAX_REFUSALS
-from burg_drake.cameras.live.actions import ViewActions
-from burg_drake.cameras.live.event_log import EventLog
-from burg_drake.cameras.live.frame_processing import FrameProcessor
-from burg_drake.cameras.live.recording_table import read_poses
-from burg_drake.cameras.live.session import LiveSession
-from burg_drake.cameras.live.snapshot import load_snapshot
-from burg_drake.cameras.sources.opencv_log import quiet
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.scene.document.scene import load_scene
+from burg_drake.apps import LIVE_VIEW_FILES, MAX_REFUSALS, ViewServer
+from burg_drake.cameras import (
+    EventLog,
+    FrameProcessor,
+    LiveSession,
+    ViewActions,
+    load_snapshot,
+    read_poses,
+    silence_opencv,
+)
+from burg_drake.core import InvalidInputError
+from burg_drake.scene import load_scene
 from tests.apps.ar_views import CAMERA, X_SC, Camera, photo
 from tests.hang_guard import HANG_GUARD, until
 
@@ -83,7 +84,7 @@ def decoded(jpeg: bytes) -> np.ndarray:
 
 
 def test_page_needs_nothing_from_elsewhere(server: ViewServer) -> None:
-    for path, (_, kind) in PAGES.items():
+    for path, (_, kind) in LIVE_VIEW_FILES.items():
         code, headers, body = request(server, "GET", path)
         assert code == 200 and headers["Content-Type"] == kind
         assert "default-src 'self'" in headers["Content-Security-Policy"]
@@ -94,7 +95,7 @@ def test_page_needs_nothing_from_elsewhere(server: ViewServer) -> None:
 def test_page_has_what_its_script_looks_for() -> None:
     from importlib.resources import files as package_files
 
-    folder = package_files("burg_drake.apps.ar")
+    folder = package_files("burg_drake.apps") / "live_page"
     script, page = ((folder / name).read_text() for name in ("page.js", "page.html"))
     wanted = {part.split('"')[0] for part in script.split('$("')[1:]}
     assert len(wanted) > 20
@@ -116,7 +117,7 @@ def test_pictures_follow_one_another(server: ViewServer) -> None:
 
 
 def test_stream_is_one_that_opencv_reads(server: ViewServer) -> None:
-    with quiet():
+    with silence_opencv():
         capture = cv2.VideoCapture(f"{server.url}stream.mjpg")
     pictures = [capture.read() for _ in range(3)]
     capture.release()  # goes away in the middle; the server does not mind

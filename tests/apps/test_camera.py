@@ -9,14 +9,16 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.apps.camera.intrinsics_text import field_of_view
-from burg_drake.apps.cli import main
-from burg_drake.cameras.calibration.target import CharucoTarget
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.optics.intrinsics_file import load_intrinsics, save_intrinsics
-from burg_drake.cameras.sources.frame import Image
-from burg_drake.cameras.sources.image_file import write_image
-from burg_drake.cameras.sources.opencv_log import quiet
+from burg_drake.apps import field_of_view, main
+from burg_drake.cameras import (
+    CharucoTarget,
+    Image,
+    Intrinsics,
+    load_intrinsics,
+    save_intrinsics,
+    silence_opencv,
+    write_image,
+)
 
 Capture = pytest.CaptureFixture[str]
 TRUTH = Intrinsics(width=320, height=240, focal=(330.0, 332.0), center=(163.0, 117.0))
@@ -94,7 +96,7 @@ def test_live_views_are_taken_from_whatever_moves(
 ) -> None:
     """A video in which the target is held still in each place for three frames."""
     video = tmp_path / "held.avi"
-    with quiet():
+    with silence_opencv():
         writer = cv2.VideoWriter(str(video), cv2.VideoWriter.fourcc(*"MJPG"), 10.0, (320, 240))
     for tilt in TURNS:
         for distance in (0.24, 0.24, 0.24, 0.32, 0.32, 0.32):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,16 +10,11 @@ import pytest
 import yaml
 from PIL import Image
 
-from burg_drake.apps.camera.locate import add_to
-from burg_drake.apps.options.arguments import Parser, add_group
-from burg_drake.cameras.optics.intrinsics import of_camera
-from burg_drake.cameras.optics.intrinsics_file import save_intrinsics
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import rotation_angle
-from burg_drake.core.paths.resources import resolve
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import load_station
+from burg_drake.apps import build_parser
+from burg_drake.cameras import camera_intrinsics, save_intrinsics
+from burg_drake.core import InvalidInputError, resolve_reference, rotation_angle
+from burg_drake.scene import load_scene
+from burg_drake.station import build_station_diagram, load_station
 from burg_drake.system_libraries import missing_render_libraries
 from tests.cameras.synthetic import board_image
 
@@ -42,14 +36,12 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
     Image.fromarray(np.ascontiguousarray(pixels)).save(folder / "photo.png")
     Image.new("RGB", (640, 480)).save(folder / "nothing.png")
     Image.new("RGB", (320, 240)).save(folder / "small.png")
-    save_intrinsics(of_camera(station.camera("board")), folder / "K.yaml")
+    save_intrinsics(camera_intrinsics(station.camera("board")), folder / "K.yaml")
     return folder
 
 
 def locate(folder: Path, *words: str) -> int:
-    parser = Parser()
-    add_to(add_group(parser.add_subparsers(), "camera", "cameras"))
-    arguments: argparse.Namespace = parser.parse_args(
+    arguments = build_parser().parse_args(
         ["camera", "locate", "tabletop_six", *words, "--intrinsics", str(folder / "K.yaml")]
     )
     return int(arguments.run(arguments))
@@ -60,7 +52,7 @@ def test_lines_make_a_station_document(pictures: Path, tmp_path: Path, capsys: C
     assert locate(pictures, photo, photo, "--name", "seen") == 0
     out, err = capsys.readouterr()
     assert "photo.png: " in err and "markers" in err and "of the mean" in err
-    text = resolve("panda_tabletop", "stations").read_text(encoding="utf-8")
+    text = resolve_reference("panda_tabletop", "stations").read_text(encoding="utf-8")
     (tmp_path / "mine.yaml").write_text(text[: text.index("cameras:")] + out, encoding="utf-8")
     document = load_station(tmp_path / "mine.yaml").document
     truth = load_station("panda_tabletop").camera("board")
@@ -76,7 +68,7 @@ def test_a_folder_of_a_measured_print(pictures: Path, tmp_path: Path, capsys: Ca
     station = load_station("panda_tabletop")
     camera = station.camera("board")
     X_SC = np.linalg.inv(station.document.X_WS.matrix()) @ camera.X_WC.matrix()
-    drawn = board_image(scene.board, of_camera(camera), X_SC, scale=(0.97, 0.97))
+    drawn = board_image(scene.board, camera_intrinsics(camera), X_SC, scale=(0.97, 0.97))
     for name in ("1.png", "2.png"):
         Image.fromarray(drawn).save(tmp_path / name)
     found = []

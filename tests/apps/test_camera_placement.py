@@ -9,12 +9,10 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.optics.intrinsics_file import save_intrinsics
-from burg_drake.cameras.placement.document import load_placement
-from burg_drake.core.frames import make_pose
-from burg_drake.scene.document.scene import load_scene
+from burg_drake.apps import main
+from burg_drake.cameras import Intrinsics, load_placement, save_intrinsics
+from burg_drake.core import make_pose
+from burg_drake.scene import load_scene
 from burg_drake.system_libraries import missing_render_libraries
 from tests.cameras.placement_views import looking
 from tests.cameras.synthetic import board_image

@@ -13,36 +13,14 @@ import sys
 import pytest
 
 from burg_drake import __version__
-from burg_drake.apps import cli
-from burg_drake.apps.options.arguments import (
-    DEFAULT_STATION,
-)
-from burg_drake.apps.runs import evaluate
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.paths.resources import builtin_names
+from burg_drake.apps import DEFAULT_STATION, cli
+from burg_drake.apps.commands import evaluate
+from burg_drake.core import InvalidInputError, UnknownNameError, builtin_names
 
-GROUPS = tuple(
-    [name]
-    for name in ("library", "scene", "camera", "grasps", "station", "hand", "trials", "dataset")
-)
-HELP = (
-    [],
-    *GROUPS,
-    *(["library", v] for v in ("build", "add", "list", "show", "check", "import-burg")),
-    *(["library", "import-ycb"],),
-    *(["scene", v] for v in ("show", "validate", "settle", "import-burg")),
-    *(["grasps", v] for v in ("sample", "score", "show", "convert", "stats")),
-    *(["camera", v] for v in ("target", "calibrate", "show", "convert", "list")),
-    *(["camera", v] for v in ("locate", "placement")),
-    *(["station", v] for v in ("list", "check", "show")),
-    *(["hand", v] for v in ("list", "check")),
-    *([v] for v in ("reach", "evaluate", "robustness", "replay", "report", "frames")),
-    *([v] for v in ("printout", "ar", "setup", "ros", "demo", "doctor", "render")),
-    *(["dataset", v] for v in ("generate", "check", "show", "export")),
-    *(["scene", v] for v in ("sample", "export")),
-    *([v] for v in ("compare", "gap", "merge", "status")),
-    *(["trials", v] for v in ("plan", "sheet", "export", "serve", "record", "show", "restore")),
-)
+COMMANDS = [command for commands in cli.COMMANDS.values() for command in commands]
+GROUPS = [command.words.split() for command in COMMANDS if command.module is None]
+HELP = [[], *(command.words.split() for command in COMMANDS if command.words != "completion")]
+"""Commands whose help is tested; the examples of `completion` are for several shells."""
 
 
 @pytest.mark.parametrize("verb", HELP, ids=" ".join)
@@ -107,6 +85,36 @@ def test_help_imports_nothing_heavy() -> None:
     heavy = ("pydrake", "trimesh", "scipy", "numpy", "rich", "cv2", "coacd", "embreex", "yaml")
     heavy += ("pandas", "pyarrow", "distributed", "dask")
     assert [name for name in heavy if name in modules] == []
+
+
+def test_help_imports_no_other_command() -> None:
+    code = """
+import contextlib, importlib, io, os, sys
+from burg_drake.apps.cli import COMMANDS, main
+from burg_drake.printout import PrintSettings  # imports once what many commands need
+
+def command_modules():
+    return {name for name in sys.modules if name.startswith("burg_drake.apps.commands.")}
+
+def print_help(words):
+    with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):
+        main([*words.split(), "--help"])
+
+print_help("")
+assert command_modules() == set()
+for command in (command for commands in COMMANDS.values() for command in commands):
+    if os.fork() == 0:  # each command in a process of its own
+        if command.module is not None:
+            importlib.import_module(f"burg_drake.apps.commands.{command.module}")
+        own_modules = command_modules()
+        print_help(command.words)
+        assert command_modules() == own_modules, (command, command_modules() - own_modules)
+        os._exit(0)
+    if os.wait()[1]:
+        sys.exit(1)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
@@ -183,7 +191,7 @@ def run_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> int:
     def fail(arguments: object) -> int:
         raise error
 
-    monkeypatch.setattr("burg_drake.apps.runs.report.run_report", fail)
+    monkeypatch.setattr("burg_drake.apps.commands.runs.run_report", fail)
     monkeypatch.setattr(cli, "build_parser", inspect.unwrap(cli.build_parser))
     return cli.main(["report", "somewhere"])
 
@@ -233,10 +241,10 @@ def test_an_interrupt_behind_another_error_is_an_interrupt(
 def test_further_interrupts_change_nothing() -> None:
     code = (
         "import os, signal, sys\nfrom burg_drake.apps import cli\n"
-        "from burg_drake.apps.runs import report\n"
+        "from burg_drake.apps.commands import runs\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "def interrupt(*_): os.kill(os.getpid(), signal.SIGINT)\n"
-        "report.run_report = interrupt\nsys.argv[1:] = ['report', 'somewhere']\n"
+        "runs.run_report = interrupt\nsys.argv[1:] = ['report', 'somewhere']\n"
         "code = cli.main()\ninterrupt()\ninterrupt()\nsys.exit(code)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
@@ -293,8 +301,8 @@ def test_a_reader_that_goes_away_is_no_error() -> None:
 
 def test_names_that_are_no_text_are_printed() -> None:
     code = (
-        "import sys\nfrom burg_drake.apps import cli\nfrom burg_drake.apps.runs import report\n"
-        "report.run_report = lambda _: print('\\udcff') or 0\nsys.argv[1:] = ['report', 'x']\n"
+        "import sys\nfrom burg_drake.apps import cli\nfrom burg_drake.apps.commands import runs\n"
+        "runs.run_report = lambda _: print('\\udcff') or 0\nsys.argv[1:] = ['report', 'x']\n"
         "sys.exit(cli.main())"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.core.paths.resources import data_root
+from burg_drake.apps import main
+from burg_drake.core import data_root
 
 HEAVY = ("numpy", "yaml", "rich", "pydrake", "trimesh")
 

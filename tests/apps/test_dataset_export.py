@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.dataset.samples import DatasetWriter, Sample
+from burg_drake.apps import main
+from burg_drake.dataset import DatasetWriter, Sample
 from tests.dataset import drawn_samples as drawn
 
 LEFT_OUT = "burg-drake: warning: {} stores one depth image per view: the {} is left out.\n"

@@ -12,16 +12,13 @@ import numpy as np
 import pytest
 
 import burg_drake
-from burg_drake.apps.cli import main
-from burg_drake.apps.options.arguments import Parser
-from burg_drake.apps.options.declared import add_options, settings_from
-from burg_drake.core.settings import DEGREES, KEY, MILLIMETRES, PERCENT, THOUSANDTHS, setting
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.robustness.settings import RobustnessSettings
-from burg_drake.experiment.gap.placement_noise import PlacementNoise
-from burg_drake.grasping.similarity.neighbour_search import Tolerance
-from burg_drake.simulation.robustness.settings import Noise
-from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.apps import Parser, add_settings_options, main, settings_from
+from burg_drake.core import Units, setting
+from burg_drake.evaluation import EvaluationSettings, RobustnessSettings
+from burg_drake.experiment import PlacementNoise
+from burg_drake.grasping import Tolerance
+from burg_drake.simulation import Noise
+from burg_drake.station import GraspMotion
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,10 +26,12 @@ class Made:
     """One field of each kind."""
 
     count: int = setting(3, "how many", flags=("-c",), low=1)
-    depth: float = setting(0.005, "how deep", unit=MILLIMETRES, low=0, high=50, noun="a length")
-    turn: float = setting(math.radians(2.0), "how far round", unit=DEGREES, low=0)
-    share: float = setting(0.1, "of all", unit=PERCENT, above=0)
-    way: float = setting(0.02, "as far as it goes", unit=MILLIMETRES, above=0, infinite=True)
+    depth: float = setting(
+        0.005, "how deep", unit=Units.millimetres, low=0, high=50, noun="a length"
+    )
+    turn: float = setting(math.radians(2.0), "how far round", unit=Units.degrees, low=0)
+    share: float = setting(0.1, "of all", unit=Units.percent, above=0)
+    way: float = setting(0.02, "as far as it goes", unit=Units.millimetres, above=0, infinite=True)
     fast: bool = setting(False, "hurry")
     level: bool = setting(True, "leave it as it stands", name="no_level")
     size: tuple[int, int] = setting((8, 11), "columns and rows", metavar="CxR")
@@ -43,7 +42,7 @@ class Made:
 
 def parsed(*words: str, **others: object) -> Made:
     parser = Parser()
-    add_options(parser, Made)
+    add_settings_options(parser, Made)
     return settings_from(parser.parse_args(words), Made, **others)
 
 
@@ -64,7 +63,7 @@ def test_values_come_back_in_si() -> None:
 
 def test_the_help_has_units_and_defaults() -> None:
     parser = Parser()
-    add_options(parser, Made)
+    add_settings_options(parser, Made)
     text = " ".join(parser.format_help().split())
     for part in (
         "--count N how many (default: 3)",
@@ -108,23 +107,28 @@ def test_what_is_out_of_range(words: str, message: str, capsys: pytest.CaptureFi
 def test_defaults_survive_the_way_through_their_units(settings: type) -> None:
     """To the bit: they are in hashes."""
     parser = Parser()
-    names = [f.name for f in fields(settings) if KEY in f.metadata and f.name != "lift_direction"]
-    add_options(parser, settings, *names)
+    names = [
+        f.name for f in fields(settings) if "setting" in f.metadata and f.name != "lift_direction"
+    ]
+    add_settings_options(parser, settings, *names)
     found, usual = settings_from(parser.parse_args([]), settings), settings()
     assert [getattr(found, name) for name in names] == [getattr(usual, name) for name in names]
 
 
 def test_units_that_files_tell_apart() -> None:
-    assert MILLIMETRES.to_si(9.0) == 0.009000000000000001 and THOUSANDTHS.to_si(9.0) == 0.009
+    assert (
+        Units.millimetres.to_si(9.0) == 0.009000000000000001
+        and Units.millimetres_by_division.to_si(9.0) == 0.009
+    )
 
 
 COMMANDS = {
     "cameras/calibration/target_sheet.py",
     "evaluation/cluster/document.py",
-    "evaluation/report/sections/reproduction.py",
+    "evaluation/report/reproduction.py",
     "evaluation/grasp_sets/mistake_search.py",
     "evaluation/grasp_sets/pose_mistakes.py",
-    "experiment/pages/protocol.py",
+    "experiment/lab/protocol.py",
 }
 """Files with commands to type, of our program and of Dask's, or texts beside such a command."""
 OPTION = re.compile(r"(^|[ `]|(?<!var)\()(--[a-z]|-o\b)")

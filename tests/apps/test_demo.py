@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.apps.runs import demo
-from burg_drake.core.paths.resources import builtin_names
+from burg_drake.apps import main
+from burg_drake.apps.commands import demo
+from burg_drake.core import builtin_names
 from tests.apps.conftest import TWO
 
 

@@ -8,10 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.apps.cli import build_parser, main
-from burg_drake.apps.options.grasp_file import DEFAULT_HAND
-from burg_drake.formats.common.grasp_format import PANDA
-from burg_drake.formats.grasp_files import FORMATS
+from burg_drake.apps import DEFAULT_HAND, build_parser, main
+from burg_drake.formats import GRASP_FORMATS, PANDA_GRIPPER
 
 Capture = pytest.CaptureFixture[str]
 
@@ -34,7 +32,7 @@ def test_tables(capsys: Capture) -> None:
     rows: dict[str, str] = {}
     for line in out.splitlines():
         rows.setdefault((line.split() or [""])[0], line)
-    for name, format in FORMATS.items():
+    for name, format in GRASP_FORMATS.items():
         assert format.suffixes[0] in rows[name] and f" {format.frame} " in rows[name]
     assert "103.4 mm behind G" in rows["acronym"]
 
@@ -87,7 +85,7 @@ def test_refusals(arguments: list[str], message: str, capsys: Capture) -> None:
 
 
 def test_the_default_hand_is_the_one_that_formats_know() -> None:
-    assert PANDA.name == DEFAULT_HAND
+    assert PANDA_GRIPPER.name == DEFAULT_HAND
 
 
 def test_examples_of_the_help_can_be_parsed(capsys: Capture) -> None:

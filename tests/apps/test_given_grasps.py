@@ -10,17 +10,19 @@ import h5py
 import numpy as np
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.apps.options.arguments import Parser
-from burg_drake.apps.runs import campaign, evaluate
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import grasp_from_axes, make_pose, rotation_from_rpy
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.records.table_file import read_table
-from burg_drake.evaluation.run.request import GraspsLike, given_content, given_correction
-from burg_drake.formats.grasp_files import write_grasp_file
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.document.station_document import load_station
+from burg_drake.apps import build_parser, main
+from burg_drake.apps.commands import evaluate
+from burg_drake.core import (
+    GraspSet,
+    InvalidInputError,
+    grasp_from_axes,
+    make_pose,
+    rotation_from_rpy,
+)
+from burg_drake.evaluation import GraspsLike, given_content, given_correction, read_table
+from burg_drake.formats import write_grasp_file
+from burg_drake.scene import load_scene
+from burg_drake.station import load_station
 from tests.apps.conftest import TWO
 
 Capture = pytest.CaptureFixture[str]
@@ -174,8 +176,7 @@ def test_a_run_over_scenes_tells_the_mistake_of_its_file_once(
 
 def test_another_file_of_grasps_of_scenes_is_not_taken_for_the_first(tmp_path: Path) -> None:
     """Grasps in the frame of a scene are read scene by scene: what they come from has to tell."""
-    station, parser = load_station("panda_tabletop"), Parser()
-    evaluate.add_to(parser.add_subparsers())
+    station, parser = load_station("panda_tabletop"), build_parser()
 
     def given(name: str, height: float, *options: str) -> GraspsLike | None:
         X_SG = X_OG[:1] @ make_pose(p_AB=(0.0, 0.0, height))
@@ -183,7 +184,7 @@ def test_another_file_of_grasps_of_scenes_is_not_taken_for_the_first(tmp_path: P
         grasps = GraspSet.create(X_SG, object="", width=0.05, columns=columns)
         write_grasp_file(grasps, tmp_path / name, "vgn")
         words = ["evaluate", "scenes", "--grasps", str(tmp_path / name), *options]
-        return campaign._given(parser.parse_args(words), station)
+        return evaluate._grasps_from_file(parser.parse_args(words), station)
 
     first, same, other = given("a.csv", 0.0), given("b.csv", 0.0), given("a.csv", 0.001)
     corrected = given("a.csv", 0.0, "--correction", "inverse")
@@ -215,17 +216,16 @@ def test_grasps_for_another_hand_are_judged_with_a_note(tmp_path: Path, capsys: 
 def test_a_file_that_does_not_say_which_scene_it_is_of(tmp_path: Path) -> None:
     path = tmp_path / "grasps.npz"
     GraspSet.create(X_OG, object="box").save(path)
-    parser = Parser()
-    evaluate.add_to(parser.add_subparsers())
+    parser = build_parser()
     station = load_station("panda_tabletop")
     scene = load_scene("tabletop_six")
     arguments = parser.parse_args(["evaluate", scene.name, "--grasps", str(path)])
     with pytest.raises(InvalidInputError) as error:
-        campaign._FileOfScenes(arguments, station, "", ())(scene)
+        evaluate._SceneGraspFile(arguments, station, "", ())(scene)
     assert "without saying which; evaluate that scene alone" in str(error.value)
     arguments.grasps = str(tmp_path / "no scene ids.npz")  # another error is not taken for it
     with pytest.raises(InvalidInputError, match=r"no scene ids\.npz does not exist"):
-        campaign._FileOfScenes(arguments, station, "", ())(scene)
+        evaluate._SceneGraspFile(arguments, station, "", ())(scene)
 
 
 @pytest.mark.parametrize(

@@ -9,15 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.apps.cli import build_parser, main
-from burg_drake.apps.options.given_grasps import read_given
-from burg_drake.apps.options.grasp_file import named_gripper
-from burg_drake.core.frames import grasp_from_axes
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.formats.common.grasp_format import PANDA
-from burg_drake.formats.grasp_files import write_grasp_file
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.document.station_document import load_station
+from burg_drake.apps import build_parser, gripper_by_name, main, read_grasps_from_options
+from burg_drake.core import GraspSet, grasp_from_axes
+from burg_drake.formats import PANDA_GRIPPER, write_grasp_file
+from burg_drake.scene import load_scene
+from burg_drake.station import load_station
 
 Capture = pytest.CaptureFixture[str]
 
@@ -31,7 +27,9 @@ BOX = GraspSet.create(
 def theirs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     """The grasp as a file that calls the hand's body `fr3_hand`."""
     monkeypatch.chdir(tmp_path)
-    write_grasp_file(BOX, "a.yaml", "isaac_grasp", dataclasses.replace(PANDA, body="fr3_hand"))
+    write_grasp_file(
+        BOX, "a.yaml", "isaac_grasp", dataclasses.replace(PANDA_GRIPPER, body="fr3_hand")
+    )
     return "a.yaml"
 
 
@@ -52,7 +50,9 @@ def test_every_verb_can_be_told_the_link(verb: list[str], theirs: str, capsys: C
     assert "'/World/fr3_hand' is not 'panda_hand'" in line and "name 'fr3_hand'" in line
     if verb[0] == "evaluate":  # reading is what matters here
         arguments = build_parser().parse_args([*verb, "--gripper-link", "fr3_hand"])
-        given = read_given(arguments, load_scene(verb[1]), load_station("panda_tabletop"))
+        given = read_grasps_from_options(
+            arguments, load_scene(verb[1]), load_station("panda_tabletop")
+        )
         np.testing.assert_allclose(given.by_instance["box"].X_OG, BOX.X_OG, atol=1e-12)
     else:
         assert main([*verb, "--gripper-link", "fr3_hand"]) == 0
@@ -68,7 +68,7 @@ def test_the_format_can_be_named(verb: str, theirs: str, capsys: Capture) -> Non
 def test_stats_of_another_hand(tmp_path: Path, capsys: Capture) -> None:
     ours, theirs, figures = (str(tmp_path / name) for name in ("a.h5", "a.yaml", "f.json"))
     BOX.save(ours)
-    write_grasp_file(BOX, theirs, "isaac_grasp", named_gripper("wsg_50"))
+    write_grasp_file(BOX, theirs, "isaac_grasp", gripper_by_name("wsg_50"))
     assert main(["grasps", "stats", ours, theirs]) == 2
     assert "the frame of hand 'panda_hand'" in capsys.readouterr().err
     options = ["--hand", "wsg_50", "--json", figures]

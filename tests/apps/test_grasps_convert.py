@@ -11,10 +11,9 @@ import pytest
 import yaml
 
 from burg_drake.apps import cli
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.core.paths.resources import resolve
-from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.formats.grasp_files import FORMATS
+from burg_drake.core import GraspSet, resolve_reference
+from burg_drake.evaluation import Run
+from burg_drake.formats import GRASP_FORMATS
 
 DOWN = np.array(
     [[0.0, 1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.1034], [0.0, 0.0, 0.0, 1.0]]
@@ -116,7 +115,7 @@ def test_outcomes_of_a_run(mug: str, run: Run, capsys: pytest.CaptureFixture[str
     assert capsys.readouterr().out.startswith(f"{run.path}: run, 3 grasps of box in the frame")
     with h5py.File("out/box.h5") as file:
         assert file["grasps/qualities/flex/object_in_gripper"][()].tolist() == [1, 0, 0]
-        assert resolve(file["object/file"].asstr()[()]).is_file()
+        assert resolve_reference(file["object/file"].asstr()[()]).is_file()
     assert convert(str(run.table_path), "r.h5") == 2
     assert "is the table of a run; give the run's folder" in capsys.readouterr().err
 
@@ -141,7 +140,7 @@ def test_the_hand_is_that_of_the_set(mug: str, capsys: pytest.CaptureFixture[str
 def test_formats_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     assert ended("--formats") == 0
     text = capsys.readouterr().out
-    for name, format in FORMATS.items():
+    for name, format in GRASP_FORMATS.items():
         assert f"{name} " in text and format.title in text
         assert all(suffix in text for suffix in format.suffixes)
 

@@ -10,17 +10,14 @@ import h5py
 import numpy as np
 import pytest
 
-from burg_drake.apps.cli import build_parser, main
-from burg_drake.apps.runs import reach
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.candidates.candidates import given_candidates
-from burg_drake.evaluation.candidates.sampling import sample_candidates
-from burg_drake.evaluation.grasp_sets.candidate_files import read_grasps
-from burg_drake.evaluation.grasp_sets.scored import scored_set
-from burg_drake.formats.grasp_files import read_grasp_file
-from burg_drake.objects.library.document import load_library
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.document.station_document import load_station
+from burg_drake.apps import build_parser, main
+from burg_drake.apps.commands import reach
+from burg_drake.core import GraspSet
+from burg_drake.evaluation import given_candidates, read_grasps, sample_candidates, scored_set
+from burg_drake.formats import read_grasp_file
+from burg_drake.objects import load_library
+from burg_drake.scene import load_scene
+from burg_drake.station import load_station
 
 TILTED = """\
 version: 1
@@ -160,7 +157,7 @@ def test_a_folder_gets_a_file_an_object(scene_file: Path, tmp_path: Path, capsys
 def test_nothing_is_sampled_in_vain(
     scene_file: Path, tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from burg_drake.evaluation.candidates import sampling
+    from burg_drake.evaluation.grasp_sets import sampling
 
     monkeypatch.delattr(sampling, "sample_on_scene")
     (tmp_path / "file").write_text("")

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.grasping.quality.metrics import METRICS
+from burg_drake.apps import main
+from burg_drake.core import GraspSet
+from burg_drake.evaluation import Run
+from burg_drake.grasping import METRICS
 
 Capture = pytest.CaptureFixture[str]
 

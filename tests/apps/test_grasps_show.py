@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.core.frames import grasp_from_axes
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.formats.grasp_files import write_grasp_file
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.document.station_document import load_station
+from burg_drake.apps import main
+from burg_drake.core import GraspSet, grasp_from_axes
+from burg_drake.evaluation import Run
+from burg_drake.formats import write_grasp_file
+from burg_drake.scene import load_scene
+from burg_drake.station import load_station
 
 Capture = pytest.CaptureFixture[str]
 N = 12

@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.store.run_folder import Run
+from burg_drake.apps import main
+from burg_drake.core import GraspSet, make_pose
+from burg_drake.evaluation import Run
 
 
 def line(*millimetres: float, object: str = "mug") -> GraspSet:

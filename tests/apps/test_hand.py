@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.core.paths.resources import builtin_names, resolve
+from burg_drake.apps import main
+from burg_drake.core import builtin_names, resolve_reference
 
 Capture = pytest.CaptureFixture[str]
 
@@ -28,7 +28,7 @@ def test_check_says_what_the_hand_measures(capsys: Capture) -> None:
 
 
 def test_check_of_an_own_document(tmp_path: Path, capsys: Capture) -> None:
-    text = resolve("wsg_50", "models/hands").read_text(encoding="utf-8")
+    text = resolve_reference("wsg_50", "models/hands").read_text(encoding="utf-8")
     own = tmp_path / "my_hand.yaml"
     own.write_text(text.replace("name: wsg_50", "name: mine"), encoding="utf-8")
     assert main(["hand", "check", str(own)]) == 0

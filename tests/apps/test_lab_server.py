@@ -18,17 +18,22 @@ from typing import Any
 
 import pytest
 
-from burg_drake.apps.trials.lab_page.server import PAGES, LabServer
-from burg_drake.apps.trials.serve import _kept_secret as kept_secret
-from burg_drake.apps.web import MOST_CONNECTIONS
-from burg_drake.core import BrowserToken
-from burg_drake.core.grasps.outcome import RealOutcome
-from burg_drake.experiment.pages.lab_book import LabBook
-from burg_drake.experiment.pages.picture_cache import PictureCache
-from burg_drake.experiment.pages.tried_runs import TriedRuns
-from burg_drake.experiment.trials.book import TrialBook
-from burg_drake.experiment.trials.entries import journal_path, read_entries
-from burg_drake.experiment.trials.sheet import load_trials
+from burg_drake.apps import (
+    LAB_PAGE_FILES,
+    MAX_PAGE_CONNECTIONS,
+    LabServer,
+    _load_or_create_secret as kept_secret,
+)
+from burg_drake.core import BrowserToken, RealOutcome
+from burg_drake.experiment import (
+    LabBook,
+    PictureCache,
+    TrialBook,
+    TriedRuns,
+    journal_path,
+    load_trials,
+    read_entries,
+)
 from tests.experiment.pages.conftest import made as made, trials as trials
 from tests.hang_guard import HANG_GUARD
 
@@ -134,7 +139,7 @@ def test_other_sites_and_broken_requests_are_refused(server: LabServer, trials: 
         assert request(port, "GET", path)[0] == 404
     assert request(port, "GET", "/states", Origin="http://evil.example")[0] == 403
     assert trials.read_text() == before
-    for path in PAGES:
+    for path in LAB_PAGE_FILES:
         code, headers, body = request(port, "GET", path)
         assert code == 200 and body and "default-src 'self'" in headers["Content-Security-Policy"]
     own = f"http://127.0.0.1:{port}"
@@ -187,7 +192,7 @@ def test_slow_connections_lock_nobody_out(trials: Path) -> None:
         tablet = http.client.HTTPConnection("127.0.0.1", port, timeout=HANG_GUARD)
         stack.callback(tablet.close)
         for _ in range(3):
-            for _ in range(MOST_CONNECTIONS + 2):
+            for _ in range(MAX_PAGE_CONNECTIONS + 2):
                 slow = socket.create_connection(("127.0.0.1", port), timeout=HANG_GUARD)
                 stack.callback(slow.close)
                 slow.sendall(HEAD[:20])
@@ -209,7 +214,7 @@ def test_a_request_has_to_be_whole_in_time(
     kept.request("GET", "/states")
     assert kept.getresponse().read()
     used = kept.sock
-    monkeypatch.setattr("burg_drake.apps.web.server.REQUEST_TIMEOUT", 0.3)
+    monkeypatch.setattr("burg_drake.apps.page_server.ConnectionTimeouts.request", 0.3)
     rest = b"X-Slow: " if sent == HEAD else b""
     with socket.create_connection(("127.0.0.1", port), timeout=HANG_GUARD) as slow:
         slow.sendall(sent + rest)
@@ -242,10 +247,10 @@ def test_an_address_has_its_share_of_the_connections(trials: Path) -> None:
             server.process_request(theirs, (address, 1))
             return ours
 
-        ours = [come("192.0.2.1") for _ in range(MOST_CONNECTIONS // 2 + 3)]
+        ours = [come("192.0.2.1") for _ in range(MAX_PAGE_CONNECTIONS // 2 + 3)]
         assert [connection.recv(1) for connection in ours[:3]] == [b""] * 3
         others = [come("192.0.2.2"), come("2001:db8::1"), come("::ffff:127.0.0.1")]
-        for number in range(MOST_CONNECTIONS):
+        for number in range(MAX_PAGE_CONNECTIONS):
             come(f"2001:db8::{number:x}")
         for connection in (*ours[-8:], others[0], others[2]):  # are served still
             connection.sendall(HEAD + b"\r\n")

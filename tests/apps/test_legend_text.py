@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from burg_drake.apps.terminal.legend import print_legend, tick_line
-from burg_drake.visualization.style.legend import ColorBar, LegendEntry
+from burg_drake.apps import print_legend, tick_line
+from burg_drake.visualization import ColorBar, LegendEntry
 
 
 def test_numbers_are_below_their_places() -> None:

@@ -11,11 +11,10 @@ from typing import Any
 import pytest
 import trimesh
 
-from burg_drake.apps.cli import main
-from burg_drake.objects.library.document import load_library
-from burg_drake.pipeline import stages
-from burg_drake.pipeline.source import ObjectSource
-from burg_drake.system_libraries import GLIB
+from burg_drake.apps import main
+from burg_drake.objects import load_library
+from burg_drake.pipeline import ObjectSource, object_build
+from burg_drake.system_libraries import SystemLibrary
 
 Capture = pytest.CaptureFixture[str]
 QUICK = "--no-confirm"
@@ -139,14 +138,14 @@ def test_nothing_could_be_built(
 def test_an_unexpected_error_names_the_object_and_is_told_in_full(
     others: int, mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
 ) -> None:
-    original = stages.build_geometry
+    original = object_build.build_geometry
 
     def fails_for_me(source: ObjectSource, *arguments: Any) -> Any:
         if source.name == "me":
             raise TypeError("name of me is wrong, supported are:\n  1. (int) -> str")
         return original(source, *arguments)
 
-    monkeypatch.setattr(stages, "build_geometry", fails_for_me)
+    monkeypatch.setattr(object_build, "build_geometry", fails_for_me)
     shutil.copy(mesh, tmp_path / "me.ply")
     meshes = (tmp_path / "me.ply", mesh)[: 1 + others]
     assert build(*meshes, QUICK, "-o", tmp_path / "library") == 2 - others
@@ -169,13 +168,13 @@ def test_a_wrong_unit_is_told_before_the_others_are_built(
     mesh: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
 ) -> None:
     """And the unit of one mesh can be given, by which it gets its size."""
-    original, told = stages.build_geometry, []
+    original, told = object_build.build_geometry, []
 
     def told_by_now(*arguments: Any) -> Any:
         told.append(capsys.readouterr().err)
         return original(*arguments)
 
-    monkeypatch.setattr(stages, "build_geometry", told_by_now)
+    monkeypatch.setattr(object_build, "build_geometry", told_by_now)
     trimesh.creation.box((50, 40, 60)).export(tmp_path / "wrong.stl")
     meshes = (mesh, tmp_path / "wrong.stl")
     assert build(*meshes, QUICK, "-o", tmp_path / "library") == 1
@@ -298,7 +297,9 @@ def test_folder_without_meshes(tmp_path: Path, capsys: Capture) -> None:
 def test_a_missing_system_library_is_named_before_anything_is_built(
     capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("burg_drake.apps.library.building.missing_import_libraries", lambda: [GLIB])
+    monkeypatch.setattr(
+        "burg_drake.apps.commands.library.missing_import_libraries", lambda: [SystemLibrary.glib]
+    )
     trimesh.creation.box((0.05, 0.05, 0.05)).export(tmp_path / "box.stl")
     assert build(str(tmp_path / "box.stl"), "-o", str(tmp_path / "library")) == 2
     assert "cannot be imported without libglib-2.0.so.0" in capsys.readouterr().err

@@ -6,11 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.apps.options.arguments import Parser
-from burg_drake.apps.options.hand_motion import add_motion, chosen_motion
-from burg_drake.station.document.grasp_motion import GraspMotion
-from burg_drake.station.document.station_document import load_station
+from burg_drake.apps import Parser, add_motion_options, main, motion_from_options
+from burg_drake.station import GraspMotion, load_station
 
 
 def test_an_option_counts_more_than_the_station_and_that_more_than_the_usual() -> None:
@@ -18,10 +15,10 @@ def test_an_option_counts_more_than_the_station_and_that_more_than_the_usual() -
     own = GraspMotion(retreat=0.05, least_lift=0.02)
     station = replace(station, document=replace(station.document, motion=own))
     parser = Parser()
-    add_motion(parser)
-    assert chosen_motion(parser.parse_args([]), station) == own
+    add_motion_options(parser)
+    assert motion_from_options(parser.parse_args([]), station) == own
     words = ["--retreat-mm", "0", "--lift-mm", "150", "--lift-direction", "0", "1", "1"]
-    assert chosen_motion(parser.parse_args(words), station) == GraspMotion(
+    assert motion_from_options(parser.parse_args(words), station) == GraspMotion(
         retreat=0.0, lift_height=0.15, least_lift=0.02, lift_direction=(0.0, 1.0, 1.0)
     )
 

@@ -12,13 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.core.errors import MissingDependencyError
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.run.request import Request
-from burg_drake.evaluation.store.run_folder import Run, load_run
-from burg_drake.station.document.station_document import load_station
+from burg_drake.apps import main
+from burg_drake.core import GraspSet, MissingDependencyError
+from burg_drake.evaluation import EvaluationSettings, Request, Run, load_run
+from burg_drake.station import load_station
 
 pytest.importorskip("mujoco")
 

@@ -8,11 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.apps.terminal import number_tables
-from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.core.terminal.number_text import format_number
+from burg_drake.apps import main
+from burg_drake.apps.commands import grasp_tables
+from burg_drake.core import GraspSet, format_number, make_pose
 
 Capture = pytest.CaptureFixture[str]
 
@@ -67,13 +65,13 @@ def test_a_table_of_quantiles(
     columns: str, expected: str, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", columns)
-    heads = [f"{q:.0%}" for q in number_tables.QUANTILES]
+    heads = [f"{q:.0%}" for q in grasp_tables.TABLE_QUANTILES]
     rows = {
         "gravity_margin": (200, [1.234e-7, 8.66e-4, 0.7071, 1e4, 1e30]),
         "patch_area": (200, [5.9e-6, 17.7e-6, 82e-6, 1e-4, 324e-6]),
         "antipodal_angle": (1000, [0.0, math.pi / 2, math.pi, math.inf, math.nan]),
     }
-    number_tables.print_numbers(
+    grasp_tables.print_numbers(
         "mug",
         {n: (known, dict(zip(heads, v, strict=True))) for n, (known, v) in rows.items()},
     )

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.apps.cli import main
+from burg_drake.apps import main
 from burg_drake.apps.options import values
-from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core import GraspSet
 
 INTRINSICS = "version: 1\nwidth: 640\nheight: 480\nfocal: [600, 610]\ncenter: [319.5, 239.5]\n"
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.apps.cli import main
+from burg_drake.apps import main
 
 Capture = pytest.CaptureFixture[str]
 

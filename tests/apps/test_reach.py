@@ -8,11 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.core.frames import grasp_from_axes, make_pose
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.core.paths.resources import resolve
-from burg_drake.evaluation.records.table_file import read_table
+from burg_drake.apps import main
+from burg_drake.core import GraspSet, grasp_from_axes, make_pose, resolve_reference
+from burg_drake.evaluation import read_table
 from tests.apps.conftest import TWO
 
 ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
@@ -106,7 +104,7 @@ def test_plans_of_an_earlier_call_are_left_alone(
 def test_a_board_out_of_reach_is_one_line(
     grasps: Path, tmp_path: Path, verb: str, capsys: Capture
 ) -> None:
-    text = resolve("panda_tabletop", "stations").read_text(encoding="utf-8")
+    text = resolve_reference("panda_tabletop", "stations").read_text(encoding="utf-8")
     for old, new in (
         ("X_WS: {translation: [0.24,", "X_WS: {translation: [1.5,"),
         ("size: [1.2, 1.4, 0.1]", "size: [5.0, 1.4, 0.1]"),

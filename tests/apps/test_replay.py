@@ -14,18 +14,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.core.frames import grasp_from_axes, make_pose, rotation_from_rpy
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.records.table import table_row, trial_columns
-from burg_drake.evaluation.records.table_file import read_table, write_table
-from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.simulation.trials.hand_trial import HandTrial
-from burg_drake.station.document.engine import ENGINES
-from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.apps import main
+from burg_drake.core import GraspSet, Outcome, grasp_from_axes, make_pose, rotation_from_rpy
+from burg_drake.evaluation import (
+    EvaluationSettings,
+    Run,
+    evaluate,
+    read_table,
+    table_row,
+    trial_columns,
+    write_table,
+)
+from burg_drake.simulation import HandTrial
+from burg_drake.station import ENGINES, GraspMotion
 
 SCENE = """\
 version: 1
@@ -180,8 +181,7 @@ def test_a_scene_that_is_gone_or_changed(run: Run, row_file: Path, capsys: Captu
 def test_a_trial_with_another_friction_is_replayed_with_it(
     run: Run, tmp_path: Path, capsys: Capture
 ) -> None:
-    from burg_drake.evaluation.records.run_document import origin_of
-    from burg_drake.evaluation.stages.judge import trial_verdict
+    from burg_drake.evaluation import origin_of, trial_verdict
 
     trial = dataclasses.replace(run.trial(run.candidates.id[0]), friction=0.01, mass=0.5)
     result = HandTrial(run.scene(), run.station(), engine=ENGINE, motion=LOW).run(

@@ -9,26 +9,20 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps import Verdict
-from burg_drake.core.grasps.column_meanings import describe
-from burg_drake.core.grasps.outcome import Outcome, Stage
-from burg_drake.core.terminal.progress import Progress
-from burg_drake.evaluation.records.journal import Journal, read_journal
-from burg_drake.evaluation.records.table_file import read_table
-from burg_drake.evaluation.robustness import assessment as tested
-from burg_drake.evaluation.robustness.assessment import assess_robustness
-from burg_drake.evaluation.robustness.settings import (
+from burg_drake.apps import main
+from burg_drake.core import InvalidInputError, Outcome, Progress, Stage, Verdict, describe_column
+from burg_drake.evaluation import (
+    Journal,
     RobustnessSettings,
+    Run,
+    assess_robustness,
+    load_run,
+    read_journal,
+    read_table,
+    robustness as tested,
 )
-from burg_drake.evaluation.store.run_folder import Run, load_run
-from burg_drake.simulation.robustness.friction_search import friction_limit
-from burg_drake.simulation.robustness.grip import Grip, take_grip
-from burg_drake.simulation.robustness.hold_force import tug
-from burg_drake.simulation.robustness.perturbation import success_rate
-from burg_drake.simulation.trials.hand_trial import HandTrial
-from burg_drake.station.document.engine import ENGINES
+from burg_drake.simulation import Grip, HandTrial, friction_limit, success_rate, take_grip, tug
+from burg_drake.station import ENGINES
 from tests.apps.conftest import box_run
 
 Capture = pytest.CaptureFixture[str]
@@ -57,7 +51,7 @@ def test_the_table_has_what_the_functions_say(copied: Run) -> None:
     table = read_table(copied.path / "robustness.csv")
     (id,) = copied.best()
     assert table["id"].tolist() == [id]
-    assert all(map(describe, table))
+    assert all(map(describe_column, table))
     candidate = copied.candidate(id)
     trial = HandTrial(copied.scene(), copied.station(), engine=copied.document.engine)
     grip = take_grip(trial, candidate.instance, candidate.X_OG)

@@ -11,15 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.apps.options.retries import how_to_retry
-from burg_drake.core.errors import UnknownNameError
-from burg_drake.core.frames import grasp_from_axes
-from burg_drake.core.grasps import Verdict
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.core.grasps.outcome import Outcome, Stage
-from burg_drake.evaluation.records.journal import Journal
-from burg_drake.evaluation.store.run_folder import Run, load_run, save_run
+from burg_drake.apps import main, retry_advice
+from burg_drake.core import GraspSet, Outcome, Stage, UnknownNameError, Verdict, grasp_from_axes
+from burg_drake.evaluation import Journal, Run, load_run, save_run
 
 Capture = pytest.CaptureFixture[str]
 
@@ -133,7 +127,7 @@ def test_what_was_ended_from_outside_is_tried_again_by_the_same_command(
     ],
 )
 def test_how_to_try_again_is_said(interrupted: int, failed: int, said: str) -> None:
-    assert re.search(said, how_to_retry(interrupted, failed))
+    assert re.search(said, retry_advice(interrupted, failed))
 
 
 def test_interrupted_evaluation_says_how_to_go_on(

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.core.paths.resources import builtin_names, resolve
-from burg_drake.scene.document.scene import load_scene
+from burg_drake.apps import main
+from burg_drake.core import builtin_names, resolve_reference
+from burg_drake.scene import load_scene
 from tests.hang_guard import HANG_GUARD
 from tests.thorough import thorough
 
@@ -77,7 +77,7 @@ def edit_scene(scene_file: Path, edit: tuple[str, str]) -> Path:
 )
 def test_built_in_scenes_are_sound(name: str, capsys: Capture) -> None:
     assert main(["scene", "validate", name]) == 0
-    path = resolve(name, "scenes")
+    path = resolve_reference(name, "scenes")
     assert capsys.readouterr().out == (
         f"{path}: no mistakes on station panda_tabletop: {len(load_scene(name).instances)} objects,"
         " all standing within the board, none overlapping another\n"
@@ -92,7 +92,7 @@ def test_mistakes(verb: list[str], mistake: str, scene_file: Path, capsys: Captu
     options = ["-o", str(scene_file.parent / "run")] if verb == ["evaluate"] else []
     assert main([*verb, str(scene_file), *options]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    household = resolve("household", "models")
+    household = resolve_reference("household", "models")
     for word, value in {
         "SCENE": scene_file,
         "FOLDER": scene_file.parent,

@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 import yaml
 
-from burg_drake.apps.cli import main
-from burg_drake.core.paths.resources import builtin_names
-from burg_drake.motion.workspace.usable_arm import require_usable_arm
-from burg_drake.pipeline.check import check_library
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.checks.scene_issues import check_scene
-from burg_drake.station.document.station_document import load_station
+from burg_drake.apps import main
+from burg_drake.core import builtin_names
+from burg_drake.motion import require_usable_arm
+from burg_drake.pipeline import check_library
+from burg_drake.scene import load_scene
+from burg_drake.station import check_scene, load_station
 from tests.apps.burg_kitchen import write_kitchen
 
 Capture = pytest.CaptureFixture[str]

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.scene.document.scene import load_scene
+from burg_drake.apps import main
+from burg_drake.scene import load_scene
 
 SAMPLE = ("scene", "sample", "household", "--no-settle", "--quiet")
 Captured = pytest.CaptureFixture[str]

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.core.paths.resources import resolve
-from burg_drake.scene.document.scene import load_scene
+from burg_drake.apps import main
+from burg_drake.core import resolve_reference
+from burg_drake.scene import load_scene
 
 Capture = pytest.CaptureFixture[str]
 
@@ -47,7 +47,7 @@ def test_what_hovers_falls(scene_file: Path, capsys: Capture) -> None:
 
 
 def test_a_library_of_ones_own_is_found_from_the_new_place(scene_file: Path) -> None:
-    shutil.copytree(resolve("household", "models"), scene_file.parent / "mine")
+    shutil.copytree(resolve_reference("household", "models"), scene_file.parent / "mine")
     code, out = settle(edited(scene_file, ("library: household", "library: mine")))
     assert code == 0
     assert "library: ../mine\n" in out.read_text()

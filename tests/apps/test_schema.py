@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.apps.cli import main
+from burg_drake.apps import main
 
 
 def test_kinds_are_listed(capsys: pytest.CaptureFixture[str]) -> None:

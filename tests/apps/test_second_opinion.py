@@ -8,15 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps import verdict
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.records.journal import Journal
-from burg_drake.evaluation.results import contested
-from burg_drake.evaluation.second_opinion import judge_again, settled
-from burg_drake.evaluation.store.campaign_folder import Campaign, load_campaign
-from burg_drake.evaluation.store.run_folder import load_run
+from burg_drake.apps import main
+from burg_drake.core import GraspSet, InvalidInputError, verdict
+from burg_drake.evaluation import (
+    Campaign,
+    Journal,
+    judge_again,
+    load_campaign,
+    load_run,
+    outcome_counts,
+    settle_verdict,
+)
 
 from .conftest import X_OG
 
@@ -34,7 +36,7 @@ def command(tmp_path: Path) -> list[str]:
 def test_all_in_one_command(
     command: list[str], tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(verdict, "CONTESTED", 1.1)  # every executed verdict is
+    monkeypatch.setattr(verdict, "CONTESTED_CONFIDENCE", 1.1)  # every executed verdict is
     assert main([*command, "--rejudge", "contested", "--engine", "reference"]) == 0
     assert "settled 2 contested grasps by reference; changed 0" in capsys.readouterr().out
     run = load_run(tmp_path / "run")
@@ -54,7 +56,7 @@ def test_all_in_one_command(
 def test_where_nothing_is_contested(
     command: list[str], capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(verdict, "CONTESTED", 0.0)
+    monkeypatch.setattr(verdict, "CONTESTED_CONFIDENCE", 0.0)
     assert main([*command, "--rejudge", "contested", "--engine", "reference"]) == 0
     assert "no verdict is contested" in capsys.readouterr().out
 
@@ -104,8 +106,8 @@ def many(judged: Path, tmp_path: Path) -> Campaign:
 def test_all_scenes_of_a_run_are_settled(
     command: list[str], many: Campaign, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(verdict, "CONTESTED", 1.1)
-    monkeypatch.setattr(contested, "CONTESTED", 1.1)
+    monkeypatch.setattr(verdict, "CONTESTED_CONFIDENCE", 1.1)
+    monkeypatch.setattr(outcome_counts, "CONTESTED_CONFIDENCE", 1.1)
     names = ("outcome", "judged_again", "engine", "run")
     before = many.columns(names)
     executed = before["outcome"] != "collision_target"
@@ -136,12 +138,12 @@ def test_a_scene_that_was_left_half_way_is_finished(
     many: Campaign, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As after an interruption: the journal has the new verdict, the table has not."""
-    monkeypatch.setattr(verdict, "CONTESTED", 0.0)
-    monkeypatch.setattr(contested, "CONTESTED", 0.0)
+    monkeypatch.setattr(verdict, "CONTESTED_CONFIDENCE", 0.0)
+    monkeypatch.setattr(outcome_counts, "CONTESTED_CONFIDENCE", 0.0)
     run = many.runs[0]
     id = run.candidates.id[0]
     with Journal(run.path / "journal.jsonl") as journal:
-        journal.append(id, settled(run.verdicts[id], run.verdicts[id], "reference"))
+        journal.append(id, settle_verdict(run.verdicts[id], run.verdicts[id], "reference"))
     campaign = judge_again(str(many.path), workers=1, progress=False)
     assert isinstance(campaign, Campaign)
     assert "reference" in (run.path / "results.csv").read_text()

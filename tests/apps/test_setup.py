@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.apps.cli import main
+from burg_drake.apps import main
 from tests.hang_guard import HANG_GUARD
 
 pytest.importorskip("viser", reason="the page needs viser: pip install 'burg-drake[ui]'")
@@ -111,9 +111,9 @@ def test_small_files_of_huge_pictures_are_refused() -> None:
     program = """
 import io
 from PIL import Image
-from burg_drake.apps.scene.setup import bound_pictures
-bound_pictures()
-from burg_drake.cameras.sources.image_file import decode_image
+from burg_drake.apps.commands.setup import limit_picture_size
+limit_picture_size()
+from burg_drake.cameras import decode_image
 for side in (1000, 12_000):
     file = io.BytesIO()
     Image.new("1", (side, side)).save(file, "png")

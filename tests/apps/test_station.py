@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.core.paths.resources import builtin_names, resolve
-from burg_drake.motion.workspace import reachability
+from burg_drake.apps import main
+from burg_drake.core import builtin_names, resolve_reference
+from burg_drake.motion import reachability
 
 Capture = pytest.CaptureFixture[str]
 
@@ -31,7 +31,7 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def own(folder: Path, *replaced: tuple[str, str], name: str = "panda_tabletop") -> Path:
-    text = resolve(name, "stations").read_text(encoding="utf-8")
+    text = resolve_reference(name, "stations").read_text(encoding="utf-8")
     for old, new in replaced:
         assert old in text
         text = text.replace(old, new)
@@ -158,7 +158,7 @@ def test_show_writes_a_page(tmp_path: Path, capsys: Capture) -> None:
 
 def test_show_of_an_unknown_camera(capsys: Capture) -> None:
     assert main(["station", "show", "panda_tabletop", "--camera", "bord", "--no-wait"]) == 2
-    path = resolve("panda_tabletop", "stations")
+    path = resolve_reference("panda_tabletop", "stations")
     assert capsys.readouterr().err == (
         f"burg-drake: error: station 'panda_tabletop' ({path}) has no camera 'bord'; did you mean"
         " 'board'? Known: board, overview\n"

@@ -12,33 +12,34 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from burg_drake.apps.camera.placement import placement_table
-from burg_drake.apps.grasps.sample import sampled_table
-from burg_drake.apps.grasps.stats_tables import comparison_table, ranking_table, summary_table
-from burg_drake.apps.library.viewing import library_table
-from burg_drake.apps.runs.reach_tables import outcome_table, print_tables, reach_table
-from burg_drake.apps.scene.verbs import displacement_table
-from burg_drake.apps.terminal.number_tables import number_table
-from burg_drake.cameras.placement.document import Placement
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.core.grasps.outcome import Outcome, Stage
-from burg_drake.core.terminal.text_table import TextTable
-from burg_drake.evaluation.results.counts import OutcomeCounts, StageCost, Summary
-from burg_drake.evaluation.results.summary_tables import SummaryView
-from burg_drake.evaluation.robustness.settings import (
-    RobustnessSettings,
+from burg_drake.apps import (
+    comparison_table,
+    displacement_table,
+    library_table,
+    number_table,
+    outcome_table,
+    placement_table,
+    print_reach_tables,
+    ranking_table,
+    reach_table,
+    sampling_table,
+    summary_table,
 )
-from burg_drake.evaluation.robustness.table import GraspRobustness, robustness_view
-from burg_drake.grasping.comparison.score_ranking import rank_by
-from burg_drake.grasping.comparison.summary import compare_grasps, summarize
-from burg_drake.grasping.similarity.neighbour_search import Tolerance
-from burg_drake.objects.library.document import load_library
-from burg_drake.simulation.rest.displacement import Displacement
-from burg_drake.simulation.robustness.hold_force import AXES, DIRECTIONS, HoldForces
-from burg_drake.simulation.robustness.perturbation import SuccessRate
-from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.cameras import Placement
+from burg_drake.core import GraspSet, Outcome, Pose, Stage, TextTable, make_pose
+from burg_drake.evaluation import (
+    GraspRobustness,
+    OutcomeCounts,
+    RobustnessSettings,
+    StageCost,
+    Summary,
+    SummaryView,
+    robustness_view,
+)
+from burg_drake.grasping import Tolerance, compare_grasps, rank_by, summarize
+from burg_drake.objects import load_library
+from burg_drake.simulation import SHAKE_AXES, TUG_DIRECTIONS, Displacement, HoldForces, SuccessRate
+from burg_drake.station import GraspMotion
 
 NAME = "a_scanned_thing_with_a_name_of_sixty_characters_from_a_robot"
 VALUES = (1e-9, 1e9, math.nan, math.inf, -123456.789, 0.0)
@@ -76,8 +77,8 @@ def library() -> TextTable:
 
 
 def robustness() -> TextTable:
-    tug = HoldForces({name: 1e9 for name in DIRECTIONS}, 1.0)
-    shake = HoldForces({name: math.inf for name in AXES}, 1.0)
+    tug = HoldForces({name: 1e9 for name in TUG_DIRECTIONS}, 1.0)
+    shake = HoldForces({name: math.inf for name in SHAKE_AXES}, 1.0)
     rate = SuccessRate(Counter({Outcome.LIFTED: 10**9}))
     known = GraspRobustness(f"{NAME}-0123", NAME, NAME, 1e-9, tug, shake, 1e9, rate)
     unknown = GraspRobustness("mug-0123", "mug", "mug", 0.24)
@@ -110,7 +111,7 @@ TABLES = {
     "placement": placements,
     "reach": lambda: reach_table(COUNTS, COUNTS[NAME]),
     "outcomes": lambda: outcome_table(grasps(0), COUNTS, COUNTS[NAME]),
-    "sampled": lambda: sampled_table(
+    "sampled": lambda: sampling_table(
         {
             name: dataclasses.replace(grasps(0), provenance={"rays": 10**12, "tried": MANY})
             for name in (NAME, "mug")
@@ -209,7 +210,7 @@ def test_objects_without_a_clear_grasp_have_a_line(capsys: pytest.CaptureFixture
             "cpu": [0.0] * 5,
         },
     )
-    print_tables(judged, ["box", "marble", "mug", "can"], GraspMotion(retreat=0.1))
+    print_reach_tables(judged, ["box", "marble", "mug", "can"], GraspMotion(retreat=0.1))
     out = capsys.readouterr().out
     rows = [line.split() for line in out.splitlines()]
     for row in ("box 1 1 1 100 %", "marble 0 0 0 -", "mug 3 0 0 -", "all 5 2 1 50.0 %"):

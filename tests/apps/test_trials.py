@@ -12,14 +12,10 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.optics.intrinsics_file import save_intrinsics
-from burg_drake.cameras.placement.document import load_placement
-from burg_drake.cameras.sources.image_file import write_image
-from burg_drake.core.frames import make_pose
-from burg_drake.experiment.trials.book import TrialBook
-from burg_drake.experiment.trials.sheet import RealTrial, load_trials
+from burg_drake.apps import main
+from burg_drake.cameras import Intrinsics, load_placement, save_intrinsics, write_image
+from burg_drake.core import make_pose
+from burg_drake.experiment import RealTrial, TrialBook, load_trials
 from burg_drake.system_libraries import missing_render_libraries
 from tests.experiment.known_runs import ended, make_run, make_scene
 
@@ -185,7 +181,7 @@ def test_an_old_buffer_is_seen_and_mended(sheet: Path, capsys: Capture) -> None:
     bool(missing_render_libraries()), reason="the renderer's system libraries are missing"
 )
 def test_a_photo_is_measured_and_kept(sheet: Path, capsys: Capture) -> None:
-    from burg_drake.scene.document.scene import load_scene
+    from burg_drake.scene import load_scene
     from tests.cameras.placement_photo import ScenePhotographer
 
     folder = sheet.parent

@@ -13,11 +13,14 @@ from room.lens import Camera, Fisheye
 from room.target import target_picture, view_at
 from room.views import look_at, seen_at
 
-from burg_drake.cameras.calibration.estimation import Calibration, calibrate_views
-from burg_drake.cameras.calibration.image_parts import part_of
-from burg_drake.cameras.calibration.lens_fit import fit_lens
-from burg_drake.cameras.calibration.target import find_target
-from burg_drake.cameras.optics.known_parts import PARTS
+from burg_drake.cameras import (
+    IMAGE_PARTS,
+    Calibration,
+    calibrate_views,
+    find_target,
+    fit_lens,
+    image_part_indices,
+)
 from tests.thorough import thorough
 
 RATIONAL = Camera((640, 480), (500.0, 502.0), (322.0, 236.0), (0.4, 0.1, 1e-3, -1e-3, 0.0, 0.6))
@@ -57,9 +60,9 @@ def test_a_simpler_model_that_fits_as_well_is_known_to_be_off() -> None:
     rational = calibrate_views(views, calibration.TARGET, model="rational")
     assert simple.rms < 1.02 * rational.rms
     pixels, off = calibration.errors(camera, simple.intrinsics)
-    part = np.array(PARTS)[part_of(pixels, camera.size)]
+    part = np.array(IMAGE_PARTS)[image_part_indices(pixels, camera.size)]
     promise = simple.promise
-    corners = [name for name in PARTS if "corner" in name]
+    corners = [name for name in IMAGE_PARTS if "corner" in name]
     assert off.max() > 1.0
     assert set(corners) <= set(promise.except_at) == set(simple.intrinsics.except_at)
     for name in corners:

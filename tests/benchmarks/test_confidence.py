@@ -11,7 +11,7 @@ from confidence_plot import reliability_diagram
 from confidence_trials import WORLDS, is_held_out, perturbed
 from oracle.cases import Case
 
-from burg_drake.core.grasps.outcome import Outcome
+from burg_drake.core import Outcome
 
 
 def made_up(count: int, seed: int) -> tuple[list[Judged], np.ndarray]:

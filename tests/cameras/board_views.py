@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
+from burg_drake.cameras import Intrinsics
 
 CAMERA = Intrinsics(width=640, height=480, focal=(600.0, 602.0), center=(318.0, 241.5))
 SMALL = Intrinsics(width=320, height=240, focal=(420.0, 420.0), center=(159.5, 119.5))

@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras.calibration.target import CharucoTarget
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.sources.frame import Image
-from burg_drake.core.arrays import Array
-from burg_drake.scene.document.markers import marker_dictionary
+from burg_drake.cameras import CharucoTarget, Image, Intrinsics
+from burg_drake.core import Array
+from burg_drake.scene import marker_dictionary
 from tests.cameras import synthetic
 
 TABLE, WHITE, BLACK = 0, 1, 2

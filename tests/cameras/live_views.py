@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from burg_drake.cameras.live.event_log import EventLog
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.sources.frame import Frame, FrameSource
-from burg_drake.core.frames import make_pose
+from burg_drake.cameras import EventLog, Frame, FrameSource, Intrinsics
+from burg_drake.core import make_pose
 
 CAMERA = Intrinsics(width=320, height=240, focal=(300.0, 300.0), center=(159.5, 119.5))
 

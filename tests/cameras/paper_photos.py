@@ -8,8 +8,8 @@ import functools
 import cv2
 import numpy as np
 
-from burg_drake.printout.board_printout import PrintSettings, print_board
-from burg_drake.scene.document.scene import load_scene
+from burg_drake.printout import PrintSettings, print_board
+from burg_drake.scene import load_scene
 from tests.cameras.synthetic import levels, light_of
 from tests.printout.paper import rasterised
 

@@ -35,12 +35,10 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform
 from pydrake.systems.sensors import CameraInfo
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics, camera_info
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import MissingDependencyError
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.world.board_visual import board_meshes
-from burg_drake.station.world.camera_sensors import LIGHTS
+from burg_drake.cameras import Intrinsics, camera_info
+from burg_drake.core import Array, MissingDependencyError
+from burg_drake.scene import Scene
+from burg_drake.station import DEFAULT_LIGHTS, board_meshes
 from burg_drake.system_libraries import describe_missing, missing_render_libraries
 
 RENDERER = "photo"
@@ -86,7 +84,7 @@ class ScenePhotographer:
         self._targets = {n: scene.X_SO(n) for n in (*scene.instances, *scene.background)}
         self._graph = SceneGraph()
         self._source = self._graph.RegisterSource("photo")
-        parameters = RenderEngineVtkParams(lights=LIGHTS)
+        parameters = RenderEngineVtkParams(lights=DEFAULT_LIGHTS)
         self._graph.AddRenderer(RENDERER, MakeRenderEngineVtk(parameters))
         below = RigidTransform([*np.array(scene.board.size) / 2, -TABLE_SIZE[2] / 2 - 5e-4])
         self._show("table", below, Box(*TABLE_SIZE), TABLE_COLOR)

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.placement.alignment.pinhole import PinholeView
-from burg_drake.core.arrays import Array
-from burg_drake.core.frames import make_pose
+from burg_drake.cameras import Intrinsics, PinholeView
+from burg_drake.core import Array, make_pose
 
 INTRINSICS = Intrinsics(width=640, height=480, focal=(600.0, 600.0), center=(319.5, 239.5))
 

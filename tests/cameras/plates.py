@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.placement.alignment.background import empty_board
-from burg_drake.cameras.placement.alignment.pinhole import PinholeView
-from burg_drake.cameras.placement.alignment.shape import TargetShape, target_shape
-from burg_drake.cameras.placement.alignment.silhouette_aligner import SilhouetteAligner
-from burg_drake.core.arrays import Array
-from burg_drake.core.frames import make_pose, rot_z
-from burg_drake.scene.document.scene import Board
+from burg_drake.cameras import (
+    Intrinsics,
+    PinholeView,
+    SilhouetteAligner,
+    TargetShape,
+    empty_board,
+    target_shape,
+)
+from burg_drake.core import Array, make_pose, rot_z
+from burg_drake.scene import Board
 from tests.cameras.placement_views import looking
 from tests.cameras.synthetic import ImageDegradation, board_image, levels, light_of
 

@@ -13,11 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.scene.document.markers import MarkerLayout
-from burg_drake.scene.document.scene import Board
+from burg_drake.cameras import Intrinsics
+from burg_drake.core import Array, InvalidInputError
+from burg_drake.scene import Board, MarkerLayout
 
 COARSE, FINE = 34, 89
 """Samples a pixel that an edge crosses; Fibonacci numbers, see `_lattice`."""

@@ -13,19 +13,29 @@ from pydrake.systems.framework import Context
 from scipy.ndimage import binary_dilation, binary_erosion
 from scipy.spatial import KDTree
 
-from burg_drake.cameras.optics.field_of_view import FieldOfView
-from burg_drake.cameras.overlay.style import OverlayStyle
-from burg_drake.cameras.projection.line_drawing import OUTLINE, visible_lines
-from burg_drake.cameras.projection.scene_mesh import build_scene_mesh
-from burg_drake.cameras.systems.board_loop import BoardLoop, LoopCamera, build_board_loop
-from burg_drake.cameras.systems.pose_filter import PoseFilter
-from burg_drake.core.arrays import Array
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import inverse, make_pose, rotation_angle, rotation_from_rpy
-from burg_drake.scene.document.scene import Board, Scene, SceneDocument, load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import Camera, Station, load_station
+from burg_drake.cameras import (
+    OUTLINE_KIND,
+    BoardLoop,
+    FieldOfView,
+    LoopCamera,
+    OverlayStyle,
+    PoseFilter,
+    build_board_loop,
+    build_scene_mesh,
+    visible_lines,
+)
+from burg_drake.core import (
+    Array,
+    InvalidInputError,
+    Pose,
+    UnknownNameError,
+    inverse,
+    make_pose,
+    rotation_angle,
+    rotation_from_rpy,
+)
+from burg_drake.scene import Board, Scene, SceneDocument, load_scene
+from burg_drake.station import Camera, Station, build_station_diagram, load_station
 from burg_drake.system_libraries import missing_render_libraries
 
 pytestmark = pytest.mark.skipif(
@@ -157,7 +167,7 @@ def test_outlines_are_on_the_edges_that_drake_renders(
 
     X_SC = output(loop, context, "board.X_SC")
     lines = visible_lines(build_scene_mesh(scene), FieldOfView(loop.intrinsics), X_SC)
-    middle = lines.ends[lines.kind == OUTLINE].mean(axis=1)
+    middle = lines.ends[lines.kind == OUTLINE_KIND].mean(axis=1)
     column, row = (fine * (middle + 0.5) - 0.5).T
     inside = (column >= 0) & (row >= 0) & (column < width - 1) & (row < height - 1)
     at = np.stack([row[inside], column[inside]], axis=1)

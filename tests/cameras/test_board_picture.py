@@ -10,15 +10,17 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.rectification import top_view
-from burg_drake.cameras.rectification.stream import board_observations
-from burg_drake.cameras.rectification.top_view import BoardPicture, BoardRectifier, board_picture
-from burg_drake.cameras.sources.opening import open_source
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import inverse, transform_points
-from burg_drake.scene.document.markers import Markers
-from burg_drake.scene.document.scene import Board
+from burg_drake.cameras import (
+    BoardPicture,
+    BoardRectifier,
+    Intrinsics,
+    board_observations,
+    board_picture,
+    open_source,
+    top_view,
+)
+from burg_drake.core import InvalidInputError, inverse, transform_points
+from burg_drake.scene import Board, Markers
 from tests.cameras.board_views import view
 from tests.cameras.live_views import Pictures
 from tests.cameras.paper_photos import photo, shown_at
@@ -94,8 +96,8 @@ def test_without_intrinsics(plain: np.ndarray, bent: np.ndarray) -> None:
 def test_no_more_pixels_than_graphics_cards_take(
     plain: np.ndarray, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert top_view.LARGEST == 2048
-    monkeypatch.setattr(top_view, "LARGEST", 512)
+    assert top_view.MAX_PICTURE_SIDE == 2048
+    monkeypatch.setattr(top_view, "MAX_PICTURE_SIDE", 512)
     picture = board_picture(plain, BOARD, VGA, margin=0.0, resolution=1e-4)
     assert picture.image.shape == (362, 512, 3)
 

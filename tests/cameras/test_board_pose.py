@@ -8,13 +8,9 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.pose.edge_projection import perturbed_pose
-from burg_drake.cameras.pose.estimate import BoardEstimate
-from burg_drake.cameras.pose.estimator import BoardPose, estimate_board
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.scene.document.markers import Markers
-from burg_drake.scene.document.scene import Board
+from burg_drake.cameras import BoardEstimate, BoardPose, Intrinsics, estimate_board, perturbed_pose
+from burg_drake.core import InvalidInputError
+from burg_drake.scene import Board, Markers
 from tests.cameras.board_views import CAMERA, SMALL, error, view
 from tests.cameras.synthetic import (
     FINE,

@@ -9,10 +9,9 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ZeroOrderHold
 from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
 
-from burg_drake.cameras.pose.estimator import BoardPose
-from burg_drake.cameras.systems.pose_estimator import BoardPoseEstimator
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.scene.document.scene import Board
+from burg_drake.cameras import BoardPose, BoardPoseEstimator
+from burg_drake.core import InvalidInputError
+from burg_drake.scene import Board
 from tests.cameras.board_views import SMALL, error, view
 from tests.cameras.synthetic import board_depth, board_image
 

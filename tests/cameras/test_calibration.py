@@ -8,29 +8,27 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.calibration.estimation import (
+from burg_drake.cameras import (
+    CharucoTarget,
+    CharucoView,
+    Frame,
+    Intrinsics,
+    LensHypothesis,
+    ViewCollector,
     calibrate,
     calibrate_views,
-    displacement,
-)
-from burg_drake.cameras.calibration.first_guess import first_guess
-from burg_drake.cameras.calibration.guidance import wanted_views
-from burg_drake.cameras.calibration.image_parts import coverage
-from burg_drake.cameras.calibration.lens_fit import fit_lens
-from burg_drake.cameras.calibration.lens_uncertainty import (
-    LensHypothesis,
-    covariance_of,
-    error_of,
+    calibration_advice,
+    camera_covariance,
+    camera_error,
+    corner_coverage,
+    corner_displacement,
+    fit_lens,
+    guess_camera,
     image_grid,
+    is_useless,
+    wanted_views,
 )
-from burg_drake.cameras.calibration.quality import advice, is_useless
-from burg_drake.cameras.calibration.target import CharucoTarget, CharucoView
-from burg_drake.cameras.calibration.view_collector import ViewCollector
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.sources.frame import Frame
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import make_pose
+from burg_drake.core import Array, InvalidInputError, UnknownNameError, make_pose
 from tests.cameras.charuco_image import target_image
 
 TARGET = CharucoTarget()
@@ -118,7 +116,7 @@ def test_the_lens_model_is_the_one_that_the_corners_support(model: str) -> None:
 @pytest.mark.parametrize("model", ["radial4", "radial", "rational"])
 def test_standard_deviations_are_those_of_opencv(model: str) -> None:
     views = views_of(LENSES[model], 12, 0.1)
-    fit = fit_lens(views, TARGET, model, first_guess(views, TARGET, "perspective"), bend=0.0)
+    fit = fit_lens(views, TARGET, model, guess_camera(views, TARGET, "perspective"), bend=0.0)
     flags = {"radial4": cv2.CALIB_FIX_K3, "radial": 0, "rational": cv2.CALIB_RATIONAL_MODEL}[model]
     guess = fit.intrinsics
     k = np.array([*guess.distortion, 0.0])[: max(5, len(guess.distortion))]
@@ -130,7 +128,7 @@ def test_standard_deviations_are_those_of_opencv(model: str) -> None:
         k,
         flags=flags | cv2.CALIB_USE_INTRINSIC_GUESS,
     )
-    ours = np.sqrt(np.diag(covariance_of(fit)))
+    ours = np.sqrt(np.diag(camera_covariance(fit)))
     # Some combinations of rational coefficients are held by the prior, which OpenCV does not have.
     compared = [0, 1, 2, 3, 6, 7] if model == "rational" else list(range(len(ours)))
     assert np.allclose(ours[compared], np.ravel(deviations)[compared], rtol=5e-3)
@@ -141,7 +139,7 @@ def test_standard_deviations_are_those_of_opencv(model: str) -> None:
 
 def test_a_fisheye_fit_is_that_of_opencv() -> None:
     views = views_of(LENSES["fisheye"], 12, 0.1)
-    fit = fit_lens(views, TARGET, "fisheye", first_guess(views, TARGET, "fisheye"), bend=0.0)
+    fit = fit_lens(views, TARGET, "fisheye", guess_camera(views, TARGET, "fisheye"), bend=0.0)
     k = np.array(fit.intrinsics.distortion)
     names = cv2.fisheye if hasattr(cv2.fisheye, "CALIB_FIX_SKEW") else cv2  # OpenCV 4, OpenCV 5
     flags = names.CALIB_USE_INTRINSIC_GUESS | names.CALIB_FIX_SKEW | names.CALIB_RECOMPUTE_EXTRINSIC
@@ -166,7 +164,7 @@ def test_uncertainty_is_the_scatter_of_many_calibrations() -> None:
     """Monte Carlo: the same views with other noise, over and over."""
     truth, pixels = LENSES["radial4"], image_grid(PINHOLE, 5, 4)
     exact = views_of(truth, 8, 0.0)
-    start = first_guess(exact, TARGET, "perspective")
+    start = guess_camera(exact, TARGET, "perspective")
     seen = np.concatenate([view.corners for view in exact])
     rays, seen_rays = truth.rays(pixels), truth.rays(seen)
     rng = np.random.default_rng(1)
@@ -187,8 +185,8 @@ def test_uncertainty_is_the_scatter_of_many_calibrations() -> None:
         turn = np.linalg.lstsq(np.transpose(by_turn), difference, rcond=None)[0]
         R = cv2.Rodrigues(-turn)[0]
         off.append(np.linalg.norm(found.project(rays @ R.T) - pixels, axis=1))
-        alone = LensHypothesis(1.0, found, covariance_of(fit))
-        expected.append(error_of(found, (alone,), seen, pixels))
+        alone = LensHypothesis(1.0, found, camera_covariance(fit))
+        expected.append(camera_error(found, (alone,), seen, pixels))
     scatter = np.sqrt(np.mean(np.square(off), axis=0))
     assert np.allclose(scatter, np.mean(expected, axis=0), rtol=0.4)
     assert scatter.mean() == pytest.approx(np.mean(expected), rel=0.2)
@@ -245,10 +243,10 @@ def test_views_without_tilt_are_known_to_tell_little() -> None:
     straight = calibrate_views(views_of(LENSES["radial4"], 12, 0.1, tilt=0.02), TARGET)
     tilted = calibrate_views(views_of(LENSES["radial4"], 15, 0.1), TARGET)
     sides = "tilt the target by 20 to 45 degrees, so that it faces left, then right, then up, then"
-    assert any(line.startswith(sides) for line in advice(straight))
+    assert any(line.startswith(sides) for line in calibration_advice(straight))
     assert straight.parameters["fx"][1] > 20 * tilted.parameters["fx"][1]
     assert is_useless(straight) and not is_useless(tilted)
-    assert not any(line.startswith(sides) for line in advice(tilted))
+    assert not any(line.startswith(sides) for line in calibration_advice(tilted))
 
 
 def test_advice_names_what_was_not_seen() -> None:
@@ -259,11 +257,13 @@ def test_advice_names_what_was_not_seen() -> None:
         kept.append(replace(view, ids=view.ids[inside], corners=view.corners[inside]))
     found = calibrate_views([v for v in kept if len(v.ids) > 15], TARGET)
     (line,) = (
-        text for text in advice(found) if text.startswith("move the target into and across the ")
+        text
+        for text in calibration_advice(found)
+        if text.startswith("move the target into and across the ")
     )
     assert "right edge" in line and "left" not in line
     few = calibrate_views(views[:5], TARGET)
-    assert "5 views are too few; take 15 to 30" in advice(few)
+    assert "5 views are too few; take 15 to 30" in calibration_advice(few)
 
 
 def facing(turns: list[tuple[float, float]], distances: tuple[float, ...]) -> list[CharucoView]:
@@ -294,7 +294,7 @@ def test_live_views_are_asked_for_until_there_are_enough(monkeypatch: pytest.Mon
     blank = Frame(np.zeros((480, 640, 3), np.uint8), None, 0.0, "camera 0")
 
     def offer(view: CharucoView) -> tuple[bool, str]:
-        name = "burg_drake.cameras.calibration.view_collector.find_target"
+        name = "burg_drake.cameras.calibration.view_guidance.find_target"
         monkeypatch.setattr(name, lambda image, target, name: view)
         assert collector.offer(blank) == (False, "hold still")
         return collector.offer(blank)
@@ -351,7 +351,7 @@ def test_corners_of_the_image_are_asked_for_by_what_is_known_of_them() -> None:
 
 def test_coverage_counts_every_corner_in_its_part_of_the_image() -> None:
     views = views_of(PINHOLE, 5, 0.0)
-    counts = coverage(views, (640, 480))
+    counts = corner_coverage(views, (640, 480))
     brute = np.zeros_like(counts)
     for u, v in np.concatenate([view.corners for view in views]):
         brute[int((v + 0.5) // 80), int((u + 0.5) // 80)] += 1
@@ -361,9 +361,9 @@ def test_coverage_counts_every_corner_in_its_part_of_the_image() -> None:
 def test_displacement_of_views() -> None:
     view = views_of(PINHOLE, 1, 0.0)[0]
     moved = replace(view, corners=view.corners + np.array([3.0, 4.0]))
-    assert displacement(view, moved) == pytest.approx(5.0 / 800.0)
+    assert corner_displacement(view, moved) == pytest.approx(5.0 / 800.0)
     part = replace(view, ids=view.ids[:3], corners=view.corners[:3])
-    assert displacement(view, part) == float("inf")
+    assert corner_displacement(view, part) == float("inf")
 
 
 def test_live_views_are_still_and_different() -> None:

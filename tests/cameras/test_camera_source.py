@@ -8,11 +8,16 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from burg_drake.cameras.sources.frame import CameraLost, Frame, FrameSource, Image
-from burg_drake.cameras.sources.image_file import write_image
-from burg_drake.cameras.sources.opening import open_source
-from burg_drake.cameras.systems.camera_source import CameraSource
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.cameras import (
+    CameraLost,
+    CameraSource,
+    Frame,
+    FrameSource,
+    Image,
+    open_source,
+    write_image,
+)
+from burg_drake.core import InvalidInputError
 
 
 def picture(number: int) -> Image:

@@ -9,14 +9,17 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.calibration.target import CharucoTarget, CharucoView, find_target
-from burg_drake.cameras.calibration.target_sheet import upper_left, write_target
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.sources.frame import Image
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import BurgError, InvalidInputError
-from burg_drake.core.frames import make_pose
-from burg_drake.printout.board_printout import PrintSettings
+from burg_drake.cameras import (
+    CharucoTarget,
+    CharucoView,
+    Image,
+    Intrinsics,
+    find_target,
+    target_origin,
+    write_target,
+)
+from burg_drake.core import Array, BurgError, InvalidInputError, make_pose
+from burg_drake.printout import PrintSettings
 from tests.cameras.charuco_image import target_image
 from tests.cameras.synthetic import levels, light_of
 from tests.printout.paper import rasterised
@@ -169,7 +172,7 @@ def test_the_printed_target_has_its_true_size(
     assert len(view.ids) == len(target.p_TQ)  # every corner, so every marker too
     per_metre = 300 / 0.0254
     stretch = 0.1 / np.array(settings.measured)
-    place = upper_left(target, paper)[None] + target.p_TQ[view.ids, :2] * [1.0, -1.0]
+    place = target_origin(target, paper)[None] + target.p_TQ[view.ids, :2] * [1.0, -1.0]
     found = (view.corners + 0.5) / per_metre * [1.0, -1.0] + [0.0, len(page) / per_metre]
     assert np.abs(found / stretch - place).max() < 0.06e-3
     sizes = np.ptp(found / stretch, axis=0) - np.ptp(target.p_TQ[:, :2], axis=0)

@@ -13,14 +13,26 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from burg_drake.cameras.noise.document import NOISES, DepthNoise, depth_noise
-from burg_drake.cameras.noise.measurement import noisy_depth
-from burg_drake.cameras.noise.shadow import hidden_from_second
-from burg_drake.cameras.noise.surfaces import depth_edges, incidence_angle
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.core.arrays import Array, Bytes, Single
-from burg_drake.core.documents.schema import save_document
-from burg_drake.core.errors import DocumentError, FieldError, InvalidInputError, UnknownNameError
+from burg_drake.cameras import (
+    NOISE_PRESETS,
+    DepthNoise,
+    Intrinsics,
+    depth_edges,
+    depth_noise,
+    hidden_from_second_imager,
+    incidence_angle,
+    noisy_depth,
+)
+from burg_drake.core import (
+    Array,
+    Bytes,
+    DocumentError,
+    FieldError,
+    InvalidInputError,
+    Single,
+    UnknownNameError,
+    save_document,
+)
 
 CAMERA = Intrinsics(width=640, height=480, focal=(600.0, 660.0), center=(321.0, 237.0))
 SHAPE = (480, 640)
@@ -119,7 +131,7 @@ def test_a_far_point_without_disparity_has_no_depth() -> None:
 def test_the_shadow_of_a_box_is_as_wide_as_its_disparity(baseline: float, z1: float) -> None:
     depth = wall(1.2)
     depth[200:300, 250:400] = z1
-    hidden = hidden_from_second(depth, F, baseline, same_view=False)
+    hidden = hidden_from_second_imager(depth, F, baseline, same_view=False)
     width = F * abs(baseline) * (1.0 / z1 - 1.0 / 1.2)
     rows, columns = np.nonzero(hidden)
     assert set(rows) == set(range(200, 300))
@@ -132,7 +144,7 @@ def test_the_shadow_of_a_narrow_pole_lies_apart() -> None:
     """Between pole and shadow the wall is seen by both, as a line to the second centre shows."""
     depth = wall(1.2)
     depth[:, 320:326] = 0.5
-    hidden = hidden_from_second(depth, F, B, same_view=False)[100]
+    hidden = hidden_from_second_imager(depth, F, B, same_view=False)[100]
     columns = np.arange(640)
     x = (columns - 321.0) / F * 1.2
     at_pole = x + (B - x) * (1.2 - 0.5) / 1.2  # where the line to the centre passes z = 0.5
@@ -145,11 +157,11 @@ def test_the_shadow_of_a_narrow_pole_lies_apart() -> None:
 def test_a_plane_hides_nothing_of_itself(angle: float) -> None:
     depth, _ = plane(angle, 0.4)
     for baseline in (B, -B):
-        assert not hidden_from_second(depth, F, baseline, same_view=False)[:, 100:540].any()
+        assert not hidden_from_second_imager(depth, F, baseline, same_view=False)[:, 100:540].any()
 
 
 def test_what_the_second_imager_does_not_see_is_lost() -> None:
-    hidden = hidden_from_second(wall(0.5), F, B, same_view=True)
+    hidden = hidden_from_second_imager(wall(0.5), F, B, same_view=True)
     assert hidden[:, :59].all() and not hidden[:, 60:].any()  # F B / 0.5 = 60 pixels
     noise = DepthNoise(baseline=-B, second_view="same")
     assert (measured(wall(0.5), noise) == 0.0).sum() == 480 * 60
@@ -255,38 +267,38 @@ def test_angles_and_edges_are_those_of_planes() -> None:
     assert not depth_edges(crease).any()
 
 
-@pytest.mark.parametrize("name", list(NOISES))
+@pytest.mark.parametrize("name", list(NOISE_PRESETS))
 def test_planes_stay_where_they_are(name: str) -> None:
     """In space, too: a shift by half a pixel would move the slanted one by 0.8 mm."""
     for depth in (wall(0.8), plane(45.0, 0.8)[0]):
-        result = measured(depth, NOISES[name])
+        result = measured(depth, NOISE_PRESETS[name])
         kept = (result > 0.0) & (depth < 1.5)
         assert kept.mean() > 0.5
         errors = result[kept].astype(float) - depth[kept]
         assert abs(np.median(errors)) < 1.5e-4 and abs(errors.mean()) < 1.5e-4
 
 
-@pytest.mark.parametrize("name", list(NOISES))
+@pytest.mark.parametrize("name", list(NOISE_PRESETS))
 def test_nothing_gets_depth_that_had_none(name: str) -> None:
     depth = step()
     depth[100:150, 300:340] = 0.0
     before = depth.copy()
     color = np.random.default_rng(0).integers(0, 255, (*SHAPE, 3), dtype=np.uint8)
-    result = measured(depth, NOISES[name], color=color)
+    result = measured(depth, NOISE_PRESETS[name], color=color)
     assert not result[depth == 0.0].any() and result.dtype == np.float32
     assert np.isfinite(result).all() and (result >= 0.0).all()
     np.testing.assert_array_equal(depth, before)
-    np.testing.assert_array_equal(measured(depth, NOISES[name], color=color), result)
+    np.testing.assert_array_equal(measured(depth, NOISE_PRESETS[name], color=color), result)
     if name == "none":
         np.testing.assert_array_equal(result, depth)
     else:
-        assert (measured(depth, NOISES[name], 1, color=color) != result).any()
-    assert not measured(np.zeros_like(depth), NOISES[name], color=color).any()
+        assert (measured(depth, NOISE_PRESETS[name], 1, color=color) != result).any()
+    assert not measured(np.zeros_like(depth), NOISE_PRESETS[name], color=color).any()
 
 
 def test_documents_come_back_and_refuse_what_makes_no_sense(tmp_path: Path) -> None:
-    save_document(NOISES["d435"], tmp_path / "noise.yaml")
-    assert depth_noise(tmp_path / "noise.yaml") == NOISES["d435"] == depth_noise("d435")
+    save_document(NOISE_PRESETS["d435"], tmp_path / "noise.yaml")
+    assert depth_noise(tmp_path / "noise.yaml") == NOISE_PRESETS["d435"] == depth_noise("d435")
     (tmp_path / "bad.yaml").write_text("version: 1\nbaseline: 0.05\nflying: 1.5\n")
     with pytest.raises(DocumentError, match=r"bad.yaml:3: flying is 1.5; it must be 0 to 1"):
         depth_noise(tmp_path / "bad.yaml")
@@ -303,7 +315,7 @@ def test_documents_come_back_and_refuse_what_makes_no_sense(tmp_path: Path) -> N
 
 
 def test_images_that_do_not_fit_are_refused() -> None:
-    noise = NOISES["d435"]
+    noise = NOISE_PRESETS["d435"]
     small = replace(CAMERA, width=320, height=240)
     with pytest.raises(InvalidInputError, match="the depth image has 640 x 480 pixels, but"):
         noisy_depth(wall(), noise, small, np.random.default_rng(0))

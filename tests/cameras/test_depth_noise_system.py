@@ -31,10 +31,8 @@ from pydrake.systems.sensors import (
     RgbdSensorDiscrete,
 )
 
-from burg_drake.cameras.noise.document import NOISES, DepthNoise
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.systems.depth_noise_system import DepthNoiseSystem
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.cameras import NOISE_PRESETS, DepthNoise, DepthNoiseSystem, Intrinsics
+from burg_drake.core import InvalidInputError
 from burg_drake.system_libraries import missing_render_libraries
 
 CAMERA = Intrinsics(width=64, height=48, focal=(60.0, 60.0), center=(31.5, 23.5))
@@ -112,7 +110,7 @@ def test_bad_input_is_refused() -> None:
         DepthNoiseSystem(AXIAL, CAMERA, seed=-1)
     with pytest.raises(InvalidInputError, match="period of depth noise is 0 s; give more than 0"):
         DepthNoiseSystem(AXIAL, CAMERA, period=0.0)
-    system = DepthNoiseSystem(NOISES["d435"], CAMERA)
+    system = DepthNoiseSystem(NOISE_PRESETS["d435"], CAMERA)
     with pytest.raises(InvalidInputError, match="depth_noise: input port depth_image has no value"):
         depth(system, system.CreateDefaultContext())
     with pytest.raises(InvalidInputError, match="the depth image has 32 x 48 pixels"):

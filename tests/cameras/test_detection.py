@@ -5,13 +5,17 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from burg_drake.cameras.pose.detection import MarkerDetector, other_markers
-from burg_drake.cameras.pose.edge_projection import perturbed_pose, view_edges
-from burg_drake.cameras.pose.edges import REACH, marker_edges
-from burg_drake.cameras.pose.estimator import grey_image
-from burg_drake.cameras.pose.quadrilaterals import read_cells
-from burg_drake.scene.document.markers import Markers, marker_dictionary
-from burg_drake.scene.document.scene import Board
+from burg_drake.cameras import (
+    NEIGHBOUR_EDGES,
+    MarkerDetector,
+    find_foreign_markers,
+    grey_image,
+    marker_edges,
+    perturbed_pose,
+    project_edges,
+    read_cells,
+)
+from burg_drake.scene import Board, Markers, marker_dictionary
 from tests.cameras.board_views import SMALL, view
 from tests.cameras.synthetic import board_image
 
@@ -87,11 +91,11 @@ def test_white_cells_in_a_border_are_forgiven_up_to_a_share() -> None:
 
 def test_markers_of_others_are_named() -> None:
     image = grey_image(board_image(BOARD, SMALL, NEAR))
-    other = other_markers(image, Board(markers=Markers(dictionary="5X5_250")).layout)
+    other = find_foreign_markers(image, Board(markers=Markers(dictionary="5X5_250")).layout)
     assert other is not None
     assert other.dictionary == "ARUCO_MIP_36h12"
     assert set(other.ids) == set(range(20, 32))
-    assert other_markers(np.full_like(image, 128), BOARD.layout) is None
+    assert find_foreign_markers(np.full_like(image, 128), BOARD.layout) is None
 
 
 def test_edges_are_all_changes_of_color() -> None:
@@ -107,7 +111,7 @@ def test_edges_are_all_changes_of_color() -> None:
         upper_left = layout.p_SQ[edges.marker, 0, :2]
         column, row = np.floor((p - upper_left) * [1, -1] / cell).astype(int).T
         is_white = white[edges.marker, row + 1, column + 1]
-        assert np.array_equal(is_white, edges.steps[:, 1, REACH] * step > 0)
+        assert np.array_equal(is_white, edges.steps[:, 1, NEIGHBOUR_EDGES] * step > 0)
     # Every beginning is spread over all markers.
     assert np.ptp(np.bincount(edges.marker[:60], minlength=12)) <= 1
 
@@ -122,18 +126,20 @@ def test_motion_and_print_are_derivatives() -> None:
     )
     edges = marker_edges(BOARD.layout)
     which = np.arange(len(edges.marker))
-    views = view_edges(edges, which, lens, NEAR)
+    views = project_edges(edges, which, lens, NEAR)
     normal = views.across / np.linalg.norm(views.across, axis=1, keepdims=True)
     h = 1e-5
     for k, unit in enumerate(np.eye(6)):
         ahead, back = (
-            view_edges(edges, views.which, lens, perturbed_pose(NEAR, s * h * unit))
+            project_edges(edges, views.which, lens, perturbed_pose(NEAR, s * h * unit))
             for s in (1, -1)
         )
         change = ((ahead.at - back.at) * normal).sum(axis=1) / (2 * h)
         assert np.allclose(change, views.motion[:, k], rtol=1e-3, atol=0.05), k
     longer = marker_edges(BOARD.layout, (1 - h, 1 + h))
-    change = ((view_edges(longer, views.which, lens, NEAR).at - views.at) * normal).sum(axis=1) / h
+    change = ((project_edges(longer, views.which, lens, NEAR).at - views.at) * normal).sum(
+        axis=1
+    ) / h
     assert np.allclose(change, views.print[:, 0], rtol=1e-2, atol=0.05)
 
 

@@ -6,11 +6,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.cameras.pose.disturbance import Disturbance, DisturbanceFit, SheetModes
-from burg_drake.cameras.pose.edge_projection import EdgeViews, perturbed_pose, view_edges
-from burg_drake.cameras.pose.edges import marker_edges
-from burg_drake.cameras.pose.estimator import BoardPose
-from burg_drake.scene.document.scene import Board
+from burg_drake.cameras import (
+    BoardPose,
+    Disturbance,
+    DisturbanceFit,
+    EdgeViews,
+    SheetModes,
+    marker_edges,
+    perturbed_pose,
+    project_edges,
+)
+from burg_drake.scene import Board
 from tests.cameras.board_views import CAMERA, error, view
 from tests.cameras.placement_views import INTRINSICS, looking
 from tests.cameras.synthetic import ImageDegradation, board_image
@@ -27,7 +33,7 @@ PRIOR = np.diag([0.0] * 6 + [1.0])
 
 
 def seen_from(X_SC: np.ndarray) -> EdgeViews:
-    return view_edges(EDGES, np.arange(800), CAMERA, X_SC)
+    return project_edges(EDGES, np.arange(800), CAMERA, X_SC)
 
 
 def fitted(offset: np.ndarray, rng: np.random.Generator) -> Disturbance:

@@ -11,15 +11,17 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.optics.field_of_view import FieldOfView
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.optics.undistortion import Undistortion
-from burg_drake.cameras.overlay.renderer import Overlay
-from burg_drake.cameras.pose.estimator import BoardPose
-from burg_drake.cameras.rectification.top_view import board_picture
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.dataset.views.view import View
-from burg_drake.scene.document.scene import Board, load_scene
+from burg_drake.cameras import (
+    BoardPose,
+    FieldOfView,
+    Intrinsics,
+    Overlay,
+    Undistortion,
+    board_picture,
+)
+from burg_drake.core import InvalidInputError
+from burg_drake.dataset import View
+from burg_drake.scene import Board, load_scene
 from tests.cameras.board_views import error, view
 from tests.cameras.synthetic import ImageDegradation, board_image
 

@@ -10,11 +10,15 @@ import numpy as np
 import pytest
 from pydrake.systems.sensors import CameraInfo
 
-from burg_drake.cameras.optics.fisheye import fisheye_lens
-from burg_drake.cameras.optics.intrinsics import Intrinsics, camera_info, of_camera, of_camera_info
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import FieldError, InvalidInputError
-from burg_drake.station.document.station_document import Camera
+from burg_drake.cameras import (
+    Intrinsics,
+    camera_info,
+    camera_intrinsics,
+    fisheye_lens,
+    of_camera_info,
+)
+from burg_drake.core import FieldError, InvalidInputError, Pose
+from burg_drake.station import Camera
 
 PINHOLE = Intrinsics(width=640, height=480, focal=(600.0, 610.0), center=(315.0, 241.0))
 RADIAL = replace(PINHOLE, distortion=(-0.3, 0.1, 0.001, -0.002, -0.01))
@@ -110,7 +114,7 @@ def test_drake_has_the_principal_point_half_a_pixel_further() -> None:
     assert of_camera_info(info) == PINHOLE
     # A centred camera: Drake's principal point is half of the size, ours the middle pixel's centre.
     centred = of_camera_info(CameraInfo(640, 480, 600.0, 600.0, 320.0, 240.0))
-    assert centred.center == (319.5, 239.5) == of_camera(Camera(X_WC=Pose())).center
+    assert centred.center == (319.5, 239.5) == camera_intrinsics(Camera(X_WC=Pose())).center
     with pytest.raises(InvalidInputError, match="pinholes without lens distortion"):
         camera_info(RADIAL)
     with pytest.raises(InvalidInputError, match="pinholes without lens distortion"):

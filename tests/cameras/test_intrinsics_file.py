@@ -10,13 +10,8 @@ import numpy as np
 import pytest
 import yaml
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.optics.intrinsics_file import (
-    load_intrinsics,
-    save_camera_info,
-    save_intrinsics,
-)
-from burg_drake.core.errors import BurgError, DocumentError, InvalidInputError
+from burg_drake.cameras import Intrinsics, load_intrinsics, save_camera_info, save_intrinsics
+from burg_drake.core import BurgError, DocumentError, InvalidInputError
 
 RADIAL = Intrinsics(
     camera="webcam",

@@ -11,21 +11,22 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.live.actions import ViewActions
-from burg_drake.cameras.live.event_log import EventLog
-from burg_drake.cameras.live.frame_processing import (
+from burg_drake.cameras import (
+    EventLog,
+    Frame,
     FrameProcessor,
+    FrameReader,
+    FrameSource,
+    LiveSession,
+    ViewActions,
     ViewSettings,
+    open_source,
+    read_poses,
+    silence_opencv,
+    source_opening,
 )
-from burg_drake.cameras.live.frame_reader import FrameReader
-from burg_drake.cameras.live.recording_table import read_poses
-from burg_drake.cameras.live.session import LiveSession
-from burg_drake.cameras.sources import device
-from burg_drake.cameras.sources.frame import Frame, FrameSource
-from burg_drake.cameras.sources.opencv_log import quiet
-from burg_drake.cameras.sources.opening import open_source
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.core import InvalidInputError, UnknownNameError
+from burg_drake.scene import Scene, load_scene
 from tests.cameras.live_views import CAMERA, Pictures, camera_at, lines
 from tests.cameras.synthetic import board_image
 from tests.hang_guard import HANG_GUARD, until
@@ -50,7 +51,7 @@ def image(scene: Scene) -> np.ndarray:
 def video(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Six frames at 20 a second; in the third and fourth the board is hidden."""
     path = tmp_path_factory.mktemp("video") / "board.avi"
-    with quiet():
+    with silence_opencv():
         writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 20.0, (320, 240))
     for i in range(6):
         picture = np.zeros((240, 320, 3), np.uint8)
@@ -212,15 +213,15 @@ def test_a_lost_camera_is_told_once_and_comes_back(
     live: Callable[..., LiveSession], video: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """OpenCV reads the video as it reads a camera; at its end the camera is gone for a while."""
-    monkeypatch.setattr(device, "PATIENCE", 0.05)
-    monkeypatch.setattr(device, "FIRST_WAIT", 0.05)
+    monkeypatch.setattr(source_opening, "FRAME_TIMEOUT", 0.05)
+    monkeypatch.setattr(source_opening, "FIRST_WAIT", 0.05)
     gone = [True]
 
     def plug_in() -> cv2.VideoCapture | None:
         return None if gone[0] else cv2.VideoCapture(str(video))
 
     gone[0] = False
-    source = device.DeviceSource("camera 7", plug_in)
+    source = source_opening.DeviceSource("camera 7", plug_in)
     gone[0] = True
     log = EventLog()
     running = live(source, events=log)

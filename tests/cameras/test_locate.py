@@ -7,15 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.pose.camera_location import locate_camera
-from burg_drake.cameras.pose.estimate import BoardEstimate
-from burg_drake.cameras.pose.estimator import estimate_board
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import make_pose, rotation_angle, rotation_from_rpy
-from burg_drake.scene.document.scene import Board
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.cameras import BoardEstimate, Intrinsics, estimate_board, locate_camera
+from burg_drake.core import InvalidInputError, Pose, make_pose, rotation_angle, rotation_from_rpy
+from burg_drake.scene import Board
+from burg_drake.station import Station, load_station
 from tests.cameras.synthetic import ImageDegradation, board_image
 
 K = Intrinsics(width=640, height=480, focal=(600.0, 602.0), center=(318.0, 241.0))

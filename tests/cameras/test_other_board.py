@@ -8,11 +8,9 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.pose.estimator import BoardPose
-from burg_drake.cameras.pose.wrong_board import WrongBoardCheck
-from burg_drake.core import photo_light
-from burg_drake.scene.document.markers import Markers
-from burg_drake.scene.document.scene import Board
+from burg_drake.cameras import BoardPose, WrongBoardCheck
+from burg_drake.core import srgb_to_linear
+from burg_drake.scene import Board, Markers
 from tests.cameras.board_views import CAMERA, SMALL, error, view
 from tests.cameras.synthetic import ImageDegradation, board_image, covers_of
 
@@ -127,7 +125,7 @@ def test_frames_are_looked_at_where_the_ring_is() -> None:
     X_SC = VIEW.copy()  # marker 5 of the sheet stands where the board of one has its own
     X_SC[:3, 3] -= BOARD.layout.p_SQ[5].mean(axis=0) - one.layout.p_SQ[0].mean(axis=0)
     grey = board_image(BOARD, SMALL, VIEW)[:, :, 1]
-    light = photo_light(grey)
+    light = srgb_to_linear(grey)
     said = WrongBoardCheck(one, SMALL, (1.0, 1.0)).beyond(grey, light, X_SC)
     assert "ids 0, 1, 2 ..." in said
     assert not WrongBoardCheck(BOARD, SMALL, (1.0, 1.0)).beyond(grey, light, VIEW)

@@ -9,28 +9,31 @@ import trimesh
 from numpy.typing import NDArray
 
 import burg_drake as burg
-from burg_drake.cameras.optics.field_of_view import FieldOfView
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.overlay.antialiasing import strokes
-from burg_drake.cameras.overlay.corrections import COLORS, mark
-from burg_drake.cameras.overlay.renderer import Overlay, instance_labels
-from burg_drake.cameras.overlay.style import OverlayStyle
-from burg_drake.cameras.overlay.tag_layout import lay_out
-from burg_drake.cameras.overlay.text_tags import notice
-from burg_drake.cameras.placement.document import (
+from burg_drake.cameras import (
+    INNER_KIND,
+    OUTLINE_KIND,
+    VERDICT_COLORS,
     CheckedImage,
     CheckedScene,
+    FieldOfView,
+    Intrinsics,
+    Overlay,
+    OverlayStyle,
     Placement,
     PlacementCheck,
+    SceneMesh,
+    SurfaceCamera,
+    VisibleLines,
+    build_scene_mesh,
+    correction_mark,
+    draw_notice,
+    instance_labels,
+    place_tags,
+    rasterize_lines,
+    visible_lines,
 )
-from burg_drake.cameras.projection.line_drawing import INNER, OUTLINE, VisibleLines, visible_lines
-from burg_drake.cameras.projection.scene_mesh import SceneMesh, build_scene_mesh
-from burg_drake.cameras.projection.surface_image import SurfaceCamera
-from burg_drake.core.arrays import Array
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import make_pose
-from burg_drake.scene.document.scene import Scene
+from burg_drake.core import Array, InvalidInputError, Pose, UnknownNameError, make_pose
+from burg_drake.scene import Scene
 
 LENS = (-0.25, 0.08, 0.0004, -0.0003, 0.0)
 PINHOLE = Intrinsics(width=320, height=240, focal=(300.0, 302.0), center=(160.3, 118.9))
@@ -110,7 +113,7 @@ def test_outlines_are_where_rays_find_borders(
 ) -> None:
     lines = visible_lines(shape, FieldOfView(intrinsics), X_SC)
     truth = borders(shape, intrinsics, X_SC)
-    error = distances(truth, lines.ends[lines.kind == OUTLINE])
+    error = distances(truth, lines.ends[lines.kind == OUTLINE_KIND])
     # The ends of bits that run behind another object are seen or hidden as a whole.
     assert len(truth) > 500 and np.percentile(error, 99) < 0.02 and (error < 0.1).mean() > 0.995
 
@@ -118,7 +121,7 @@ def test_outlines_are_where_rays_find_borders(
 @pytest.mark.parametrize("X_SC", VIEWS)
 def test_every_outline_is_a_border(shape: SceneMesh, X_SC: Array) -> None:
     lines = visible_lines(shape, FieldOfView(PINHOLE), X_SC)
-    ends = lines.ends[lines.kind == OUTLINE]
+    ends = lines.ends[lines.kind == OUTLINE_KIND]
     along = ends[:, 1] - ends[:, 0]
     long = np.linalg.norm(along, axis=1) > 0.2
     ends, along = ends[long], along[long]
@@ -147,7 +150,7 @@ def test_outline_of_a_ball_is_the_ellipse_of_its_cone() -> None:
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     passing = np.linalg.norm(np.cross(rays, center), axis=1)  # distance from the ball's centre
     error = (0.05 - passing) / 0.5 * 300.0
-    assert (lines.kind == OUTLINE).all() and np.abs(error).max() < 0.05
+    assert (lines.kind == OUTLINE_KIND).all() and np.abs(error).max() < 0.05
 
 
 def test_nearer_objects_hide_others_even_where_they_interlock() -> None:
@@ -175,7 +178,7 @@ def test_a_handle_before_its_mug_is_an_inner_line(scene: Scene, shape: SceneMesh
     middle = mug.boxes[0].mean(axis=0)
     eye = middle + 0.35 * np.array([np.cos(yaw), np.sin(yaw), 0.5])
     lines = visible_lines(mug, FieldOfView(PINHOLE), looking(tuple(eye), tuple(middle)))
-    assert (lines.kind == INNER).sum() > 20
+    assert (lines.kind == INNER_KIND).sum() > 20
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.3, 0.785, 1.2, 1.57])
@@ -184,7 +187,7 @@ def test_strokes_lie_where_they_should(angle: float) -> None:
     start = np.array([50.37, 40.81])
     points = start + np.arange(-30, 31, 1.7)[:, None] * np.array(along)
     ends = np.stack([points[:-1], points[1:]], axis=1)
-    drawn = strokes(ends, np.full(len(ends), 1.1), 1.5, (100, 80))
+    drawn = rasterize_lines(ends, np.full(len(ends), 1.1), 1.5, (100, 80))
     at = np.stack([drawn.at % 100, drawn.at // 100], axis=1) - start
     middle = np.abs(at @ along) < 15.0
     cover = drawn.cover()[middle]
@@ -197,8 +200,8 @@ def test_strokes_lie_where_they_should(angle: float) -> None:
 
 def test_overlapping_bits_cover_no_more_than_one() -> None:
     one = np.array([[[10.2, 10.0], [14.0, 12.5]]])
-    twice = strokes(np.concatenate([one, one]), np.ones(2), 1.5, (30, 30))
-    once = strokes(one, np.ones(1), 1.5, (30, 30))
+    twice = rasterize_lines(np.concatenate([one, one]), np.ones(2), 1.5, (30, 30))
+    once = rasterize_lines(one, np.ones(1), 1.5, (30, 30))
     np.testing.assert_array_equal(twice.at, once.at)
     np.testing.assert_allclose(twice.cover(), once.cover(), atol=2e-3)
 
@@ -331,10 +334,10 @@ def placed(displacement: tuple[float, float] | None, angle: float | None) -> Pla
 
 
 def test_arrows_lead_from_where_it_stands_to_where_it_should() -> None:
-    note = mark(placed((0.03, -0.04), None), OverlayStyle(), 0.1)
+    note = correction_mark(placed((0.03, -0.04), None), OverlayStyle(), 0.1)
     np.testing.assert_allclose(note.lines[0], [[0.33, 0.26, 0.1], [0.3, 0.3, 0.1]], atol=1e-12)
     assert note.verdict == "off" and note.text == "50 mm"
-    short = mark(placed((0.0, 0.002), 0.001), OverlayStyle(), 0.1)
+    short = correction_mark(placed((0.0, 0.002), 0.001), OverlayStyle(), 0.1)
     start, tip = short.lines[0]
     np.testing.assert_allclose(tip, [0.3, 0.3, 0.1], atol=1e-12)
     assert start[1] > tip[1] + 0.02 and short.text == "2.0 mm 0.1°"
@@ -342,7 +345,7 @@ def test_arrows_lead_from_where_it_stands_to_where_it_should() -> None:
 
 @pytest.mark.parametrize("angle", [0.4, -0.4])
 def test_arcs_turn_back(angle: float) -> None:
-    note = mark(placed((0.0, 0.0), angle), OverlayStyle(), 0.0)
+    note = correction_mark(placed((0.0, 0.0), angle), OverlayStyle(), 0.0)
     spokes = note.lines[:-2, :, :2] - (0.3, 0.3)
     turning = np.cross(
         np.pad(spokes[:, 0], ((0, 0), (0, 1))), np.pad(spokes[:, 1], ((0, 0), (0, 1)))
@@ -352,11 +355,11 @@ def test_arcs_turn_back(angle: float) -> None:
 
 def test_verdicts() -> None:
     style = OverlayStyle(tolerance=1e-3, angle_tolerance=math.radians(1.0))
-    good = mark(placed((6e-4, -7e-4), math.radians(-0.9)), style, 0.0)
+    good = correction_mark(placed((6e-4, -7e-4), math.radians(-0.9)), style, 0.0)
     assert good.verdict == "placed" and good.text == "0.9 mm 0.9°" and not len(good.lines)
-    assert mark(placed((1.1e-3, 0.0), None), style, 0.0).verdict == "off"
-    assert mark(placed((0.0, 0.0), math.radians(1.1)), style, 0.0).verdict == "off"
-    assert mark(placed(None, None), style, 0.0).verdict == "not_seen"
+    assert correction_mark(placed((1.1e-3, 0.0), None), style, 0.0).verdict == "off"
+    assert correction_mark(placed((0.0, 0.0), math.radians(1.1)), style, 0.0).verdict == "off"
+    assert correction_mark(placed(None, None), style, 0.0).verdict == "not_seen"
 
 
 def test_doubtful_results_have_a_question_mark_and_their_spread() -> None:
@@ -366,11 +369,11 @@ def test_doubtful_results_have_a_question_mark_and_their_spread() -> None:
         angle_sd=math.radians(2.0),
     )
     doubtful = replace(sure, status="uncertain", reason="two poses fit equally well")
-    assert mark(sure, OverlayStyle(), 0.0).text == "5.0 mm 12°"
-    note = mark(doubtful, OverlayStyle(), 0.0)
+    assert correction_mark(sure, OverlayStyle(), 0.0).text == "5.0 mm 12°"
+    note = correction_mark(doubtful, OverlayStyle(), 0.0)
     assert (note.verdict, note.text) == ("uncertain", "? 5.0±1.0 mm 12±2.0°")
     nowhere = replace(placed(None, None), status="uncertain", reason="no outline")
-    assert mark(nowhere, OverlayStyle(), 0.0).verdict == "uncertain"
+    assert correction_mark(nowhere, OverlayStyle(), 0.0).verdict == "uncertain"
 
 
 def test_placement_shows_in_the_colour_of_outlines(scene: Scene) -> None:
@@ -384,15 +387,17 @@ def test_placement_shows_in_the_colour_of_outlines(scene: Scene) -> None:
     )
     drawn = overlay.draw(gray(), VIEWS[0], placement=check)
     for verdict in ("placed", "off"):
-        assert (drawn == COLORS[verdict]).all(axis=2).sum() > 30
+        assert (drawn == VERDICT_COLORS[verdict]).all(axis=2).sum() > 30
     doubtful = replace(check.instances["mug"], status="uncertain", reason="badly fitting outline")
     dashed = overlay.draw(gray(), VIEWS[0], placement=replace(check, instances={"mug": doubtful}))
     arrows = replace(check, instances={"mug": replace(doubtful, displacement=(2e-4, 0.0))})
     bare = overlay.draw(gray(), VIEWS[0], placement=arrows)
-    assert (dashed == COLORS["uncertain"]).all(axis=2).sum() > 30
+    assert (dashed == VERDICT_COLORS["uncertain"]).all(axis=2).sum() > 30
     whole = replace(check, instances={"mug": placed((2e-4, 0.0), None)})
-    green = (overlay.draw(gray(), VIEWS[0], placement=whole) == COLORS["placed"]).all(axis=2)
-    yellow = (bare == COLORS["uncertain"]).all(axis=2)
+    green = (overlay.draw(gray(), VIEWS[0], placement=whole) == VERDICT_COLORS["placed"]).all(
+        axis=2
+    )
+    yellow = (bare == VERDICT_COLORS["uncertain"]).all(axis=2)
     assert 0.4 * green.sum() < yellow.sum() < 0.75 * green.sum() and not (yellow & ~green).any()
     quiet = OverlayStyle(errors=False, names=False, footprints=False)
     np.testing.assert_array_equal(
@@ -406,7 +411,7 @@ def test_tags_lie_beside_each_other() -> None:
     low = rng.uniform((0, 0), (560, 420), (7, 2))
     boxes = np.stack([low, low + rng.uniform(10, 60, (7, 2))], axis=1)
     sizes = [(int(w), 20) for w in rng.integers(40, 110, 7)]
-    corners = lay_out(boxes, sizes, np.zeros((480, 640), bool))
+    corners = place_tags(boxes, sizes, np.zeros((480, 640), bool))
     taken = np.zeros((480, 640), int)
     for (x, y), (w, h) in zip(corners, sizes, strict=True):
         assert 0 <= x <= 640 - w and 0 <= y <= 480 - h
@@ -419,16 +424,16 @@ def test_tags_lie_on_no_body() -> None:
     that of a bar at the upper edge, which has no room above, below it."""
     bodies = np.ones((480, 640), bool)
     bodies[:, 500:] = False
-    (corner,) = lay_out(np.array([[[400.0, 200.0], [495.0, 260.0]]]), [(80, 20)], bodies)
+    (corner,) = place_tags(np.array([[[400.0, 200.0], [495.0, 260.0]]]), [(80, 20)], bodies)
     assert corner[0] >= 499 and 180 <= corner[1] <= 270
     bar = np.zeros((480, 640), bool)
     bar[:30, 100:400] = True
-    (corner,) = lay_out(np.array([[[100.0, 0.0], [399.0, 29.0]]]), [(80, 20)], bar)
+    (corner,) = place_tags(np.array([[[100.0, 0.0], [399.0, 29.0]]]), [(80, 20)], bar)
     assert not bar[corner[1] : corner[1] + 20, corner[0] : corner[0] + 80].any()
 
 
 def test_notices_are_wrapped_and_change_a_copy() -> None:
     image = gray()
-    short, long = notice(image, "no marker"), notice(image, "no marker of the board " * 5)
+    short, long = draw_notice(image, "no marker"), draw_notice(image, "no marker of the board " * 5)
     rows = [(n != 128).any(axis=(1, 2)).sum() for n in (short, long)]
     assert (image == 128).all() and rows[0] < 40 < rows[1] < 140

@@ -8,13 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from burg_drake.cameras.placement.alignment.shape import target_shapes
-from burg_drake.cameras.placement.check import check_placement
-from burg_drake.cameras.pose.estimate import BoardEstimate
-from burg_drake.core.arrays import Array
-from burg_drake.core.documents.schema import dump_document
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.cameras import BoardEstimate, check_placement, target_shapes
+from burg_drake.core import Array, InvalidInputError, dump_document
+from burg_drake.scene import Scene, load_scene
 from burg_drake.system_libraries import missing_render_libraries
 from tests.cameras.placement_photo import Photo, ScenePhotographer
 from tests.cameras.placement_views import INTRINSICS, X_SC, looking

@@ -10,9 +10,8 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.sources.depth_file import read_depth
-from burg_drake.cameras.sources.image_file import decode_image, read_image
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.cameras import decode_image, read_depth, read_image
+from burg_drake.core import InvalidInputError
 
 METRES = np.array([[0.5, 0.75], [0.0, 1.25]])
 

@@ -8,22 +8,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.placement.document import (
+from burg_drake.cameras import (
     CameraPlace,
     CheckedImage,
     CheckedScene,
     ExtraObject,
+    Intrinsics,
     Placement,
     PlacementCheck,
-    image_of_file,
+    describe_image_file,
     load_placement,
     save_placement,
 )
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import DocumentError, InvalidInputError
-from burg_drake.core.frames import make_pose, rot_z
-from burg_drake.core.paths.resources import resolve
+from burg_drake.core import (
+    DocumentError,
+    InvalidInputError,
+    Pose,
+    make_pose,
+    resolve_reference,
+    rot_z,
+)
 
 CHECK = PlacementCheck(
     scene=CheckedScene(name="two", path="two.yaml", content="abc"),
@@ -85,18 +89,18 @@ def test_a_status_that_does_not_exist_names_those_that_do(tmp_path: Path) -> Non
 
 def test_files_go_by_name_and_hash(tmp_path: Path) -> None:
     (tmp_path / "a.png").write_bytes(b"abc")
-    entry = image_of_file(tmp_path / "a.png")
+    entry = describe_image_file(tmp_path / "a.png")
     # of FIPS 180-2, appendix B.1
     digest = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
     assert entry == CheckedImage(file="a.png", content=digest)
     with pytest.raises(InvalidInputError, match=r"cannot read .*b\.png"):
-        image_of_file(tmp_path / "b.png")
+        describe_image_file(tmp_path / "b.png")
 
 
 def test_a_scene_beside_the_file_keeps_its_path_when_both_move(tmp_path: Path) -> None:
     for given, kept in (
         (tmp_path / "scenes" / "two.yaml", "../scenes/two.yaml"),
-        (resolve("tabletop_six", "scenes"), "tabletop_six"),
+        (resolve_reference("tabletop_six", "scenes"), "tabletop_six"),
     ):
         check = replace(CHECK, scene=replace(CHECK.scene, path=str(given)))
         (tmp_path / "trial").mkdir(exist_ok=True)

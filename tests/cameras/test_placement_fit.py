@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from burg_drake.cameras.placement.alignment.least_squares import fit_displacement
+from burg_drake.cameras import fit_displacement
 
 UNIT = np.array([1e-3, 1e-3, 1e-2])
 STEP = np.array([0.002, -0.001, 0.01])

@@ -10,25 +10,23 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.placement.alignment.background import empty_board
-from burg_drake.cameras.placement.alignment.pinhole import PinholeView
-from burg_drake.cameras.placement.alignment.shape import target_shape
-from burg_drake.cameras.placement.alignment.silhouette_aligner import SilhouetteAligner
-from burg_drake.cameras.placement.combination import combine_checks
-from burg_drake.cameras.placement.document import (
+from burg_drake.cameras import (
     CheckedImage,
     CheckedScene,
     ExtraObject,
+    Intrinsics,
+    PinholeView,
     Placement,
     PlacementCheck,
+    SilhouetteAligner,
+    combine_checks,
+    empty_board,
+    find_exchanged_objects,
+    find_extra_objects,
+    locate_objects,
+    target_shape,
 )
-from burg_drake.cameras.placement.exchanged import exchanged_objects
-from burg_drake.cameras.placement.extras import extra_objects
-from burg_drake.cameras.placement.localization import locate_objects
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import make_pose, rot_z
+from burg_drake.core import InvalidInputError, Pose, make_pose, rot_z
 from tests.cameras.plates import BOARD, INTRINSICS, VIEW, X_SC, aligner, cover, drawing, plate
 from tests.cameras.synthetic import ImageDegradation, board_image
 
@@ -41,10 +39,10 @@ ON_PLACE = np.zeros(3)
 def test_what_is_no_object_of_the_scene_is_named_where_it_stands() -> None:
     there = aligner(drawing([cover(LONG, HERE, ON_PLACE), cover(SHORT, THERE, ON_PLACE)], LOOK))
     shape = plate(LONG, HERE)
-    (extra,) = extra_objects(there, [(shape, ON_PLACE)])
+    (extra,) = find_extra_objects(there, [(shape, ON_PLACE)])
     assert np.hypot(*np.subtract(extra.position, THERE[:2])) < 0.015
     assert extra.width == pytest.approx(0.06, abs=0.02)
-    assert extra_objects(there, [(shape, ON_PLACE), (plate(SHORT, THERE), ON_PLACE)]) == ()
+    assert find_extra_objects(there, [(shape, ON_PLACE), (plate(SHORT, THERE), ON_PLACE)]) == ()
 
 
 def test_straight_below_the_camera_it_is_named_in_its_middle() -> None:
@@ -54,7 +52,7 @@ def test_straight_below_the_camera_it_is_named_in_its_middle() -> None:
     picture = empty_board(BOARD, image, INTRINSICS.K, X_SC)
     assert picture is not None
     view = PinholeView(INTRINSICS.K, (INTRINSICS.width, INTRINSICS.height), X_SC)
-    (extra,) = extra_objects(SilhouetteAligner(view, image, picture), [])
+    (extra,) = find_extra_objects(SilhouetteAligner(view, image, picture), [])
     assert np.hypot(*np.subtract(extra.position, THERE[:2])) < 0.004
     assert extra.width == pytest.approx(0.056, abs=0.012)  # of a disk as large
 
@@ -63,7 +61,7 @@ def test_objects_on_each_others_places_are_told() -> None:
     there = aligner(drawing([cover(SHORT, HERE, ON_PLACE), cover(LONG, THERE, ON_PLACE)], LOOK))
     shapes = {"long": plate(LONG, HERE), "short": plate(SHORT, THERE)}
     located = locate_objects(there, shapes)
-    stands, _ = exchanged_objects(there, shapes, located, ["long", "short"])
+    stands, _ = find_exchanged_objects(there, shapes, located, ["long", "short"])
     assert {place: name for place, (name, _) in stands.items()} == {
         "long": "short",
         "short": "long",
@@ -76,7 +74,7 @@ def test_objects_on_their_own_places_are_not() -> None:
     there = aligner(drawing([cover(LONG, HERE, ON_PLACE), cover(SHORT, THERE, ON_PLACE)], LOOK))
     shapes = {"long": plate(LONG, HERE), "short": plate(SHORT, THERE)}
     located = locate_objects(there, shapes)
-    assert exchanged_objects(there, shapes, located, ["long", "short"]) == ({}, set())
+    assert find_exchanged_objects(there, shapes, located, ["long", "short"]) == ({}, set())
 
 
 def test_what_stands_behind_an_object_is_named_where_its_hidden_foot_may_be() -> None:
@@ -90,7 +88,7 @@ def test_what_stands_behind_an_object_is_named_where_its_hidden_foot_may_be() ->
     image = drawing([cover(square, place, ON_PLACE)], LOOK)
     corners = cv2.convexHull(VIEW.project(box.p_SV)[1].astype(np.float32))
     cv2.fillConvexPoly(image, np.rint(corners).astype(np.int32), (200, 60, 40))
-    (extra,) = extra_objects(aligner(image), [(box, ON_PLACE)])
+    (extra,) = find_extra_objects(aligner(image), [(box, ON_PLACE)])
     assert np.hypot(*np.subtract(extra.position, middle)) < 0.02
 
 
@@ -102,7 +100,7 @@ def test_an_object_stands_on_anothers_place_only_if_enough_of_it_is_seen(
     there = aligner(drawing([cover(LONG, place, ON_PLACE)], LOOK))
     shapes = {"long": plate(LONG, HERE), "short": plate(SHORT, place)}
     located = locate_objects(there, shapes)
-    stands, _ = exchanged_objects(there, shapes, located, ["long", "short"])
+    stands, _ = find_exchanged_objects(there, shapes, located, ["long", "short"])
     assert {place: name for place, (name, _) in stands.items()} == (
         {"short": "long"} if told else {}
     )
@@ -114,14 +112,14 @@ def test_what_an_object_left_its_place_to_may_be_the_one_that_is_missing() -> No
     there = aligner(drawing([strip, cover(LONG, THERE, ON_PLACE)], LOOK))
     shapes = {"long": plate(LONG, HERE), "short": plate(SHORT, THERE)}
     located = locate_objects(there, shapes)
-    stands, empty = exchanged_objects(there, shapes, located, ["long", "short"])
+    stands, empty = find_exchanged_objects(there, shapes, located, ["long", "short"])
     assert {place: name for place, (name, _) in stands.items()} == {"short": "long"}
     assert empty == {"long"}
     placed = [where for _, where in stands.values()]
-    (strip_seen,) = extra_objects(there, placed)
+    (strip_seen,) = find_extra_objects(there, placed)
     assert np.hypot(*np.subtract(strip_seen.position, HERE[:2])) < 0.02
-    assert extra_objects(there, placed, [shapes["long"].p_SR]) == ()
-    assert extra_objects(there, placed, [shapes["short"].p_SR]) == (strip_seen,)
+    assert find_extra_objects(there, placed, [shapes["long"].p_SR]) == ()
+    assert find_extra_objects(there, placed, [shapes["short"].p_SR]) == (strip_seen,)
 
 
 def mug(x: float, sd: float, angle: float = 0.1, **changes: object) -> Placement:

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from burg_drake.cameras.placement.alignment.pinhole import PinholeView
-from burg_drake.cameras.placement.alignment.shape import target_shape
-from burg_drake.cameras.placement.alignment.window import Window, window_around
-from burg_drake.core.frames import make_pose, rot_z
+from burg_drake.cameras import PinholeView, Window, target_shape, window_around
+from burg_drake.core import make_pose, rot_z
 
 K = np.array([[500.0, 0.0, 31.5], [0.0, 480.0, 23.5], [0.0, 0.0, 1.0]])
 ALL = Window(0, 0, 64, 48)

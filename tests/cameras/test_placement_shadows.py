@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.cameras.placement.alignment.background import empty_board
-from burg_drake.cameras.placement.alignment.step_fit import StepLines, fit_steps
-from burg_drake.cameras.placement.localization import locate_objects
-from burg_drake.core.arrays import Array
+from burg_drake.cameras import StepLines, empty_board, fit_steps, locate_objects
+from burg_drake.core import Array
 from tests.cameras.plates import BOARD, INTRINSICS, X_SC, aligner, cover, drawing, plate
 from tests.cameras.synthetic import ImageDegradation
 from tests.thorough import thorough

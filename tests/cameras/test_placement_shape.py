@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.cameras.placement.alignment.shape import target_shape, target_shapes
-from burg_drake.core.frames import make_pose, rot_z, transform_points
-from burg_drake.scene.document.scene import load_scene
+from burg_drake.cameras import target_shape, target_shapes
+from burg_drake.core import make_pose, rot_z, transform_points
+from burg_drake.scene import load_scene
 
 X_SO = make_pose(rot_z(0.7), (0.2, 0.1, 0.05))
 

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.cameras.placement.alignment.background import empty_board
-from burg_drake.cameras.placement.localization import locate_objects
-from burg_drake.cameras.placement.search import find_places
-from burg_drake.core import photo_light
+from burg_drake.cameras import empty_board, find_places, locate_objects
+from burg_drake.core import srgb_to_linear
 from tests.cameras.plates import (
     BOARD,
     INTRINSICS,
@@ -60,7 +58,7 @@ def test_an_empty_board_in_uneven_light_is_empty() -> None:
     assert picture is not None
     here = picture.sheet
     assert (picture.evidence[here] > 0.1).mean() < 0.01
-    assert np.abs(picture.color[here] - photo_light(image)[here]).mean() < 6.0 / 255.0
+    assert np.abs(picture.color[here] - srgb_to_linear(image)[here]).mean() < 6.0 / 255.0
     assert 0.4 < picture.blur < 1.2
     assert 1.5 < 255.0 * picture.noise < 6.0
 

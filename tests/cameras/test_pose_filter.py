@@ -10,9 +10,8 @@ from pydrake.common.value import AbstractValue
 from pydrake.systems.analysis import Simulator
 from scipy.spatial.transform import Rotation
 
-from burg_drake.cameras.pose.estimate import BoardEstimate
-from burg_drake.cameras.systems.pose_filter import PoseFilter, Track
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.cameras import BoardEstimate, PoseFilter, Track
+from burg_drake.core import InvalidInputError
 from tests.cameras.board_views import error, view
 from tests.thorough import thorough
 

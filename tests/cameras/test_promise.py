@@ -7,16 +7,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from burg_drake.apps.camera.intrinsics_text import print_intrinsics
-from burg_drake.cameras.calibration.lens_uncertainty import LensHypothesis
-from burg_drake.cameras.calibration.promise import Promise, promise_of
-from burg_drake.cameras.calibration.quality import is_useless
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.optics.known_parts import PARTS
+from burg_drake.apps import print_intrinsics
+from burg_drake.cameras import (
+    IMAGE_PARTS,
+    Intrinsics,
+    LensHypothesis,
+    Promise,
+    calibration_promise,
+    is_useless,
+)
 
 CAMERA = Intrinsics(width=640, height=480, focal=(600.0, 600.0), center=(320.0, 240.0))
 FISHEYE = replace(CAMERA, focal=(100.0, 100.0), model="fisheye", distortion=(0.0,) * 4)
-CORNERS = [name for name in PARTS if "corner" in name]
+CORNERS = [name for name in IMAGE_PARTS if "corner" in name]
 
 
 @dataclass
@@ -37,7 +40,7 @@ class Known:
 
 def promise(middle: float = 0.2, **others: float) -> Promise:
     """Of the middle and, with `_` in their names, of other parts that are not as good."""
-    bounds = {name: others.get(name.replace(" ", "_"), middle) for name in PARTS}
+    bounds = {name: others.get(name.replace(" ", "_"), middle) for name in IMAGE_PARTS}
     return Promise(bounds, 0.0)
 
 
@@ -51,7 +54,7 @@ def test_a_promise_holds_over_the_whole_image_or_says_where_not() -> None:
 
 
 def test_a_promise_that_holds_in_few_parts_begins_with_these() -> None:
-    parts = dict.fromkeys(PARTS, 1.2) | {"middle": 0.24, "left edge": 0.3}
+    parts = dict.fromkeys(IMAGE_PARTS, 1.2) | {"middle": 0.24, "left edge": 0.3}
     assert str(Promise(parts, 0.0)) == (
         "known in the left edge, middle only, to 0.30 pixels there, and not in the upper left"
         " corner (1.2), upper edge (1.2), upper right corner (1.2), right edge (1.2), lower left"
@@ -73,22 +76,25 @@ def test_a_document_says_as_much(capsys: pytest.CaptureFixture[str]) -> None:
         ((), "to 0.24 pixels over the whole image"),
         (("upper edge",), "to 0.24 pixels, but for the upper edge"),
         ((*CORNERS, "upper edge"), "in the left edge, middle, right edge, lower edge only"),
-        (tuple(name for name in PARTS if name != "middle"), "in the middle only, to 0.24 pixels"),
+        (
+            tuple(name for name in IMAGE_PARTS if name != "middle"),
+            "in the middle only, to 0.24 pixels",
+        ),
     ):
         print_intrinsics(replace(CAMERA, known_to=0.24, except_at=excepted))
         assert f"known            {words}" in capsys.readouterr().out
 
 
 def test_bounds_that_are_no_numbers_are_not_promised() -> None:
-    found = promise_of(Known(CAMERA, np.nan))
+    found = calibration_promise(Known(CAMERA, np.nan))
     assert set(found.parts.values()) == {np.inf} and found.unknown == 1.0
     assert found.known_to == np.inf and str(found) == "known no better than to 10 pixels"
-    assert promise_of(Known(CAMERA, 1e-8)).known_to < 0.1
+    assert calibration_promise(Known(CAMERA, 1e-8)).known_to < 0.1
 
 
 def test_parts_that_look_too_far_aside_are_not_promised() -> None:
     """100 pixels a radian: 85 degrees are 148 pixels from the middle, the image's corners 400."""
-    found = promise_of(Known(FISHEYE, 1e-8))
+    found = calibration_promise(Known(FISHEYE, 1e-8))
     assert found.parts.keys() == {"middle"}
     assert set(CORNERS) < set(found.except_at)
     assert "upper left corner (beyond 85 degrees)" in str(found)
@@ -96,7 +102,7 @@ def test_parts_that_look_too_far_aside_are_not_promised() -> None:
 
 def test_an_axis_far_outside_of_the_image_leaves_no_middle() -> None:
     seen = np.random.default_rng(0).uniform(0.0, 40.0, (50, 2))
-    found = promise_of(Known(replace(FISHEYE, center=(-60.0, -60.0)), 1e-10, seen))
+    found = calibration_promise(Known(replace(FISHEYE, center=(-60.0, -60.0)), 1e-10, seen))
     assert found.parts.keys() == {"upper left corner"}
     assert "middle" in found.except_at and found.known_to < 0.1
     assert str(found).startswith("known in the upper left corner only")
@@ -119,5 +125,5 @@ def test_a_camera_that_is_known_in_the_middle_only_is_of_little_use(
     elsewhere: float, unknown: float, useless: bool
 ) -> None:
     """The middle is half of the image: what is off by pixels around it counts by parts."""
-    bounds = dict.fromkeys(PARTS, elsewhere) | {"middle": 0.2}
+    bounds = dict.fromkeys(IMAGE_PARTS, elsewhere) | {"middle": 0.2}
     assert is_useless(Calibrated(bounds, unknown)) is useless  # type: ignore[arg-type]

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.pose.quadrilaterals import LEAST_CONTRAST, dark_quadrilaterals, read_cells
+from burg_drake.cameras import MIN_CELL_CONTRAST, find_dark_quadrilaterals, read_cells
 
 CORNERS = np.array([[90.0, 60.0], [210.0, 80.0], [230.0, 190.0], [70.0, 170.0]])
 CELLS = 6
@@ -23,7 +23,7 @@ def picture(black: np.ndarray, corners: np.ndarray = CORNERS, dark: int = 30) ->
 
 def test_a_dark_one_is_found_clockwise() -> None:
     # within a window of its border; the thresholded area has an outer and an inner contour
-    found = dark_quadrilaterals(picture(np.ones((CELLS, CELLS), bool)), 13, 15.0, 100.0)
+    found = find_dark_quadrilaterals(picture(np.ones((CELLS, CELLS), bool)), 13, 15.0, 100.0)
     outer = max(found, key=lambda q: cv2.contourArea(q.astype(np.float32)))
     first = np.linalg.norm(outer - CORNERS[0], axis=1).argmin()
     # through the middles of dark pixels, about half a pixel inside
@@ -32,8 +32,8 @@ def test_a_dark_one_is_found_clockwise() -> None:
 
 def test_small_ones_and_those_at_the_border_are_left_out() -> None:
     image = picture(np.ones((CELLS, CELLS), bool))
-    assert len(dark_quadrilaterals(image, 13, 15.0, 600.0)) == 0
-    assert len(dark_quadrilaterals(image[:, 92:], 13, 15.0, 100.0)) == 0
+    assert len(find_dark_quadrilaterals(image, 13, 15.0, 600.0)) == 0
+    assert len(find_dark_quadrilaterals(image[:, 92:], 13, 15.0, 100.0)) == 0
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -50,4 +50,4 @@ def test_cells_are_read_in_rows_from_the_first_corner(seed: int) -> None:
 def test_an_even_area_has_no_contrast() -> None:
     noise = np.random.default_rng(0).normal(120.0, 2.0, (240, 320)).astype(np.uint8)
     _, contrast = read_cells(noise, CORNERS[None], CELLS)
-    assert contrast[0] < LEAST_CONTRAST
+    assert contrast[0] < MIN_CELL_CONTRAST

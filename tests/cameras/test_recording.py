@@ -12,15 +12,22 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.live.recording import Recording, RecordingDocument
-from burg_drake.cameras.live.recording_table import read_poses
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.placement.document import CheckedScene
-from burg_drake.cameras.pose.estimate import BoardEstimate
-from burg_drake.cameras.sources.opencv_log import quiet
-from burg_drake.core.documents.schema import load_document
-from burg_drake.core.errors import DocumentError, InvalidInputError
-from burg_drake.core.frames import make_pose, rotation_from_rpy
+from burg_drake.cameras import (
+    BoardEstimate,
+    CheckedScene,
+    Intrinsics,
+    Recording,
+    RecordingDocument,
+    read_poses,
+    silence_opencv,
+)
+from burg_drake.core import (
+    DocumentError,
+    InvalidInputError,
+    load_document,
+    make_pose,
+    rotation_from_rpy,
+)
 
 CAMERA = Intrinsics(width=64, height=48, focal=(60.0, 60.0), center=(31.5, 23.5))
 SCENE = CheckedScene(name="two", content="abc")
@@ -35,7 +42,7 @@ def plate(level: int) -> np.ndarray:
 
 def levels(path: Path) -> list[int]:
     """Red of every frame of a video."""
-    with quiet():
+    with silence_opencv():
         capture, found = cv2.VideoCapture(str(path)), []
     while (frame := capture.read())[0]:
         assert frame[1].shape == (48, 64, 3)
@@ -168,11 +175,11 @@ def test_what_cannot_be_begun_leaves_nothing(tmp_path: Path) -> None:
 
 QUIET = """\
 import sys
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.sources.opencv_log import quiet
+from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.cameras.image_files import silence_opencv
 from burg_drake.cameras.placement.document import CheckedScene
-from burg_drake.cameras.live.recording import Recording
-from burg_drake.cameras.sources.opening import open_source
+from burg_drake.cameras.recording import Recording
+from burg_drake.cameras.source_opening import open_source
 from burg_drake.core.errors import InvalidInputError
 
 camera = Intrinsics(width=64, height=48, focal=(60.0, 60.0), center=(31.5, 23.5))

@@ -11,16 +11,16 @@ from pydrake.systems.framework import Context
 from pydrake.systems.sensors import ImageRgba8U
 
 import burg_drake as burg
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.placement.document import (
+from burg_drake.cameras import (
+    BoardEstimate,
     CheckedImage,
     CheckedScene,
+    Intrinsics,
     Placement,
     PlacementCheck,
+    SceneOverlay,
 )
-from burg_drake.cameras.pose.estimate import BoardEstimate
-from burg_drake.cameras.systems.scene_overlay import SceneOverlay
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core import InvalidInputError
 
 INTRINSICS = Intrinsics(width=320, height=240, focal=(300.0, 300.0), center=(159.5, 119.5))
 X_SC = RigidTransform(RollPitchYaw(np.deg2rad([-140.0, 0.0, 0.0])), [0.3, -0.3, 0.6])

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.optics.sensors import SENSORS, scaled, sensor
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
+from burg_drake.cameras import SENSOR_PRESETS, Intrinsics, scaled, sensor
+from burg_drake.core import InvalidInputError, UnknownNameError
 
 
 def test_sizes_agree_with_what_devices_say() -> None:
@@ -48,7 +47,7 @@ def test_fields_of_view_are_those_of_data_sheets(
 
 
 def test_presets_are_whole() -> None:
-    for name, preset in SENSORS.items():
+    for name, preset in SENSOR_PRESETS.items():
         near, far = preset.depth_range
         assert preset.name == name and preset.source and 0.0 < near < far
         assert preset.depth_camera() is preset.depth[0]

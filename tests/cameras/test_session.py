@@ -7,22 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from burg_drake.cameras.live.frame_processing import (
+from burg_drake.cameras import (
+    BoardEstimate,
+    Frame,
     FrameProcessor,
+    Intrinsics,
     ViewSettings,
-    changed_settings,
-    checked_settings,
-    placing_order,
-    pose_line,
+    change_settings,
+    check_settings,
+    describe_pose,
+    placement_order,
     position_sd,
 )
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.pose.estimate import BoardEstimate
-from burg_drake.cameras.sources.frame import Frame
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import make_pose
-from burg_drake.scene.document.scene import Board, Scene, load_scene
+from burg_drake.core import InvalidInputError, Pose, UnknownNameError, make_pose
+from burg_drake.scene import Board, Scene, load_scene
 from tests.cameras.synthetic import board_image
 
 CAMERA = Intrinsics(width=320, height=240, focal=(300.0, 300.0), center=(159.5, 119.5))
@@ -100,41 +98,41 @@ def test_print_scale(scene: Scene) -> None:
 
 
 def test_words(scene: Scene) -> None:
-    assert pose_line(BoardEstimate(reason="no marker"), scene.board) == "no marker"
+    assert describe_pose(BoardEstimate(reason="no marker"), scene.board) == "no marker"
     spread = np.diag([1.0, 1.0, 1.0, 1e-10, 4e-10, 9e-10])
     seen = BoardEstimate(X_SC=np.eye(4), valid=True, covariance=spread, ids=tuple(range(7)))
     assert position_sd(seen) == pytest.approx(3e-5)
-    assert pose_line(seen, Board()) == "7 of 54 markers, camera within 0.03 mm"
+    assert describe_pose(seen, Board()) == "7 of 54 markers, camera within 0.03 mm"
     doubtful = replace(seen, reason="printed at 99 %")
-    assert pose_line(doubtful, Board()).endswith("; printed at 99 %")
+    assert describe_pose(doubtful, Board()).endswith("; printed at 99 %")
 
 
 def test_settings_are_checked(scene: Scene) -> None:
     with pytest.raises(InvalidInputError, match=r"opacity 1\.5 is not a number from 0 to 1"):
-        checked_settings(scene, ViewSettings(opacity=1.5))
+        check_settings(scene, ViewSettings(opacity=1.5))
     with pytest.raises(UnknownNameError, match="did you mean 'mug'"):
-        checked_settings(scene, ViewSettings(guide="mugg"))
+        check_settings(scene, ViewSettings(guide="mugg"))
 
 
 def test_placing_order(scene: Scene) -> None:
-    order = placing_order(scene)
+    order = placement_order(scene)
     assert sorted(order) == sorted(scene.instances)
     rows = [scene.X_SO(name)[1, 3] > 0.21 for name in order]
     assert rows == [True] * 3 + [False] * 3, "the far row comes first"
     first = scene.document.instances[0]
     above = replace(first, name="on_top", X_SO=Pose((0.3, 0.4, 0.2)))
     stacked = replace(scene.document, instances=(above, *scene.document.instances))
-    assert placing_order(Scene(stacked, scene.library, scene.path))[-1] == "on_top"
+    assert placement_order(Scene(stacked, scene.library, scene.path))[-1] == "on_top"
 
 
 def test_settings_keep_their_types(scene: Scene) -> None:
     """A browser sends 0 and 1 where a fraction is meant."""
     settings = ViewSettings()
     for opacity in (0, 0.45, 1, 0.3):
-        settings = changed_settings(scene, settings, {"opacity": opacity})
+        settings = change_settings(scene, settings, {"opacity": opacity})
         assert settings.opacity == opacity
     for wrong in (True, "0.5", None, 10**400, float("nan")):
         with pytest.raises(InvalidInputError, match="opacity"):
-            changed_settings(scene, settings, {"opacity": wrong})
+            change_settings(scene, settings, {"opacity": wrong})
     with pytest.raises(InvalidInputError, match="names must be a bool, not 1"):
-        changed_settings(scene, settings, {"names": 1})
+        change_settings(scene, settings, {"names": 1})

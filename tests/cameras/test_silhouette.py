@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.cameras.projection.mesh_outline import MeshOutline
-from burg_drake.core.frames import inverse, make_pose, rotation_from_rpy
+from burg_drake.cameras import MeshOutline
+from burg_drake.core import inverse, make_pose, rotation_from_rpy
 
 RNG_SEED = 5
 

@@ -8,19 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.cameras.live.snapshot import (
+from burg_drake.cameras import (
+    BoardEstimate,
+    Intrinsics,
     Snapshot,
     describe_snapshot,
+    load_intrinsics,
     load_snapshot,
-    numbered,
+    next_free_path,
     save_snapshot,
 )
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.optics.intrinsics_file import load_intrinsics
-from burg_drake.cameras.pose.estimate import BoardEstimate
-from burg_drake.core.errors import DocumentError, InvalidInputError
-from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.scene.document.scene import load_scene
+from burg_drake.core import DocumentError, InvalidInputError, make_pose, rotation_from_rpy
+from burg_drake.scene import load_scene
 
 LENS = Intrinsics(
     width=64,
@@ -141,5 +140,5 @@ def test_permissions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_numbers_of_snapshots(tmp_path: Path) -> None:
     (tmp_path / "a_001").mkdir()
     (tmp_path / "a_003.mp4").touch()
-    assert numbered(tmp_path, "a") == tmp_path / "a_002"
-    assert numbered(tmp_path, "a", ".mp4") == tmp_path / "a_001.mp4"
+    assert next_free_path(tmp_path, "a") == tmp_path / "a_002"
+    assert next_free_path(tmp_path, "a", ".mp4") == tmp_path / "a_001.mp4"

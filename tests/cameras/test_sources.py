@@ -14,20 +14,24 @@ import numpy as np
 import pytest
 from PIL import Image as PilImage
 
-from burg_drake.cameras.optics.intrinsics import of_camera
-from burg_drake.cameras.sources import device
-from burg_drake.cameras.sources.device import DeviceSource, open_device
-from burg_drake.cameras.sources.frame import CameraLost, FrameSource, Image
-from burg_drake.cameras.sources.image_file import read_image, write_image
-from burg_drake.cameras.sources.opencv_log import quiet
-from burg_drake.cameras.sources.opening import open_source
-from burg_drake.cameras.sources.simulated import SimulatedSource
-from burg_drake.cameras.sources.video import VideoSource
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import make_pose
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.document.station_document import load_station
+from burg_drake.cameras import (
+    CameraLost,
+    DeviceSource,
+    FrameSource,
+    Image,
+    SimulatedSource,
+    VideoSource,
+    camera_intrinsics,
+    open_device,
+    open_source,
+    read_image,
+    silence_opencv,
+    source_opening,
+    write_image,
+)
+from burg_drake.core import Array, InvalidInputError, UnknownNameError, make_pose
+from burg_drake.scene import load_scene
+from burg_drake.station import load_station
 from tests.hang_guard import HANG_GUARD
 
 
@@ -43,7 +47,7 @@ def number_of(image: Image) -> int:
 
 
 def write_video(path: Path, frames: int = 10, codec: str = "MJPG") -> Path:
-    with quiet():
+    with silence_opencv():
         writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*codec), 25.0, (64, 48))
     for number in range(frames):
         writer.write(picture(number)[..., ::-1])
@@ -262,9 +266,9 @@ class Stream(http.server.BaseHTTPRequestHandler):
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """A source that waits less than for real cameras."""
-    monkeypatch.setattr(device, "PATIENCE", 0.3)
-    monkeypatch.setattr(device, "FIRST_WAIT", 0.05)
-    monkeypatch.setattr(device, "LONGEST_WAIT", 0.2)
+    monkeypatch.setattr(source_opening, "FRAME_TIMEOUT", 0.3)
+    monkeypatch.setattr(source_opening, "FIRST_WAIT", 0.05)
+    monkeypatch.setattr(source_opening, "MAX_WAIT", 0.2)
 
 
 @pytest.fixture
@@ -357,7 +361,7 @@ def test_a_vanished_device_is_lost_and_a_new_one_found(tmp_path: Path, impatient
     hidden = tmp_path / "unplugged.avi"
 
     def open_capture() -> cv2.VideoCapture | None:
-        with quiet():
+        with silence_opencv():
             capture = cv2.VideoCapture(str(path))
         return capture if capture.isOpened() else None
 
@@ -403,7 +407,7 @@ def test_depth_of_a_simulated_camera_is_that_of_the_board() -> None:
             assert frame is not None and frame.depth is not None
             assert frame.image.shape == (480, 640, 3) and frame.image.std() > 10.0
             pixels = np.stack(np.meshgrid(np.arange(640.0), np.arange(480.0)), axis=-1)
-            k = of_camera(camera)
+            k = camera_intrinsics(camera)
             rays = np.concatenate([(pixels - k.center) / k.focal, np.ones((480, 640, 1))], axis=-1)
             depth = -expected[2, 3] / (rays @ expected[:3, :3].T)[..., 2]
             on_board = np.abs(frame.depth - depth) < 2e-4

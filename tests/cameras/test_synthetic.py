@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.scene.document.markers import Markers
-from burg_drake.scene.document.scene import Board
+from burg_drake.cameras import Intrinsics
+from burg_drake.core import InvalidInputError
+from burg_drake.scene import Board, Markers
 from tests.cameras.synthetic import (
     COLORS,
     ImageDegradation,

@@ -10,25 +10,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from burg_drake.cameras.live.actions import ViewActions, placement_summary
-from burg_drake.cameras.live.event_log import EventLog
-from burg_drake.cameras.live.frame_processing import (
-    FrameProcessor,
-)
-from burg_drake.cameras.live.recording import Recording
-from burg_drake.cameras.live.recording_table import read_poses
-from burg_drake.cameras.live.session import LiveSession
-from burg_drake.cameras.live.snapshot import load_snapshot
-from burg_drake.cameras.placement.document import (
+from burg_drake.cameras import (
     CheckedImage,
     CheckedScene,
+    EventLog,
+    FrameProcessor,
+    FrameSource,
+    LiveSession,
     Placement,
     PlacementCheck,
+    Recording,
+    ViewActions,
+    load_snapshot,
+    placement_summary,
+    read_poses,
 )
-from burg_drake.cameras.sources.frame import FrameSource
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.core import InvalidInputError, Pose
+from burg_drake.scene import Scene, load_scene
 from tests.cameras.live_views import CAMERA, Pictures, camera_at, lines
 from tests.cameras.synthetic import board_image
 from tests.hang_guard import HANG_GUARD

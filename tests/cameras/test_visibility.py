@@ -6,11 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from burg_drake.cameras.projection.visibility import visible_from
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import UnknownNameError
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.station_document import Camera, Obstacle, Station, load_station
+from burg_drake.cameras import visible_from
+from burg_drake.core import Pose, UnknownNameError
+from burg_drake.scene import Scene
+from burg_drake.station import Camera, Obstacle, Station, load_station
 from tests.evaluation.composed import composed
 
 CAN = composed(("can", "can", 0.3, 0.21, 0.0))

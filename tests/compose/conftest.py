@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake import load_station
 from burg_drake.compose import ComposeSession
-from burg_drake.station.document.station_document import Station
+from burg_drake.station import Station, load_station
 
 
 @pytest.fixture(scope="session")

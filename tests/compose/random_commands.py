@@ -16,6 +16,7 @@ from burg_drake.compose import (
     AddObject,
     Align,
     Clear,
+    Command,
     Delete,
     Distribute,
     Duplicate,
@@ -31,9 +32,8 @@ from burg_drake.compose import (
     Turn,
     board_size,
 )
-from burg_drake.compose.commands.command import Command
-from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.scene.document.scene import Board
+from burg_drake.core import make_pose, rotation_from_rpy
+from burg_drake.scene import Board
 
 Make = Callable[[Sequence[str]], Command]
 """Makes a command of the names of all instances."""

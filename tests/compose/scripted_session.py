@@ -10,9 +10,9 @@ import sys
 import time
 from pathlib import Path
 
-from burg_drake import load_station
 from burg_drake.compose import AddObject, ComposeSession, Delete
-from burg_drake.core.errors import BurgError
+from burg_drake.core import BurgError
+from burg_drake.station import load_station
 
 
 def main(reference: str, folder: str, what: str) -> None:

@@ -13,20 +13,25 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.compose import AddObject, ComposeSession, Delete, MoveObjects
-from burg_drake.compose.background.settling import SettlingProposal
-from burg_drake.compose.document.checker import known_scene
-from burg_drake.compose.editing.view import SessionView
-from burg_drake.core.errors import (
+from burg_drake.compose import (
+    AddObject,
+    ComposeSession,
+    Delete,
+    MoveObjects,
+    SessionView,
+    SettlingProposal,
+    scene_of_known_objects,
+)
+from burg_drake.core import (
     InvalidInputError,
     SimulationError,
     TaskCancelled,
     UnknownNameError,
+    resolve_reference,
 )
-from burg_drake.core.paths.resources import resolve
-from burg_drake.objects.library.document import LIBRARY_FILE, load_library
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.document.station_document import Station
+from burg_drake.objects import LIBRARY_FILE, load_library
+from burg_drake.scene import load_scene
+from burg_drake.station import Station
 from tests.hang_guard import HANG_GUARD
 
 
@@ -73,7 +78,7 @@ def library(tmp_path: Path) -> Path:
     whole = load_library("household")
     for name in ("can", "marble"):
         shutil.copytree(whole.root / name, folder / name)
-    text = resolve("household", "models").joinpath(LIBRARY_FILE).read_text()
+    text = resolve_reference("household", "models").joinpath(LIBRARY_FILE).read_text()
     (folder / LIBRARY_FILE).write_text(only(text, "can", "marble"))
     return folder
 
@@ -107,7 +112,7 @@ def test_a_library_that_loses_an_object_is_told(station: Station, library: Path)
         session.save()
         assert set(load_scene(saved).instances) == {"can", "can_2"}
         session.undo()
-        known = known_scene(session.view.state, saved).document
+        known = scene_of_known_objects(session.view.state, saved).document
         assert [instance.object for instance in known.instances] == ["can", "can"]
         settled = replace(known, instances=known.instances[:1])  # as if the other one had fallen
         kept = session.accept(SettlingProposal(known, settled, {}, {}, ("can_2",), 1.0))

@@ -19,6 +19,7 @@ from burg_drake.compose import (
     PutDown,
     RandomConfiguration,
     Rename,
+    SessionView,
     SetBoard,
     SetFixed,
     SetPose,
@@ -27,13 +28,9 @@ from burg_drake.compose import (
     Turn,
     board_size,
 )
-from burg_drake.compose.editing.view import SessionView
-from burg_drake.core.arrays import Array
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import BurgError, InvalidInputError
-from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.scene.document.scene import Board
-from burg_drake.station.document.station_document import Obstacle, Station
+from burg_drake.core import Array, BurgError, InvalidInputError, Pose, make_pose, rotation_from_rpy
+from burg_drake.scene import Board
+from burg_drake.station import Obstacle, Station
 
 ROUNDED = 2e-6
 """Of poses as people read them [m]."""

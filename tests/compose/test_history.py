@@ -9,11 +9,10 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from burg_drake.compose import ComposeSession
-from burg_drake.compose.storage.journal import journal_path, recover
-from burg_drake.core.errors import BurgError
-from burg_drake.scene.document.scene import SceneDocument
-from burg_drake.station.document.station_document import Station
+from burg_drake.compose import ComposeSession, journal_path, recover_journal
+from burg_drake.core import BurgError
+from burg_drake.scene import SceneDocument
+from burg_drake.station import Station
 from tests.compose.random_commands import adding, commands
 
 UNDO, REDO, SAVE = "undo", "redo", "save"
@@ -78,7 +77,7 @@ def test_all_steps_are_undone_and_redone_and_recovered(
     view = session.view
     journal = journal_path(view.path or session.folder / f"{view.document.name}.yaml")
     if len(steps.documents) > 1:
-        found = recover(journal)
+        found = recover_journal(journal)
         assert found is not None and found.history is not None and not found.damage
         assert [step.state.document for step in found.history.steps] == steps.documents
         assert found.history.position == steps.at

@@ -12,11 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.compose import AddObject, ComposeSession, Delete
-from burg_drake.compose.storage.scene_file import FileChanged
-from burg_drake.compose.storage.scene_lock import SceneInUse
-from burg_drake.core.paths.resources import resolve
-from burg_drake.station.document.station_document import Station
+from burg_drake.compose import AddObject, ComposeSession, Delete, FileChanged, SceneInUse
+from burg_drake.core import resolve_reference
+from burg_drake.station import Station
 
 SCRIPT = Path(__file__).with_name("scripted_session.py")
 
@@ -194,7 +192,7 @@ def test_a_journal_of_the_version_before_is_read(station: Station, left: Path) -
 
 def test_steps_whose_library_is_gone_hinder_no_new_scene(station: Station, tmp_path: Path) -> None:
     mine = tmp_path / "mine"
-    shutil.copytree(resolve("household", "models"), mine)
+    shutil.copytree(resolve_reference("household", "models"), mine)
     with ComposeSession.open(mine, station, folder=tmp_path) as session:
         session.do(AddObject("mug"))
     mine.rename(tmp_path / "elsewhere")

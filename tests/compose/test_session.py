@@ -9,19 +9,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake import load_scene
-from burg_drake.compose import AddObject, ComposeSession, Delete, MoveObjects, Rename
-from burg_drake.compose.document import history as history_module
-from burg_drake.compose.storage import scene_lock
-from burg_drake.compose.storage.journal import journal_path, recover
-from burg_drake.compose.storage.scene_file import FileChanged, UnsavedChanges
-from burg_drake.compose.storage.scene_lock import SceneInUse, SceneLock
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import make_pose
-from burg_drake.generation.sample import sample_scene
-from burg_drake.scene.document.recipe import SceneRecipe
-from burg_drake.scene.document.scene import save_scene
-from burg_drake.station.document.station_document import Station
+from burg_drake.compose import (
+    AddObject,
+    ComposeSession,
+    Delete,
+    FileChanged,
+    MoveObjects,
+    Rename,
+    SceneInUse,
+    SceneLock,
+    UnsavedChanges,
+    journal_path,
+    recover_journal,
+    scene_storage,
+    state as history_module,
+)
+from burg_drake.core import InvalidInputError, UnknownNameError, make_pose
+from burg_drake.generation import sample_scene
+from burg_drake.scene import SceneRecipe, load_scene, save_scene
+from burg_drake.station import Station
 
 
 def test_steps_are_undone_and_redone(session: ComposeSession) -> None:
@@ -57,7 +63,7 @@ def test_what_is_typed_bit_by_bit_is_one_step(session: ComposeSession) -> None:
     assert list(named.instances) == ["box2"]
     for x in (0.002, 0.021, 0.21):
         moved = session.do(MoveObjects({"box2": make_pose(p_AB=(x, 0.1, 0.0))}), field="x")
-    journal = recover(journal_path(session.folder / "new_scene.yaml"))
+    journal = recover_journal(journal_path(session.folder / "new_scene.yaml"))
     assert journal is not None and journal.history is not None
     documents = [mug.document, named.document, moved.document]
     assert [s.state.document for s in journal.history.steps][1:] == documents
@@ -212,14 +218,14 @@ def test_two_editors_never_hold_one_scene(tmp_path: Path, monkeypatch: pytest.Mo
     file and before it locks it: the lock of a file that is gone keeps no third editor out."""
     scene = tmp_path / "breakfast.yaml"
     first = [SceneLock(scene)]
-    lock_file = scene_lock.try_lock
+    lock_file = scene_storage.try_lock
 
     def lock_late(file: int) -> bool:
         if first:
             first.pop().release()
         return lock_file(file)
 
-    monkeypatch.setattr(scene_lock, "try_lock", lock_late)
+    monkeypatch.setattr(scene_storage, "try_lock", lock_late)
     second = SceneLock(scene, "http://127.0.0.1:7200")
     with pytest.raises(SceneInUse, match=r"is already open at http://127.0.0.1:7200"):
         SceneLock(scene)
@@ -251,6 +257,6 @@ def test_what_several_pages_do_at_once_is_all_done_and_saved(session: ComposeSes
     view = session.view
     assert len(view.instances) == 25 and view.saved and view.path is not None
     assert load_scene(view.path).document == view.document
-    found = recover(journal_path(view.path))
+    found = recover_journal(journal_path(view.path))
     assert found is not None and found.history is not None and not found.damage
     assert [len(s.state.instances) for s in found.history.steps] == list(range(26))

@@ -12,14 +12,12 @@ from pathlib import Path
 import pytest
 import worker_jobs as jobs
 
-from burg_drake.core.workers import WorkerPool, allocator
-from burg_drake.core.workers.allocator import (
-    PRELOAD,
-    SYSTEM_LIBRARIES,
-    VARIABLE,
-    WHEEL_LIBRARY,
+from burg_drake.core import (
+    AllocatorSettings,
+    WorkerPool,
     installed_allocators,
     worker_preload,
+    worker_processes,
 )
 from tests.hang_guard import HANG_GUARD
 
@@ -28,9 +26,9 @@ linux = pytest.mark.skipif(sys.platform != "linux", reason="nothing is preloaded
 
 @pytest.fixture(autouse=True)
 def nothing_given(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in (VARIABLE, PRELOAD):
+    for name in (AllocatorSettings.variable, AllocatorSettings.preload_variable):
         monkeypatch.delenv(name, raising=False)
-    allocator._warn.cache_clear()
+    worker_processes._warn_unusable.cache_clear()
 
 
 @pytest.fixture
@@ -38,7 +36,7 @@ def library() -> Path:
     """An allocator of this machine that works."""
     if not any(map(can_be_opened, installed_allocators())):
         pytest.skip("there is no allocator that works on this machine")
-    return Path(worker_preload({})[PRELOAD])
+    return Path(worker_preload({})[AllocatorSettings.preload_variable])
 
 
 def can_be_opened(path: Path) -> bool:
@@ -59,7 +57,7 @@ def maths() -> str:
 
 
 def of(path: Path | str, **environment: str) -> dict[str, str]:
-    return worker_preload({VARIABLE: str(path), **environment})
+    return worker_preload({AllocatorSettings.variable: str(path), **environment})
 
 
 # --- what is found --------------------------------------------------------------------------------
@@ -68,12 +66,15 @@ def of(path: Path | str, **environment: str) -> dict[str, str]:
 def test_the_package_comes_first_and_the_best_of_the_system_then(tmp_path: Path) -> None:
     places = [tmp_path / "one", tmp_path / "two"]
     packages = [tmp_path / "none", tmp_path / "packages"]
-    system = [places[1] / SYSTEM_LIBRARIES[0], *(places[0] / name for name in SYSTEM_LIBRARIES[1:])]
-    for path in [packages[1] / WHEEL_LIBRARY, *system]:
+    system = [
+        places[1] / AllocatorSettings.system_libraries[0],
+        *(places[0] / name for name in AllocatorSettings.system_libraries[1:]),
+    ]
+    for path in [packages[1] / AllocatorSettings.wheel_library, *system]:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.touch()
     found = installed_allocators(["", *map(str, packages)], [*map(str, places)])
-    assert list(found) == [packages[1] / WHEEL_LIBRARY, *system]
+    assert list(found) == [packages[1] / AllocatorSettings.wheel_library, *system]
 
 
 @linux
@@ -82,9 +83,9 @@ def test_the_first_that_works_is_taken(
 ) -> None:
     broken = tmp_path / "libmimalloc.so"
     broken.write_text("GROUP ( libmimalloc.so.3 )")
-    monkeypatch.setattr(allocator, "installed_allocators", lambda: iter([broken, library]))
-    assert worker_preload({}) == {PRELOAD: str(library)}
-    monkeypatch.setattr(allocator, "installed_allocators", lambda: iter([broken]))
+    monkeypatch.setattr(worker_processes, "installed_allocators", lambda: iter([broken, library]))
+    assert worker_preload({}) == {AllocatorSettings.preload_variable: str(library)}
+    monkeypatch.setattr(worker_processes, "installed_allocators", lambda: iter([broken]))
     assert worker_preload({}) == {}
 
 
@@ -94,7 +95,9 @@ def test_the_package_has_its_library_where_it_is_looked_for() -> None:
         distribution = metadata.distribution("cmeel-mimalloc")
     except metadata.PackageNotFoundError:
         pytest.skip("cmeel-mimalloc is not installed")
-    assert next(installed_allocators()) == Path(str(distribution.locate_file(WHEEL_LIBRARY)))
+    assert next(installed_allocators()) == Path(
+        str(distribution.locate_file(AllocatorSettings.wheel_library))
+    )
 
 
 # --- what is refused ------------------------------------------------------------------------------
@@ -121,7 +124,7 @@ def test_a_file_of_another_kind_is_not_even_tried(
     def fail(*_: object) -> bool:
         raise AssertionError("tried")
 
-    monkeypatch.setattr(allocator, "_replaces_malloc", fail)
+    monkeypatch.setattr(worker_processes, "_replaces_malloc", fail)
     assert of(altered(library, tmp_path, place, value)) == {}
 
 
@@ -147,7 +150,9 @@ def test_what_cannot_be_used_is_told_once_and_nothing_is_preloaded(
         caplog.clear()
         with caplog.at_level(logging.WARNING, "burg_drake"):
             assert of(path) == of(path) == {}
-        assert caplog.messages == [f"{VARIABLE}: {path} {why}; workers run without it"]
+        assert caplog.messages == [
+            f"{AllocatorSettings.variable}: {path} {why}; workers run without it"
+        ]
     assert capfd.readouterr() == ("", "")
 
 
@@ -157,7 +162,9 @@ def test_an_allocator_that_ends_the_process_is_refused(
 ) -> None:
     copy = tmp_path / "libmimalloc.so"
     copy.write_bytes(library.read_bytes())
-    monkeypatch.setattr(allocator, "PROBE", "import os, signal; os.kill(os.getpid(), 11)")
+    monkeypatch.setattr(
+        worker_processes, "ALLOCATOR_PROBE", "import os, signal; os.kill(os.getpid(), 11)"
+    )
     assert of(copy) == {}
 
 
@@ -166,9 +173,11 @@ def test_it_is_tried_in_the_environment_that_is_given(
     library: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     spoilt = "import os\nif 'SPOILT' in os.environ: raise SystemExit(1)\n"
-    monkeypatch.setattr(allocator, "PROBE", spoilt + allocator.PROBE)
+    monkeypatch.setattr(
+        worker_processes, "ALLOCATOR_PROBE", spoilt + worker_processes.ALLOCATOR_PROBE
+    )
     monkeypatch.setenv("SPOILT", "1")
-    assert of(library, MARK="1") == {PRELOAD: str(library)}
+    assert of(library, MARK="1") == {AllocatorSettings.preload_variable: str(library)}
     monkeypatch.delenv("SPOILT")
     assert of(library, SPOILT="1") == {}
 
@@ -179,7 +188,7 @@ def test_one_that_was_replaced_is_tried_again(library: Path, tmp_path: Path) -> 
     copy.write_bytes(library.read_bytes()[:2000])
     assert of(copy) == {}
     copy.write_bytes(library.read_bytes())
-    assert of(copy) == {PRELOAD: str(copy)}
+    assert of(copy) == {AllocatorSettings.preload_variable: str(copy)}
 
 
 # --- what the user says ---------------------------------------------------------------------------
@@ -204,14 +213,16 @@ def test_nothing_is_done_where_address_space_is_limited(
 
 @linux
 def test_what_the_user_preloads_stays(library: Path, maths: str) -> None:
-    assert of(library, **{PRELOAD: maths}) == {PRELOAD: f"{maths}:{library}"}
+    assert of(library, **{AllocatorSettings.preload_variable: maths}) == {
+        AllocatorSettings.preload_variable: f"{maths}:{library}"
+    }
 
 
 @linux
 def test_the_users_own_allocator_stays_alone(library: Path, tmp_path: Path) -> None:
     own = tmp_path / "libmine.so"
     own.write_bytes(library.read_bytes())
-    assert worker_preload({PRELOAD: str(own)}) == {}
+    assert worker_preload({AllocatorSettings.preload_variable: str(own)}) == {}
 
 
 # --- workers --------------------------------------------------------------------------------------
@@ -223,7 +234,7 @@ def test_workers_have_it_and_what_they_start_does_not(
     library: Path, maths: str, monkeypatch: pytest.MonkeyPatch, preloaded: bool
 ) -> None:
     if preloaded:
-        monkeypatch.setenv(PRELOAD, maths)
+        monkeypatch.setenv(AllocatorSettings.preload_variable, maths)
     with WorkerPool(1) as pool:
         assert str(library) in pool.submit(jobs.mapped_files).result(HANG_GUARD)
         preload, files = pool.submit(jobs.preloaded_in_a_child).result(HANG_GUARD)
@@ -235,7 +246,7 @@ def test_workers_have_it_and_what_they_start_does_not(
 def test_results_are_the_same_without(library: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     found = [jobs.sums_of_many_arrays()]
     for given in (str(library), "none"):
-        monkeypatch.setenv(VARIABLE, given)
+        monkeypatch.setenv(AllocatorSettings.variable, given)
         with WorkerPool(1) as pool:
             files = pool.submit(jobs.mapped_files).result(HANG_GUARD)
             assert (str(library) in files) is (given != "none")
@@ -248,4 +259,7 @@ def test_a_process_that_is_no_worker_keeps_its_own(library: Path) -> None:
     with WorkerPool(1) as pool:
         pool.submit(jobs.square, 2).result(HANG_GUARD)
     assert str(library) not in jobs.mapped_files()
-    assert PRELOAD not in subprocess.run(["env"], capture_output=True, text=True).stdout
+    assert (
+        AllocatorSettings.preload_variable
+        not in subprocess.run(["env"], capture_output=True, text=True).stdout
+    )

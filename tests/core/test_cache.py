@@ -11,9 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core import cache
-from burg_drake.core.cache import Arrays, cache_folder, cached
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core import Arrays, InvalidInputError, cache, cache_folder, cached
 
 KEY = "0123456789abcdef" * 4
 ARRAYS = {"x": np.array([0.1, np.nan, -0.0]), "k": np.arange(6).reshape(2, 3), "b": np.array(True)}
@@ -154,7 +152,7 @@ def test_the_entries_longest_unused_go_first(folder: Path, monkeypatch: pytest.M
         os.utime(folder / f"thing-{k}-{KEY[:32]}.npz", (100.0 * k, 100.0 * k))
     size = (folder / f"thing-0-{KEY[:32]}.npz").stat().st_size
     cached("thing-0", KEY, never)  # marks it as in use
-    monkeypatch.setattr(cache, "MOST_BYTES", 3 * size)
+    monkeypatch.setattr(cache, "MAX_CACHE_BYTES", 3 * size)
     cached("thing-4", KEY, compute)
     left = {path.name.removesuffix(f"-{KEY[:32]}.npz") for path in folder.iterdir()}
     assert left == {"thing-0", "thing-3", "thing-4", "notes.txt"}

@@ -8,9 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps.column_meanings import describe
-from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core import GraspSet, describe_column, make_pose
 
 
 @pytest.mark.parametrize(
@@ -29,13 +27,13 @@ from burg_drake.core.grasps.grasp_set import GraspSet
     ],
 )
 def test_names_with_varying_parts(name: str, unit: str) -> None:
-    column = describe(name)
+    column = describe_column(name)
     assert column is not None and column.unit == unit
 
 
 @pytest.mark.parametrize("name", ["theirs", "q_grasp_", "tug_w_g", "moved_", "slip2"])
 def test_what_others_made_up_is_not_known(name: str) -> None:
-    assert describe(name) is None
+    assert describe_column(name) is None
 
 
 def test_datasets_of_grasps_say_their_units(tmp_path: Path) -> None:
@@ -58,7 +56,7 @@ def test_datasets_of_grasps_say_their_units(tmp_path: Path) -> None:
 
 
 def test_metrics_are_described() -> None:
-    from burg_drake.evaluation.grasp_sets.scored import SCENE_COLUMNS
-    from burg_drake.grasping.quality.metrics import METRICS
+    from burg_drake.evaluation import SCENE_COLUMNS
+    from burg_drake.grasping import METRICS
 
-    assert all(map(describe, (*METRICS, *SCENE_COLUMNS)))
+    assert all(map(describe_column, (*METRICS, *SCENE_COLUMNS)))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.content import content_hash, rng_from
+from burg_drake.core import content_hash, rng_from
 
 
 def test_nothing_runs_into_its_neighbour_or_passes_for_another_type():

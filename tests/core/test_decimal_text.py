@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.core.files.decimal_text import PLACES, format_rows, rounded_to_places
+from burg_drake.core import DecimalGrid, format_rows, round_to_grid
 
 
 def values() -> np.ndarray:
@@ -13,7 +13,7 @@ def values() -> np.ndarray:
     whole = np.array([[0.0, -0.0, 1.0, -1.0, 8999.0, -9000.0, 9000.000000000001, 1e-12, -1e-12]])
     wide = rng.normal(size=(200, 9)) * 10.0 ** rng.integers(-13, 4, (200, 9))
     extreme = np.array([[1e300, -1e-300, 5e-324, 1e16, 123456.789, 0.1, 0.3, -2.5, 1e-13]])
-    return np.concatenate([whole, wide, rounded_to_places(wide), extreme])
+    return np.concatenate([whole, wide, round_to_grid(wide), extreme])
 
 
 @pytest.mark.parametrize("separator", [",", ", "])
@@ -24,7 +24,7 @@ def test_rows_read_back_bit_by_bit(separator: str) -> None:
 
 
 def test_numbers_on_the_grid_are_as_short_as_python_has_them() -> None:
-    grid = rounded_to_places(values()[:-1])
+    grid = round_to_grid(values()[:-1])
     grid = grid[np.abs(grid).max(axis=1) <= 9000.0]
     grid[np.abs(grid) < 1e-3] = 0.5  # for small ones Python has exponents
     assert format_rows(grid) == [",".join(map(repr, row)) for row in grid.tolist()]
@@ -32,9 +32,9 @@ def test_numbers_on_the_grid_are_as_short_as_python_has_them() -> None:
 
 def test_the_grid_is_the_nearest_decimal() -> None:
     given = values()[np.abs(values()).max(axis=1) < 9000.0]
-    expected = [[float(f"{x:.{PLACES}f}") for x in row] for row in given.tolist()]
+    expected = [[float(f"{x:.{DecimalGrid.decimals}f}") for x in row] for row in given.tolist()]
     np.testing.assert_allclose(
-        rounded_to_places(given), expected, rtol=5e-16, atol=1.01 * 10.0**-PLACES
+        round_to_grid(given), expected, rtol=5e-16, atol=1.01 * 10.0**-DecimalGrid.decimals
     )
 
 

@@ -9,20 +9,26 @@ from typing import Any
 
 import pytest
 
-from burg_drake.core.documents.json_text import parse_json
-from burg_drake.core.documents.plain_yaml import parse_plain_yaml
-from burg_drake.core.documents.yaml_nodes import parse_nodes
-from burg_drake.core.errors import DocumentError, quoted
-from burg_drake.core.files.bounded_text import DOCUMENT, read_bytes, read_rows, read_text
+from burg_drake.core import (
+    DocumentError,
+    FileLimits,
+    parse_json,
+    parse_plain_yaml,
+    parse_yaml_node,
+    quote_value,
+    read_bytes,
+    read_rows,
+    read_text,
+)
 
-DEEP = DOCUMENT.depth
+DEEP = FileLimits.document.depth
 BOMB = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
     f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 9)
 )
 CHAIN = "a0: &a0 [x]\n" + "".join(f"a{i}: &a{i} [*a{i - 1}]\n" for i in range(1, 300))
 
 
-@pytest.mark.parametrize("parse", [parse_nodes, parse_plain_yaml])
+@pytest.mark.parametrize("parse", [parse_yaml_node, parse_plain_yaml])
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -44,7 +50,7 @@ def test_yaml_beyond_its_bounds(parse: Callable[[str, str], Any], text: str, sai
     assert len(str(raised.value)) < 200
 
 
-@pytest.mark.parametrize("parse", [parse_nodes, parse_plain_yaml])
+@pytest.mark.parametrize("parse", [parse_yaml_node, parse_plain_yaml])
 def test_yaml_within_its_bounds(parse: Callable[[str, str], Any]) -> None:
     parse("[" * DEEP + "]" * DEEP, "d")
     parse("a: &a !!str 1\nb: [*a, *a]\nc: ! d\n", "d")
@@ -52,7 +58,7 @@ def test_yaml_within_its_bounds(parse: Callable[[str, str], Any]) -> None:
 
 def test_a_second_document_is_refused() -> None:
     with pytest.raises(DocumentError, match="d:2: not valid YAML: a second document begins"):
-        parse_nodes("a: 1\n---\nb: 2\n", "d")
+        parse_yaml_node("a: 1\n---\nb: 2\n", "d")
 
 
 @pytest.mark.parametrize(
@@ -86,7 +92,7 @@ def test_json_within_its_bounds() -> None:
 def test_only_regular_files_of_some_size_are_read(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     with (tmp_path / "large").open("wb") as stream:
-        stream.truncate(DOCUMENT.size + 1)
+        stream.truncate(FileLimits.document.size + 1)
     (tmp_path / "binary").write_bytes(b"\xff\xfe")
     for place, said in {
         tmp_path: "it is a folder",
@@ -121,6 +127,6 @@ def test_csv_that_is_none(tmp_path: Path, text: str, said: str) -> None:
 
 
 def test_messages_repeat_little_of_what_is_given() -> None:
-    assert quoted("mug") == "'mug'" and quoted(1.5) == "1.5"
+    assert quote_value("mug") == "'mug'" and quote_value(1.5) == "1.5"
     for value in ("9" * 10_000, 10**99, [["x" * 1000] * 100] * 100, {"a": {"b": {"c": {}}}}):
-        assert len(quoted(value)) <= 120
+        assert len(quote_value(value)) <= 120

@@ -22,15 +22,22 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 from jsonschema import Draft7Validator
 
 import burg_drake
-from burg_drake.core.documents.kinds import DOCUMENT_KINDS, document_class
-from burg_drake.core.documents.reader import Reader
-from burg_drake.core.documents.schema import document_text, load_document, parse_document
-from burg_drake.core.documents.schema_file import json_schema, write_schemas
-from burg_drake.core.documents.yaml_nodes import load_nodes
-from burg_drake.core.errors import BurgError, UnknownNameError
-from burg_drake.core.paths.resources import data_root
-from burg_drake.dataset.samples.document import load_dataset_document
-from burg_drake.pipeline.recipe import load_recipe
+from burg_drake.core import (
+    DOCUMENT_KINDS,
+    BurgError,
+    Reader,
+    UnknownNameError,
+    data_root,
+    document_class,
+    document_text,
+    json_schema,
+    load_document,
+    load_yaml_node,
+    parse_document,
+    write_schemas,
+)
+from burg_drake.dataset import load_dataset_document
+from burg_drake.pipeline import load_recipe
 
 ADDRESS = "https://burg-drake.github.io/burg_drake/schema/"
 EXAMPLES = {path.stem: path for path in (Path(__file__).parent / "documents").iterdir()}
@@ -43,7 +50,7 @@ BUILT_IN = [
     for pattern in ("scenes/*.yaml", "stations/*.yaml", "models/hands/*.yaml", "models/*/*.yaml")
     for path in sorted(data_root().glob(pattern))
 ]
-NOT_YAML = {"Appearance", "Comparison", "Record", "Nearest", "PrecisionRecall", "Matches"} | {
+NOT_YAML = {"Appearance", "BuildRecord", "Comparison", "Nearest", "PrecisionRecall", "Matches"} | {
     *("TopPrecision", "SetComparison", "SetSummary"),
 }
 """Classes with a version that are written as JSON, or within another document."""
@@ -109,7 +116,7 @@ def refusal(kind: str, path: Path) -> str | None:
     """What the reader says against a file."""
     try:
         if kind == "pose":
-            Reader(path.name).read(load_nodes(path), document_class(kind), "")
+            Reader(path.name).read(load_yaml_node(path), document_class(kind), "")
         elif kind == "dataset":
             load_dataset_document(path)
         elif kind == "objects":

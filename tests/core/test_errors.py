@@ -33,19 +33,23 @@ def test_errors_survive_the_way_back_from_a_worker_process():
 
 def test_nearest_suggests_and_lists():
     known = ["mug", "bowl", "marble"]
-    assert errors.nearest("mog", known) == "did you mean 'mug'? Known: bowl, marble, mug"
-    assert errors.nearest("panda", ["panda_wsg", "panda_bin"]) == "known: panda_bin, panda_wsg"
-    assert errors.nearest("panda", ["ur5e", "panda_bin"]).startswith("did you mean 'panda_bin'?")
-    assert errors.nearest("spaceship", known) == "known: bowl, marble, mug"
-    assert errors.nearest("spaceship", known, ordered=True) == "known: mug, bowl, marble"
-    assert errors.nearest("mug", []) == "known: (none)"
+    assert errors.suggest_names("mog", known) == "did you mean 'mug'? Known: bowl, marble, mug"
+    assert (
+        errors.suggest_names("panda", ["panda_wsg", "panda_bin"]) == "known: panda_bin, panda_wsg"
+    )
+    assert errors.suggest_names("panda", ["ur5e", "panda_bin"]).startswith(
+        "did you mean 'panda_bin'?"
+    )
+    assert errors.suggest_names("spaceship", known) == "known: bowl, marble, mug"
+    assert errors.suggest_names("spaceship", known, ordered=True) == "known: mug, bowl, marble"
+    assert errors.suggest_names("mug", []) == "known: (none)"
 
 
 def test_of_many_names_the_first_few_are_listed():
     many = [f"mug_{k:02}" for k in range(25)]
-    assert errors.listing(many[:24]).endswith("mug_22, mug_23")
+    assert errors.list_names(many[:24]).endswith("mug_22, mug_23")
     first = "mug_00, mug_01, mug_02, mug_03, mug_04, mug_05, mug_06, mug_07, mug_08"
-    assert errors.nearest("bowl", many) == f"known: {first} and 16 others"
+    assert errors.suggest_names("bowl", many) == f"known: {first} and 16 others"
 
 
 def test_a_field_error_keeps_its_place_on_the_way_back_from_a_worker_process():
@@ -54,6 +58,6 @@ def test_a_field_error_keeps_its_place_on_the_way_back_from_a_worker_process():
 
 
 def test_a_text_from_outside_is_repeated_up_to_a_length() -> None:
-    assert errors.shown("ten digits", 10) == "ten digits"
-    assert errors.shown("eleven digits", 10) == "eleven ..."
-    assert len(errors.quoted("x" * 1000)) < 200
+    assert errors.shorten_text("ten digits", 10) == "ten digits"
+    assert errors.shorten_text("eleven digits", 10) == "eleven ..."
+    assert len(errors.quote_value("x" * 1000)) < 200

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.files.atomic import (
+from burg_drake.core import (
+    InvalidInputError,
     atomic_write,
     atomic_write_all,
+    ensure_writable_folder,
     require_writable,
-    writable_folder,
+    try_lock,
 )
-from burg_drake.core.files.lock import try_lock
 
 
 def test_writes_text_and_bytes_into_folders_that_do_not_exist_yet(tmp_path: Path):
@@ -85,11 +85,14 @@ def test_permissions_of_the_process_are_never_touched(tmp_path, monkeypatch):
 def test_unwritable_places_are_named(tmp_path: Path):
     file = tmp_path / "file"
     file.write_text("in the way")
-    for write in (lambda: atomic_write(file / "x.csv", "x"), lambda: writable_folder(file / "run")):
+    for write in (
+        lambda: atomic_write(file / "x.csv", "x"),
+        lambda: ensure_writable_folder(file / "run"),
+    ):
         with pytest.raises(InvalidInputError, match=r"^cannot write .*choose a writable place$"):
             write()
     with pytest.raises(InvalidInputError, match=r"cannot write to folder .*: it is a file;"):
-        writable_folder(file)
+        ensure_writable_folder(file)
     assert file.read_text() == "in the way"
 
 
@@ -117,7 +120,7 @@ def test_a_file_that_could_be_written_is_not_made(tmp_path: Path):
 
 
 def test_writable_folder_is_made_and_left_empty(tmp_path: Path):
-    assert writable_folder(tmp_path / "runs" / "first") == tmp_path / "runs" / "first"
+    assert ensure_writable_folder(tmp_path / "runs" / "first") == tmp_path / "runs" / "first"
     assert not list((tmp_path / "runs" / "first").iterdir())
 
 

@@ -11,13 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.core import InvalidInputError
-from burg_drake.core.files import FolderLock
+from burg_drake.core import FolderLock, InvalidInputError
 
 HELD = """
 import sys
 from pathlib import Path
-from burg_drake.core.files import FolderLock
+from burg_drake.core import FolderLock
 lock = FolderLock(Path(sys.argv[1]))
 print("held", flush=True)
 sys.stdin.read()

@@ -5,8 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from burg_drake.core import frames
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core import InvalidInputError, frames
 
 
 def random_rotations(n: int, seed: int) -> np.ndarray:

@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import make_pose, swap_fingers
-from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core import GraspSet, InvalidInputError, UnknownNameError, make_pose, swap_fingers
 
 COLUMNS = ("X_OG", "width", "id", "object", "score")
 

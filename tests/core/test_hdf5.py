@@ -13,9 +13,7 @@ import h5py
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.files.hdf5 import open_hdf5
-from burg_drake.core.files.stored_array import NUMBERS
+from burg_drake.core import NUMBER_KINDS, InvalidInputError, open_hdf5
 
 
 def external_storage(file: Any, other: Path) -> None:
@@ -99,14 +97,14 @@ def long_fixed_text(file: Any) -> None:
 def test_bombs_are_refused_before_they_take_memory(
     tmp_path: Path, make: Callable[[Any], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("burg_drake.core.files.stored_array.MOST_BYTES", 50_000_000)
+    monkeypatch.setattr("burg_drake.core.array_files.MAX_ARRAY_BYTES", 50_000_000)
     path = tmp_path / "bomb.h5"
     with h5py.File(path, "w", libver="latest") as file:
         make(file)
     before = most_memory()
     said = rf"^{path}: x (would take|is damaged)"
     with open_hdf5(path) as tree, pytest.raises(InvalidInputError, match=said) as caught:
-        tree.array("x").read(NUMBERS + "U")
+        tree.array("x").read(NUMBER_KINDS + "U")
     assert "\n" not in str(caught.value)
     assert most_memory() - before < 100_000_000
 

@@ -34,7 +34,7 @@ def test_a_name_is_loaded_on_first_use_and_then_stays():
     code = (
         "import burg_drake\n"
         "assert 'GraspSet' not in vars(burg_drake)\n"
-        "from burg_drake.core.grasps.grasp_set import GraspSet\n"
+        "from burg_drake.core.grasp_set import GraspSet\n"
         "assert burg_drake.GraspSet is GraspSet\n"
         "assert vars(burg_drake)['GraspSet'] is GraspSet\n"
     )

@@ -8,14 +8,11 @@ from typing import Any
 
 import pytest
 
-from burg_drake.core.errors import DocumentError, InvalidInputError
-from burg_drake.core.paths.names import name_from, require_name
-from burg_drake.core.paths.resources import data_root
-from burg_drake.objects.library.document import load_library
-from burg_drake.pipeline.recipe import load_recipe
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.document.gripper_document import load_hand
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import DocumentError, InvalidInputError, data_root, make_name, require_name
+from burg_drake.objects import load_library
+from burg_drake.pipeline import load_recipe
+from burg_drake.scene import load_scene
+from burg_drake.station import load_hand, load_station
 
 RECIPE = "version: 1\nname: mine\nobjects:\n  a: {mesh: a.obj}\n"
 
@@ -23,7 +20,7 @@ RECIPE = "version: 1\nname: mine\nobjects:\n  a: {mesh: a.obj}\n"
 @pytest.mark.parametrize("name", ["a", "mug_2", "Ä-1.0", "x" * 100])
 def test_names(name: str) -> None:
     require_name(name)
-    assert name_from(name) == name
+    assert make_name(name) == name
 
 
 @pytest.mark.parametrize(
@@ -33,7 +30,7 @@ def test_names(name: str) -> None:
 def test_what_is_no_name(name: str) -> None:
     with pytest.raises(InvalidInputError, match="cannot be used in paths"):
         require_name(name)
-    require_name(name_from(name))
+    require_name(make_name(name))
 
 
 def built_in(place: str) -> str:

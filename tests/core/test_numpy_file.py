@@ -10,9 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.files.numpy_file import npy_shape, open_npy, open_npz, write_npy
-from burg_drake.core.files.read_errors import reporting_read_errors
+from burg_drake.core import (
+    InvalidInputError,
+    npy_shape,
+    open_npy,
+    open_npz,
+    report_read_errors,
+    write_npy,
+)
 
 
 def header(shape: tuple[int, ...], dtype: str = "<f8") -> bytes:
@@ -57,7 +62,7 @@ def test_what_is_no_file_is_refused_and_not_waited_for(tmp_path: Path) -> None:
 def test_entries_are_looked_at_before_they_are_unpacked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("burg_drake.core.files.stored_array.MOST_BYTES", 10_000_000)
+    monkeypatch.setattr("burg_drake.core.array_files.MAX_ARRAY_BYTES", 10_000_000)
     path = tmp_path / "a.npz"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("bomb.npy", header((2_000_000,)) + bytes(16_000_000))
@@ -97,12 +102,12 @@ def test_errors_of_others_become_one_line_that_names_the_file() -> None:
         ValueError("9" * 1000): "9" * 200 + "...",
     }.items():
         message = rf"^a.b is not good: {re.escape(said)}$"
-        with pytest.raises(InvalidInputError, match=message), reporting_read_errors("a.b", "good"):
+        with pytest.raises(InvalidInputError, match=message), report_read_errors("a.b", "good"):
             raise error
     with (
         pytest.raises(InvalidInputError, match=r"^a.b: width is bad$"),
-        reporting_read_errors("a.b", "good"),
+        report_read_errors("a.b", "good"),
     ):
         raise InvalidInputError("width is bad")
-    with pytest.raises(InvalidInputError, match=r"^in a.b$"), reporting_read_errors("a.b", "good"):
+    with pytest.raises(InvalidInputError, match=r"^in a.b$"), report_read_errors("a.b", "good"):
         raise InvalidInputError("in a.b")

@@ -4,7 +4,7 @@ import pickle
 import re
 from pathlib import Path
 
-from burg_drake.core.grasps.outcome import Outcome, Stage
+from burg_drake.core import Outcome, Stage
 
 
 def test_stored_values_never_change():

@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 from pydrake.multibody.parsing import PackageMap
 
-from burg_drake.core.errors import UnknownNameError
-from burg_drake.core.paths.packages import Packages, drake_models_folder, package_file
+from burg_drake.core import Packages, UnknownNameError, drake_models_folder, package_file
 
 
 def package(folder: Path, name: str) -> Path:

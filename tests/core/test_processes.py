@@ -10,12 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.core.workers.processes import (
-    default_workers,
-    exit_cause,
-    start_worker,
-    was_ended_from_outside,
-)
+from burg_drake.core import default_workers, exit_cause, start_worker, was_ended_from_outside
 
 ECHO = """\
 import os
@@ -74,7 +69,7 @@ def main(handle):
     print("left alone", file=sys.stderr, flush=True)
 """
 PARENT = """
-from burg_drake.core.workers.processes import start_worker
+from burg_drake.core.worker_processes import start_worker
 start_worker("busy_worker")[0].wait()
 """
 

@@ -6,8 +6,7 @@ from collections import Counter
 
 import pytest
 
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.core.terminal.progress import Progress, ProgressMeter, Reporter
+from burg_drake.core import Outcome, Progress, ProgressMeter, Reporter
 
 Capture = pytest.CaptureFixture[str]
 

@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from burg_drake.core.paths.references import (
+from burg_drake.core import (
+    data_root,
     is_resolved,
     shareable_reference,
     with_resolved_references,
     with_shareable_references,
 )
-from burg_drake.core.paths.resources import data_root
 
 
 @pytest.mark.parametrize(

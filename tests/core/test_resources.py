@@ -4,9 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.core.errors import UnknownNameError
-from burg_drake.core.paths import resources
-from burg_drake.core.paths.resources import resolve
+from burg_drake.core import UnknownNameError, paths, resolve_reference
 
 
 @pytest.fixture
@@ -24,34 +22,37 @@ def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (root / file).write_text("version: 1\n")
     cwd.mkdir()
     monkeypatch.chdir(cwd)
-    monkeypatch.setattr(resources, "data_root", lambda: root)
+    monkeypatch.setattr(paths, "data_root", lambda: root)
     return root
 
 
 def test_built_in_names_and_package_references(root: Path):
-    assert resolve("tabletop_six", "scenes") == root / "scenes/tabletop_six.yaml"
-    assert resolve("household", "models") == root / "models/household"
-    assert resolve("panda_hand", "models/hands") == root / "models/hands/panda_hand.yaml"
-    arm = resolve("package://burg_drake/models/panda/panda_arm.sdf")
+    assert resolve_reference("tabletop_six", "scenes") == root / "scenes/tabletop_six.yaml"
+    assert resolve_reference("household", "models") == root / "models/household"
+    assert resolve_reference("panda_hand", "models/hands") == root / "models/hands/panda_hand.yaml"
+    arm = resolve_reference("package://burg_drake/models/panda/panda_arm.sdf")
     assert arm == root / "models/panda/panda_arm.sdf"
-    assert resources.builtin_names("models") == ["household"]  # the arm is not a library
+    assert paths.builtin_names("models") == ["household"]  # the arm is not a library
 
 
 def test_paths_start_from_the_document_or_the_working_directory(root: Path, tmp_path: Path):
     for folder in (tmp_path / "mine", Path.cwd()):
         folder.mkdir(exist_ok=True)
         (folder / "scene.yaml").write_text(str(folder))
-    assert resolve("scene.yaml", "scenes") == Path.cwd() / "scene.yaml"
-    assert resolve("scene.yaml", "scenes", tmp_path / "mine") == tmp_path / "mine" / "scene.yaml"
-    assert resolve("../mine/scene.yaml", "scenes") == tmp_path / "mine" / "scene.yaml"
+    assert resolve_reference("scene.yaml", "scenes") == Path.cwd() / "scene.yaml"
+    assert (
+        resolve_reference("scene.yaml", "scenes", tmp_path / "mine")
+        == tmp_path / "mine" / "scene.yaml"
+    )
+    assert resolve_reference("../mine/scene.yaml", "scenes") == tmp_path / "mine" / "scene.yaml"
     absolute = tmp_path / "mine" / "scene.yaml"
-    assert resolve(absolute, "scenes", root) == absolute
+    assert resolve_reference(absolute, "scenes", root) == absolute
 
 
 def test_messages_list_what_exists(root: Path, tmp_path: Path):
     def message(*arguments):
         with pytest.raises(UnknownNameError) as caught:
-            resolve(*arguments)
+            resolve_reference(*arguments)
         return str(caught.value)
 
     assert message("tabletop_sx", "scenes") == (
@@ -76,11 +77,11 @@ def test_paths_that_cannot_be(root: Path, reference: str):
     Path("lib").mkdir()
     Path("lib/link").symlink_to("link")
     with pytest.raises(UnknownNameError, match=r"has no home folder|does not exist"):
-        resolve(reference, "models", Path.cwd())
+        resolve_reference(reference, "models", Path.cwd())
 
 
 def test_the_installation_has_its_data():
-    assert resolve("household", "models").joinpath("library.yaml").is_file()
-    assert resolve("tabletop_six", "scenes").is_file()
-    assert resolve("panda_tabletop", "stations").is_file()
-    assert resolve("panda_hand", "models/hands").is_file()
+    assert resolve_reference("household", "models").joinpath("library.yaml").is_file()
+    assert resolve_reference("tabletop_six", "scenes").is_file()
+    assert resolve_reference("panda_tabletop", "stations").is_file()
+    assert resolve_reference("panda_hand", "models/hands").is_file()

@@ -10,15 +10,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core.documents.schema import (
+from burg_drake.core import (
+    DocumentError,
+    InvalidInputError,
     Pose,
     dump_document,
     load_document,
+    make_pose,
     parse_document,
     save_document,
 )
-from burg_drake.core.errors import DocumentError, InvalidInputError
-from burg_drake.core.frames import make_pose
 
 
 class Shading(enum.Enum):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import statsmodels.api as sm
 
-from burg_drake.core.statistics import clustered_interval, wilson_interval
+from burg_drake.core import clustered_interval, wilson_interval
 
 
 def test_wilson_interval_has_the_published_values() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import pickle
 
-from burg_drake.core.grasps import Margins
+from burg_drake.core import Margins
 
 
 def test_margins_that_were_not_measured_are_equal() -> None:

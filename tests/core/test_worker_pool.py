@@ -17,9 +17,18 @@ from pathlib import Path
 import pytest
 import worker_jobs as jobs
 
-from burg_drake.core.errors import InvalidInputError, SimulationError, TaskCancelled, WorkerDied
-from burg_drake.core.workers import Session, Task, TimeLimit, WorkerPool, map_unordered
-from burg_drake.core.workers.prefetch import Prefetcher
+from burg_drake.core import (
+    InvalidInputError,
+    Prefetcher,
+    Session,
+    SimulationError,
+    Task,
+    TaskCancelled,
+    TimeLimit,
+    WorkerDied,
+    WorkerPool,
+    map_unordered,
+)
 from tests.hang_guard import HANG_GUARD, until
 
 
@@ -308,7 +317,7 @@ def test_an_interrupt_ends_the_pool(capfd: pytest.CaptureFixture[str]) -> None:
 
 PARENT = """\
 import sys, worker_jobs as jobs
-from burg_drake.core.workers import WorkerPool
+from burg_drake.core import WorkerPool
 pool = WorkerPool(2)
 futures = [pool.submit(jobs.slow, k) for k in range(2)]
 while len(workers := tuple(pool.processes)) < 2:

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from burg_drake.core.documents.plain_yaml import load_plain_yaml
-from burg_drake.core.errors import DocumentError
+from burg_drake.core import DocumentError, load_plain_yaml
 
 
 def random_tree(rng: np.random.Generator, depth: int) -> Any:

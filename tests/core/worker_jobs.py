@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.workers import report_progress
+from burg_drake.core import InvalidInputError, report_progress
 
 
 def square(x: int) -> int:

@@ -5,12 +5,9 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from burg_drake.cameras.optics import Intrinsics
+from burg_drake.cameras import Intrinsics
 from burg_drake.core import make_pose
-from burg_drake.dataset.blender import BlenderScene
-from burg_drake.dataset.blender.process import Blender
-from burg_drake.dataset.blender.scene import Lamp
-from burg_drake.dataset.blender.surfaces import Material, PaintedSurface
+from burg_drake.dataset import Blender, BlenderScene, Lamp, Material, PaintedSurface
 
 CAMERA = Intrinsics(width=160, height=120, focal=(210.0, 170.0), center=(61.3, 70.8))
 """With pixels that are not square, and an axis that is not in the middle."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from burg_drake.objects.library import ObjectLibrary
+from burg_drake.objects import ObjectLibrary
 from tests.dataset.polyhedra import InMemory, scene_of, some_grasps, write_library
 
 

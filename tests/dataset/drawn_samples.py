@@ -11,13 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from burg_drake import load_scene
-from burg_drake.cameras.optics import Intrinsics
-from burg_drake.dataset.labels import InstanceLabel, LabelledGrasps
-from burg_drake.dataset.rendering import Images
-from burg_drake.dataset.samples import DatasetDocument, DatasetWriter, Sample
-from burg_drake.dataset.views import View
-from burg_drake.scene.document import Scene
+from burg_drake.cameras import Intrinsics
+from burg_drake.dataset import (
+    DatasetDocument,
+    DatasetWriter,
+    Images,
+    InstanceLabel,
+    LabelledGrasps,
+    Sample,
+    View,
+)
+from burg_drake.scene import Scene, load_scene
 
 WIDTH, HEIGHT = 64, 48
 RADIUS = 0.05

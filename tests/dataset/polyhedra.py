@@ -12,13 +12,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras.optics import Intrinsics
+from burg_drake.cameras import Intrinsics
 from burg_drake.core import inverse, make_pose, rotation_from_rpy
-from burg_drake.dataset.labels import InstanceLabel, LabelledGrasps
-from burg_drake.dataset.rendering import Images
-from burg_drake.dataset.samples import Sample
-from burg_drake.dataset.views import View
-from burg_drake.objects.library import (
+from burg_drake.dataset import Images, InstanceLabel, LabelledGrasps, Sample, View
+from burg_drake.objects import (
     ContactGeometry,
     Fit,
     LibraryDocument,
@@ -104,7 +101,7 @@ def write_library(folder: Path, texture: bytes = b"") -> ObjectLibrary:
 
 
 def _contact() -> ContactGeometry:
-    from burg_drake.core.documents import Pose
+    from burg_drake.core import Pose
 
     lower, upper = BOX
     middle = Pose(tuple(0.5 * (lower + upper)))

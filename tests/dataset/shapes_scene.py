@@ -10,12 +10,10 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.core.arrays import Array, Single
-from burg_drake.core.documents.schema import Pose
-from burg_drake.objects.library.document import LibraryDocument, ObjectLibrary
-from burg_drake.objects.library.entry import MassProperties, ObjectEntry, Source
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
+from burg_drake.cameras import Intrinsics
+from burg_drake.core import Array, Pose, Single
+from burg_drake.objects import LibraryDocument, MassProperties, ObjectEntry, ObjectLibrary, Source
+from burg_drake.scene import Instance, Scene, SceneDocument
 
 
 def shapes_scene(

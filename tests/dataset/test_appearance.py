@@ -11,26 +11,26 @@ import numpy as np
 import pytest
 
 from burg_drake.cameras import Intrinsics
-from burg_drake.core import DocumentError, InvalidInputError, UnknownNameError
-from burg_drake.core.documents import Pose
-from burg_drake.dataset.appearance import (
+from burg_drake.core import DocumentError, InvalidInputError, Pose, UnknownNameError
+from burg_drake.dataset import (
     Appearance,
     AppearanceSettings,
     Distractor,
     Photometry,
     TableSurface,
+    apply_photometry,
     distractor_boxes,
     draw_appearance,
-    photometric,
+    environment_file,
+    environment_map,
+    fill_background,
     read_appearance,
-    with_background,
+    render_parameters,
+    table_texture,
 )
-from burg_drake.dataset.appearance.patterns import table_texture
-from burg_drake.dataset.appearance.rendering import environment_file, render_parameters
-from burg_drake.dataset.appearance.room import environment_map
-from burg_drake.objects.library import load_library
-from burg_drake.scene.document import load_scene
-from burg_drake.station.document import Obstacle, load_station
+from burg_drake.objects import load_library
+from burg_drake.scene import load_scene
+from burg_drake.station import Obstacle, load_station
 
 CLUTTER = load_library("clutter")
 SCENE, STATION = load_scene("tabletop_six"), load_station("panda_tabletop")
@@ -67,7 +67,7 @@ def grey(value: int, size: int = 200) -> np.ndarray:
 def made(image: np.ndarray, labels: np.ndarray | None = None, **settings: object) -> np.ndarray:
     gains = settings.pop("object_gains", ())
     look = Appearance(photometry=Photometry(**settings), object_gains=gains)
-    return photometric(image, labels, look, np.random.default_rng(0))
+    return apply_photometry(image, labels, look, np.random.default_rng(0))
 
 
 # --- drawing --------------------------------------------------------------------------------------
@@ -239,10 +239,10 @@ def test_the_room_is_seen_where_it_is() -> None:
     room = environment_map(5).astype(float)
     empty = np.tile(np.array([255, 0, 254], np.uint8), (48, 64, 1))
     for quarter, column in enumerate((512, 256, 0, 768)):  # +x, +y, -x, -y
-        seen = with_background(empty, level_camera(quarter * np.pi / 2), LENS, Appearance(room=5))
+        seen = fill_background(empty, level_camera(quarter * np.pi / 2), LENS, Appearance(room=5))
         around = room.take(range(column - 1, column + 1), axis=1, mode="wrap")[255:257]
         np.testing.assert_allclose(seen[23:25, 31:33].mean((0, 1)), around.mean((0, 1)), atol=2.0)
-    assert (with_background(empty, np.eye(4), LENS, Appearance()) == 150).all()
+    assert (fill_background(empty, np.eye(4), LENS, Appearance()) == 150).all()
 
 
 def test_edges_show_the_room_behind_them_and_nothing_else_changes() -> None:
@@ -250,11 +250,11 @@ def test_edges_show_the_room_behind_them_and_nothing_else_changes() -> None:
     image = np.tile(inside.astype(np.uint8), (48, 64, 1))
     image[:, 32:] = key
     image[:, 31] = np.round(0.7 * inside + 0.3 * key)
-    seen = with_background(image, np.eye(4), LENS, Appearance()).astype(float)
+    seen = fill_background(image, np.eye(4), LENS, Appearance()).astype(float)
     np.testing.assert_allclose(seen[:, 31], np.tile(0.7 * inside + 0.3 * behind, (48, 1)), atol=2.0)
     assert (seen[:, :31] == inside).all() and (seen[:, 32:] == behind).all()
     solid = grey(90, 48)
-    assert with_background(solid, np.eye(4), LENS, Appearance(room=1)) is solid
+    assert fill_background(solid, np.eye(4), LENS, Appearance(room=1)) is solid
 
 
 # --- photometry -----------------------------------------------------------------------------------

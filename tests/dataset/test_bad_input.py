@@ -14,12 +14,15 @@ import numpy as np
 import pytest
 
 import burg_drake as burg
-from burg_drake.apps.cli import main
-from burg_drake.core import InvalidInputError
-from burg_drake.core.documents import Pose, load_document
-from burg_drake.dataset.generating import DatasetRecipe, check_generated
-from burg_drake.dataset.rendering import render, station_view
-from burg_drake.dataset.views import ViewpointSettings
+from burg_drake.apps import main
+from burg_drake.core import InvalidInputError, Pose, load_document
+from burg_drake.dataset import (
+    DatasetRecipe,
+    ViewpointSettings,
+    check_generated,
+    render,
+    station_view,
+)
 from burg_drake.system_libraries import missing_render_libraries
 
 STATION = "panda_tabletop"

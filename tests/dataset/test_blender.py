@@ -12,16 +12,21 @@ import pytest
 import trimesh
 
 import burg_drake as burg
-from burg_drake.cameras.optics import Intrinsics
+from burg_drake.cameras import Intrinsics
 from burg_drake.core import MissingDependencyError, make_pose
-from burg_drake.dataset.appearance.background import SKY
-from burg_drake.dataset.blender import BlenderScene
-from burg_drake.dataset.blender.process import VARIABLE, Blender, blender_command
-from burg_drake.dataset.blender.surfaces import Material
-from burg_drake.dataset.rendering import SceneRenderer, station_view
-from burg_drake.dataset.rendering.ray_scene import RayScene
-from burg_drake.dataset.rendering.ray_surface import RaySurface
-from burg_drake.dataset.views import View
+from burg_drake.dataset import (
+    BLENDER_ENVIRONMENT_VARIABLE,
+    NO_APPEARANCE_COLOR,
+    Blender,
+    BlenderScene,
+    Material,
+    RayScene,
+    RaySurface,
+    SceneRenderer,
+    View,
+    blender_command,
+    station_view,
+)
 from tests.dataset.blender_parts import DOWN, WHITE_CHALK, image_of, lamp, surface
 from tests.dataset.shapes_scene import looking_at
 
@@ -74,7 +79,7 @@ def test_a_program_that_calls_itself_blender(
         f'[ "$1 $2" = "--background --factory-startup" ] || exit 9\nexec {run} "$6"\n'
     )
     stand_in.chmod(0o755)
-    monkeypatch.setenv(VARIABLE, str(stand_in))
+    monkeypatch.setenv(BLENDER_ENVIRONMENT_VARIABLE, str(stand_in))
     started = Blender(blender_command())
     assert started.version == rendering.version
     started.close()
@@ -167,7 +172,7 @@ def test_it_looks_like_drakes(rendering: Blender, small: View) -> None:
     apart = np.abs(ours.color.astype(int) - drakes.color).max(axis=2)
     assert (apart < 40).mean() > 0.85 and (apart > 0).mean() > 0.3
     behind = cv2.erode((ours.depth == 0.0).astype(np.uint8), np.ones((5, 5))).astype(bool)
-    assert behind.any() and (ours.color[behind] == SKY).all()
+    assert behind.any() and (ours.color[behind] == NO_APPEARANCE_COLOR).all()
 
 
 def test_a_lens_bends_the_picture_as_the_labels(rendering: Blender, small: View) -> None:

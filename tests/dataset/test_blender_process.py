@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 
 import burg_drake as burg
-from burg_drake.apps.cli import main
+from burg_drake.apps import main
 from burg_drake.core import FieldError, MissingDependencyError, SimulationError, UnknownNameError
-from burg_drake.dataset.blender import BlenderScene
-from burg_drake.dataset.blender.process import VARIABLE, Blender, blender_command
+from burg_drake.dataset import BLENDER_ENVIRONMENT_VARIABLE, Blender, BlenderScene, blender_command
 from tests.dataset.blender_parts import image_of
 
 
 def test_no_blender(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv(VARIABLE, "no_such_blender")
+    monkeypatch.setenv(BLENDER_ENVIRONMENT_VARIABLE, "no_such_blender")
     with pytest.raises(
         MissingDependencyError,
         match=r"'no_such_blender', which is not an executable: pip install 'burg",
@@ -33,7 +32,7 @@ def test_a_python_without_bpy(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
     bare = tmp_path / "python"
     bare.write_text(f'#!/bin/sh\nexec {sys.executable} -S "$@"\n')
     bare.chmod(0o755)
-    monkeypatch.setenv(VARIABLE, str(bare))
+    monkeypatch.setenv(BLENDER_ENVIRONMENT_VARIABLE, str(bare))
     with pytest.raises(MissingDependencyError, match=r"has no Blender \(No module named 'bpy'\)"):
         Blender(blender_command())
 
@@ -41,14 +40,14 @@ def test_a_python_without_bpy(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
 def test_the_command_line_says_what_to_install(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setenv(VARIABLE, "no_such_blender")
+    monkeypatch.setenv(BLENDER_ENVIRONMENT_VARIABLE, "no_such_blender")
     out = tmp_path / "view.png"
     assert main(["render", "tabletop_six", "--renderer", "blender", "-o", str(out)]) != 0
     assert "pip install 'burg-drake[blender]'" in capsys.readouterr().err and not out.exists()
 
 
 def test_labels_need_no_blender(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(VARIABLE, "no_such_blender")
+    monkeypatch.setenv(BLENDER_ENVIRONMENT_VARIABLE, "no_such_blender")
     kinds = ("depth", "labels")
     ours = burg.render("tabletop_six", "panda_tabletop", "board", kinds, renderer="blender")
     drakes = burg.render("tabletop_six", "panda_tabletop", "board", kinds)

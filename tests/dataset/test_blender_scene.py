@@ -9,13 +9,19 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.optics import Intrinsics
-from burg_drake.dataset.appearance import Appearance, DirectedLight, TableSurface
-from burg_drake.dataset.appearance.background import GREY, SKY, over_background
-from burg_drake.dataset.blender import blender_scene
-from burg_drake.dataset.blender.surfaces import painted_surfaces
-from burg_drake.dataset.rendering import SceneRenderer
-from burg_drake.station.diagram import visible_surfaces
+from burg_drake.cameras import Intrinsics
+from burg_drake.dataset import (
+    BACKGROUND_GREY,
+    NO_APPEARANCE_COLOR,
+    Appearance,
+    DirectedLight,
+    SceneRenderer,
+    TableSurface,
+    blend_over_background,
+    make_blender_scene,
+    painted_surfaces,
+)
+from burg_drake.station import visible_surfaces
 
 
 def test_surfaces_are_those_that_rays_meet() -> None:
@@ -46,7 +52,7 @@ def test_files_of_a_scene(tmp_path: Path) -> None:
         table=TableSurface(pattern="wood", seed=1),
     )
     rendered = SceneRenderer("tabletop_six", "panda_tabletop", appearance=look, renderer="blender")
-    scene = blender_scene(rendered._built, look)
+    scene = make_blender_scene(rendered._built, look)
     scene.write(tmp_path, threads=2)
     described = json.loads((tmp_path / "scene.json").read_text())
     arrays = np.load(tmp_path / "meshes.npz")
@@ -74,8 +80,13 @@ def test_what_is_behind_is_mixed_in_linear_light() -> None:
     color = np.zeros((1, 3, 4), np.uint8)
     color[0, :, 3] = (255, 0, 128)
     camera = Intrinsics(width=3, height=1, focal=(3.0, 3.0), center=(1.0, 0.0))
-    found = over_background(color, np.eye(4), camera, None)
-    assert found[0, 0].tolist() == [0, 0, 0] and found[0, 1].tolist() == list(SKY)
-    half = 255.0 * ((SKY[0] / 255.0 + 0.055) / 1.055 * 0.498 ** (1 / 2.4) * 1.055 - 0.055)
+    found = blend_over_background(color, np.eye(4), camera, None)
+    assert found[0, 0].tolist() == [0, 0, 0] and found[0, 1].tolist() == list(NO_APPEARANCE_COLOR)
+    half = 255.0 * (
+        (NO_APPEARANCE_COLOR[0] / 255.0 + 0.055) / 1.055 * 0.498 ** (1 / 2.4) * 1.055 - 0.055
+    )
     assert found[0, 2, 0] == pytest.approx(half, abs=1.0)
-    assert over_background(color, np.eye(4), camera, Appearance())[0, 1].tolist() == [GREY] * 3
+    assert (
+        blend_over_background(color, np.eye(4), camera, Appearance())[0, 1].tolist()
+        == [BACKGROUND_GREY] * 3
+    )

@@ -11,11 +11,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from burg_drake.dataset.exchange import write_bop
-from burg_drake.dataset.exchange.bop_models import diameter
-from burg_drake.dataset.exchange.model_file import visual_model
-from burg_drake.dataset.exchange.symmetry import symmetries
-from burg_drake.objects.library import load_library
+from burg_drake.dataset import diameter, find_symmetries, visual_model, write_bop
+from burg_drake.objects import load_library
 from tests.dataset.exported_files import image, read_ply
 from tests.dataset.polyhedra import BOX_CORNERS, CAMERA, COLORS, InMemory, write_library
 
@@ -132,7 +129,7 @@ def test_symmetries_are_those_of_the_mesh_and_its_colours() -> None:
     found = {}
     for name in ("bowl", "bottle", "can", "mug"):
         model = visual_model(library, name)
-        found[name] = symmetries(model, diameter(model.vertices))
+        found[name] = find_symmetries(model, diameter(model.vertices))
     assert found["mug"] == {}
     assert found["bowl"].keys() == found["can"].keys() == {"symmetries_continuous"}
     (axis,) = found["bowl"]["symmetries_continuous"]

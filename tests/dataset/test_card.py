@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import pytest
 
 from burg_drake.core import InvalidInputError
-from burg_drake.dataset.exchange import write_card
+from burg_drake.dataset import write_card
 from tests.dataset.exported_files import image
 from tests.dataset.polyhedra import InMemory, some_grasps
 

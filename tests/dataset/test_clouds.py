@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.dataset.labels.clouds import depth_cloud, surface_cloud
-from burg_drake.scene.document.scene import Instance, Scene
+from burg_drake.cameras import Intrinsics
+from burg_drake.core import InvalidInputError, Pose
+from burg_drake.dataset import depth_cloud, surface_cloud
+from burg_drake.scene import Instance, Scene
 from tests.dataset.shapes_scene import shapes_scene
 
 CAMERA = Intrinsics(width=64, height=48, focal=(60.0, 61.0), center=(31.2, 24.9))

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.dataset.exchange import write_coco
+from burg_drake.dataset import write_coco
 from tests.dataset.exported_files import image, mask_of
 from tests.dataset.polyhedra import COLORS, InMemory
 

@@ -10,13 +10,16 @@ from pathlib import Path
 import pytest
 
 import burg_drake as burg
-from burg_drake.apps.cli import main
-from burg_drake.core import rng_from
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.paths import data_root
-from burg_drake.dataset.appearance import AppearanceSettings, draw_appearance
-from burg_drake.dataset.generating import DatasetRecipe, check_generated, sample_again
-from burg_drake.scene.document import SceneRecipe
+from burg_drake.apps import main
+from burg_drake.core import InvalidInputError, UnknownNameError, data_root, rng_from
+from burg_drake.dataset import (
+    AppearanceSettings,
+    DatasetRecipe,
+    check_generated,
+    draw_appearance,
+    sample_again,
+)
+from burg_drake.scene import SceneRecipe
 
 LOOKS = AppearanceSettings(room=0.0, shadows=0.0, distractors=(3, 4), distractor_library="things")
 RECIPE = DatasetRecipe(views=1, sensor="d435", size=(160, 120), colors=False, looks=LOOKS)

@@ -14,11 +14,15 @@ import numpy as np
 import pytest
 
 from burg_drake.core import InvalidInputError
-from burg_drake.dataset.rendering import Images
-from burg_drake.dataset.samples import DatasetFinding, Sample, check_dataset
-from burg_drake.dataset.samples.index import write_index
-from burg_drake.dataset.samples.png import encode_image
-from burg_drake.dataset.samples.sample_files import encoded
+from burg_drake.dataset import (
+    DatasetFinding,
+    Images,
+    Sample,
+    check_dataset,
+    encode_image,
+    encode_sample,
+    write_index,
+)
 from tests.dataset import drawn_samples as drawn
 
 SHARD = "shards/000012.tar"
@@ -58,7 +62,7 @@ def record(change: Callable[[Any], object]) -> Callable[[Files], object]:
 
 def other_sample(change: Callable[[Sample], Sample]) -> Callable[[Files], object]:
     """Puts files of a changed sample in place of the second one."""
-    return lambda files: files.update(encoded(change(drawn.sample(1, 12))))
+    return lambda files: files.update(encode_sample(change(drawn.sample(1, 12))))
 
 
 def unknown_outcome(sample: Sample) -> Sample:

@@ -19,15 +19,15 @@ import numpy as np
 import pytest
 
 from burg_drake.core import DocumentError, InvalidInputError, UnknownNameError
-from burg_drake.dataset.samples import (
+from burg_drake.dataset import (
     Dataset,
     DatasetWriter,
     Sample,
     check_dataset,
     load_dataset,
+    write_index,
     write_scene,
 )
-from burg_drake.dataset.samples.index import write_index
 from tests.dataset import drawn_samples as drawn
 
 
@@ -130,7 +130,7 @@ def test_a_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from burg_drake.dataset.samples import DatasetWriter
+from burg_drake.dataset import DatasetWriter
 from tests.dataset import drawn_samples as drawn
 def samples():
     yield drawn.sample(0, 13)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from burg_drake.core import InvalidInputError, UnknownNameError
-from burg_drake.dataset.exchange import write_bop, write_coco, write_graspnet, write_webdataset
+from burg_drake.dataset import write_bop, write_coco, write_graspnet, write_webdataset
 from tests.dataset.polyhedra import CAMERA, InMemory, zoomed
 
 

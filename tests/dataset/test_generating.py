@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 
 import burg_drake as burg
-from burg_drake.apps.cli import main
-from burg_drake.core.documents import Pose
-from burg_drake.core.errors import FieldError, InvalidInputError
-from burg_drake.dataset.generating import DatasetRecipe, check_generated, sample_again
-from burg_drake.dataset.views import ViewpointSettings
+from burg_drake.apps import main
+from burg_drake.core import FieldError, InvalidInputError, Pose
+from burg_drake.dataset import (
+    DatasetRecipe,
+    ViewpointSettings,
+    check_generated,
+    sample_again,
+)
 
 SCENES = ["tabletop_six", "tabletop_close"]
 RECIPE = DatasetRecipe(views=2, sensor="d435", size=(320, 240), grasps_per_object=5)

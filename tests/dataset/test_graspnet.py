@@ -14,8 +14,7 @@ import trimesh
 from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
-from burg_drake.dataset.exchange import write_graspnet
-from burg_drake.dataset.exchange.graspnet import grasp_scores
+from burg_drake.dataset import grasp_scores, write_graspnet
 from tests.dataset.exported_files import image, read_ply
 from tests.dataset.polyhedra import CAMERA, COLORS, InMemory, some_grasps, zoomed
 

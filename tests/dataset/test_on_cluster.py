@@ -14,25 +14,25 @@ import trimesh
 from PIL import Image
 
 import burg_drake as burg
-from burg_drake.apps.cli import main
-from burg_drake.core.errors import ClusterError, InvalidInputError
-from burg_drake.core.paths.resources import data_root
-from burg_drake.dataset.appearance import AppearanceSettings
-from burg_drake.dataset.generating import DatasetRecipe
-from burg_drake.dataset.generating.contents import portable_recipe
-from burg_drake.dataset.generating.makers import catalogue, scene_maker
-from burg_drake.dataset.generating.sent_scene import SentScene, make_sent_scene
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.cluster.bundles.bundle import make_bundle
-from burg_drake.evaluation.cluster.bundles.unpacked import unpack
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.objects.library.obj_file import write_visual
-from burg_drake.scene.document import SceneRecipe
+from burg_drake.apps import main
+from burg_drake.core import ClusterError, InvalidInputError, data_root
+from burg_drake.dataset import (
+    AppearanceSettings,
+    DatasetRecipe,
+    SampleTask,
+    catalogue_scene,
+    portable_recipe,
+    run_sample_task,
+    scene_maker,
+)
+from burg_drake.evaluation import EvaluationSettings, evaluate, make_bundle, unpack
+from burg_drake.objects import write_visual
+from burg_drake.scene import SceneRecipe
 
 pytest.importorskip("distributed", reason="the cluster needs burg-drake[dask]")
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
 
-from burg_drake.evaluation.cluster.local_nodes import LocalNodes  # noqa: E402
+from burg_drake.evaluation import LocalNodes  # noqa: E402
 
 SCENES = ["tabletop_six", "tabletop_close", "tabletop_six"]
 RECIPE = DatasetRecipe(views=1, sensor="d435", size=(160, 120), looks=None)
@@ -120,12 +120,12 @@ def test_a_node_needs_no_file_of_the_user(tmp_path: Path) -> None:
     scene, station = burg.load_scene(user / "mugs.yaml"), burg.load_station(STATION)
     recipe = replace(RECIPE, looks=AppearanceSettings(), grasps_per_object=2)
     burg.generate_dataset([scene], station, tmp_path / "set", recipe)
-    bundle = make_bundle(catalogue(scene.library, [scene]), station, looks=True)
+    bundle = make_bundle(catalogue_scene(scene.library, [scene]), station, looks=True)
     shutil.rmtree(user)
     folder = unpack(bundle.data, tmp_path / "node", bundle.name)
     world = replace(bundle, data=b"")
     sent = portable_recipe(recipe, tmp_path / "set")
-    made = make_sent_scene(SentScene(world, sent, 0, scene.document, scene.path, None), folder)
+    made = run_sample_task(SampleTask(world, sent, 0, scene.document, scene.path, None), folder)
     assert made.shard == (tmp_path / "set/shards/000000.tar").read_bytes()
     assert made.entry.filesize == len(made.shard)
     assert [path.name for path in folder.parent.iterdir()] == [bundle.name]

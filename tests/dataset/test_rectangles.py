@@ -8,12 +8,9 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import swap_fingers
-from burg_drake.dataset.labels.labelled_grasps import LabelledGrasps
-from burg_drake.dataset.labels.rectangles import MOST_ANGLE, grasp_rectangles
+from burg_drake.cameras import Intrinsics
+from burg_drake.core import Array, InvalidInputError, swap_fingers
+from burg_drake.dataset import MAX_APPROACH_ANGLE, LabelledGrasps, grasp_rectangles
 
 CAMERA = Intrinsics(width=640, height=480, focal=(600.0, 600.0), center=(320.3, 239.1))
 JAW = 0.02
@@ -63,7 +60,7 @@ def test_along_the_optical_axis_it_is_the_image_of_the_pads() -> None:
 
 
 def test_tilted_ones_deviate_by_a_little() -> None:
-    X_CG = random_grasps(200, 0.99 * MOST_ANGLE)
+    X_CG = random_grasps(200, 0.99 * MAX_APPROACH_ANGLE)
     found = grasp_rectangles(grasps(X_CG), CAMERA, jaw=JAW)
     assert len(found) == 200
     away = off(found.corners, pads_in_image(X_CG, 0.06))
@@ -88,7 +85,7 @@ def test_fingers_are_alike() -> None:
 
 def test_only_what_looks_like_a_rectangle_in_the_image() -> None:
     X_CG = random_grasps(6, 0.0)
-    X_CG[0] = random_grasps(1, MOST_ANGLE + 0.01)[0]
+    X_CG[0] = random_grasps(1, MAX_APPROACH_ANGLE + 0.01)[0]
     X_CG[1, 2, 3] = -0.5  # behind the camera
     X_CG[3, 0, 3] = 1.0  # beside the image
     X_CG[4, :3, :3] = np.diag([1.0, -1.0, -1.0])  # towards the camera

@@ -10,20 +10,18 @@ import pytest
 from pydrake.geometry import ClippingRange, ColorRenderCamera, RenderCameraCore, Role
 from pydrake.math import RigidTransform
 
-from burg_drake.cameras import camera_info
-from burg_drake.cameras.optics import of_camera
-from burg_drake.core.documents import Pose
-from burg_drake.dataset.appearance import (
+from burg_drake.cameras import camera_info, camera_intrinsics
+from burg_drake.core import Pose
+from burg_drake.dataset import (
     Appearance,
     DirectedLight,
     Distractor,
     TableSurface,
+    appearance_rendering,
     apply_appearance,
-    rendering,
 )
-from burg_drake.scene.document import load_scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.document import load_station
+from burg_drake.scene import load_scene
+from burg_drake.station import build_station_diagram, load_station
 from burg_drake.system_libraries import missing_render_libraries
 
 pytestmark = pytest.mark.skipif(
@@ -50,7 +48,7 @@ def image(look: Appearance) -> np.ndarray:
     assert contact_geometries(built) == before
     context = built.diagram.CreateDefaultContext()
     query = built.diagram.GetOutputPort("geometry_query").Eval(context)
-    info = camera_info(of_camera(CAMERA))
+    info = camera_info(camera_intrinsics(CAMERA))
     core = RenderCameraCore(name, info, ClippingRange(0.02, 10.0), RigidTransform())
     world = built.scene_graph.world_frame_id()
     seen = query.RenderColorImage(ColorRenderCamera(core, False), world, RigidTransform(X_WC))
@@ -64,7 +62,7 @@ def contact_geometries(built: object) -> int:
 def pixels(p_S: np.ndarray) -> np.ndarray:
     """(N, 2) by OpenCV."""
     X_CS = np.linalg.inv(X_WC) @ X_WS
-    lens = of_camera(CAMERA)
+    lens = camera_intrinsics(CAMERA)
     rotation = cv2.Rodrigues(X_CS[:3, :3])[0]
     return cv2.projectPoints(p_S, rotation, X_CS[:3, 3], lens.K, np.zeros(4))[0][:, 0]
 
@@ -134,5 +132,5 @@ def test_without_headroom_vtk_draws_false_shadows(monkeypatch: pytest.MonkeyPatc
     corners = np.array([(a, b, height, 1.0) for a in (-0.02, 0.02) for b in (-0.06, 0.06)])
     top = within((SCENE.X_SO("box") @ corners.T)[:3].T, margin=0)
     assert np.ptp(image(look)[top].mean(axis=1)) < 10.0
-    monkeypatch.setattr(rendering, "_add_speck", lambda built: None)
+    monkeypatch.setattr(appearance_rendering, "_add_shadow_speck", lambda built: None)
     assert np.ptp(image(look)[top].mean(axis=1)) > 50.0

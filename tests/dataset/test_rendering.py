@@ -10,18 +10,19 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 import burg_drake as burg
-from burg_drake.cameras.optics import Intrinsics
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import inverse, make_pose
-from burg_drake.dataset.labels import label_instances
-from burg_drake.dataset.rendering import SceneRenderer, render, station_view
-from burg_drake.dataset.rendering.ray_scene import RayScene
-from burg_drake.dataset.rendering.ray_surface import RaySurface
-from burg_drake.dataset.views import View
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.diagram import StationDiagram, build_station_diagram
-from burg_drake.station.document.station_document import Station
-from burg_drake.station.world.camera_sensors import render_cameras
+from burg_drake.cameras import Intrinsics
+from burg_drake.core import InvalidInputError, UnknownNameError, inverse, make_pose
+from burg_drake.dataset import (
+    RayScene,
+    RaySurface,
+    SceneRenderer,
+    View,
+    label_instances,
+    render,
+    station_view,
+)
+from burg_drake.scene import Scene
+from burg_drake.station import Station, StationDiagram, build_station_diagram, render_cameras
 from tests.thorough import thorough
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from burg_drake.core import InvalidInputError
-from burg_drake.dataset.labels import decode_mask, encode_mask
+from burg_drake.dataset import decode_mask, encode_mask
 
 RNG = np.random.default_rng(7)
 MASKS = [

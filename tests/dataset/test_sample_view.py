@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 from pydrake.geometry import Meshcat
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.dataset.exchange import show_sample
-from burg_drake.dataset.samples import DatasetWriter, Sample, load_dataset
-from burg_drake.station.document import load_station
-from burg_drake.visualization.scenes import open_meshcat
+from burg_drake.core import InvalidInputError
+from burg_drake.dataset import DatasetWriter, Sample, load_dataset, show_sample
+from burg_drake.station import load_station
+from burg_drake.visualization import open_meshcat
 from tests.dataset import drawn_samples as drawn
 
 msgpack = pytest.importorskip("msgspec").msgpack

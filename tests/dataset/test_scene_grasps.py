@@ -10,18 +10,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import make_pose, rotation_from_quaternion, rotation_from_rpy
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.dataset.labels.grasp_volume import volume_grasps
-from burg_drake.dataset.labels.grasps import grasps_of_run, sampled_grasps
-from burg_drake.dataset.labels.labelled_grasps import LabelledGrasps
-from burg_drake.dataset.labels.scene_grasps import SceneGrasps, label_grasps
-from burg_drake.evaluation.store.campaign_folder import Campaign
-from burg_drake.evaluation.store.run_folder import JOURNAL_FILE, Run, load_run
-from burg_drake.scene.document.scene import Instance, load_scene
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import (
+    InvalidInputError,
+    Outcome,
+    Pose,
+    UnknownNameError,
+    make_pose,
+    rotation_from_quaternion,
+    rotation_from_rpy,
+)
+from burg_drake.dataset import (
+    LabelledGrasps,
+    SceneGrasps,
+    grasps_of_run,
+    label_grasps,
+    sampled_grasps,
+    volume_grasps,
+)
+from burg_drake.evaluation import JOURNAL_FILE, Campaign, Run, load_run
+from burg_drake.scene import Instance, load_scene
+from burg_drake.station import load_station
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "evaluation"))
 
@@ -118,8 +126,8 @@ def test_the_camera_has_them_at_their_places() -> None:
 def test_sampled_grasps_have_the_words_of_a_run() -> None:
     """Where the open hand collides, Drake's own query finds the body that the outcome speaks of;
     elsewhere it finds none."""
-    from burg_drake.grasping.clearance.hand_clearance import HandClearance
-    from burg_drake.station.diagram.builder import build_station_diagram
+    from burg_drake.grasping import HandClearance
+    from burg_drake.station import build_station_diagram
 
     scene = load_scene("tabletop_six")
     names = ("mug", "box")

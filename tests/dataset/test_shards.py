@@ -18,10 +18,7 @@ import PIL.Image
 import pytest
 
 from burg_drake.core import InvalidInputError
-from burg_drake.dataset.rendering import Images
-from burg_drake.dataset.samples import Sample, load_dataset
-from burg_drake.dataset.samples.index import write_index
-from burg_drake.dataset.samples.shard import write_shard
+from burg_drake.dataset import Images, Sample, load_dataset, write_index, write_shard
 from tests.dataset import drawn_samples as drawn
 
 NAMES = ("json", "color.png", "depth.png", "labels.png", "normals.png", "sensor_depth.png")

@@ -9,8 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.dataset.exchange import contact_sheet
-from burg_drake.dataset.exchange.sheet import tag_place
+from burg_drake.dataset import contact_sheet, place_name_tag
 from tests.dataset.exported_files import image
 from tests.dataset.polyhedra import COLORS, InMemory
 
@@ -58,7 +57,7 @@ def test_names_on_a_sheet_stay_in_it_and_beside_each_other() -> None:
     boxes += [np.array([300.0, 230.0, 40.0, 30.0]), np.array([-20.0, -20.0, 30.0, 30.0])]
     taken: list[NDArray] = []
     for box in boxes:
-        place = tag_place(box, np.array([55, 15]), (320, 240), taken)
+        place = place_name_tag(box, np.array([55, 15]), (320, 240), taken)
         assert (place[2:] - place[:2]).tolist() == [55, 15]
         assert (place[:2] >= 0).all() and (place[2:] <= [320, 240]).all()
         for other in taken:

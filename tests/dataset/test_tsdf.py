@@ -9,13 +9,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.core.documents import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.dataset.labels.exact_distance import exact_tsdf, mesh_distance
-from burg_drake.dataset.labels.tsdf import Tsdf, fuse_tsdf
-from burg_drake.station.document import Obstacle, load_station
+from burg_drake.cameras import Intrinsics
+from burg_drake.core import InvalidInputError, Pose, make_pose, rotation_from_rpy
+from burg_drake.dataset import Tsdf, exact_tsdf, fuse_tsdf, mesh_distance
+from burg_drake.station import Obstacle, load_station
 from tests.dataset.shapes_scene import SphereAndBox, looking_at
 
 CAMERA = Intrinsics(width=320, height=240, focal=(300.0, 300.0), center=(159.5, 119.5))

@@ -10,12 +10,17 @@ import numpy as np
 import pytest
 
 from burg_drake.cameras import Intrinsics
-from burg_drake.core import DocumentError, InvalidInputError, UnknownNameError
-from burg_drake.core.documents import Pose, dump_document, parse_document
-from burg_drake.dataset.views import PlacedBox, View, ViewpointSettings, ViewSampler
-from burg_drake.scene.document import load_scene
-from burg_drake.station.diagram import build_station_diagram
-from burg_drake.station.document import Camera, Obstacle, Station, load_station
+from burg_drake.core import (
+    DocumentError,
+    InvalidInputError,
+    Pose,
+    UnknownNameError,
+    dump_document,
+    parse_document,
+)
+from burg_drake.dataset import PlacedBox, View, ViewpointSettings, ViewSampler
+from burg_drake.scene import load_scene
+from burg_drake.station import Camera, Obstacle, Station, build_station_diagram, load_station
 
 SCENE, STATION = load_scene("tabletop_six"), load_station("panda_tabletop")
 X_WS = STATION.document.X_WS.matrix()

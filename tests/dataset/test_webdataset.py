@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.dataset.exchange import write_card, write_webdataset
-from burg_drake.dataset.samples import load_dataset
+from burg_drake.dataset import load_dataset, write_card, write_webdataset
 from tests.dataset import drawn_samples
 from tests.dataset.exported_files import decoded, mask_of
 from tests.dataset.polyhedra import InMemory, some_grasps

@@ -14,9 +14,9 @@ from PIL import Image
 
 import burg_drake as burg
 from burg_drake import system_libraries
-from burg_drake.apps.cli import main
+from burg_drake.apps import main
 from burg_drake.core import InvalidInputError, MissingDependencyError
-from burg_drake.dataset.generating import DatasetRecipe, check_generated, sample_again
+from burg_drake.dataset import DatasetRecipe, check_generated, sample_again
 from burg_drake.system_libraries import missing_render_libraries
 
 SCENE, STATION = "tabletop_six", "panda_tabletop"
@@ -56,7 +56,9 @@ def lost(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def lose_libraries(patch: pytest.MonkeyPatch) -> None:
     """Hides EGL from whoever looks for it."""
-    patch.setattr(system_libraries, "_loads", lambda name: name != system_libraries.EGL)
+    patch.setattr(
+        system_libraries, "_can_load", lambda name: name != system_libraries.SystemLibrary.egl
+    )
     patch.setattr(system_libraries, "_has_mesa_driver", lambda: True)
     patch.setattr(system_libraries.shutil, "which", lambda _: "/usr/bin/apt-get")
 
@@ -68,7 +70,7 @@ def members(folder: Path) -> dict[str, bytes]:
 
 
 def recipe_file(folder: Path) -> str:
-    """Of the size and the number of views of `RECIPE`."""
+    """Of the size and the number of views of `RECIPE_KEY`."""
     path = folder / "recipe.yaml"
     path.write_text("version: 1\nviews: 2\nsize: [320, 240]\n")
     return str(path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any
 
-from burg_drake.evaluation.records.settings import EvaluationSettings
+from burg_drake.evaluation import EvaluationSettings
 
 SETTINGS = {field.name for field in fields(EvaluationSettings)}
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.objects.library.document import load_library
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene
+from burg_drake.core import Pose
+from burg_drake.objects import load_library
+from burg_drake.scene import Instance, Scene, SceneDocument, load_scene
 
 
 def composed(*placed: tuple[str, str, float, float, float]) -> Scene:

@@ -9,12 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.store.campaign_folder import Campaign
-from burg_drake.evaluation.store.run_folder import Run, load_run
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.evaluation import Campaign, EvaluationSettings, Run, evaluate, load_run
+from burg_drake.scene import Scene
+from burg_drake.station import Station, load_station
 
 # Worker processes and scripts import the judges by name.
 sys.path.insert(0, str(Path(__file__).parent))
@@ -24,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 def no_chart_of_reach(no_pose_mistakes: None) -> Iterator[None]:
     """How far the arm reaches is most of the work of a page, and has a test of its own."""
     with pytest.MonkeyPatch.context() as patch:
-        place = "burg_drake.evaluation.report.page.reachability_section"
+        place = "burg_drake.evaluation.report.pages.reachability_section"
         patch.setattr(place, lambda run: None)
         yield
 

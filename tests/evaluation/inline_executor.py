@@ -6,11 +6,8 @@ import random
 from collections.abc import Generator, Iterable
 from dataclasses import dataclass
 
-from burg_drake.core.errors import BurgError
-from burg_drake.core.grasps import Verdict
-from burg_drake.evaluation.candidates.candidates import Candidate
-from burg_drake.evaluation.stages.judge import judge_grasp
-from burg_drake.evaluation.workers.job import Job, JobFailed, OnFailure
+from burg_drake.core import BurgError, Verdict
+from burg_drake.evaluation import Candidate, Job, JobFailed, OnFailure, judge_grasp
 
 
 @dataclass

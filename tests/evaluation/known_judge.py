@@ -18,10 +18,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps.outcome import Outcome, Stage
-from burg_drake.evaluation.candidates.candidates import Candidate
-from burg_drake.evaluation.stages.judge import Decide, Decision, Screen
+from burg_drake.core import InvalidInputError, Outcome, Stage
+from burg_drake.evaluation import Candidate, Decide, Decision, Screen
 
 TOPPLED = 0.0185
 """What is moved by more than this lies afterwards [m]."""
@@ -278,11 +276,11 @@ class DieOnStart:
 def install(setattr: Callable[[str, Any], None], log: Path | None = None, pause: float = 0) -> None:
     """Replaces the simulation of `evaluate` in this process by `KnownJudge`."""
     judge = Make(KnownJudge(log, pause))
-    for module in ("cascade", "run.many_scenes"):
+    for module in ("cascade", "many_scenes"):
         setattr(f"burg_drake.evaluation.{module}.StationJudgeFactory", lambda *_: judge)
-    for module in ("cascade", "run.scene_tasks"):
+    for module in ("cascade", "scene_tasks"):
         setattr(f"burg_drake.evaluation.{module}.require_sound", lambda *_: None)
     # of many scenes, too: processes of their own would not know of this
-    setattr("burg_drake.evaluation.run.scene_processes.preparers", lambda workers: 0)
+    setattr("burg_drake.evaluation.scene_tasks.preparer_count", lambda workers: 0)
     # the chart of the arm's reach takes longer than all else
-    setattr("burg_drake.evaluation.report.page.reachability_section", lambda *_: None)
+    setattr("burg_drake.evaluation.report.pages.reachability_section", lambda *_: None)

@@ -12,13 +12,10 @@ from asked import asked
 from inline_executor import Inline
 from known_scene import write_scene
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.table import TEXT, Columns
-from burg_drake.evaluation.store.campaign_folder import Campaign
-from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.scene.document.scene import save_scene
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import Pose
+from burg_drake.evaluation import TEXT_COLUMNS, Campaign, Columns, Run, evaluate
+from burg_drake.scene import save_scene
+from burg_drake.station import Station
 
 OPTIONS: dict[str, Any] = {"grasps_per_object": 5, "blind": True, "progress": False}
 
@@ -48,14 +45,14 @@ def same(a: Columns, b: Columns) -> bool:
     """Whether tables agree bit for bit in everything but time."""
     names = [name for name in a if not name.startswith("cpu_")]
     assert names == [name for name in b if not name.startswith("cpu_")]
-    return all(np.array_equal(a[n], b[n], equal_nan=n not in TEXT) for n in names)
+    return all(np.array_equal(a[n], b[n], equal_nan=n not in TEXT_COLUMNS) for n in names)
 
 
 def empty_pages(setattr: Callable[[str, Any], None]) -> None:
     """Reports are written without anything in them, which takes no time."""
-    setattr("burg_drake.evaluation.run.preparation.write_report", _write_nothing)
-    setattr("burg_drake.evaluation.run.many_scenes.renew_report", lambda campaign: None)
-    setattr("burg_drake.evaluation.merge.finishing.write_campaign_report", _write_nothing)
+    setattr("burg_drake.evaluation.run_preparation.write_report", _write_nothing)
+    setattr("burg_drake.evaluation.many_scenes.renew_report", lambda campaign: None)
+    setattr("burg_drake.evaluation.run_merging.write_campaign_report", _write_nothing)
 
 
 def _write_nothing(run: Run | Campaign) -> None:

@@ -6,10 +6,17 @@ from pathlib import Path
 
 import trimesh
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.objects.library.document import LibraryDocument, ObjectLibrary, load_library
-from burg_drake.objects.library.entry import MassProperties, ObjectEntry, Source, StablePose
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene, save_scene
+from burg_drake.core import Pose
+from burg_drake.objects import (
+    LibraryDocument,
+    MassProperties,
+    ObjectEntry,
+    ObjectLibrary,
+    Source,
+    StablePose,
+    load_library,
+)
+from burg_drake.scene import Instance, Scene, SceneDocument, load_scene, save_scene
 
 
 def write_library(folder: Path) -> ObjectLibrary:

@@ -8,7 +8,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from burg_drake.core.errors import InvalidInputError
+from burg_drake.core import InvalidInputError
 
 FILE = "content.txt"
 """That the bundle has."""

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet
 
-DECLARATION = "burg_drake.core.grasps.verdict"
+DECLARATION = "burg_drake.core.verdict"
 LINES = (
-    '    wobble: float = margin("rad", "how much it wobbles", mode="reach")\n'
-    '    detour: float = margin("m", "how far round", mode="reach", stage=Stage.REACHABLE)\n'
+    '    wobble: float = margin_field("rad", "how much it wobbles", mode="reach")\n'
+    '    detour: float = margin_field("m", "how far round", mode="reach", stage=Stage.REACHABLE)\n'
 )
 AFTER = "    def of_trial(self) -> dict[str, float]:\n"
 
@@ -35,27 +35,33 @@ def declare() -> None:
 
 def look_for_it(folder: Path) -> None:
     """Fails where the margin of a trial is missing."""
-    from burg_drake.core.grasps import Margins, Outcome, Stage, Verdict
-    from burg_drake.core.grasps.column_meanings import GROUPS, describe
-    from burg_drake.evaluation.records import journal, table, table_file, trial
-    from burg_drake.evaluation.records.origin import TrialOrigin
-    from burg_drake.evaluation.replay import as_result, differences
-    from burg_drake.evaluation.stages.judge import trial_verdict
-    from burg_drake.simulation.trials.result import TrialResult
-    from burg_drake.station.document.engine import ENGINES
+    from burg_drake.core import COLUMN_GROUPS, Margins, Outcome, Stage, Verdict, describe_column
+    from burg_drake.evaluation import (
+        TrialOrigin,
+        as_result,
+        differences,
+        journal,
+        results_table,
+        table_file,
+        trial_verdict,
+    )
+    from burg_drake.simulation import TrialResult
+    from burg_drake.station import ENGINES
 
     margins = Margins(**{"wobble": 0.25})
     verdict = trial_verdict(TrialResult(outcome=Outcome.LIFTED, margins=margins))
     assert verdict.margins["wobble"] == 0.25
-    line = journal.encode("box-1", verdict)
+    line = journal.encode_verdict("box-1", verdict)
     assert json.loads(line)["margins"]["wobble"] == 0.25
-    assert journal.decode(line)[1].margins["wobble"] == 0.25
+    assert journal.decode_verdict(line)[1].margins["wobble"] == 0.25
 
-    meaning = describe("wobble")
+    meaning = describe_column("wobble")
     assert meaning is not None and meaning.unit == "rad"
-    assert GROUPS["Margins and cost"]["wobble"] == meaning
+    assert COLUMN_GROUPS["Margins and cost"]["wobble"] == meaning
 
-    judged = trial.RecordedTrial(id="box-1", instance="box", X_OG=np.eye(4), verdict=verdict)
+    judged = results_table.RecordedTrial(
+        id="box-1", instance="box", X_OG=np.eye(4), verdict=verdict
+    )
     for mode in ("hand", "reach", "arm"):
         origin = TrialOrigin(
             scene="a scene",
@@ -69,7 +75,7 @@ def look_for_it(folder: Path) -> None:
             seed=0,
             run="89ab",
         )
-        columns = table.trial_columns([judged], origin, instances=["box"])
+        columns = results_table.trial_columns([judged], origin, instances=["box"])
         assert ("wobble" in columns) == (mode != "hand")
     names = list(columns)
     declared = [one.name for one in dataclasses.fields(Margins)]
@@ -78,7 +84,9 @@ def look_for_it(folder: Path) -> None:
     for suffix in (".csv", ".parquet"):
         path = (folder / "results").with_suffix(suffix)
         table_file.write_table(path, columns)
-        back = trial.read_trial(table.table_row(table_file.read_table(path), 0), "here")
+        back = results_table.read_trial(
+            results_table.table_row(table_file.read_table(path), 0), "here"
+        )
         assert back.verdict is not None and back.verdict.margins["wobble"] == 0.25
     described = json.loads((folder / "results.csv-metadata.json").read_text(encoding="utf-8"))
     (column,) = [c for c in described["tableSchema"]["columns"] if c["name"] == "wobble"]
@@ -94,18 +102,17 @@ def look_for_it(folder: Path) -> None:
 
 def look_for_it_where_people_read() -> None:
     """Fails where reports or replays do not show the margins."""
-    from burg_drake.core.grasps import Margins, Outcome, Stage, Verdict
-    from burg_drake.evaluation.replay import arm_figures
-    from burg_drake.evaluation.report.sections import FURTHER, further_margins
-    from burg_drake.simulation.trials.result import TrialResult
-    from burg_drake.visualization.scenes import describe
+    from burg_drake.core import Margins, Outcome, Stage, Verdict
+    from burg_drake.evaluation import FURTHER_MARGINS, arm_figures, further_margins
+    from burg_drake.simulation import TrialResult
+    from burg_drake.visualization import describe_trial
 
-    assert {"wobble", "detour"} <= set(FURTHER)
+    assert {"wobble", "detour"} <= set(FURTHER_MARGINS)
     values = {"wobble": np.array([0.1, 0.2]), "detour": np.array([0.1, 0.2])}
     page = str(further_margins(values, np.zeros(2, dtype=np.int8)))
     assert "wobble [°]" in page and "detour [mm]" in page
     found = Margins(**{"slip": 0.001, "wobble": np.deg2rad(3.0)})
-    told = describe(TrialResult(outcome=Outcome.LIFTED, margins=found))
+    told = describe_trial(TrialResult(outcome=Outcome.LIFTED, margins=found))
     assert told == ["lifted", "slip 1.0 mm, wobble 3.0 deg"]
     verdict = Verdict(Outcome.LIFTED, Stage.EXECUTED, margins={"wobble": 1.0, "detour": 0.25})
     assert arm_figures(verdict) == ["detour 250.0 mm"]
@@ -113,11 +120,10 @@ def look_for_it_where_people_read() -> None:
 
 def look_for_that_of_the_arm() -> None:
     """Fails where the margin that the arm's screen measures is missing, or taken for a trial's."""
-    from burg_drake.core.grasps import Margins, Outcome, Stage, Verdict
-    from burg_drake.evaluation.feasibility import MARGIN_COLUMNS
-    from burg_drake.evaluation.replay import as_result, differences
+    from burg_drake.core import Margins, Outcome, Stage, Verdict
+    from burg_drake.evaluation import REACH_MARGIN_COLUMNS, as_result, differences
 
-    assert "detour" in MARGIN_COLUMNS and "wobble" not in MARGIN_COLUMNS
+    assert "detour" in REACH_MARGIN_COLUMNS and "wobble" not in REACH_MARGIN_COLUMNS
     assert "detour" not in Margins().of_trial()
     recorded = Verdict(Outcome.LIFTED, Stage.EXECUTED, margins={"clearance": 0.1, "detour": 0.5})
     by_hand = Verdict(Outcome.LIFTED, Stage.EXECUTED, margins={"clearance": 0.1})

@@ -8,21 +8,25 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from burg_drake.core.frames import grasp_from_axes, make_pose
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.core.grasps.outcome import Outcome, Stage
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.origin import read_origin
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.records.table import table_row
-from burg_drake.evaluation.records.table_file import read_table
-from burg_drake.evaluation.records.trial import read_trial
-from burg_drake.evaluation.replay import as_result, decisive_mode, differences, rerun
-from burg_drake.evaluation.results.counts import Pushes, pushes
-from burg_drake.evaluation.results.summary import summarize
-from burg_drake.evaluation.results.summary_tables import summary_view
-from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import GraspSet, Outcome, Stage, grasp_from_axes, make_pose
+from burg_drake.evaluation import (
+    EvaluationSettings,
+    Pushes,
+    Run,
+    as_result,
+    count_pushes,
+    decisive_mode,
+    differences,
+    evaluate,
+    read_origin,
+    read_table,
+    read_trial,
+    rerun,
+    summarize,
+    summary_view,
+    table_row,
+)
+from burg_drake.station import load_station
 from tests.evaluation.composed import tabletop
 
 pytestmark = pytest.mark.usefixtures("judged_here")
@@ -78,13 +82,13 @@ def test_pushes_of_the_target_and_of_others_are_counted_apart(run: Run) -> None:
         "pushed_can": np.array([0.0, 0.0, 0.012, 0.0, 0.05, 0.04, np.nan]),
         "pushed_mug": np.array([0.0, 0.0, 0.0, 0.0, 0.03, 0.0011, np.nan]),
     }
-    found = pushes(columns)
+    found = count_pushes(columns)
     assert found == Pushes(trials=6, pushed=4, largest=0.05, target_pushed=4, target_largest=0.03)
     assert str(found).endswith(
         " 1 mm in 4 of 6 trials (largest 50.0 mm), the object to be grasped in 4 (largest 30.0 mm)."
     )
-    assert pushes({**columns, "pushed": np.full(7, np.nan)}) is None
-    assert pushes({"outcome": columns["outcome"]}) is None
+    assert count_pushes({**columns, "pushed": np.full(7, np.nan)}) is None
+    assert count_pushes({"outcome": columns["outcome"]}) is None
 
 
 def test_a_row_alone_gives_the_same_bits(run: Run) -> None:

@@ -12,17 +12,20 @@ from asked import asked
 from inline_executor import Inline
 from known_judge import expected, install
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.evaluation.candidates.sampling import sample_candidates, sample_on_scene
-from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.report.sections.commands import reproduce_command
-from burg_drake.evaluation.results.notes import run_notes
-from burg_drake.evaluation.run.balancing import sample_requested
-from burg_drake.evaluation.store.run_folder import Run, save_run
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.core import InvalidInputError, Outcome
+from burg_drake.evaluation import (
+    Run,
+    SamplingSettings,
+    evaluate,
+    reproduce_command,
+    run_notes,
+    sample_candidates,
+    sample_on_scene,
+    sample_requested,
+    save_run,
+)
+from burg_drake.scene import Scene, load_scene
+from burg_drake.station import Station, load_station
 
 OPTIONS = {"grasps_per_object": 4, "until_balanced": 3, "blind": True, "progress": False}
 
@@ -80,7 +83,7 @@ def test_only_what_lacks_something_is_sampled_again(
         asked_of.append(set(arguments[-1]))
         return sample_on_scene(*arguments)
 
-    monkeypatch.setattr("burg_drake.evaluation.run.balancing.sample_on_scene", noted)
+    monkeypatch.setattr("burg_drake.evaluation.run_preparation.sample_on_scene", noted)
     only = {"left", "right", "bar"} if blind else {"bottle", "box"}
     options = {"blind": blind, "only": sorted(only), "until_balanced": 3 if blind else 1}
     run = judged(scene, station, tmp_path / "run", mode="hand", **options)
@@ -118,7 +121,7 @@ def _killed_and_continued(
         return save_run(run)
 
     with monkeypatch.context() as patch:
-        patch.setattr("burg_drake.evaluation.run.preparation.save_run", killed)
+        patch.setattr("burg_drake.evaluation.run_preparation.save_run", killed)
         for _ in range(3):
             with pytest.raises(KeyboardInterrupt):
                 judged(scene, station, out)

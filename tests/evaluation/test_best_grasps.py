@@ -7,17 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import UnknownNameError
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.grasp_sets.run_set import run_grasps
-from burg_drake.evaluation.results.best_grasps import (
+from burg_drake.core import GraspSet, UnknownNameError
+from burg_drake.evaluation import (
+    Run,
     best_of_each,
-    index_of,
-    ranked_run,
-    ranked_set,
+    grasp_index,
+    rank_by_score,
+    rank_run_grasps,
+    run_grasps,
     shown_ids,
 )
-from burg_drake.evaluation.store.run_folder import Run
 
 HOLDER = np.array(["mug", "box", "mug", "mug", "box", "mug"])
 ALL = np.ones(6, dtype=bool)
@@ -30,7 +29,7 @@ def grasps(score: list[float] | None) -> GraspSet:
 
 
 def test_by_score_with_unknown_ones_last() -> None:
-    ranking = ranked_set(grasps([1.0, np.nan, 3.0, np.nan, 5.0, 2.0]))
+    ranking = rank_by_score(grasps([1.0, np.nan, 3.0, np.nan, 5.0, 2.0]))
     assert ranking.by == "score"
     assert best_of_each(HOLDER, ALL, ranking, None) == [2, 5, 0, 3, 4, 1]
     assert best_of_each(HOLDER, ALL, ranking, 1) == [2, 4]
@@ -43,7 +42,7 @@ def test_of_a_run_held_ones_come_before_lost_ones(own_run: Run) -> None:
     others = [k for k in range(len(run.candidates.id)) if run.results["outcome"][k] != "lifted"]
     outcomes = run.results["outcome"].astype(object)
     outcomes[others] = np.resize(["no_ik", "slipped", "", "lifted_turned"], len(others))
-    ranking = ranked_run(run, run_grasps(run).with_columns(outcome=outcomes.astype(str)))
+    ranking = rank_run_grasps(run, run_grasps(run).with_columns(outcome=outcomes.astype(str)))
     assert ranking.order[0] == first
     texts = [text for text in outcomes[ranking.order] if text != "lifted"]
     assert list(dict.fromkeys(texts)) == ["lifted_turned", "slipped", "no_ik", ""]
@@ -51,11 +50,11 @@ def test_of_a_run_held_ones_come_before_lost_ones(own_run: Run) -> None:
 
 def test_what_the_score_is_made_of() -> None:
     scored = replace(grasps([1.0] * 6), provenance={"quality": {"by": "load_margin"}})
-    assert ranked_set(scored).by == "score (load_margin)"
+    assert rank_by_score(scored).by == "score (load_margin)"
 
 
 def test_evenly_without_scores() -> None:
-    ranking = ranked_set(grasps(None))
+    ranking = rank_by_score(grasps(None))
     assert ranking.by == ""
     assert best_of_each(HOLDER, ALL, ranking, 2) == [0, 3, 1, 4]
 
@@ -66,7 +65,7 @@ def test_identifiers_with_and_without_instances() -> None:
         plain.select([0, 2]).with_columns(instance=name) for name in ("mug_1", "mug_2")
     )
     id = str(plain.id[2])
-    assert index_of(plain, id, "file") == 2
-    assert index_of(twice, f"mug_2-{id}", "file") == shown_ids(twice).index(f"mug_2-{id}") == 3
+    assert grasp_index(plain, id, "file") == 2
+    assert grasp_index(twice, f"mug_2-{id}", "file") == shown_ids(twice).index(f"mug_2-{id}") == 3
     with pytest.raises(UnknownNameError, match=f"file has no grasp '{id}'.*mug_[12]-{id}"):
-        index_of(twice, id, "file")
+        grasp_index(twice, id, "file")

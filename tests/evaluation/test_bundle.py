@@ -11,13 +11,17 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.paths.resources import data_root
-from burg_drake.evaluation.cluster.bundles.bundle import load_bundle, make_bundle, require_content
-from burg_drake.evaluation.cluster.bundles.unpacked import FOLDER, bundle_folder, unpack
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.document.content import world_content
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import InvalidInputError, data_root
+from burg_drake.evaluation import (
+    BUNDLES_FOLDER,
+    bundle_folder,
+    load_bundle,
+    make_bundle,
+    require_same_content,
+    unpack,
+)
+from burg_drake.scene import load_scene
+from burg_drake.station import load_station, world_content
 
 SCENE = """version: 1
 name: two
@@ -43,7 +47,7 @@ def test_what_is_unpacked_is_what_was_packed(station: str, tmp_path: Path) -> No
     folder = unpack(bundle.data, tmp_path / "there", bundle.name)
     shutil.rmtree(tmp_path / "here")
     there, station_there = load_bundle(folder)
-    require_content(bundle, there, station_there)
+    require_same_content(bundle, there, station_there)
     assert world_content(there, station_there) == bundle.content
     assert list(there.instances) == ["mug"]
     assert set(there.library.objects) == {"mug", "box"}
@@ -93,7 +97,7 @@ def test_packages_travel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     folder = unpack(bundle.data, tmp_path / "there", bundle.name)
     shutil.rmtree(tmp_path / "ws")
     scene, there = load_bundle(folder)
-    require_content(bundle, scene, there)
+    require_same_content(bundle, scene, there)
     assert there.arm_model == folder / "my_robot/urdf/arm.sdf"
     assert (folder / "my_robot/meshes/link0.obj").is_file()
 
@@ -105,15 +109,15 @@ def test_a_world_that_changed_on_the_way_is_refused(tmp_path: Path) -> None:
     folder = unpack(bundle.data, tmp_path, bundle.name)
     assert unpack(bundle.data, tmp_path, bundle.name) == folder
     assert bundle_folder(tmp_path, bundle.name) == folder
-    assert [path.name for path in (tmp_path / FOLDER).iterdir()] == [bundle.name]
+    assert [path.name for path in (tmp_path / BUNDLES_FOLDER).iterdir()] == [bundle.name]
     mesh = next(folder.glob("library.d/mug/pieces/*.obj"))
     mesh.write_bytes(mesh.read_bytes() + b"\n")
     with pytest.raises(InvalidInputError, match=r"files of the objects of 'tabletop_six' on"):
-        require_content(bundle, *load_bundle(folder))
+        require_same_content(bundle, *load_bundle(folder))
     model = next(folder.glob("arm.d/*.sdf"))
     model.write_bytes(model.read_bytes() + b"\n")
     with pytest.raises(InvalidInputError, match=r"the station of 'tabletop_six' on .* changed"):
-        require_content(bundle, *load_bundle(folder))
+        require_same_content(bundle, *load_bundle(folder))
 
 
 def test_the_zip_is_plain() -> None:

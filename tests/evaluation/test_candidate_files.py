@@ -11,22 +11,29 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import grasp_from_axes, inverse, make_pose
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.candidates.sampling import sample_candidates
-from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
-from burg_drake.evaluation.candidates.scene_frame import in_frame
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.grasp_sets.candidate_files import NoSceneIdsError, read_grasps
-from burg_drake.evaluation.grasp_sets.run_set import run_grasps
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.records.table_file import read_table
-from burg_drake.formats.common.grasp_format import PANDA
-from burg_drake.formats.grasp_files import write_grasp_file
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import (
+    Array,
+    GraspSet,
+    InvalidInputError,
+    UnknownNameError,
+    grasp_from_axes,
+    inverse,
+    make_pose,
+)
+from burg_drake.evaluation import (
+    EvaluationSettings,
+    NoSceneIdsError,
+    SamplingSettings,
+    evaluate,
+    join_in_frame,
+    read_grasps,
+    read_table,
+    run_grasps,
+    sample_candidates,
+)
+from burg_drake.formats import PANDA_GRIPPER, write_grasp_file
+from burg_drake.scene import Scene
+from burg_drake.station import Station
 
 pytestmark = pytest.mark.usefixtures("judged_here")
 
@@ -191,7 +198,7 @@ def test_there_and_back(format: str, scene: Scene, station: Station, tmp_path: P
     sets = {name: sampled.grasps.select(sampled.instance == name) for name in scene.instances}
     path = tmp_path / ("a.csv" if format == "vgn" else "a.npy")
     X_SF = X_SC if format == "graspnet" else make_pose(p_AB=(0.15, 0.05, -0.05))
-    write_grasp_file(in_frame(scene, sets, X_SF), path, format, PANDA)
+    write_grasp_file(join_in_frame(scene, sets, X_SF), path, format, PANDA_GRIPPER)
     given = read_grasps(scene, path, X_SF=X_SF)
     assert given.notes == () and list(given.by_instance) == list(sets)
     for name, grasps in given.by_instance.items():

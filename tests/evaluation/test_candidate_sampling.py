@@ -7,21 +7,18 @@ import dataclasses
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.candidates.sampling import (
+from burg_drake.core import GraspSet, InvalidInputError, Pose, UnknownNameError
+from burg_drake.evaluation import (
+    SamplingSettings,
     sample_candidates,
     sample_library,
     sample_on_scene,
+    sampled_set,
 )
-from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
-from burg_drake.evaluation.grasp_sets.sampled import sampled_set
-from burg_drake.grasping.clearance.hand_clearance import HandClearance, hand_clearance_alone
-from burg_drake.objects.library.document import load_library
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.grasping import HandClearance, hand_clearance_alone
+from burg_drake.objects import load_library
+from burg_drake.scene import Scene, load_scene
+from burg_drake.station import Station, build_station_diagram, load_station
 
 BLIND = SamplingSettings(blind=True)
 

@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.candidates.candidates import Candidates, given_candidates
-from burg_drake.evaluation.candidates.sampling import sample_candidates
-from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
-from burg_drake.evaluation.grasp_sets.candidate_files import read_grasps
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import GraspSet, InvalidInputError, Pose, UnknownNameError, make_pose
+from burg_drake.evaluation import (
+    Candidates,
+    SamplingSettings,
+    given_candidates,
+    read_grasps,
+    sample_candidates,
+)
+from burg_drake.scene import Scene
+from burg_drake.station import Station
 
 BLIND = SamplingSettings(blind=True)
 """The objects of the small scene are nothing to Drake."""

@@ -17,20 +17,20 @@ from asked import asked
 from inline_executor import Inline
 from known_judge import KnownJudge, Make, ShortOfMemory, expected, install
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.core.terminal.progress import Progress
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.grasp_sets.candidate_files import read_grasps
-from burg_drake.evaluation.records.journal import read_journal
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.records.table import TEXT
-from burg_drake.evaluation.records.table_file import read_table
-from burg_drake.evaluation.report.sections.reproduction import reproduce_command
-from burg_drake.evaluation.store.run_folder import Run, load_run
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import GraspSet, InvalidInputError, Progress, UnknownNameError, make_pose
+from burg_drake.evaluation import (
+    TEXT_COLUMNS,
+    EvaluationSettings,
+    Run,
+    evaluate,
+    load_run,
+    read_grasps,
+    read_journal,
+    read_table,
+    reproduce_command,
+)
+from burg_drake.scene import Scene
+from burg_drake.station import Station
 from tests.hang_guard import HANG_GUARD, until
 
 
@@ -38,7 +38,9 @@ def same_results(a: Run, b: Run) -> bool:
     """Whether two tables agree in everything but time."""
     assert list(a.results) == list(b.results)
     names = [name for name in a.results if not name.startswith("cpu_")]
-    return all(np.array_equal(a.results[n], b.results[n], equal_nan=n not in TEXT) for n in names)
+    return all(
+        np.array_equal(a.results[n], b.results[n], equal_nan=n not in TEXT_COLUMNS) for n in names
+    )
 
 
 def test_results_do_not_depend_on_workers(
@@ -401,7 +403,7 @@ def test_a_run_that_is_killed_at_its_start_goes_on(
 
     options = {"grasps_per_object": 2, "blind": True, "executor": Inline(), "progress": False}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(f"burg_drake.evaluation.store.run_folder.{write}", die)
+        patch.setattr(f"burg_drake.evaluation.run_folder.{write}", die)
         with pytest.raises(KeyboardInterrupt):
             evaluate(scene, station, tmp_path / "run", **asked(**options))  # type: ignore[arg-type]
     run = evaluate(scene, station, tmp_path / "run", **asked(**options))  # type: ignore[arg-type]
@@ -465,7 +467,7 @@ def test_an_unsound_scene_is_refused(scene: Scene, station: Station, tmp_path: P
         raise InvalidInputError("'left' and 'right' overlap")
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("burg_drake.station.checks.require_valid_scene", refuse)
+        patch.setattr("burg_drake.station.require_valid_scene", refuse)
         with pytest.raises(InvalidInputError, match="overlap"):
             evaluate(scene, station, tmp_path / "run", progress=False)
     assert not (tmp_path / "run").exists()
@@ -474,8 +476,8 @@ def test_an_unsound_scene_is_refused(scene: Scene, station: Station, tmp_path: P
 def test_judges_are_pickled_with_all_they_need(scene: Scene, station: Station) -> None:
     import pickle
 
-    from burg_drake.evaluation.stages.station_judge import StationJudgeFactory
-    from burg_drake.station.document.engine import ENGINES
+    from burg_drake.evaluation import StationJudgeFactory
+    from burg_drake.station import ENGINES
 
     factory = StationJudgeFactory(scene, station, ENGINES["standard"], "reach")
     assert pickle.loads(pickle.dumps(factory)).scene.content == scene.content

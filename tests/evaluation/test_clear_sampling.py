@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.grasp_sets.sampled import sample_grasps
-from burg_drake.evaluation.grasp_sets.scored import scored_set
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import Array, GraspSet
+from burg_drake.evaluation import sample_grasps, scored_set
+from burg_drake.scene import load_scene
+from burg_drake.station import load_station
 
 PAD_Y, PAD_Z = np.linspace(-8.7e-3, 8.7e-3, 20), np.linspace(-8.9e-3, 9.4e-3, 20)
 """The Franka Hand's rubber tips, 17.5 x 18.5 mm (franka_ros)."""

@@ -16,31 +16,27 @@ import pytest
 from known_judge import CrashingJudge, KnownJudge, Make, MakeAndTell, expected, refuse
 
 import burg_drake
-from burg_drake.core.errors import ClusterError, InvalidInputError
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.core.workers.processes import start_worker
-from burg_drake.evaluation.candidates.candidates import Candidate
-from burg_drake.evaluation.stages.station_judge import StationJudgeFactory
-from burg_drake.evaluation.workers import Job, JobFailed
-from burg_drake.evaluation.workers.limits import WorkerLimits
-from burg_drake.scene.document.scene import Scene
-from burg_drake.simulation.trials.trial_settings import TrialSettings
-from burg_drake.station.document.engine import ENGINES
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import ClusterError, InvalidInputError, Outcome, start_worker
+from burg_drake.evaluation import Candidate, Job, JobFailed, StationJudgeFactory, WorkerLimits
+from burg_drake.scene import Scene
+from burg_drake.simulation import TrialSettings
+from burg_drake.station import ENGINES, Station
 
 distributed = pytest.importorskip("distributed", reason="the cluster needs burg-drake[dask]")
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
 
-from burg_drake.evaluation.cluster.dask_executor import DaskExecutor, connect_cluster  # noqa: E402
-from burg_drake.evaluation.cluster.delivery import deliver_bundle  # noqa: E402
-from burg_drake.evaluation.cluster.local_nodes import LocalNodes  # noqa: E402
-from burg_drake.evaluation.cluster.members import ClusterWorkers, threads_by_address  # noqa: E402
-from burg_drake.evaluation.cluster.node import NO_WEB  # noqa: E402
-from burg_drake.evaluation.cluster.sent_job import SentJob  # noqa: E402
-from burg_drake.evaluation.cluster.versions import (  # noqa: E402
+from burg_drake.evaluation import (  # noqa: E402
+    NO_DASHBOARD,
+    ClusterWorkers,
+    DaskExecutor,
+    LocalNodes,
+    SentJob,
     code_hash,
-    require_same,
-    software,
+    connect_cluster,
+    deciding_versions,
+    deliver_bundle,
+    require_same_versions,
+    threads_by_address,
 )
 from tests.hang_guard import HANG_GUARD, until  # noqa: E402
 
@@ -177,7 +173,7 @@ def test_other_versions_are_refused(
     """A worker whose release of the package differs in one comment."""
     package = Path(burg_drake.__file__).parent
     shutil.copytree(package, tmp_path / package.name, ignore=shutil.ignore_patterns("*.pyc"))
-    with (tmp_path / package.name / "core/content.py").open("a") as file:
+    with (tmp_path / package.name / "core/provenance.py").open("a") as file:
         file.write("# another release\n")
     with monkeypatch.context() as patch:
         patch.syspath_prepend(tmp_path)
@@ -199,20 +195,20 @@ def test_all_that_decides_about_verdicts_is_compared(tmp_path: Path) -> None:
     """The second engine, and the curves that confidences come from."""
     package = tmp_path / "burg_drake"
     shutil.copytree(Path(burg_drake.__file__).parent, package)
-    ours = software()
+    ours = deciding_versions()
     assert code_hash(package) == ours["code of burg_drake"]
-    with (package / "simulation/confidence/calibration.json").open("a") as file:
+    with (package / "simulation/calibration.json").open("a") as file:
         file.write("\n")
     assert code_hash(package) != ours["code of burg_drake"]
-    require_same({"tcp://a": ours})
+    require_same_versions({"tcp://a": ours})
     with pytest.raises(ClusterError, match=rf"tcp://a has mujoco 1 \(here {ours['mujoco']}\)"):
-        require_same({"tcp://a": {**ours, "mujoco": "1"}})
+        require_same_versions({"tcp://a": {**ours, "mujoco": "1"}})
 
 
 def test_a_worker_that_can_be_reached_from_elsewhere_is_refused(cluster: Cluster) -> None:
     async def start() -> Any:
         beyond = {"contact_address": "tcp://203.0.113.9:40000", "host": "127.0.0.1"}
-        return await distributed.Worker(cluster.nodes.address, nthreads=1, **beyond, **NO_WEB)
+        return await distributed.Worker(cluster.nodes.address, nthreads=1, **beyond, **NO_DASHBOARD)
 
     worker = cluster.client.sync(start)
     try:
@@ -225,7 +221,7 @@ def test_a_worker_that_can_be_reached_from_elsewhere_is_refused(cluster: Cluster
 
 def test_a_scheduler_that_can_be_reached_from_elsewhere_is_refused(cluster: Cluster) -> None:
     async def start() -> Any:
-        return await distributed.Scheduler(host="0.0.0.0", port=0, **NO_WEB)
+        return await distributed.Scheduler(host="0.0.0.0", port=0, **NO_DASHBOARD)
 
     scheduler = cluster.client.sync(start)
     try:
@@ -245,9 +241,9 @@ sys.path.insert(0, {tests!r})
 from pathlib import Path
 import numpy as np
 from known_judge import KnownJudge, MakeAndTell
-from burg_drake.evaluation.candidates.candidates import Candidate
+from burg_drake.evaluation.candidates import Candidate
 from burg_drake.evaluation.cluster.dask_executor import connect_cluster
-from burg_drake.evaluation.workers import Job
+from burg_drake.evaluation.executor import Job
 grasps = [Candidate(str(k), "cube", np.eye(4)) for k in range(400)]
 with connect_cluster("local:1") as executor:
     job = Job("job", MakeAndTell(KnownJudge(pause=0.05), Path({log!r}), "job"), grasps)
@@ -274,7 +270,7 @@ def test_a_killed_driver_leaves_nothing_behind(tmp_path: Path) -> None:
 
 @pytest.mark.thorough
 def test_a_scheduler_that_is_not_there_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("burg_drake.evaluation.cluster.dask_executor.REACH", 1.0)
+    monkeypatch.setattr("burg_drake.evaluation.cluster.dask_executor.SCHEDULER_TIMEOUT", 1.0)
     reached = "^no Dask scheduler answered at tcp://127.0.0.1:9 within 1 s: nobody listens there"
     with pytest.raises(ClusterError, match=reached), connect_cluster("tcp://127.0.0.1:9"):
         pass

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.core.errors import BurgError, ClusterError, DocumentError, InvalidInputError
-from burg_drake.evaluation.cluster.document import read_cluster, require_safe
-from burg_drake.evaluation.cluster.jobqueue import parameters
+from burg_drake.core import BurgError, ClusterError, DocumentError, InvalidInputError
+from burg_drake.evaluation import jobqueue_parameters, read_cluster, require_safe_address
 
 
 def document(folder: Path, text: str) -> str:
@@ -45,13 +44,13 @@ def test_plain_tcp_beyond_this_machine_is_refused(host: str) -> None:
     with pytest.raises(
         ClusterError, match="is not encrypted: whoever reaches this port can run programs"
     ):
-        require_safe(f"tcp://{host}:8786")
-    require_safe(f"tls://{host}:8786")
+        require_safe_address(f"tcp://{host}:8786")
+    require_safe_address(f"tls://{host}:8786")
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.1.2.3", "localhost", "[::1]"])
 def test_plain_tcp_on_this_machine_is_taken(host: str) -> None:
-    require_safe(f"tcp://{host}:8786")
+    require_safe_address(f"tcp://{host}:8786")
 
 
 def test_files_are_found_beside_the_document(tmp_path: Path) -> None:
@@ -70,7 +69,7 @@ def test_a_batch_system(tmp_path: Path) -> None:
     found = read_cluster(document(tmp_path, f"{queue}adapt: {{maximum: 40}}\n")).document
     assert found is not None
     assert found.jobqueue is not None
-    told = parameters(found.jobqueue)
+    told = jobqueue_parameters(found.jobqueue)
     assert (told["cores"], told["processes"], told["memory"]) == (8, 8, "32GB")
     assert told["protocol"] == "tls://"
     assert told["job_extra_directives"] == ["--qos=low"]

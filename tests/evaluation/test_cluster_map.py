@@ -14,22 +14,19 @@ import pytest
 from known_work import FILE, Known, square
 
 import burg_drake
-from burg_drake.core.errors import BurgError, ClusterError, InvalidInputError
-from burg_drake.core.workers.processes import start_worker
-from burg_drake.evaluation.cluster.bundles.bundle import Bundle
-from burg_drake.evaluation.cluster.dask_executor import (
-    DaskExecutor,
-    connect_cluster,
-    map_on_cluster,
-)
+from burg_drake.core import BurgError, ClusterError, InvalidInputError, start_worker
+from burg_drake.evaluation import Bundle, DaskExecutor, connect_cluster, map_on_cluster
 
 distributed = pytest.importorskip("distributed", reason="the cluster needs burg-drake[dask]")
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
 
-from burg_drake.evaluation.cluster.calls import ClusterCall, make_call  # noqa: E402
-from burg_drake.evaluation.cluster.delivery import send_bundle  # noqa: E402
-from burg_drake.evaluation.cluster.local_nodes import LocalNodes  # noqa: E402
-from burg_drake.evaluation.cluster.members import threads_by_address  # noqa: E402
+from burg_drake.evaluation import (  # noqa: E402
+    ClusterCall,
+    LocalNodes,
+    make_call,
+    send_bundle,
+    threads_by_address,
+)
 from tests.hang_guard import HANG_GUARD, until  # noqa: E402
 
 
@@ -43,7 +40,7 @@ def nodes() -> Iterator[LocalNodes]:
 
 @pytest.fixture
 def executor(nodes: LocalNodes, monkeypatch: pytest.MonkeyPatch) -> Iterator[DaskExecutor]:
-    monkeypatch.setattr("burg_drake.evaluation.cluster.cluster_map.WORKER_POLL_INTERVAL", 0.2)
+    monkeypatch.setattr("burg_drake.evaluation.cluster.cluster_map.CALL_POLL_INTERVAL", 0.2)
     client = distributed.Client(nodes.address, set_as_default=False, timeout=HANG_GUARD)
     nodes.restart_workers()  # those that another test has killed
     until(lambda: len(threads_by_address(client)) == 2)
@@ -112,7 +109,7 @@ def test_work_of_a_lost_worker_is_done_by_others(executor: DaskExecutor, tmp_pat
 def test_work_at_which_several_workers_are_lost_is_given_up(
     executor: DaskExecutor, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("burg_drake.evaluation.cluster.cluster_map.LOSSES", 2)
+    monkeypatch.setattr("burg_drake.evaluation.cluster.cluster_map.ChunkSettings.max_losses", 2)
     found = squares(executor, [Known(k, "parent" if k == 1 else "") for k in range(4)])
     assert found == {
         **{k: (k * k, "known") for k in (0, 2, 3)},
@@ -137,7 +134,7 @@ def test_children_without_work_end(
 ) -> None:
     """As when their driver was killed: nobody ends the run. The worker is a thread of this process,
     so that it sees the shorter time."""
-    monkeypatch.setattr("burg_drake.evaluation.cluster.calls.IDLE", 0.3)
+    monkeypatch.setattr("burg_drake.evaluation.cluster.worker_tasks.CHILD_IDLE_TIMEOUT", 0.3)
     monkeypatch.setattr("burg_drake.evaluation.cluster.cluster_map.end_run", lambda *_: None)
     log = tmp_path / "log"
     with (
@@ -156,7 +153,7 @@ def test_other_versions_are_refused(
 ) -> None:
     package = Path(burg_drake.__file__).parent
     shutil.copytree(package, tmp_path / package.name, ignore=shutil.ignore_patterns("*.pyc"))
-    with (tmp_path / package.name / "core/content.py").open("a") as file:
+    with (tmp_path / package.name / "core/provenance.py").open("a") as file:
         file.write("# another release\n")
     with monkeypatch.context() as patch:
         patch.syspath_prepend(tmp_path)

@@ -14,24 +14,22 @@ import numpy as np
 import pytest
 from known_judge import KnownJudge, Make, expected
 
-from burg_drake.core.errors import ClusterError, InvalidInputError
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.evaluation.candidates.candidates import Candidate
-from burg_drake.evaluation.stages.judge import judge_grasp
-from burg_drake.evaluation.stages.station_judge import StationJudgeFactory
-from burg_drake.evaluation.workers import Job
-from burg_drake.evaluation.workers.limits import WorkerLimits
-from burg_drake.scene.document.scene import Scene
-from burg_drake.simulation.trials.trial_settings import TrialSettings
-from burg_drake.station.document.engine import ENGINES
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import ClusterError, InvalidInputError, Outcome
+from burg_drake.evaluation import Candidate, Job, StationJudgeFactory, WorkerLimits, judge_grasp
+from burg_drake.scene import Scene
+from burg_drake.simulation import TrialSettings
+from burg_drake.station import ENGINES, Station
 
 distributed = pytest.importorskip("distributed", reason="the cluster needs burg-drake[dask]")
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
 
-from burg_drake.evaluation.cluster.dask_executor import DaskExecutor, connect_cluster  # noqa: E402
-from burg_drake.evaluation.cluster.members import threads_by_address  # noqa: E402
-from burg_drake.evaluation.cluster.remote import Answers, Supervisor  # noqa: E402
+from burg_drake.evaluation import (  # noqa: E402
+    ChunkAnswers,
+    DaskExecutor,
+    Supervisor,
+    connect_cluster,
+    threads_by_address,
+)
 
 
 @contextlib.contextmanager
@@ -53,9 +51,9 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Supervisor, "judge", judge_here)
 
 
-def judge_here(self: Supervisor, job: Job, limits: WorkerLimits) -> Answers:
+def judge_here(self: Supervisor, job: Job, limits: WorkerLimits) -> ChunkAnswers:
     judge = KnownJudge()
-    return Answers([(k, judge_grasp(judge, grasp)) for k, grasp in enumerate(job.candidates)])
+    return ChunkAnswers([(k, judge_grasp(judge, grasp)) for k, grasp in enumerate(job.candidates)])
 
 
 def grasps(n: int, scene: str = "cube") -> list[Candidate]:
@@ -85,7 +83,7 @@ def test_without_work_nobody_is_waited_for() -> None:
 
 
 def test_workers_that_never_come_are_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("burg_drake.evaluation.cluster.waiting.WORKER_TIMEOUT", 0.3)
+    monkeypatch.setattr("burg_drake.evaluation.cluster.members.WORKER_TIMEOUT", 0.3)
     job = Job("job", Make(KnownJudge()), grasps(3))
     with cluster() as (_, client), pytest.raises(ClusterError, match="has had no worker for"):
         list(DaskExecutor(client).judge([job]))
@@ -127,12 +125,12 @@ def test_grasps_that_are_not_answered_are_asked_again(monkeypatch: pytest.Monkey
     job, silent = Job("job", Make(KnownJudge()), grasps(12)), "cube-0005"
     asked: list[int] = []
 
-    def judge_some(self: Supervisor, job: Job, limits: WorkerLimits) -> Answers:
+    def judge_some(self: Supervisor, job: Job, limits: WorkerLimits) -> ChunkAnswers:
         """Forgets the last one of several, and always a certain one."""
         answers = judge_here(self, job, limits)
         asked.append(len(job.candidates))
         kept = answers.verdicts[:-1] if len(job.candidates) > 1 else answers.verdicts
-        return Answers([(k, v) for k, v in kept if job.candidates[k].id != silent])
+        return ChunkAnswers([(k, v) for k, v in kept if job.candidates[k].id != silent])
 
     monkeypatch.setattr(Supervisor, "judge", judge_some)
     with cluster(1) as (_, client):
@@ -167,7 +165,7 @@ def test_a_scene_that_does_not_arrive_is_told_of(
         if error is not None:
             raise error
 
-    monkeypatch.setattr("burg_drake.evaluation.cluster.remote.unpack", unpack_nothing)
+    monkeypatch.setattr("burg_drake.evaluation.cluster.worker_tasks.unpack", unpack_nothing)
     factory = StationJudgeFactory(scene, station, ENGINES["standard"], "hand", TrialSettings())
     with cluster(1) as (_, client):
         told = rf"^worker inproc://\S+ did not receive the scene 'job': {why}$"
@@ -178,7 +176,7 @@ def test_a_scene_that_does_not_arrive_is_told_of(
 
 @pytest.mark.thorough
 def test_who_listens_and_stays_silent_is_no_scheduler(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("burg_drake.evaluation.cluster.dask_executor.REACH", 0.3)
+    monkeypatch.setattr("burg_drake.evaluation.cluster.dask_executor.SCHEDULER_TIMEOUT", 0.3)
     with socket.create_server(("127.0.0.1", 0)) as silent:
         address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
         with (

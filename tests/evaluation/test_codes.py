@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.evaluation.records.rows import CLEARANCE_STEP, best_rows
-from burg_drake.evaluation.store.text_codes import member_codes
+from burg_drake.core import InvalidInputError, Outcome
+from burg_drake.evaluation import RANKING_CLEARANCE_STEP, best_rows, member_codes
 
 
 def test_codes_are_places_among_the_members() -> None:
@@ -33,7 +31,7 @@ def test_the_first_of_the_best_are_those_of_the_whole_ranking(count: int) -> Non
         "id": rng.permutation(np.array([f"g{k:03d}" for k in range(n)])),
         "instance": rng.choice(["a", "b", "c"], n),
         "outcome": rng.choice(["lifted", "slipped"], n),
-        "clearance": CLEARANCE_STEP * rng.choice([np.nan, *range(6)], n),
+        "clearance": RANKING_CLEARANCE_STEP * rng.choice([np.nan, *range(6)], n),
         "slip": 0.001 * rng.integers(3, size=n),
         "tilt": np.zeros(n),
         "others_moved": np.zeros(n),

@@ -12,12 +12,11 @@ import pytest
 from asked import asked
 from inline_executor import Inline
 
-from burg_drake.apps.cli import main
-from burg_drake.core.errors import SimulationError
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.workers import Job, OnFailure
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.station_document import Station
+from burg_drake.apps import main
+from burg_drake.core import SimulationError
+from burg_drake.evaluation import Job, OnFailure, evaluate
+from burg_drake.scene import Scene
+from burg_drake.station import Station
 
 OPTIONS = {"grasps_per_object": 5, "blind": True, "progress": False}
 

@@ -13,19 +13,12 @@ import pytest
 import trimesh
 from inline_executor import Inline
 
-from burg_drake.apps.cli import main
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import grasp_from_axes, inverse
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.core.grasps.outcome import Outcome, Stage
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.records.table_file import read_table
-from burg_drake.evaluation.store.run_folder import Run, load_run
-from burg_drake.pipeline.build import ObjectSource, build_library
-from burg_drake.scene.document.scene import Instance, SceneDocument, load_scene, save_scene
-from burg_drake.station.diagram.station_diagram import instance_pose
-from burg_drake.station.document.station_document import load_station
+from burg_drake.apps import main
+from burg_drake.core import GraspSet, Outcome, Pose, Stage, grasp_from_axes, inverse
+from burg_drake.evaluation import EvaluationSettings, Run, evaluate, load_run, read_table
+from burg_drake.pipeline import ObjectSource, build_library
+from burg_drake.scene import Instance, SceneDocument, load_scene, save_scene
+from burg_drake.station import instance_pose, load_station
 from tests.evaluation.composed import tabletop
 
 SCENE, STATION = "tabletop_six", "panda_tabletop"
@@ -115,7 +108,7 @@ def test_a_lifted_grasp_has_its_margins_and_arm_configurations(run: Run) -> None
 
 
 def test_the_arm_stands_at_the_grasp(run: Run) -> None:
-    from burg_drake.station.diagram.builder import build_station_diagram
+    from burg_drake.station import build_station_diagram
 
     scene, station = run.scene(), run.station()
     built = build_station_diagram(scene, station, robot="arm")

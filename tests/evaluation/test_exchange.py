@@ -8,12 +8,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import grasp_from_axes, make_pose
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.grasp_sets.exchange import SeenScene, read_in_frame
-from burg_drake.formats.grasp_files import write_grasp_file
-from burg_drake.scene.document.scene import Scene
+from burg_drake.core import (
+    GraspSet,
+    InvalidInputError,
+    UnknownNameError,
+    grasp_from_axes,
+    make_pose,
+)
+from burg_drake.evaluation import SeenScene, read_in_frame
+from burg_drake.formats import write_grasp_file
+from burg_drake.scene import Scene
 
 X_SC = make_pose(Rotation.from_euler("xyz", [170, 10, 30], degrees=True).as_matrix(), (0.3, 0, 0.6))
 """A camera above the scene."""

@@ -21,11 +21,8 @@ from known_judge import (
     refuse,
 )
 
-from burg_drake.core.errors import InvalidInputError, SimulationError
-from burg_drake.core.grasps.outcome import Outcome, Stage
-from burg_drake.evaluation.candidates.candidates import Candidate
-from burg_drake.evaluation.workers.limits import WorkerLimits
-from burg_drake.evaluation.workers.single_job import judge_all
+from burg_drake.core import InvalidInputError, Outcome, SimulationError, Stage
+from burg_drake.evaluation import Candidate, WorkerLimits, judge_all
 
 
 def grasps(n: int) -> list[Candidate]:

@@ -15,22 +15,31 @@ import numpy as np
 import pytest
 from known_judge import refuse
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import BurgError, InvalidInputError, UnknownNameError
-from burg_drake.core.frames import grasp_from_axes, make_pose
-from burg_drake.core.grasps import Verdict
-from burg_drake.core.grasps.column_meanings import describe
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.core.grasps.outcome import Outcome, Stage
-from burg_drake.core.terminal.progress import Progress
-from burg_drake.evaluation.feasibility import reach, reach_columns
-from burg_drake.evaluation.records.journal import encode
-from burg_drake.evaluation.records.table_file import read_table, write_table
-from burg_drake.evaluation.store.plan_folder import PlanOutput
-from burg_drake.motion.plans.grasp_plan import load_plan
-from burg_drake.scene.document.scene import Scene, load_scene, save_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.core import (
+    Array,
+    BurgError,
+    GraspSet,
+    InvalidInputError,
+    Outcome,
+    Progress,
+    Stage,
+    UnknownNameError,
+    Verdict,
+    describe_column,
+    grasp_from_axes,
+    make_pose,
+)
+from burg_drake.evaluation import (
+    PlanOutput,
+    encode_verdict,
+    reach,
+    reach_columns,
+    read_table,
+    write_table,
+)
+from burg_drake.motion import load_plan
+from burg_drake.scene import Scene, load_scene, save_scene
+from burg_drake.station import Station, build_station_diagram, load_station
 from tests.evaluation.composed import tabletop
 
 pytestmark = pytest.mark.usefixtures("judged_here")
@@ -188,7 +197,7 @@ def test_what_failed_is_asked_again_on_request(
     given = GraspSet.create(GRASPS, object="box", width=0.06)
     failed = Verdict(Outcome.SIMULATION_FAILED, Stage.PLANNED, reason="it crashed")
     with (folder / "journal.jsonl").open("ab") as journal:
-        journal.write(encode(f"box-{judged.id[2]}", failed))
+        journal.write(encode_verdict(f"box-{judged.id[2]}", failed))
     kept = reach(scene, station, given, plans=folder)
     assert np.flatnonzero(kept.column("outcome") == "").tolist() == [2]
     with pytest.raises(BurgError, match="no such model"):
@@ -197,7 +206,7 @@ def test_what_failed_is_asked_again_on_request(
 
 KILLED = """
 import sys
-from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core.grasp_set import GraspSet
 from burg_drake.evaluation.feasibility import reach
 grasps = GraspSet.load(sys.argv[1])
 reach(sys.argv[3], "panda_tabletop", grasps, plans=sys.argv[2], workers=1)
@@ -281,7 +290,7 @@ def test_a_set_has_to_name_its_objects(station: Station) -> None:
 
 
 def test_a_table_has_it_all(judged: GraspSet, tmp_path: Path) -> None:
-    assert all(map(describe, reach_columns(judged)))
+    assert all(map(describe_column, reach_columns(judged)))
     write_table(tmp_path / "reach.csv", reach_columns(judged))
     back = read_table(tmp_path / "reach.csv")
     assert back["id"].tolist() == [f"box-{id}" for id in judged.id]

@@ -7,17 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.candidates.candidates import given_candidates
-from burg_drake.evaluation.candidates.single_object import object_grasps
-from burg_drake.evaluation.feasibility import ReachJudgeFactory
-from burg_drake.evaluation.stages.counts import THE_ARM, GraspCount, count_grasps, grasp_counts
-from burg_drake.grasping.clearance.hand_clearance import HandClearance
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import Obstacle, Station, load_station
+from burg_drake.core import GraspSet, InvalidInputError, Pose, UnknownNameError
+from burg_drake.evaluation import (
+    ARM_LIMITS,
+    GraspCount,
+    ReachJudgeFactory,
+    count_grasps,
+    given_candidates,
+    grasp_counts,
+    object_grasps,
+)
+from burg_drake.grasping import HandClearance
+from burg_drake.scene import Scene
+from burg_drake.station import Obstacle, Station, build_station_diagram, load_station
 from tests.evaluation.composed import composed
 
 N = 12
@@ -123,7 +125,7 @@ def test_the_arm_and_obstacles_are_named(panda: Station) -> None:
     far = replace(arm, X_WA=Pose((-0.6, 0.0, 0.0)))
     station = replace(panda, document=replace(panda.document, arm=far))
     count = count_grasps(ALONE, station, grasps_per_object=8)["mug"]
-    assert (count.clear, count.reachable, count.in_the_way) == (8, 0, {THE_ARM: 8})
+    assert (count.clear, count.reachable, count.in_the_way) == (8, 0, {ARM_LIMITS: 8})
     p_W = X_WO(ALONE, panda, "mug")[:3, 3]
     box = Obstacle(X_WB=Pose((p_W[0], p_W[1], 0.15)), size=(0.3, 0.3, 0.1))
     roofed = replace(panda, document=replace(panda.document, background={"roof": box}))

@@ -8,22 +8,22 @@ import h5py
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.grasp_sets.candidate_files import read_grasps
-from burg_drake.evaluation.grasp_sets.exchange import read_in_frame
-from burg_drake.evaluation.grasp_sets.input import hand_of, hand_reference, read_input
-from burg_drake.evaluation.grasp_sets.sampled import sample_grasps
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.formats.common.conversion import write_each_object
-from burg_drake.formats.common.grasp_format import PANDA
-from burg_drake.formats.grasp_files import FORMATS, format_of
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.gripper_document import locate_hand
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.core import GraspSet, InvalidInputError
+from burg_drake.evaluation import (
+    EvaluationSettings,
+    Run,
+    SamplingSettings,
+    evaluate,
+    hand_of,
+    hand_reference,
+    read_grasps,
+    read_in_frame,
+    read_input,
+    sample_grasps,
+)
+from burg_drake.formats import GRASP_FORMATS, PANDA_GRIPPER, format_of, write_each_object
+from burg_drake.scene import Scene
+from burg_drake.station import Station, load_station, locate_hand
 
 pytestmark = pytest.mark.usefixtures("judged_here")
 
@@ -42,7 +42,7 @@ def run(scene: Scene, station: Station, tmp_path: Path, known_judge: None) -> Ru
 
 def test_outcomes_of_a_run_in_files_of_acronym(run: Run, tmp_path: Path) -> None:
     grasps = read_in_frame(run.path, "object").grasps
-    write_each_object(grasps, tmp_path / "out", FORMATS["acronym"], PANDA)
+    write_each_object(grasps, tmp_path / "out", GRASP_FORMATS["acronym"], PANDA_GRIPPER)
     for name in ("cube", "bar"):
         with h5py.File(tmp_path / "out" / f"{name}.h5") as file:
             held = file["grasps/qualities/flex/object_in_gripper"][()]
@@ -98,7 +98,7 @@ def test_sampled_sets_name_their_hand(scene: Scene, tmp_path: Path) -> None:
     both.save(tmp_path / "both.h5")
     assert hand_reference(tmp_path / "both.h5") == str(station.hand_path)
     note = "The grasps were made for hand 'wsg_50'; they are judged as those of hand 'panda_hand'."
-    assert read_grasps(scene, tmp_path / "both.h5", PANDA).notes == (note,)
+    assert read_grasps(scene, tmp_path / "both.h5", PANDA_GRIPPER).notes == (note,)
     assert read_input(tmp_path / "both.h5").notes == ()
     other = sample_grasps(
         scene, load_station("panda_tabletop"), 3, settings=SamplingSettings(blind=True)
@@ -115,7 +115,9 @@ def test_a_hand_whose_document_has_moved_goes_by_its_name(tmp_path: Path) -> Non
 
 def test_sets_of_others_are_for_the_hand_that_they_were_read_with(tmp_path: Path) -> None:
     grasps = GraspSet.create(np.eye(4), object="cube", score=1.0)
-    FORMATS["acronym"].write(grasps, tmp_path / "cube.h5", PANDA)
-    assert hand_of(read_input(tmp_path / "cube.h5", gripper=PANDA).grasps) == {"name": PANDA.name}
+    GRASP_FORMATS["acronym"].write(grasps, tmp_path / "cube.h5", PANDA_GRIPPER)
+    assert hand_of(read_input(tmp_path / "cube.h5", gripper=PANDA_GRIPPER).grasps) == {
+        "name": PANDA_GRIPPER.name
+    }
     grasps.save(tmp_path / "ours.h5")
-    assert hand_of(read_input(tmp_path / "ours.h5", gripper=PANDA).grasps) is None
+    assert hand_of(read_input(tmp_path / "ours.h5", gripper=PANDA_GRIPPER).grasps) is None

@@ -7,11 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.evaluation.records.run_document import origin_of
-from burg_drake.evaluation.store.inputs import find_inputs
-from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.scene.document.scene import Scene
+from burg_drake.core import InvalidInputError
+from burg_drake.evaluation import Run, find_inputs, origin_of
+from burg_drake.scene import Scene
 
 
 @pytest.fixture

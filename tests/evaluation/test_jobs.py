@@ -10,11 +10,8 @@ import numpy as np
 import pytest
 from known_judge import CrashingJudge, KnownJudge, Make, MakeAndTell, die, expected, refuse
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.evaluation.candidates.candidates import Candidate
-from burg_drake.evaluation.workers import Job, JobFailed, LocalExecutor
-from burg_drake.evaluation.workers.limits import WorkerLimits
+from burg_drake.core import InvalidInputError, Outcome
+from burg_drake.evaluation import Candidate, Job, JobFailed, LocalExecutor, WorkerLimits
 
 
 def grasps(scene: str, n: int) -> list[Candidate]:

@@ -10,11 +10,16 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps import Verdict
-from burg_drake.core.grasps.outcome import Outcome, Stage
-from burg_drake.evaluation.records.folder_lock import Lock, is_locked, unchanged
-from burg_drake.evaluation.records.journal import Journal, decode, encode, read_journal
+from burg_drake.core import InvalidInputError, Outcome, Stage, Verdict
+from burg_drake.evaluation import (
+    Journal,
+    WriterLock,
+    decode_verdict,
+    encode_verdict,
+    hold_unchanged,
+    is_locked,
+    read_journal,
+)
 
 LIFTED = Verdict(
     Outcome.LIFTED,
@@ -39,10 +44,10 @@ KILLED = Verdict(
 
 @pytest.mark.parametrize("verdict", [LIFTED, BLOCKED, KILLED])
 def test_a_line_gives_back_what_went_in(verdict: Verdict) -> None:
-    line = encode("mug-1", verdict)
+    line = encode_verdict("mug-1", verdict)
     assert line.count(b"\n") == 1 and line.endswith(b"\n")
     assert b"NaN" not in line  # JSON has no such number
-    id, back = decode(line)
+    id, back = decode_verdict(line)
     assert id == "mug-1"
     assert repr(back) == repr(verdict)  # equality would fail on NaN
 
@@ -52,7 +57,7 @@ def test_a_line_of_an_older_release_is_read() -> None:
         b'{"id":"mug-1","outcome":"lifted","stage":"executed","blocker":"","reason":"","margins":'
         b'{"overlap":0.0,"slip":0.002,"tilt":null},"q_grasp":[],"q_pregrasp":[],"cpu":{}}\n'
     )
-    id, verdict = decode(line)
+    id, verdict = decode_verdict(line)
     assert (id, verdict.outcome, verdict.margins["slip"]) == ("mug-1", Outcome.LIFTED, 0.002)
     assert not verdict.interrupted
     assert verdict.displacements == {} and "patch_area" not in verdict.margins
@@ -60,8 +65,8 @@ def test_a_line_of_an_older_release_is_read() -> None:
 
 def test_a_torn_line_is_cut_off_and_the_rest_is_kept(tmp_path) -> None:
     path = tmp_path / "journal.jsonl"
-    whole = encode("a", LIFTED) + encode("b", BLOCKED)
-    for cut in range(len(encode("a", LIFTED)), len(whole)):
+    whole = encode_verdict("a", LIFTED) + encode_verdict("b", BLOCKED)
+    for cut in range(len(encode_verdict("a", LIFTED)), len(whole)):
         path.write_bytes(whole[:cut])
         with Journal(path) as journal:
             journal.append("c", BLOCKED)
@@ -70,7 +75,7 @@ def test_a_torn_line_is_cut_off_and_the_rest_is_kept(tmp_path) -> None:
 
 def test_opening_a_whole_journal_leaves_its_date(tmp_path) -> None:
     path = tmp_path / "journal.jsonl"
-    for content in (b"", encode("a", LIFTED)):
+    for content in (b"", encode_verdict("a", LIFTED)):
         path.write_bytes(content)
         os.utime(path, ns=(10**18, 10**18))
         Journal(path).close()
@@ -79,9 +84,11 @@ def test_opening_a_whole_journal_leaves_its_date(tmp_path) -> None:
 
 def test_a_damaged_line_counts_as_not_judged(tmp_path) -> None:
     path = tmp_path / "journal.jsonl"
-    path.write_bytes(encode("a", LIFTED) + b'{"id": "b"}\n\x00\xff\n[]\n' + encode("c", BLOCKED))
+    path.write_bytes(
+        encode_verdict("a", LIFTED) + b'{"id": "b"}\n\x00\xff\n[]\n' + encode_verdict("c", BLOCKED)
+    )
     assert list(read_journal(path)) == ["a", "c"]
-    good = encode("b", LIFTED)
+    good = encode_verdict("b", LIFTED)
     damaged = [
         good.replace(b'"tilt":1e-300', b'"tilt":"steep"'),
         good.replace(b'"cpu":{"clear":0.0002', b'"cpu":{"clear":null'),
@@ -134,10 +141,10 @@ def test_a_file_system_without_locks_is_named(
         assert is_locked(path)
     monkeypatch.setattr(fcntl, "flock", no_locks)
     expected = f"{tmp_path} is on a file system without file locks (No locks available), where two"
-    for writer in (Journal, Lock):
+    for writer in (Journal, WriterLock):
         with pytest.raises(InvalidInputError) as refused:
             writer(path)
         assert str(refused.value).startswith(expected)
     assert not is_locked(path)
-    with unchanged(path):
+    with hold_unchanged(path):
         pass

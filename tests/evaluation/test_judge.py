@@ -9,21 +9,19 @@ from functools import partial
 import numpy as np
 import pytest
 
-from burg_drake.core.grasps import MARGINS, Margins
-from burg_drake.core.grasps.outcome import Outcome, Stage
-from burg_drake.evaluation.candidates.candidates import Candidate
-from burg_drake.evaluation.candidates.sampling import sample_candidates
-from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
-from burg_drake.evaluation.stages.judge import (
+from burg_drake.core import MarginNames, Margins, Outcome, Stage
+from burg_drake.evaluation import (
+    Candidate,
     Decision,
+    SamplingSettings,
     Screen,
     ScreenAnswers,
     judge_grasp,
+    sample_candidates,
     screen_grasps,
 )
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.document.engine import ENGINES
-from burg_drake.station.document.station_document import load_station
+from burg_drake.scene import load_scene
+from burg_drake.station import ENGINES, load_station
 
 GRASP = Candidate("cube-1", "cube", np.eye(4))
 
@@ -155,8 +153,8 @@ def test_an_error_while_screening_is_that_of_one_grasp() -> None:
 
 def test_grasps_screened_together_get_the_answers_of_each_alone() -> None:
     """To the last bit, and on instances in any order: the trial asks about its grasp again."""
-    from burg_drake.evaluation.stages.station_judge import build_judge
-    from burg_drake.simulation.trials.hand_trial import HandTrial
+    from burg_drake.evaluation import build_judge
+    from burg_drake.simulation import HandTrial
 
     scene, station = load_scene("tabletop_six"), load_station("panda_tabletop")
     judge = build_judge(scene, station, engine=ENGINES["standard"], mode="hand")
@@ -183,4 +181,4 @@ def test_a_judge_without_a_last_word_is_a_mistake() -> None:
 
 def test_a_trial_measures_the_margins_that_no_stage_before_it_does() -> None:
     before = {"lift_height", "arm_clearance", "joint_excess", "duration"}
-    assert Margins().of_trial().keys() == {*MARGINS} - before
+    assert Margins().of_trial().keys() == {*MarginNames.all} - before

@@ -11,23 +11,25 @@ from pathlib import Path
 import pytest
 import yaml
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import grasp_from_axes
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.limit_numbers import limit_settings, limits_text
-from burg_drake.evaluation.records.origin import read_origin
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.records.table import table_row
-from burg_drake.evaluation.records.table_file import read_table
-from burg_drake.evaluation.records.trial import read_trial
-from burg_drake.evaluation.replay import differences, rerun
-from burg_drake.evaluation.report.sections.reproduction import reproduce_command
-from burg_drake.evaluation.results.summary import summarize
-from burg_drake.evaluation.store.run_folder import Run, load_run
-from burg_drake.simulation.trials.trial_settings import DEFAULT_TRIAL
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import GraspSet, InvalidInputError, Outcome, grasp_from_axes
+from burg_drake.evaluation import (
+    EvaluationSettings,
+    Run,
+    differences,
+    evaluate,
+    limit_settings,
+    limits_text,
+    load_run,
+    read_origin,
+    read_table,
+    read_trial,
+    reproduce_command,
+    rerun,
+    summarize,
+    table_row,
+)
+from burg_drake.simulation import DEFAULT_TRIAL
+from burg_drake.station import load_station
 from tests.evaluation.composed import tabletop
 
 pytestmark = pytest.mark.usefixtures("judged_here")

@@ -14,20 +14,20 @@ from known_judge import expected, refuse
 from known_many import OPTIONS, run_all, same
 from page_reading import read_page
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.table import TEXT
-from burg_drake.evaluation.report.campaign import campaign_page
-from burg_drake.evaluation.results.summary import summarize
-from burg_drake.evaluation.store.campaign_folder import Campaign, load_campaign
-from burg_drake.evaluation.store.loading import load_runs, read_results
-from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.scene.document.files import scene_references
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import GraspSet, InvalidInputError, Outcome, UnknownNameError, make_pose
+from burg_drake.evaluation import (
+    TEXT_COLUMNS,
+    Campaign,
+    Run,
+    campaign_page,
+    evaluate,
+    load_campaign,
+    load_runs,
+    read_results,
+    summarize,
+)
+from burg_drake.scene import Scene, load_scene, scene_references
+from burg_drake.station import Station
 
 pytest.importorskip("pyarrow")
 pytestmark = pytest.mark.usefixtures("pages")
@@ -49,7 +49,7 @@ def test_each_scene_is_as_on_its_own(
     for name in ("id", "outcome", "slip", "run", "seed", "X_OG", "given_none"):
         parts = [run.results.get(name, np.full(len(run.results["id"]), np.nan)) for run in alone]
         found = read_results(campaign.path, [name])[name]
-        assert np.array_equal(found, np.concatenate(parts), equal_nan=name not in TEXT)
+        assert np.array_equal(found, np.concatenate(parts), equal_nan=name not in TEXT_COLUMNS)
     assert np.isnan(table["moved_bar"][:10]).all()
     summary, own = summarize(campaign), [summarize(run) for run in alone]
     assert [group.judged for group in summary.scenes] == [10, 15, 15]
@@ -144,17 +144,17 @@ def test_a_scene_that_cannot_be_judged_does_not_stop_the_others(
     def judge(scene: Scene, *_):
         return refuse if scene.name == "moved" else made(scene)
 
-    from burg_drake.evaluation.run import many_scenes, scene_tasks
+    from burg_drake.evaluation import many_scenes, scene_tasks
 
     made, sound = many_scenes.StationJudgeFactory, scene_tasks.require_sound
-    monkeypatch.setattr("burg_drake.evaluation.run.scene_tasks.require_sound", unsound)
-    monkeypatch.setattr("burg_drake.evaluation.run.many_scenes.StationJudgeFactory", judge)
+    monkeypatch.setattr("burg_drake.evaluation.scene_tasks.require_sound", unsound)
+    monkeypatch.setattr("burg_drake.evaluation.many_scenes.StationJudgeFactory", judge)
     campaign = run_all(scenes, station, tmp_path / "all")
     assert campaign.failed == {"cubes": "two cubes overlap", "moved": "no such model"}
     assert not campaign.complete and campaign.run("three").complete
     assert summarize(campaign).notes == ("2 scenes could not be judged: cubes, moved",)
-    monkeypatch.setattr("burg_drake.evaluation.run.scene_tasks.require_sound", sound)
-    monkeypatch.setattr("burg_drake.evaluation.run.many_scenes.StationJudgeFactory", made)
+    monkeypatch.setattr("burg_drake.evaluation.scene_tasks.require_sound", sound)
+    monkeypatch.setattr("burg_drake.evaluation.many_scenes.StationJudgeFactory", made)
     mended = run_all(scenes, station, tmp_path / "all", executor=(executor := Inline()))
     assert mended.complete and not mended.failed and executor.judged == 25
 
@@ -165,14 +165,14 @@ def test_of_many_scenes_only_who_asks_gets_reports(
     def reports() -> list[bool]:
         return [run.report_path.exists() for run in campaign.runs]
 
-    monkeypatch.setattr("burg_drake.evaluation.records.campaign_document.FEW_SCENES", 2)
+    monkeypatch.setattr("burg_drake.evaluation.campaign_document.MAX_SCENES", 2)
     campaign = run_all(scenes, station, tmp_path / "all", grasps_per_object=1)
     assert campaign.complete and reports() == [False] * 3
     assert all(run.table_path.exists() for run in campaign.runs)
     dates = {run.table_path: run.table_path.stat().st_mtime_ns for run in campaign.runs}
     prepared: list[str] = []
     monkeypatch.setattr(
-        "burg_drake.evaluation.run.scene_tasks.open_run",
+        "burg_drake.evaluation.scene_tasks.open_run",
         lambda folder, *_: prepared.append(folder.name),
     )
     run_all(scenes, station, tmp_path / "all", grasps_per_object=1)  # has nothing to do
@@ -248,7 +248,7 @@ def test_fewer_grasps_than_asked_are_explained(
     def shortfall(name: str, asked: int, part: object, found: int) -> str:
         return f"{name}: {found} of 6" if name == "bar" else ""
 
-    monkeypatch.setattr("burg_drake.evaluation.results.notes.shortfall", shortfall)
+    monkeypatch.setattr("burg_drake.evaluation.run_summary.shortfall_note", shortfall)
     campaign = run_all(scenes, station, tmp_path / "all")
     assert summarize(load_campaign(campaign.path)).notes == (
         "scene moved: bar: 5 of 6",

@@ -11,19 +11,22 @@ from asked import asked
 from inline_executor import Inline
 from known_many import OPTIONS, run_all, same
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.files.atomic import UNFINISHED
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.merge import merged_run
-from burg_drake.evaluation.merge.runs import merge_folders
-from burg_drake.evaluation.records.journal import JOURNAL_FILE, decode, encode
-from burg_drake.evaluation.records.shard import Shard
-from burg_drake.evaluation.report.page import report_page
-from burg_drake.evaluation.store.campaign_folder import Campaign
-from burg_drake.evaluation.store.run_folder import Run, load_run
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import UNFINISHED_FILE, InvalidInputError, Outcome
+from burg_drake.evaluation import (
+    JOURNAL_FILE,
+    Campaign,
+    Run,
+    Shard,
+    decode_verdict,
+    encode_verdict,
+    evaluate,
+    load_run,
+    merge_folders,
+    merged_run,
+    report_page,
+)
+from burg_drake.scene import Scene
+from burg_drake.station import Station
 from tests.thorough import thorough
 
 pytestmark = pytest.mark.usefixtures("pages")
@@ -38,8 +41,8 @@ def change(run: Run, **values) -> str:
     """Changes the first verdict of a journal; the id of its grasp."""
     journal = run.path / JOURNAL_FILE
     first, *rest = journal.read_bytes().splitlines(keepends=True)
-    id, verdict = decode(first)
-    journal.write_bytes(b"".join([encode(id, replace(verdict, **values)), *rest]))
+    id, verdict = decode_verdict(first)
+    journal.write_bytes(b"".join([encode_verdict(id, replace(verdict, **values)), *rest]))
     return id
 
 
@@ -197,11 +200,11 @@ def test_the_same_merge_finishes_what_was_killed(
         whole = merge_folders(paths, tmp_path / f"whole_{where}")
         out = tmp_path / where
         with pytest.MonkeyPatch.context() as patch, pytest.raises(KeyboardInterrupt):
-            patch.setattr(f"burg_drake.evaluation.merge.finishing.{where}", interrupt)
+            patch.setattr(f"burg_drake.evaluation.run_merging.{where}", interrupt)
             merge_folders(paths, out)
         assert not (out / "report.html").exists()
         (note,) = out.glob(".merge.*")
-        assert UNFINISHED.fullmatch(note.name)  # `evaluate` removes it
+        assert UNFINISHED_FILE.fullmatch(note.name)  # `evaluate` removes it
         with pytest.raises(InvalidInputError, match="exists already; choose another folder"):
             merge_folders(paths[:1], out)
         merged = merge_folders(reversed(paths), out)
@@ -242,9 +245,9 @@ def test_what_is_merged_cannot_be_written_meanwhile(
                 call(given, station, out, grasps_per_object=1)
         return copytree(*arguments, **options)
 
-    choose, copytree = merged_run.choose, shutil.copytree
+    choose, copytree = merged_run.choose_verdicts, shutil.copytree
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(merged_run, "choose", look)
+        patch.setattr(merged_run, "choose_verdicts", look)
         merge_folders([one.path], tmp_path / "a")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(

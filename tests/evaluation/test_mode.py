@@ -6,12 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.feasibility import reach
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.stages.mode import mode_for
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.core import InvalidInputError
+from burg_drake.evaluation import EvaluationSettings, evaluate, mode_for, reach
+from burg_drake.station import Station, load_station
 
 
 @pytest.fixture(scope="module")

@@ -7,12 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from burg_drake.apps.options.arguments import Parser
-from burg_drake.apps.options.hand_motion import add_motion, chosen_motion
-from burg_drake.evaluation.records.motion_numbers import motion_in, motion_options, motion_text
-from burg_drake.evaluation.records.run_document import numbers
-from burg_drake.station.document.grasp_motion import GraspMotion
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.apps import Parser, add_motion_options, motion_from_options
+from burg_drake.evaluation import motion_options, motion_text, read_motion, settings_numbers
+from burg_drake.station import GraspMotion, Station, load_station
 
 USUAL = GraspMotion()
 MOTIONS = (
@@ -25,7 +22,7 @@ MOTIONS = (
 
 def asked(words: list[str]) -> argparse.Namespace:
     parser = Parser()
-    add_motion(parser)
+    add_motion_options(parser)
     return parser.parse_args(words)
 
 
@@ -38,7 +35,7 @@ def station_with(motion: GraspMotion) -> Station:
 @pytest.mark.parametrize("usual", MOTIONS)
 def test_options_ask_for_the_motion_wherever_a_station_has_another(motion, usual) -> None:
     words = motion_options(motion, usual)
-    found = chosen_motion(asked(words), station_with(usual))
+    found = motion_from_options(asked(words), station_with(usual))
     assert replace(found, least_lift=found.shortest) == replace(motion, least_lift=motion.shortest)
     assert bool(words) == (
         replace(usual, least_lift=usual.shortest) != replace(motion, least_lift=motion.shortest)
@@ -47,11 +44,11 @@ def test_options_ask_for_the_motion_wherever_a_station_has_another(motion, usual
 
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_a_record_gives_back_the_motion(motion: GraspMotion) -> None:
-    assert motion_in({"hold_time": 0.5, **numbers(motion)}) == motion
+    assert read_motion({"hold_time": 0.5, **settings_numbers(motion)}) == motion
 
 
 def test_a_record_of_a_release_without_motions_is_of_the_usual_one() -> None:
-    assert motion_in({"lift_height": 0.3, "lift_time": 1.25}) == USUAL
+    assert read_motion({"lift_height": 0.3, "lift_time": 1.25}) == USUAL
 
 
 def test_words() -> None:

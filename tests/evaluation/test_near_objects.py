@@ -5,12 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.grasp_sets.candidate_files import by_names, read_grasps
-from burg_drake.evaluation.grasp_sets.near_objects import FARTHEST, require_near
-from burg_drake.scene.document.scene import Scene
+from burg_drake.core import GraspSet, InvalidInputError, make_pose
+from burg_drake.evaluation import MAX_BOX_DISTANCE, group_by_names, read_grasps, require_near
+from burg_drake.scene import Scene
 
 
 def at(*positions: tuple[float, float, float], object: str = "cube") -> GraspSet:
@@ -19,7 +16,7 @@ def at(*positions: tuple[float, float, float], object: str = "cube") -> GraspSet
 
 def test_the_distance_is_that_of_the_bounding_box(scene: Scene) -> None:
     # the cube has half extents of 25 mm
-    corner = 0.025 + FARTHEST / np.sqrt(3.0)
+    corner = 0.025 + MAX_BOX_DISTANCE / np.sqrt(3.0)
     require_near(at((0.0, 0.0, 0.0)), scene.library, "mine.h5")
     require_near(at(3 * (corner - 1e-6,)), scene.library, "mine.h5")
     with pytest.raises(InvalidInputError, match=r"^mine.h5: .* object 'cube' is 0.25 m away"):
@@ -41,4 +38,4 @@ def test_millimetres_do_not_get_into_a_scene(scene: Scene, tmp_path) -> None:
     with pytest.raises(InvalidInputError, match=r"mm.h5: the nearest grasp of object 'cube'"):
         read_grasps(scene, tmp_path / "mm.h5")
     with pytest.raises(InvalidInputError, match="20 m away"):
-        by_names(scene, grasps)
+        group_by_names(scene, grasps)

@@ -10,12 +10,17 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.core.grasps.column_meanings import describe
-from burg_drake.core.grasps.outcome import Outcome, Stage
-from burg_drake.core.grasps.verdict import Margins, Verdict
-from burg_drake.core.grasps.verdict_columns import MARGINS, VERDICT_FIELDS
-from burg_drake.core.grasps.verdict_field import TableShape
-from burg_drake.evaluation.records.journal import decode, encode
+from burg_drake.core import (
+    MarginNames,
+    Margins,
+    Outcome,
+    RecordedFields,
+    Stage,
+    TableShape,
+    Verdict,
+    describe_column,
+)
+from burg_drake.evaluation import decode_verdict, encode_verdict
 
 MADE_UP = Path(__file__).with_name("made_up_margin.py")
 
@@ -33,7 +38,7 @@ def test_every_field_is_in_the_journal_and_comes_back() -> None:
         Stage.EXECUTED,
         blocker="a",
         reason="b",
-        margins={name: k / 3 for k, name in enumerate(MARGINS)},
+        margins={name: k / 3 for k, name in enumerate(MarginNames.all)},
         displacements={"c": 0.1},
         turned={"c": 0.3},
         toppled="c",
@@ -51,13 +56,13 @@ def test_every_field_is_in_the_journal_and_comes_back() -> None:
     for one in fields(Verdict):
         differs = getattr(verdict, one.name) != getattr(empty, one.name)
         assert differs or one.name == "stage"
-    line = encode("f", verdict)
-    assert decode(line) == ("f", verdict)
+    line = encode_verdict("f", verdict)
+    assert decode_verdict(line) == ("f", verdict)
     assert json.loads(line).keys() == {"id", *(one.name for one in fields(Verdict))}
 
 
 def test_every_column_of_a_verdict_has_a_meaning() -> None:
     shape = TableShape("arm", ["a mug"], 2)
-    for one in VERDICT_FIELDS:
-        assert all(map(describe, one.columns(shape))), one.name
+    for one in RecordedFields.verdict:
+        assert all(map(describe_column, one.columns(shape))), one.name
     assert all(one.metadata["column"].description for one in fields(Margins))

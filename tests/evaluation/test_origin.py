@@ -7,12 +7,10 @@ import math
 
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.evaluation.records.origin import TrialOrigin, engine_label, read_origin
-from burg_drake.evaluation.records.run_document import numbers
-from burg_drake.simulation.trials.trial_settings import TrialSettings
-from burg_drake.station.document.engine import ENGINES, Engine
-from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.core import InvalidInputError
+from burg_drake.evaluation import TrialOrigin, engine_label, read_origin, settings_numbers
+from burg_drake.simulation import TrialSettings
+from burg_drake.station import ENGINES, Engine, GraspMotion
 
 CUSTOM = Engine(
     name="mine",
@@ -67,7 +65,7 @@ def test_limits_and_approach_come_back_bit_for_bit(approach: bool) -> None:
         motion=GraspMotion(), tilt_limit=math.radians(7), slip_limit=1 / 300, approach=approach
     )
     for settings in (asked, dataclasses.replace(asked, tilt_limit=math.pi, slip_limit=math.inf)):
-        there = dataclasses.replace(origin(CUSTOM), trial=numbers(settings))
+        there = dataclasses.replace(origin(CUSTOM), trial=settings_numbers(settings))
         assert read_origin(row(there), "here").settings() == settings
 
 
@@ -79,7 +77,9 @@ def test_the_motion_comes_back_bit_for_bit() -> None:
         least_lift=0.02,
         lift_direction=(0.3, 0, 2),
     )
-    there = dataclasses.replace(origin(CUSTOM), trial=numbers(TrialSettings(motion=motion)))
+    there = dataclasses.replace(
+        origin(CUSTOM), trial=settings_numbers(TrialSettings(motion=motion))
+    )
     settings = read_origin(row(there), "here").settings()
     assert settings == TrialSettings(motion=motion)
     assert settings.motion is not None and settings.motion.lift_direction == (0.3, 0.0, 2.0)

@@ -15,17 +15,21 @@ from asked import asked
 from inline_executor import Inline
 from known_many import OPTIONS, run_all, same
 
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.journal import JOURNAL_FILE
-from burg_drake.evaluation.records.table import Columns
-from burg_drake.evaluation.results.summary import summarize
-from burg_drake.evaluation.store import part_writer
-from burg_drake.evaluation.store.campaign_folder import Campaign, load_campaign
-from burg_drake.evaluation.store.loading import read_results
-from burg_drake.evaluation.store.part_file import open_part, write_part
-from burg_drake.evaluation.store.part_writer import PartWriter
-from burg_drake.evaluation.store.run_folder import load_run
-from burg_drake.station.document.station_document import Station
+from burg_drake.evaluation import (
+    JOURNAL_FILE,
+    Campaign,
+    Columns,
+    PartWriter,
+    evaluate,
+    load_campaign,
+    load_run,
+    open_part,
+    part_store,
+    read_results,
+    summarize,
+    write_part,
+)
+from burg_drake.station import Station
 
 pytestmark = pytest.mark.usefixtures("pages")
 
@@ -33,7 +37,7 @@ pytestmark = pytest.mark.usefixtures("pages")
 @pytest.fixture
 def campaign(whole: Campaign, tmp_path: Path, monkeypatch) -> Campaign:
     """With several parts."""
-    monkeypatch.setattr(part_writer, "PART_ROWS", 12)
+    monkeypatch.setattr(part_store, "PART_ROWS", 12)
     campaign = load_campaign(shutil.copytree(whole.path, tmp_path / "all"))
     shutil.rmtree(campaign.path / "parts")
     refresh(campaign)
@@ -136,7 +140,7 @@ def test_grown_journals_and_later_verdicts(campaign: Campaign) -> None:
 
 
 def test_an_edit_is_noticed_wherever_it_is(campaign: Campaign, monkeypatch) -> None:
-    monkeypatch.setattr("burg_drake.evaluation.store.part_segments.TAIL", 64)
+    monkeypatch.setattr("burg_drake.evaluation.table_parts.SEGMENT_TAIL", 64)
     journal = campaign.folder("moved") / JOURNAL_FILE
     data = journal.read_bytes()
     lines = data.splitlines(keepends=True)
@@ -159,11 +163,11 @@ def test_an_edit_is_noticed_wherever_it_is(campaign: Campaign, monkeypatch) -> N
 
 
 def test_what_nobody_touched_is_not_read(campaign: Campaign, monkeypatch) -> None:
-    monkeypatch.setattr("burg_drake.evaluation.store.part_segments.TAIL", 64)
+    monkeypatch.setattr("burg_drake.evaluation.table_parts.SEGMENT_TAIL", 64)
     read = []
-    segments = importlib.import_module("burg_drake.evaluation.store.part_segments")
-    hashed = segments._hash
-    monkeypatch.setattr(segments, "_hash", lambda s, a, b: (read.append(b - a), hashed(s, a, b))[1])
+    segments = importlib.import_module("burg_drake.evaluation.table_parts")
+    hashed = segments._stream_hash
+    monkeypatch.setattr(segments, "_stream_hash", lambda s, a, b: (read.append(b - a), hashed(s, a, b))[1])
     load_campaign(campaign.path).columns(["slip"])
     assert read and max(read) <= 64
 
@@ -196,8 +200,8 @@ def test_kills_at_every_byte(
 def test_a_large_run_of_one_scene(
     scenes: list[Path], station: Station, tmp_path: Path, known_judge: None, monkeypatch
 ) -> None:
-    monkeypatch.setattr(part_writer, "PART_ROWS", 7)
-    monkeypatch.setattr(part_writer, "BATCH_BYTES", 2000)
+    monkeypatch.setattr(part_store, "PART_ROWS", 7)
+    monkeypatch.setattr(part_store, "BATCH_BYTES", 2000)
     run = evaluate(scenes[1], station, tmp_path / "one", **asked(executor=Inline(), **OPTIONS))
     assert len(list((run.path / "parts").iterdir())) == 2
     assert same(run.results, read_results(run.path))

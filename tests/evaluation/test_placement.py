@@ -8,15 +8,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import grasp_from_axes, make_pose, swap_fingers
-from burg_drake.evaluation.candidates.sampling import sample_candidates
-from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
-from burg_drake.evaluation.candidates.scene_frame import by_instance, held_instances, in_frame
-from burg_drake.formats.common.grasp_format import PANDA
-from burg_drake.scene.document.scene import Instance, Scene
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import InvalidInputError, Pose, grasp_from_axes, make_pose, swap_fingers
+from burg_drake.evaluation import (
+    SamplingSettings,
+    group_by_instance,
+    held_instances,
+    join_in_frame,
+    sample_candidates,
+)
+from burg_drake.formats import PANDA_GRIPPER
+from burg_drake.scene import Instance, Scene
+from burg_drake.station import Station
 
 DOWN = (0.0, 0.0, -1.0)
 
@@ -45,13 +47,13 @@ KNOWN = {
 def test_by_hand(name: str, scene: Scene) -> None:
     X_SG, instance, between = KNOWN[name]
     for X in (X_SG, swap_fingers(X_SG)):
-        owner, held = held_instances(scene, X[None], PANDA)
+        owner, held = held_instances(scene, X[None], PANDA_GRIPPER)
         assert (owner.tolist(), held.tolist()) == ([instance], [between])
 
 
 def test_alone_as_in_a_batch(scene: Scene) -> None:
     X_SG = np.array([X for X, _, _ in KNOWN.values()])
-    owner, held = held_instances(scene, X_SG, PANDA)
+    owner, held = held_instances(scene, X_SG, PANDA_GRIPPER)
     assert owner.tolist() == [instance for _, instance, _ in KNOWN.values()]
     assert held.tolist() == [between for _, _, between in KNOWN.values()]
 
@@ -66,17 +68,17 @@ def crowded(scene: Scene) -> Scene:
 
 def test_the_nearer_one_of_two_between_the_fingers(scene: Scene) -> None:
     X_SG = np.array([down(0.1, 0.2, 0.025), down(0.124, 0.2, 0.025), down(0.128, 0.2, 0.025)])
-    owner, held = held_instances(crowded(scene), X_SG, PANDA)
+    owner, held = held_instances(crowded(scene), X_SG, PANDA_GRIPPER)
     assert owner.tolist() == ["left", "left", "right"] and held.all()
 
 
 def test_some_instances_only(scene: Scene) -> None:
     X_SG = down(0.1, 0.2, 0.025)[None]
-    owner, held = held_instances(scene, X_SG, PANDA, ["right", "bar"])
+    owner, held = held_instances(scene, X_SG, PANDA_GRIPPER, ["right", "bar"])
     assert owner.tolist() == ["bar"] and not held.any()  # 123 mm away; the right cube 175 mm
     with pytest.raises(InvalidInputError, match="has no free objects to grasp"):
-        held_instances(scene, X_SG, PANDA, [])
-    nothing, _ = held_instances(scene, np.empty((0, 4, 4)), PANDA)
+        held_instances(scene, X_SG, PANDA_GRIPPER, [])
+    nothing, _ = held_instances(scene, np.empty((0, 4, 4)), PANDA_GRIPPER)
     assert len(nothing) == 0
 
 
@@ -103,13 +105,13 @@ def test_sampled_grasps_return_to_their_instance(seed: int, scene: Scene, statio
     }
     rng = np.random.default_rng(seed)
     X_SC = make_pose(Rotation.random(rng=rng).as_matrix(), rng.uniform(-1, 1, 3))
-    seen = in_frame(scene, sets, X_SC)
+    seen = join_in_frame(scene, sets, X_SC)
     assert seen.column("instance").tolist() == sampled.instance.tolist()
     X_SG = X_SC @ seen.X_OG
-    owner, held = held_instances(scene, X_SG, PANDA)
+    owner, held = held_instances(scene, X_SG, PANDA_GRIPPER)
     assert held.all()
     np.testing.assert_array_equal(owner, sampled.instance)
-    back = by_instance(scene, seen, X_SG, owner)
+    back = group_by_instance(scene, seen, X_SG, owner)
     assert list(back) == list(sets)
     for name, grasps in sets.items():
         np.testing.assert_allclose(back[name].X_OG, grasps.X_OG, atol=1e-12)
@@ -118,6 +120,6 @@ def test_sampled_grasps_return_to_their_instance(seed: int, scene: Scene, statio
 
 
 def test_no_grasps(scene: Scene) -> None:
-    none = in_frame(scene, {}, np.eye(4))
+    none = join_in_frame(scene, {}, np.eye(4))
     assert len(none) == 0 and none.column("instance").tolist() == []
-    assert by_instance(scene, none, none.X_OG, none.column("instance")) == {}
+    assert group_by_instance(scene, none, none.X_OG, none.column("instance")) == {}

@@ -10,22 +10,22 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core.errors import UnknownNameError
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
-from burg_drake.evaluation.grasp_sets.candidate_files import (
+from burg_drake.core import GraspSet, UnknownNameError
+from burg_drake.evaluation import (
+    FileReading,
     MisplacedGraspsError,
-    by_names,
+    SamplingSettings,
+    correct_poses,
+    find_mistake,
+    group_by_names,
+    mistake_notes,
     read_grasps,
+    read_input,
+    sample_grasps,
 )
-from burg_drake.evaluation.grasp_sets.input import read_input
-from burg_drake.evaluation.grasp_sets.mistake_search import find_mistake, mistake_notes
-from burg_drake.evaluation.grasp_sets.pose_mistakes import FileReading, corrected_poses
-from burg_drake.evaluation.grasp_sets.sampled import sample_grasps
-from burg_drake.formats.common.grasp_format import PANDA
-from burg_drake.formats.grasp_files import FORMATS, write_grasp_file
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.formats import GRASP_FORMATS, PANDA_GRIPPER, write_grasp_file
+from burg_drake.scene import Scene, load_scene
+from burg_drake.station import Station, load_station
 from tests.thorough import thorough
 
 
@@ -105,7 +105,7 @@ def test_a_planted_mistake_is_named_and_undone(
     assert found.text().startswith(f"As they were read, {found.before} of the 12 grasps fit: ")
     assert "12 of 12 fit." in found.text()
     assert f"very likely means that; --correction {correction} reads" in found.text()
-    undone = corrected_poses(spoiled, np.eye(4), correction.split(","))
+    undone = correct_poses(spoiled, np.eye(4), correction.split(","))
     fingers_swapped = undone @ pose((0, 0, 180))
     same = [np.abs(X - right.X_OG).max(axis=(1, 2)) < 1e-9 for X in (undone, fingers_swapped)]
     assert np.logical_or(*same).all()
@@ -142,7 +142,7 @@ def test_turns_about_the_closing_direction_before_the_pads(
     turned = np.linalg.inv(X_SF) @ six.X_SO("mug") @ right.X_OG
     turned = turned @ X_GF @ pose(euler) @ np.linalg.inv(X_GF)
     write_grasp_file(GraspSet.create(turned, object=""), tmp_path / "turned.npy", "graspnet")
-    given = read_grasps(six, tmp_path / "turned.npy", PANDA, X_SF=X_SF).by_instance
+    given = read_grasps(six, tmp_path / "turned.npy", PANDA_GRIPPER, X_SF=X_SF).by_instance
     found = find_mistake(given, panda, six)
     assert found is not None and found.after == 12
     assert found.mistake.correction == (f"turn:x{'-90' if euler[0] == 90 else '180'}",)
@@ -191,7 +191,7 @@ def test_poor_grasps_are_no_mistake(six: Scene, panda: Station) -> None:
     blind = sample_grasps(
         six, panda, 24, settings=SamplingSettings(blind=True), only=["mug", "banana", "box"]
     )
-    for name, part in by_names(six, blind).items():
+    for name, part in group_by_names(six, blind).items():
         assert find_mistake({name: part}, panda, six) is None, name
         in_library = {six.instance(name).object: part}
         assert find_mistake(in_library, panda, six.library) is None, name
@@ -210,24 +210,24 @@ that of GraspNet below."""
 
 
 @pytest.mark.parametrize(
-    "name", [name if name in OBJECT_AND_WORLD else thorough(name) for name in FORMATS]
+    "name", [name if name in OBJECT_AND_WORLD else thorough(name) for name in GRASP_FORMATS]
 )
 def test_files_of_every_format(
     name: str, right: GraspSet, six: Scene, panda: Station, tmp_path: Path
 ) -> None:
     """A right file has no hint; in one whose poses are turned about the approach by a quarter, the
     hint leads back to the right grasps."""
-    X_SF = pose((175, 5, 30), (0.3, 0.25, 0.7)) if FORMATS[name].frame == "camera" else None
-    X_FO = {"object": np.eye(4), "world": six.X_SO("mug")}.get(FORMATS[name].frame)
+    X_SF = pose((175, 5, 30), (0.3, 0.25, 0.7)) if GRASP_FORMATS[name].frame == "camera" else None
+    X_FO = {"object": np.eye(4), "world": six.X_SO("mug")}.get(GRASP_FORMATS[name].frame)
     X_FO = np.linalg.inv(X_SF) @ six.X_SO("mug") if X_FO is None else X_FO
     options = {"X_SF": X_SF}
-    if FORMATS[name].frame == "object":
+    if GRASP_FORMATS[name].frame == "object":
         options["objects"] = {"": "mug"}
     for turn in (np.eye(4), pose((0, 0, 90))):
-        path = tmp_path / f"grasps{FORMATS[name].suffixes[0]}"
+        path = tmp_path / f"grasps{GRASP_FORMATS[name].suffixes[0]}"
         write_grasp_file(GraspSet.create(X_FO @ right.X_OG @ turn, object="mug"), path, name)
         try:
-            given = read_grasps(six, path, PANDA, **options)
+            given = read_grasps(six, path, PANDA_GRIPPER, **options)
             found = given.by_instance
         except MisplacedGraspsError as error:
             found = error.grasps
@@ -239,7 +239,7 @@ def test_files_of_every_format(
         remedy = f"--grasps-format {other}" if other else "--correction turn:z90"
         assert remedy in text and "12 of 12 fit" in text
         more = {"format": other or FileReading(correction=("turn:z90",))}
-        corrected = read_grasps(six, path, PANDA, **options, **more)
+        corrected = read_grasps(six, path, PANDA_GRIPPER, **options, **more)
         assert find_mistake(corrected.by_instance, panda, six) is None
 
 
@@ -252,14 +252,14 @@ def test_frames_that_are_measured_in_and_poses_of_cameras(
     in_object = tmp_path / "object.npy"
     write_grasp_file(right, in_object, "burg")
     with pytest.raises(MisplacedGraspsError) as error:
-        read_grasps(six, in_object, PANDA)
+        read_grasps(six, in_object, PANDA_GRIPPER)
     found = find_mistake(error.value.grasps, panda, six)
     assert found is not None and "--grasps-frame object" in found.text()
     seen = tmp_path / "seen.npy"
     in_camera = GraspSet.create(np.linalg.inv(X_SC) @ X_SO @ right.X_OG, object="")
     write_grasp_file(in_camera, seen, "graspnet")
     with pytest.raises(MisplacedGraspsError) as error:
-        read_grasps(six, seen, PANDA, X_SF=np.linalg.inv(X_SC))
+        read_grasps(six, seen, PANDA_GRIPPER, X_SF=np.linalg.inv(X_SC))
     found = find_mistake(error.value.grasps, panda, six)
     assert found is not None and "pose of the camera inverted, 12 of 12 fit" in found.text()
 
@@ -270,10 +270,12 @@ def test_millimetres_in_a_file(right: GraspSet, six: Scene, panda: Station, tmp_
     path = tmp_path / "mm.npz"
     GraspSet.create(X, object="mug").save(path)
     with pytest.raises(MisplacedGraspsError, match="metres") as error:
-        read_grasps(six, path, PANDA)
+        read_grasps(six, path, PANDA_GRIPPER)
     found = find_mistake(error.value.grasps, panda, six)
     assert found is not None and "--correction millimetres reads" in found.text()
-    corrected = read_grasps(six, path, PANDA, format=FileReading(correction=("millimetres",)))
+    corrected = read_grasps(
+        six, path, PANDA_GRIPPER, format=FileReading(correction=("millimetres",))
+    )
     np.testing.assert_allclose(corrected.by_instance["mug"].X_OG, right.X_OG, atol=1e-12)
 
 
@@ -291,7 +293,7 @@ def test_half_widths_and_widths_beyond_the_opening(
     np.testing.assert_allclose(read.grasps.width, right.width)
     wide = np.where(np.arange(12) < 3, 0.0951, right.width)
     GraspSet.create(right.X_OG, object="mug", width=wide).save(tmp_path / "wide.npz")
-    (note,) = read_grasps(six, tmp_path / "wide.npz", PANDA).notes
+    (note,) = read_grasps(six, tmp_path / "wide.npz", PANDA_GRIPPER).notes
     assert "width of 3 of 12 grasps" in note and "(the largest is 95.1 mm)" in note
     assert "hand open at 80 mm" in note
 

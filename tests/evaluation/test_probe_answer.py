@@ -6,11 +6,9 @@ import math
 
 import pytest
 
-from burg_drake.core.grasps import Outcome, Stage, Verdict
-from burg_drake.evaluation.records.journal import decode, encode
-from burg_drake.evaluation.robustness.probe_answer import ProbeAnswer
-from burg_drake.evaluation.robustness.table import gathered
-from burg_drake.simulation.robustness import HoldForces
+from burg_drake.core import Outcome, Stage, Verdict
+from burg_drake.evaluation import ProbeAnswer, decode_verdict, encode_verdict, gather_answers
+from burg_drake.simulation import HoldForces
 
 
 def kept(answer: ProbeAnswer) -> ProbeAnswer:
@@ -18,7 +16,7 @@ def kept(answer: ProbeAnswer) -> ProbeAnswer:
     decision = answer.decision()
     assert decision.outcome is not None
     verdict = Verdict(decision.outcome, Stage.EXECUTED, margins=decision.margins)
-    return ProbeAnswer.from_verdict(answer.test, decode(encode("a", verdict))[1])
+    return ProbeAnswer.from_verdict(answer.test, decode_verdict(encode_verdict("a", verdict))[1])
 
 
 @pytest.mark.parametrize(
@@ -45,7 +43,7 @@ def test_a_repeat_that_fails_is_counted_and_a_test_that_fails_is_named() -> None
         ProbeAnswer("noise", Outcome.LIFTED),
         ProbeAnswer("noise", Outcome.SIMULATION_FAILED),
     ]
-    found = gathered("mug-1", "mug", "mug", 0.5, answers)
+    found = gather_answers("mug-1", "mug", "mug", 0.5, answers)
     assert found.tug is None and found.shake is None and found.friction_min == 0.2
     assert found.failed == ("tug",)
     assert found.success is not None

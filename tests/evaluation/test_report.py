@@ -11,16 +11,21 @@ import pytest
 from known_judge import TOPPLED, CrashingJudge, Make
 from page_reading import part, read_page
 
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.report.elements.blocks import Html, element, join
-from burg_drake.evaluation.report.elements.charts import Series, histogram, nice_step
-from burg_drake.evaluation.report.elements.style import STYLES, style_sheet
-from burg_drake.evaluation.report.page import report_page
-from burg_drake.evaluation.report.sections.outcomes import STOPPED
-from burg_drake.evaluation.results.summary import summarize
-from burg_drake.evaluation.store.run_folder import Run
+from burg_drake.core import Outcome
+from burg_drake.evaluation import (
+    GROUP_CLASSES,
+    STEP_LOSSES,
+    EvaluationSettings,
+    Run,
+    Series,
+    evaluate,
+    histogram,
+    nice_step,
+    report_page,
+    style_sheet,
+    summarize,
+)
+from burg_drake.visualization import Html, element, join
 
 
 @pytest.fixture
@@ -95,9 +100,9 @@ def test_blockers_are_listed_with_their_depth(run: Run) -> None:
 
 
 def test_the_stages_tell_what_stopped_every_grasp() -> None:
-    told = [outcome for outcomes in STOPPED.values() for outcome in outcomes]
+    told = [outcome for outcomes in STEP_LOSSES.values() for outcome in outcomes]
     assert sorted(told) == sorted(set(Outcome) - {Outcome.LIFTED})
-    assert Outcome.BLOCKED in STOPPED["held"]
+    assert Outcome.BLOCKED in STEP_LOSSES["held"]
 
 
 def test_what_was_disturbed_is_told(run: Run) -> None:
@@ -152,7 +157,7 @@ def test_numbers_stand_out_from_every_colour() -> None:
 
     rule = r"\.(g\d+) {[^}]*background: (#\w{6});[^}]*[^-]color: (#\w{6});"
     rules = re.findall(rule, style_sheet())
-    assert {name for name, _, _ in rules} == set(STYLES.values())
+    assert {name for name, _, _ in rules} == set(GROUP_CLASSES.values())
     for name, background, text in rules:
         dark, light = sorted((luminance(background), luminance(text)))
         assert (light + 0.05) / (dark + 0.05) >= 4.5, (name, background, text)

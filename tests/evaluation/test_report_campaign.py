@@ -15,22 +15,25 @@ from known_judge import expected
 from known_scene import write_scene
 from page_reading import Node, part, read_page
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.core.statistics import clustered_interval, wilson_interval
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.report.campaign import campaign_page, write_campaign_report
-from burg_drake.evaluation.report.elements.style import STYLES
-from burg_drake.evaluation.report.sections.causes import causes_of, rows_of_run
-from burg_drake.evaluation.report.sections.outcomes import worst_first
-from burg_drake.evaluation.report.sections.scenes import ranked_chart
-from burg_drake.evaluation.results.counts import OutcomeCounts
-from burg_drake.evaluation.results.summary import summarize
-from burg_drake.evaluation.store.campaign_folder import Campaign, load_campaign
-from burg_drake.evaluation.store.stored_rows import StoredRows
-from burg_drake.scene.document.scene import Scene
-from burg_drake.visualization.style.palette import group_of
+from burg_drake.core import Outcome, Pose, clustered_interval, wilson_interval
+from burg_drake.evaluation import (
+    GROUP_CLASSES,
+    Campaign,
+    EvaluationSettings,
+    OutcomeCounts,
+    StoredRows,
+    campaign_page,
+    evaluate,
+    find_causes,
+    load_campaign,
+    ranked_chart,
+    rows_of_run,
+    summarize,
+    worst_first,
+    write_campaign_report,
+)
+from burg_drake.scene import Scene
+from burg_drake.visualization import outcome_group
 
 pytestmark = pytest.mark.usefixtures("judged_here")
 
@@ -122,7 +125,7 @@ def test_every_grasp_is_drawn_on_its_object_in_its_colour(campaign: Campaign, pa
         for path in group.find("path")
     )
     assert drawn == Counter(
-        (candidates.grasps.object[k], id, STYLES[group_of(expected(id)).name])
+        (candidates.grasps.object[k], id, GROUP_CLASSES[outcome_group(expected(id)).name])
         for candidates in (run.candidates for run in campaign.runs)
         for k, id in enumerate(candidates.id)
     )
@@ -133,7 +136,7 @@ def test_causes_are_those_of_the_runs_and_their_commands_exist(
 ) -> None:
     counts: Counter[Outcome] = Counter()
     for run in campaign.runs:
-        for cause in causes_of(rows_of_run(run.results, str(run.path))):
+        for cause in find_causes(rows_of_run(run.results, str(run.path))):
             counts[cause.outcome] += cause.number
     entries = part(page, "Why grasps fail").find("article")
     assert len(entries) == len(counts)

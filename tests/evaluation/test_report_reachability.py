@@ -6,10 +6,8 @@ import dataclasses
 
 import pytest
 
-from burg_drake.evaluation.report.page import report_page
-from burg_drake.evaluation.report.sections.reachability import reachability_section
-from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.scene.document.scene import Scene
+from burg_drake.evaluation import Run, reachability_section, report_page
+from burg_drake.scene import Scene
 
 
 @pytest.fixture
@@ -21,7 +19,7 @@ def test_it_shows_where_the_objects_stand(
     run: Run, scene: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In the page, too, which other tests with the known judge do without."""
-    place = "burg_drake.evaluation.report.page.reachability_section"
+    place = "burg_drake.evaluation.report.pages.reachability_section"
     monkeypatch.setattr(place, reachability_section)
     section = reachability_section(run)
     assert section is not None and section in report_page(run)

@@ -14,14 +14,19 @@ from known_judge import expected
 from page_reading import Node, part, read_page
 from statsmodels.stats.proportion import proportion_confint
 
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.evaluation.report.elements.charts import Series
-from burg_drake.evaluation.report.elements.mirrored import Limit, mirrored_histogram
-from burg_drake.evaluation.report.elements.style import STYLES
-from burg_drake.evaluation.report.page import report_page
-from burg_drake.evaluation.report.sections.pictures import GRASPS, INSTANCES, drawn_rows
-from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.visualization.style.palette import group_of
+from burg_drake.core import Outcome
+from burg_drake.evaluation import (
+    GROUP_CLASSES,
+    MAX_DRAWN_GRASPS,
+    MAX_PICTURED_INSTANCES,
+    Limit,
+    Run,
+    Series,
+    drawn_rows,
+    mirrored_histogram,
+    report_page,
+)
+from burg_drake.visualization import outcome_group
 
 
 @pytest.fixture
@@ -88,7 +93,7 @@ def test_the_cascade_loses_what_the_judge_took(run: Run, page: Node) -> None:
                 f"lost {found[outcome]}: {found[outcome]} {outcome.replace('_', ' ')}" in row.text
             )
             lost = 100 * found[outcome] / len(run.candidates)
-            assert bars[STYLES[group_of(outcome).name]] == pytest.approx(lost, abs=0.01)
+            assert bars[GROUP_CLASSES[outcome_group(outcome).name]] == pytest.approx(lost, abs=0.01)
         assert row.find("span", "passed")[0].text == str(passed)
         assert bars["pass"] == pytest.approx(100 * passed / len(run.candidates), abs=0.01)
 
@@ -105,7 +110,7 @@ def test_every_grasp_is_drawn_once_in_the_colour_of_its_outcome(run: Run, page: 
                     drawn[id] = group.style[1], side
                     assert len(re.findall("[ML]", path.attributes["d"])) == 6
     assert drawn == {
-        id: (STYLES[group_of(expected(id)).name], expected(id) is Outcome.LIFTED)
+        id: (GROUP_CLASSES[outcome_group(expected(id)).name], expected(id) is Outcome.LIFTED)
         for id in run.candidates.id
     }
 
@@ -176,7 +181,7 @@ def test_a_run_of_failures_alone(run: Run, tmp_path: Path) -> None:
 
 
 def _verdicts(journal: str, folder: Path) -> dict:
-    from burg_drake.evaluation.records.journal import read_journal
+    from burg_drake.evaluation import read_journal
 
     path = folder / "journal.jsonl"
     path.write_text(journal)
@@ -190,7 +195,7 @@ def test_many_grasps_are_drawn_in_part_and_the_page_stays_small(run: Run) -> Non
     large.__dict__["results"] = many
     text = report_page(large)
     grasps = [p for g in read_page(text).find("g", "grasp") for p in g.find("path")]
-    assert 0.9 * GRASPS <= len(grasps) <= GRASPS + 10 * INSTANCES
+    assert 0.9 * MAX_DRAWN_GRASPS <= len(grasps) <= MAX_DRAWN_GRASPS + 10 * MAX_PICTURED_INSTANCES
     assert len(text.encode()) < 1_000_000
     assert f"of {times * len(run.candidates):,} grasps, from all outcomes" in text
 

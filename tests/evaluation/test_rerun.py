@@ -9,14 +9,9 @@ import math
 import numpy as np
 import pytest
 
-from burg_drake.core.grasps import Verdict
-from burg_drake.core.grasps.outcome import Outcome, Stage
-from burg_drake.core.versions import (
-    software_versions,
-)
-from burg_drake.evaluation.records.origin import TrialOrigin
-from burg_drake.evaluation.replay import comparison, differences
-from burg_drake.station.document.engine import ENGINES
+from burg_drake.core import Outcome, Stage, Verdict, software_versions
+from burg_drake.evaluation import TrialOrigin, comparison, differences
+from burg_drake.station import ENGINES
 
 VERDICT = Verdict(
     Outcome.LIFTED,

@@ -7,10 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import UnknownNameError
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.evaluation.records.rows import best_rows, rows_of
-from burg_drake.evaluation.records.table import Columns
+from burg_drake.core import Outcome, UnknownNameError
+from burg_drake.evaluation import Columns, best_rows, rows_of
 
 MILLIMETRE = 1e-3
 

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.grasp_sets.run_set import run_grasps
-from burg_drake.evaluation.store.run_folder import JOURNAL_FILE, Run, load_run
+from burg_drake.core import GraspSet
+from burg_drake.evaluation import JOURNAL_FILE, Run, load_run, run_grasps
 
 
 @pytest.fixture

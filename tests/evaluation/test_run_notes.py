@@ -11,19 +11,21 @@ import pytest
 from asked import asked
 from rich.console import Console
 
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.evaluation.candidates.sampling_settings import SamplingSettings
-from burg_drake.evaluation.candidates.sampling_shortfall import shortfall
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.grasp_sets.sampled import sample_grasps
-from burg_drake.evaluation.grasp_sets.scored import scored_set
-from burg_drake.evaluation.results.summary import summarize
-from burg_drake.evaluation.results.summary_tables import summary_view
-from burg_drake.evaluation.store.run_folder import load_run
-from burg_drake.grasping.sampling import antipodal
-from burg_drake.objects.library.document import load_library
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import Outcome
+from burg_drake.evaluation import (
+    SamplingSettings,
+    evaluate,
+    load_run,
+    sample_grasps,
+    scored_set,
+    shortfall_note,
+    summarize,
+    summary_view,
+)
+from burg_drake.grasping import antipodal_sampling
+from burg_drake.objects import load_library
+from burg_drake.scene import load_scene
+from burg_drake.station import load_station
 
 
 def test_an_object_without_clear_grasps_is_explained_wherever_the_run_is_shown(
@@ -31,7 +33,7 @@ def test_an_object_without_clear_grasps_is_explained_wherever_the_run_is_shown(
 ) -> None:
     """The scissors lie flat: fingers that reach them reach into the table. The screen, asked about
     the blind grasps that were tried, is the oracle of the counts."""
-    monkeypatch.setattr(antipodal, "TEST_PATIENCE", 400)
+    monkeypatch.setattr(antipodal_sampling.SamplingEffort, "min_tests", 400)
     scene, station = load_scene("tabletop_twelve"), load_station("panda_tabletop")
     out = tmp_path / "run"
     options = {"mode": "hand", "only": ["scissors"], "workers": 1, "progress": False}
@@ -74,11 +76,11 @@ def test_nothing_executed_is_explained(judged_here: None, tmp_path: Path) -> Non
 
 def test_a_margin_that_leaves_nothing_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     """No finger can close on a box and stay 0.2 m away from it."""
-    monkeypatch.setattr(antipodal, "TEST_PATIENCE", 100)
+    monkeypatch.setattr(antipodal_sampling.SamplingEffort, "min_tests", 100)
     household, station = load_library("household"), load_station("panda_tabletop")
     settings = SamplingSettings(margin=0.2)
     grasps = sample_grasps(household, station, 2, settings=settings, only=["box"])
-    note = shortfall("box", 2, grasps.provenance["parts"]["box"], len(grasps))
+    note = shortfall_note("box", 2, grasps.provenance["parts"]["box"], len(grasps))
     assert re.fullmatch(
         r"box: only 0 of 2 grasps were found: of (\d+) antipodal grasps tried, the"
         r" open hand comes within 200 mm of the object itself in \1; a smaller margin would help",

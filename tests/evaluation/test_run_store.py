@@ -13,20 +13,27 @@ import numpy as np
 import pytest
 import yaml
 
-from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownNameError
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.core.paths.references import portable_reference
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.identity import require_same_run, run_hash
-from burg_drake.evaluation.records.run_document import RunDocument
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.records.table_file import read_table
-from burg_drake.evaluation.report import write_report
-from burg_drake.evaluation.report.sections.reproduction import repeat_section
-from burg_drake.evaluation.store.run_folder import Run, load_run
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.engine import ENGINES
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.core import (
+    DocumentError,
+    InvalidInputError,
+    Outcome,
+    UnknownNameError,
+    portable_reference,
+)
+from burg_drake.evaluation import (
+    EvaluationSettings,
+    Run,
+    RunDocument,
+    evaluate,
+    load_run,
+    read_table,
+    repeat_section,
+    require_same_run,
+    run_hash,
+    write_report,
+)
+from burg_drake.scene import Scene
+from burg_drake.station import ENGINES, Station, load_station
 
 
 @pytest.fixture

@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.evaluation.stages.scene_acceptance import clear_grasp_counts, within_reach
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.core import InvalidInputError, Pose
+from burg_drake.evaluation import clear_grasp_counts, within_reach
+from burg_drake.station import Station, load_station
 from tests.evaluation.composed import composed
 
 PAIR = composed(("near", "can", 0.1, 0.05, 0.0), ("far", "can", 0.5, 0.37, 0.0))

@@ -7,21 +7,28 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.core.versions import (
+from burg_drake.core import (
+    GraspSet,
+    InvalidInputError,
+    UnknownNameError,
+    make_pose,
+    rotation_from_rpy,
     software_versions,
 )
-from burg_drake.evaluation.grasp_sets.scored import SCENE_COLUMNS, scored_set
-from burg_drake.geometry.surface import Surface
-from burg_drake.grasping.clearance.verdict import CLEARANCE_VERSION
-from burg_drake.grasping.quality.jaws import PANDA_JAWS
-from burg_drake.grasping.quality.metrics import METRICS, QUALITY_VERSION, Payload, grasp_quality
-from burg_drake.grasping.sampling.antipodal import sample_antipodal
-from burg_drake.objects.library.document import ObjectLibrary, load_library
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.evaluation import SCENE_COLUMNS, scored_set
+from burg_drake.geometry import Surface
+from burg_drake.grasping import (
+    CLEARANCE_VERSION,
+    METRICS,
+    PANDA_JAWS,
+    QUALITY_VERSION,
+    Payload,
+    grasp_quality,
+    sample_antipodal,
+)
+from burg_drake.objects import ObjectLibrary, load_library
+from burg_drake.scene import Scene, load_scene
+from burg_drake.station import Station, load_station
 
 SCENE = """\
 version: 1

@@ -7,15 +7,17 @@ from pathlib import Path
 import pytest
 from known_judge import Make, SecondJudge, confidence, expected
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.grasps.outcome import Outcome, Stage
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.journal import journal_lines
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.results.status import read_status
-from burg_drake.evaluation.results.summary import summarize
-from burg_drake.evaluation.second_opinion import judge_again
-from burg_drake.evaluation.store.run_folder import Run, load_run
+from burg_drake.core import InvalidInputError, Outcome, Stage, UnknownNameError
+from burg_drake.evaluation import (
+    EvaluationSettings,
+    Run,
+    evaluate,
+    journal_lines,
+    judge_again,
+    load_run,
+    read_status,
+    summarize,
+)
 
 PLACE = "burg_drake.evaluation.second_opinion.StationJudgeFactory"
 

@@ -18,18 +18,26 @@ from asked import asked
 from inline_executor import Inline
 from known_many import OPTIONS, run_all, same
 
-from burg_drake.apps.cli import main
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.journal import JOURNAL_FILE, Journal, decode, encode
-from burg_drake.evaluation.results.status import Watch, read_status
-from burg_drake.evaluation.store import part_writer
-from burg_drake.evaluation.store.campaign_folder import Campaign, load_campaign
-from burg_drake.evaluation.store.journal_tail import tails_of
-from burg_drake.evaluation.store.part_writer import PartWriter
-from burg_drake.evaluation.store.run_folder import Run, save_run
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.station_document import Station
+from burg_drake.apps import main
+from burg_drake.core import Outcome
+from burg_drake.evaluation import (
+    JOURNAL_FILE,
+    Campaign,
+    Journal,
+    PartWriter,
+    Run,
+    RunWatch,
+    decode_verdict,
+    encode_verdict,
+    evaluate,
+    load_campaign,
+    part_store,
+    read_journal_tails,
+    read_status,
+    save_run,
+)
+from burg_drake.scene import Scene
+from burg_drake.station import Station
 
 pytestmark = pytest.mark.usefixtures("pages")
 SCRIPT = """
@@ -39,7 +47,7 @@ sys.path.insert(0, {tests!r})
 import known_judge
 from inline_executor import Inline
 from burg_drake.evaluation import cascade
-from burg_drake.evaluation.run import many_scenes
+from burg_drake.evaluation import many_scenes
 def patch(place, value):
     module, _, name = place.rpartition(".")
     if "reachability" not in place:
@@ -54,7 +62,7 @@ def test_of_a_run(scene: Scene, station: Station, tmp_path: Path, known_judge: N
     out = tmp_path / "run"
     with pytest.raises(KeyboardInterrupt):
         evaluate(scene, station, out, **asked(executor=Inline(stop=6), **OPTIONS))
-    watch = Watch(out)
+    watch = RunWatch(out)
     status = watch.look()
     assert (status.judged, status.total, status.complete, status.working) == (6, 15, False, False)
     run = evaluate(scene, station, out, **asked(executor=Inline(), **OPTIONS))
@@ -90,12 +98,12 @@ def test_the_rate_is_that_of_the_stretch_under_way(
 
 
 def test_parts_are_not_counted_again(whole: Campaign, tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(part_writer, "PART_ROWS", 12)
+    monkeypatch.setattr(part_store, "PART_ROWS", 12)
     campaign = load_campaign(shutil.copytree(whole.path, tmp_path / "all"))
     for journal in campaign.path.glob("scenes/[mt]*/journal.jsonl"):
         first, *rest = journal.read_bytes().splitlines(keepends=True)
-        id, verdict = decode(first)
-        failed = encode(id, replace(verdict, outcome=Outcome.SIMULATION_FAILED))
+        id, verdict = decode_verdict(first)
+        failed = encode_verdict(id, replace(verdict, outcome=Outcome.SIMULATION_FAILED))
         journal.write_bytes(b"".join([failed, *rest]))
         if journal.parent.name == "three":  # and judged again after it went to a part
             PartWriter(campaign.path, campaign.places, ()).catch_up()
@@ -103,7 +111,7 @@ def test_parts_are_not_counted_again(whole: Campaign, tmp_path: Path, monkeypatc
     writer = PartWriter(campaign.path, campaign.places, ())
     writer.catch_up(["cubes", "moved"])
     writer.flush()
-    tails = tails_of(campaign.path, campaign.places)
+    tails = read_journal_tails(campaign.path, campaign.places)
     for name in ("cubes", "moved"):
         assert tails[name].place == (campaign.folder(name) / JOURNAL_FILE).stat().st_size
     told = read_status(campaign.path)
@@ -130,7 +138,7 @@ def test_of_a_campaign_that_is_killed(
         while not (out / "campaign.yaml").exists():
             assert process.poll() is None
             time.sleep(0.02)
-        watch = Watch(out)
+        watch = RunWatch(out)
         while (status := watch.look()).judged < 13:
             assert process.poll() is None
             time.sleep(0.01)

@@ -12,17 +12,15 @@ import pytest
 from known_judge import CrashingJudge, Make, expected
 from rich.console import Console
 
-from burg_drake.core.grasps.outcome import Outcome, Stage
-from burg_drake.core.statistics import wilson_interval
-from burg_drake.core.terminal.number_text import format_duration
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.results.summary import (
+from burg_drake.core import Outcome, Stage, format_duration, wilson_interval
+from burg_drake.evaluation import (
+    EvaluationSettings,
     OutcomeCounts,
+    Run,
+    evaluate,
     summarize,
+    summary_view,
 )
-from burg_drake.evaluation.results.summary_tables import summary_view
-from burg_drake.evaluation.store.run_folder import Run
 
 
 @pytest.fixture

@@ -14,24 +14,36 @@ from urllib.parse import unquote
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import InvalidInputError, MissingDependencyError
-from burg_drake.core.files.bounded_text import Limits
-from burg_drake.core.frames import make_pose, rotation_from_quaternion, rotation_from_rpy
-from burg_drake.core.grasps import MODES, Verdict
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.core.grasps.outcome import Outcome, Stage
-from burg_drake.evaluation.candidates.candidates import Candidates
-from burg_drake.evaluation.records import table_file
-from burg_drake.evaluation.records.origin import TrialOrigin, read_origin
-from burg_drake.evaluation.records.table import Columns, make_columns, table_row, trial_columns
-from burg_drake.evaluation.records.table_file import (
-    METADATA_KEY,
+from burg_drake.core import (
+    MODES,
+    GraspSet,
+    InvalidInputError,
+    Limits,
+    MissingDependencyError,
+    Outcome,
+    Stage,
+    Verdict,
+    make_pose,
+    rotation_from_quaternion,
+    rotation_from_rpy,
+)
+from burg_drake.evaluation import (
+    RUN_METADATA_KEY,
+    Candidates,
+    Columns,
+    RecordedTrial,
+    TrialOrigin,
+    make_columns,
+    read_origin,
     read_table,
+    read_trial,
     require_writer,
+    table_file,
+    table_row,
+    trial_columns,
     write_table,
 )
-from burg_drake.evaluation.records.trial import RecordedTrial, read_trial
-from burg_drake.station.document.engine import ENGINES
+from burg_drake.station import ENGINES
 
 INSTANCES = ("mug_1", "box", "bowl.2")
 ORIGIN = TrialOrigin(
@@ -235,7 +247,7 @@ def test_parquet_has_nulls_and_metadata(tmp_path: Path) -> None:
     write_table(tmp_path / "results.parquet", columns(), {"seed": 3, "versions": {"a": "1"}})
     table = parquet.read_table(tmp_path / "results.parquet")
     assert table.column("slip").to_pylist() == [2.0 / 3.0, None]
-    metadata = json.loads(table.schema.metadata[METADATA_KEY])
+    metadata = json.loads(table.schema.metadata[RUN_METADATA_KEY])
     assert metadata == {"seed": 3, "versions": {"a": "1"}}
 
 
@@ -328,6 +340,6 @@ def test_small_files_of_large_tables_are_refused(
     write_table(parquet, {"reason": np.full(5_000, "x" * 100)})
     assert len(read_table(parquet)["reason"]) == 5_000
     for limits, match in ((Limits(1 << 30, 4_999), "4,999 cells"), (Limits(400_000, 5_000), "GiB")):
-        monkeypatch.setattr(table_file, "TABLE", limits)
+        monkeypatch.setattr(table_file.FileLimits, "table", limits)
         with pytest.raises(InvalidInputError, match=rf"rows\.parquet: .*{match}"):
             read_table(parquet)

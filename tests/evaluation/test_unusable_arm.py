@@ -8,15 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.feasibility import reach
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.motion.workspace.usable_arm import require_usable_arm
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.station_document import Obstacle, Station, load_station
+from burg_drake.core import GraspSet, InvalidInputError, Pose
+from burg_drake.evaluation import EvaluationSettings, evaluate, reach
+from burg_drake.motion import require_usable_arm
+from burg_drake.scene import Scene
+from burg_drake.station import Obstacle, Station, load_station
 from tests.evaluation.composed import tabletop
 
 pytestmark = pytest.mark.usefixtures("judged_here")

@@ -10,28 +10,32 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps import Mode, Verdict
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.core.grasps.outcome import Outcome, Stage
-from burg_drake.core.versions import (
+from burg_drake.core import (
+    Array,
+    GraspSet,
+    Mode,
+    Outcome,
+    Pose,
+    Stage,
+    Verdict,
+    make_pose,
     software_versions,
 )
-from burg_drake.evaluation.candidates.candidates import Candidates
-from burg_drake.evaluation.records.identity import run_hash
-from burg_drake.evaluation.records.journal import Journal
-from burg_drake.evaluation.records.run_document import (
+from burg_drake.evaluation import (
+    JOURNAL_FILE,
+    Candidates,
     Grasps,
+    Journal,
     Library,
+    Run,
     RunDocument,
+    create_run,
     input_of,
+    load_run,
+    run_hash,
 )
-from burg_drake.evaluation.store.run_folder import JOURNAL_FILE, Run, create_run, load_run
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene, save_scene
-from burg_drake.station.document.engine import ENGINES
-from burg_drake.station.document.station_document import load_station
+from burg_drake.scene import Instance, Scene, SceneDocument, load_scene, save_scene
+from burg_drake.station import ENGINES, load_station
 
 OBJECTS = ("mug", "box")
 

@@ -9,10 +9,8 @@ from scipy.stats import mannwhitneyu
 from sklearn.isotonic import IsotonicRegression
 from sklearn.metrics import roc_auc_score
 
-from burg_drake.experiment.statistics import ordered
-from burg_drake.experiment.statistics.margin_calibration import calibration, calibrations
-from burg_drake.experiment.statistics.ordered import Ordered
-from burg_drake.experiment.statistics.rank_statistics import ranking
+from burg_drake.experiment import OrderedTrials, calibrate_margin, calibrate_margins, estimate_auroc
+from burg_drake.experiment.comparison import margin_calibration
 
 
 def trials(count: int, seed: int = 0, digits: int = 9) -> tuple[np.ndarray, np.ndarray]:
@@ -25,18 +23,18 @@ def trials(count: int, seed: int = 0, digits: int = 9) -> tuple[np.ndarray, np.n
 def test_area_is_that_of_scikit_learn_and_mann_whitney(digits: int) -> None:
     values, good = trials(200, 1, digits)
     weight = np.random.default_rng(2).random(200) + 0.1
-    rows = Ordered.of(values, good, weight)
-    assert ranking(rows).value == pytest.approx(roc_auc_score(good, values))
-    assert ranking(rows, weighted=True).value == pytest.approx(
+    rows = OrderedTrials.of(values, good, weight)
+    assert estimate_auroc(rows).value == pytest.approx(roc_auc_score(good, values))
+    assert estimate_auroc(rows, weighted=True).value == pytest.approx(
         roc_auc_score(good, values, sample_weight=weight)
     )
     u = mannwhitneyu(values[good], values[~good]).statistic
-    assert ranking(rows).value == pytest.approx(u / good.sum() / (~good).sum())
+    assert estimate_auroc(rows).value == pytest.approx(u / good.sum() / (~good).sum())
 
 
 def test_interval_of_the_area_meets_a_bootstrap() -> None:
     values, good = trials(400, 3)
-    found = ranking(Ordered.of(values, good))
+    found = estimate_auroc(OrderedTrials.of(values, good))
     rng = np.random.default_rng(0)
     wins = np.sign(values[good][:, None] - values[~good]) / 2 + 0.5
     drawn = [
@@ -56,7 +54,7 @@ def test_interval_of_a_number_that_tells_nothing_is_that_of_mann_and_whitney(
     """Evenly mixed; the statistic has the variance (m + n + 1) / (12 m n) where nothing is told,
     also of few trials."""
     values = np.r_[(np.arange(good) + 0.5) / good, (np.arange(bad) + 0.5) / bad]
-    found = ranking(Ordered.of(values, np.arange(good + bad) < good))
+    found = estimate_auroc(OrderedTrials.of(values, np.arange(good + bad) < good))
     assert found.value == pytest.approx(0.5)
     assert found.low is not None and found.high is not None
     odds = np.log(found.high / (1 - found.high)) / 1.96 * 0.25  # one standard error of the area
@@ -66,14 +64,14 @@ def test_interval_of_a_number_that_tells_nothing_is_that_of_mann_and_whitney(
 
 def test_equal_weights_are_no_weights() -> None:
     values, good = trials(90, 4, 1)
-    rows = Ordered.of(values, good, np.full(90, 7.0))
-    a, b = ranking(rows), ranking(rows, weighted=True)
+    rows = OrderedTrials.of(values, good, np.full(90, 7.0))
+    a, b = estimate_auroc(rows), estimate_auroc(rows, weighted=True)
     assert (a.value, a.low, a.high) == pytest.approx((b.value, b.low, b.high))
 
 
 def test_small_numbers_may_be_the_better_ones() -> None:
     values, good = trials(100, 5)
-    up, down = calibration("clearance", values, good), calibration("slip", -values, good)
+    up, down = calibrate_margin("clearance", values, good), calibrate_margin("slip", -values, good)
     assert up.auroc == down.auroc
     assert [step.share for step in up.isotonic] == [step.share for step in down.isotonic][::-1]
     assert [(b.successes, b.trials) for b in up.bins] == [
@@ -85,9 +83,9 @@ def test_small_numbers_may_be_the_better_ones() -> None:
 
 def test_perfect_separation_is_not_certain() -> None:
     values = np.arange(20.0)
-    found = ranking(Ordered.of(values, values >= 10))
+    found = estimate_auroc(OrderedTrials.of(values, values >= 10))
     assert found.value == 1.0 and found.high == 1.0 and 0.6 < (found.low or 0) < 0.8
-    few = ranking(Ordered.of(np.r_[np.zeros(5), np.arange(1, 50)], np.arange(54) >= 5))
+    few = estimate_auroc(OrderedTrials.of(np.r_[np.zeros(5), np.arange(1, 50)], np.arange(54) >= 5))
     assert 0.5 < (few.low or 0) < 0.6
 
 
@@ -95,16 +93,18 @@ def test_too_few_to_rank() -> None:
     """Of ten numbers that tell nothing, one ranks all of n and n trials without an error with a
     probability of 20 / binomial(2 n, n) at most: 29 % for 4, 8 % for 5."""
     for good, bad in ((1, 1), (4, 4), (4, 60), (60, 4)):
-        found = ranking(Ordered.of(np.arange(good + bad), np.arange(good + bad) < good))
+        found = estimate_auroc(
+            OrderedTrials.of(np.arange(good + bad), np.arange(good + bad) < good)
+        )
         assert found.value is None and found.reason == "fewer than 5 successes or failures"
-    assert ranking(Ordered.of(np.arange(10), np.arange(10) >= 5)).value == 1.0
+    assert estimate_auroc(OrderedTrials.of(np.arange(10), np.arange(10) >= 5)).value == 1.0
 
 
 @pytest.mark.parametrize("weighted", [False, True])
 def test_isotonic_fit_is_that_of_scikit_learn(weighted: bool) -> None:
     values, good = trials(150, 6, 1)
     weight = np.random.default_rng(7).random(150) + 0.1 if weighted else None
-    found = calibration("clearance", values, good, weight)
+    found = calibrate_margin("clearance", values, good, weight)
     expected = IsotonicRegression().fit(values, good, sample_weight=weight).predict(values)
     fitted = np.full(150, np.nan)
     for step in found.isotonic:
@@ -115,7 +115,7 @@ def test_isotonic_fit_is_that_of_scikit_learn(weighted: bool) -> None:
 def test_bins_hold_all_trials_and_never_part_equal_numbers() -> None:
     values, good = trials(120, 8, 0)
     values[:5] = np.nan
-    found = calibration("clearance", values, good)
+    found = calibrate_margin("clearance", values, good)
     assert found.without == 5 and found.trials == 115 == sum(b.trials for b in found.bins)
     assert found.successes == good[5:].sum() == sum(b.successes for b in found.bins)
     for one, next_one in zip(found.bins, found.bins[1:], strict=False):
@@ -128,7 +128,7 @@ def test_bins_hold_all_trials_and_never_part_equal_numbers() -> None:
 def test_weighted_share_of_a_bin() -> None:
     values, good = trials(60, 9)
     weight = np.random.default_rng(1).random(60)
-    for b in calibration("clearance", values, good, weight).bins:
+    for b in calibrate_margin("clearance", values, good, weight).bins:
         inside = (values >= b.low) & (values <= b.high)
         assert b.weighted is not None
         assert b.weighted.value == pytest.approx(np.average(good[inside], weights=weight[inside]))
@@ -136,22 +136,22 @@ def test_weighted_share_of_a_bin() -> None:
 
 def test_very_many_trials_share_rows(monkeypatch: pytest.MonkeyPatch) -> None:
     values, good = trials(5000, 10)
-    whole = calibration("clearance", values, good)
-    monkeypatch.setattr(ordered, "FINEST", 1000)
-    coarse = calibration("clearance", values, good)
+    whole = calibrate_margin("clearance", values, good)
+    monkeypatch.setattr(margin_calibration, "MAX_ORDERED_ROWS", 1000)
+    coarse = calibrate_margin("clearance", values, good)
     assert coarse.auroc.value == pytest.approx(whole.auroc.value, abs=1e-3)
     assert coarse.trials == 5000 and coarse.successes == whole.successes
     assert coarse.bins[-1].high == values.max() and coarse.bins[0].low == values.min()
     tied = np.r_[values[:3000], np.full(2000, 99.0)]
-    assert calibration("clearance", tied, good).trials == 5000
+    assert calibrate_margin("clearance", tied, good).trials == 5000
 
 
 def test_rows_that_are_shared_hardly_change_the_area(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ordered, "FINEST", 1000)
+    monkeypatch.setattr(margin_calibration, "MAX_ORDERED_ROWS", 1000)
     values = np.r_[np.arange(20_000.0), np.full(20_000, 2e4)]  # as where a margin is cut off
     last_five = (np.arange(40_000) >= 19_995) & (np.arange(40_000) < 20_000)
     for good in (np.arange(40_000) % 20_000 >= 19_995, last_five):
-        area = ranking(Ordered.of(values, good)).value
+        area = estimate_auroc(OrderedTrials.of(values, good)).value
         assert area == pytest.approx(roc_auc_score(good, values), abs=2 / 1000)
 
 
@@ -163,7 +163,7 @@ def test_rows_that_are_shared_hardly_change_the_area(monkeypatch: pytest.MonkeyP
 def test_edges(rows: list[tuple[float, bool]], weighted: bool) -> None:
     values = np.array([v for v, _ in rows], dtype=float)
     good = np.array([g for _, g in rows], dtype=bool)
-    found = calibration("clearance", values, good, np.ones(len(rows)) if weighted else None)
+    found = calibrate_margin("clearance", values, good, np.ones(len(rows)) if weighted else None)
     known = np.isfinite(values)
     few = min(good[known].sum(), (~good[known]).sum()) < 5
     assert (found.auroc.value is None) == few == bool(found.auroc.reason)
@@ -176,4 +176,4 @@ def test_edges(rows: list[tuple[float, bool]], weighted: bool) -> None:
 def test_margins_that_are_the_same_everywhere_tell_nothing_and_are_left_out() -> None:
     good = np.array([True, False, True])
     margins = {"slip": np.array([1.0, 2.0, 3.0]), "lift": np.ones(3), "tilt": np.full(3, np.nan)}
-    assert [c.name for c in calibrations(margins, good)] == ["slip"]
+    assert [c.name for c in calibrate_margins(margins, good)] == ["slip"]

@@ -13,31 +13,33 @@ import pytest
 from sklearn.metrics import confusion_matrix
 
 import burg_drake as burg
-from burg_drake.apps.cli import main
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps.outcome import Outcome, RealOutcome
-from burg_drake.evaluation.robustness.shares import lifted_shares
-from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.experiment.comparison.comparing import compare
-from burg_drake.experiment.comparison.record import comparison_json
-from burg_drake.experiment.comparison.report.page import comparison_page
-from burg_drake.experiment.comparison.wording import headline
-from burg_drake.experiment.pairing.matching import CONTENT, match_rows
-from burg_drake.experiment.pairing.pairs import NAMES
-from burg_drake.experiment.pairing.result_table import ResultTable
-from burg_drake.experiment.pairing.text_codes import Factor, Ids, text_keys
-from burg_drake.experiment.planning.plan import plan_trials
-from burg_drake.experiment.planning.settings import SelectionSettings
-from burg_drake.experiment.trials.sheet import (
+from burg_drake.apps import main
+from burg_drake.core import InvalidInputError, Outcome, RealOutcome
+from burg_drake.evaluation import Run, lifted_shares
+from burg_drake.experiment import (
+    GRASP_CONTENT_COLUMNS,
+    PREDICTION_COLUMNS,
+    IdColumn,
     ObjectPlace,
     RealTrial,
+    ResultTable,
     Selection,
+    SelectionSettings,
     Stratum,
+    TextFactor,
     TrialSheet,
+    compare,
+    comparison_json,
+    comparison_page,
+    grasp_content,
+    headline_sentence,
     load_trials,
+    make_source_run,
+    match_rows,
+    plan_trials,
     save_trials,
+    text_keys,
 )
-from burg_drake.experiment.trials.sources import grasp_content, source_of
 from tests.experiment import known_runs
 
 FIRST = ("lifted", "lifted", "slipped", "collision_target", "lifted_disturbed", "lifted")
@@ -97,7 +99,7 @@ def make_sheet(run: Run, folder: Path, real: tuple[str, ...] = REAL, **fields: o
             )
         )
     sheet = TrialSheet(
-        runs={"a": source_of(run, folder)},
+        runs={"a": make_source_run(run, folder)},
         selection=Selection(per_object=6, balance="outcome"),
         strata=strata,
         trials=tuple(trials),
@@ -199,13 +201,13 @@ def test_two_simulators_against_the_same_trials(tmp_path: Path) -> None:
 def test_grasps_are_the_same_by_id_and_content(tmp_path: Path) -> None:
     first, second = make_runs(tmp_path)
     run_only = {name: first.results[name] for name in first.results}
-    missing = {name: np.full(12, np.nan) for name in NAMES if name not in run_only}
+    missing = {name: np.full(12, np.nan) for name in PREDICTION_COLUMNS if name not in run_only}
     a, b = run_only | missing, dict(second.results) | missing
     b["x"] = b["x"].copy()
     b["x"][3] += 1e-3
     rows = np.array([5, 4, 3, 2, 1, 0])
-    tables = [ResultTable.of_columns(columns, NAMES) for columns in (a, b)]
-    found = match_rows(tables[0], tables[1].take(rows, CONTENT))
+    tables = [ResultTable.of_columns(columns, PREDICTION_COLUMNS) for columns in (a, b)]
+    found = match_rows(tables[0], tables[1].take(rows, GRASP_CONTENT_COLUMNS))
     assert found.other_content == 1 and found.only_first == 6 and found.only_second == 0
     assert (a["id"][found.first] == b["id"][rows][found.second]).all() and len(found.first) == 5
 
@@ -297,25 +299,25 @@ def test_a_table_of_robustness_of_another_run_is_refused(tmp_path: Path) -> None
 
 def test_texts_as_numbers() -> None:
     texts = np.array(["mug", "", "tête-à-tête", "日本", "mug", "mu"])
-    factor = Factor.of(texts)
+    factor = TextFactor.of(texts)
     assert [factor[k] for k in range(6)] == texts.tolist()
     assert factor.names == tuple(sorted(set(texts.tolist())))
     assert (text_keys(texts) == text_keys(texts.astype("<U40"))).all()
     many = np.array([f"grasp-{k:x}" for k in range(9000)])
-    assert Factor.of(many).take(np.array([8999]))[0] == "grasp-2327"
-    assert Factor.of(np.broadcast_to("a", 5)).index.tolist() == [0] * 5
-    assert Factor.of(np.array([], dtype=str)).names == ()
-    coded = Factor.of_codes(np.array([1, -1, 0]), ["mug", "box"])
+    assert TextFactor.of(many).take(np.array([8999]))[0] == "grasp-2327"
+    assert TextFactor.of(np.broadcast_to("a", 5)).index.tolist() == [0] * 5
+    assert TextFactor.of(np.array([], dtype=str)).names == ()
+    coded = TextFactor.of_codes(np.array([1, -1, 0]), ["mug", "box"])
     assert [coded[k] for k in range(3)] == ["box", "", "mug"]
-    assert Factor.of_codes(np.array([1, 0]), ["mug", "box"]).names == ("box", "mug")
-    assert Factor.of_codes(np.array([], dtype=int), []).names == ()
+    assert TextFactor.of_codes(np.array([1, 0]), ["mug", "box"]).names == ("box", "mug")
+    assert TextFactor.of_codes(np.array([], dtype=int), []).names == ()
 
 
 def test_stored_texts_have_the_same_keys() -> None:
     arrow = pytest.importorskip("pyarrow")
     texts = ["mug-0123456789", "", "tête-à-tête", "日本", "mug", "a" * 40, "mug-0123456788"]
     stored = arrow.chunked_array([arrow.array(["x", *texts[:3]])[1:], arrow.array(texts[3:])])
-    ids, array = Ids(stored), Ids(np.array(texts))
+    ids, array = IdColumn(stored), IdColumn(np.array(texts))
     assert len(set(array.keys.tolist())) == len(texts)
     assert ids.keys.tolist() == array.keys.tolist() == text_keys(np.array(texts)).tolist()
     rows = np.array([5, 0, 3])
@@ -324,7 +326,7 @@ def test_stored_texts_have_the_same_keys() -> None:
         assert [some[k] for k in range(len(some))] == ["a" * 40, "日本"]
         assert some.keys.tolist() == column.keys[[5, 3]].tolist() and not some.same(some)
         assert column.same(column) and not column.same(column.take(rows))
-    assert ids.same(Ids(arrow.chunked_array([texts]))) and not ids.same(Ids(stored[1:]))
+    assert ids.same(IdColumn(arrow.chunked_array([texts]))) and not ids.same(IdColumn(stored[1:]))
 
 
 def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -354,7 +356,7 @@ def test_the_headline_where_nothing_succeeded(tmp_path: Path) -> None:
     burg.trials.TrialBook(tmp_path / "trials.yaml").record(
         sheet.trials[0].number, outcome="slipped"
     )
-    told = headline(compare(run, tmp_path / "trials.yaml"))
+    told = headline_sentence(compare(run, tmp_path / "trials.yaml"))
     assert told.startswith("In 1 trial on the robot") and "undefined" not in told
     assert "It expected no grasp to succeed; no grasp succeeded." in told
 

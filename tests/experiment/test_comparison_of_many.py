@@ -9,17 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.records.table_file import write_table
-from burg_drake.evaluation.run import preparation
-from burg_drake.evaluation.store.campaign_folder import Campaign
-from burg_drake.experiment.comparison.comparing import compare
-from burg_drake.scene.document.scene import save_scene
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import InvalidInputError, Outcome, Pose
+from burg_drake.evaluation import (
+    Campaign,
+    EvaluationSettings,
+    evaluate,
+    run_preparation,
+    write_table,
+)
+from burg_drake.experiment import compare
+from burg_drake.scene import save_scene
+from burg_drake.station import load_station
 from tests.evaluation import known_judge
 from tests.evaluation.inline_executor import Inline
 from tests.evaluation.known_scene import write_scene
@@ -38,7 +38,7 @@ def test_many_scenes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     options = {"progress": False, "executor": Inline()}
     station = load_station("panda_tabletop")
     known_judge.install(monkeypatch.setattr)
-    monkeypatch.setattr(preparation, "write_report", lambda run: None)  # nobody reads them here
+    monkeypatch.setattr(run_preparation, "write_report", lambda run: None)  # nobody reads them here
     first = evaluate(paths, station, tmp_path / "first", settings=settings, **options)
     monkeypatch.setattr(known_judge, "expected", _other)
     second = evaluate(

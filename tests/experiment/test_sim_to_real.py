@@ -15,28 +15,32 @@ import pytest
 from scipy.stats import fisher_exact
 from statsmodels.stats.multitest import multipletests
 
-from burg_drake.apps.cli import main
-from burg_drake.core.grasps.mode import Mode
-from burg_drake.core.grasps.outcome import Outcome, RealOutcome
-from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.experiment.comparison.comparing import compare
-from burg_drake.experiment.comparison.report.page import comparison_page
-from burg_drake.experiment.comparison.standing_out import excess_p_value, holm, standing_out
-from burg_drake.experiment.comparison.tables import comparison_tables
-from burg_drake.experiment.comparison.wording import bias_words, headline
-from burg_drake.experiment.pages.words import SHORT_LIST
-from burg_drake.experiment.pairing.pairs import VerdictPairs
-from burg_drake.experiment.pairing.phases import unpredictable_outcomes
-from burg_drake.experiment.pairing.text_codes import Factor, Ids
-from burg_drake.experiment.statistics.margin_calibration import calibration
-from burg_drake.experiment.trials.sheet import (
+from burg_drake.apps import main
+from burg_drake.core import Mode, Outcome, RealOutcome
+from burg_drake.evaluation import Run
+from burg_drake.experiment import (
+    MAIN_OUTCOMES,
+    IdColumn,
     RealTrial,
     Selection,
     Stratum,
+    TextFactor,
     TrialSheet,
+    VerdictPairs,
+    bias_sentence,
+    calibrate_margin,
+    compare,
+    comparison_page,
+    comparison_tables,
+    excess_p_value,
+    find_outlier_groups,
+    grasp_content,
+    headline_sentence,
+    holm_correction,
+    make_source_run,
     save_trials,
+    unpredictable_outcomes,
 )
-from burg_drake.experiment.trials.sources import grasp_content, source_of
 from tests.experiment import known_runs
 
 Told = Mapping[str, Sequence[tuple[str, str]]]
@@ -92,7 +96,7 @@ def tried(
         for name, label in dict.fromkeys(labels)
     }
     sheet = TrialSheet(
-        runs={"a": source_of(run, folder)},
+        runs={"a": make_source_run(run, folder)},
         selection=Selection(per_object=100, balance="outcome"),
         strata=strata,
         trials=tuple(trials),
@@ -123,11 +127,11 @@ def test_sentences_hold_for_all_grasps_that_were_chosen_from(tmp_path: Path) -> 
     assert every.excess.low is not None and every.excess.high is not None
     assert every.excess.low < 51 / 740 < every.excess.high
     assert found.judgement.selected.excess.value == pytest.approx(-0.13)
-    said = bias_words(found)
+    said = bias_sentence(found)
     assert "Over all these grasps the simulator promises 6.9 percentage points more" in said
     assert "In the selected trials alone, each counted once, it promises 13.0 percentage" in said
     assert said.index("6.9") < said.index("13.0") and "McNemar" not in said
-    lead = headline(found)
+    lead = headline_sentence(found)
     # (639 + 10) of 740 are judged rightly, and 639 of 659 successes foreseen
     assert lead.startswith("Estimated for the 740 grasps that 100 trials on the robot stand for")
     assert "right for 88 %" in lead and "had expected 97 %" in lead
@@ -140,8 +144,10 @@ def test_sentences_hold_for_all_grasps_that_were_chosen_from(tmp_path: Path) -> 
 def test_trials_that_stand_for_themselves_are_told_as_trials(tmp_path: Path) -> None:
     run, sheet = tried(tmp_path, TURNED_ROUND)
     found = compare(run, sheet)
-    assert headline(found).startswith("In 100 trials on the robot the simulator's verdict was")
-    assert bias_words(found).startswith("The simulator promises 13.0 percentage points less")
+    assert headline_sentence(found).startswith(
+        "In 100 trials on the robot the simulator's verdict was"
+    )
+    assert bias_sentence(found).startswith("The simulator promises 13.0 percentage points less")
 
 
 def test_which_of_two_simulators_is_right_more_often_may_turn_round(tmp_path: Path) -> None:
@@ -261,18 +267,18 @@ def made_up(wrong: float, planted: float, rng: np.random.Generator) -> VerdictPa
     chance = np.where(predicted & (index == 0), planted, wrong)
     actual = predicted ^ (rng.random(len(index)) < chance)
     verdicts = rng.choice(["slipped", "dropped", "collision_table"], len(index))
-    none = Factor.of(np.full(len(index), ""))
+    none = TextFactor.of(np.full(len(index), ""))
     return VerdictPairs(
-        id=Ids(index.astype(str)),
+        id=IdColumn(index.astype(str)),
         run=none,
         scene=none,
-        object=Factor.of(index.astype(str)),
-        simulated=Factor.of(np.where(predicted, "lifted", verdicts)),
+        object=TextFactor.of(index.astype(str)),
+        simulated=TextFactor.of(np.where(predicted, "lifted", verdicts)),
         stage=none,
-        blocker=Factor.of(rng.choice(["", "a", "b"], len(index))),
+        blocker=TextFactor.of(rng.choice(["", "a", "b"], len(index))),
         judged_again=none,
         confidence=np.full(len(index), np.nan),
-        ended=Factor.of(np.where(actual, "lifted", "slipped")),
+        ended=TextFactor.of(np.where(actual, "lifted", "slipped")),
         predicted=predicted,
         actual=actual,
         margins={},
@@ -283,9 +289,9 @@ def test_false_alarms_are_rare_and_a_bad_object_is_found() -> None:
     """300 experiments each: 5 % of false alarms would be 15, and 23 is two standard deviations
     more; without correction something is named in 180."""
     rng = np.random.default_rng(2)
-    alarms = sum(bool(standing_out(made_up(0.2, 0.2, rng))[0]) for _ in range(300))
+    alarms = sum(bool(find_outlier_groups(made_up(0.2, 0.2, rng))[0]) for _ in range(300))
     assert 1 <= alarms <= 23
-    found = [standing_out(made_up(0.05, 0.8, rng))[0] for _ in range(100)]
+    found = [find_outlier_groups(made_up(0.05, 0.8, rng))[0] for _ in range(100)]
     named = [any((one.kind, one.name) == ("object", "0") for one in each) for each in found]
     assert sum(named) >= 95
 
@@ -295,8 +301,8 @@ def test_holms_correction_is_that_of_statsmodels() -> None:
     for count in (1, 2, 7, 30):
         p_values = rng.random(count) ** 3
         expected = multipletests(p_values, method="holm")[1]
-        np.testing.assert_allclose(holm(p_values.tolist()), expected)
-    assert holm([]) == []
+        np.testing.assert_allclose(holm_correction(p_values.tolist()), expected)
+    assert holm_correction([]) == []
 
 
 def test_mid_p_is_fair_where_the_exact_test_is_not() -> None:
@@ -328,15 +334,15 @@ def test_a_copy_has_the_same_rows(tmp_path: Path, capsys: pytest.CaptureFixture[
     again = known_runs.make_run(tmp_path / "again", scene, {"mug": other})
     found = compare(run, again)
     assert found.agreement is not None and found.agreement.same_rows == 7
-    assert "agree in 100 %" in headline(found)
+    assert "agree in 100 %" in headline_sentence(found)
     same = known_runs.make_run(tmp_path / "same", scene, {"mug": verdicts}, command="another")
-    assert "rows of both runs are the same" in headline(compare(run, same))
+    assert "rows of both runs are the same" in headline_sentence(compare(run, same))
 
 
 def test_outcomes_are_called_what_the_buttons_of_the_lab_call_them(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    real = [outcome for outcome in SHORT_LIST if outcome.attempted]
+    real = [outcome for outcome in MAIN_OUTCOMES if outcome.attempted]
     told = [("lifted", outcome.value) for outcome in real]
     told += [("lifted_disturbed", "slipped"), ("lifted_turned", "slipped")]
     run, sheet = tried(tmp_path, {"mug": told}, mode="reach")
@@ -344,7 +350,7 @@ def test_outcomes_are_called_what_the_buttons_of_the_lab_call_them(
     assert main(["compare", str(run.path), str(sheet), "--html", str(page)]) == 0
     text, out = page.read_text(), capsys.readouterr().out
     for outcome in real:
-        assert f">{SHORT_LIST[outcome][0]}<" in text
+        assert f">{MAIN_OUTCOMES[outcome][0]}<" in text
     for name in ("lifted, others moved", "lifted, turned"):
         assert name in out
     for value in ("lifted_turned", "lifted disturbed", "hand_collision", "hand collision"):
@@ -362,7 +368,7 @@ def test_two_trials_do_not_tell_which_margins_predict(tmp_path: Path) -> None:
     }
     run, sheet = tried(tmp_path, told, {"success": 7, "failure": 3})
     found = compare(run, sheet)
-    margin = calibration("slip", np.array([0.1, 0.2]), np.array([True, False]))
+    margin = calibrate_margin("slip", np.array([0.1, 0.2]), np.array([True, False]))
     found = replace(found, judgement=replace(found.judgement, calibration=(margin,)))
     text = "\n".join(str(part) for part in comparison_tables(found) if isinstance(part, str))
     words = "Too few trials to tell which margins predict actual success: that takes 5 successes"

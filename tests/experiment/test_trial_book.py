@@ -19,17 +19,30 @@ import pytest
 import yaml
 from hypothesis import example, given, settings, strategies as st
 
-from burg_drake.cameras.sources.image_file import write_image
-from burg_drake.core.documents.schema import Pose, dump_document, parse_document, plain_data
-from burg_drake.core.documents.yaml_nodes import parse_nodes
-from burg_drake.core.errors import DocumentError, InvalidInputError, UnknownNameError
-from burg_drake.core.files import UNFINISHED
-from burg_drake.core.grasps.outcome import RealOutcome
-from burg_drake.experiment.trials.book import TrialBook, TrialChanged
-from burg_drake.experiment.trials.evidence import keep_evidence
-from burg_drake.experiment.trials.file_lock import exclusive
-from burg_drake.experiment.trials.sheet import ObjectPlace, RobotReport, TrialSheet, load_trials
-from burg_drake.experiment.trials.sheet_text import SheetText
+from burg_drake.cameras import write_image
+from burg_drake.core import (
+    UNFINISHED_FILE,
+    DocumentError,
+    InvalidInputError,
+    Pose,
+    RealOutcome,
+    UnknownNameError,
+    dump_document,
+    parse_document,
+    parse_yaml_node,
+    plain_data,
+)
+from burg_drake.experiment import (
+    ObjectPlace,
+    RobotReport,
+    SheetText,
+    TrialBook,
+    TrialChanged,
+    TrialSheet,
+    load_trials,
+    lock_trials_file,
+    save_photo_and_placement,
+)
 from tests.experiment.trial_sheets import make_sheet, write_sheet
 
 PLACE = ObjectPlace(
@@ -37,7 +50,7 @@ PLACE = ObjectPlace(
 )
 WRITER = """
 import sys
-from burg_drake.experiment.trials.book import TrialBook
+from burg_drake.experiment.trials.trial_book import TrialBook
 book = TrialBook(sys.argv[1])
 for number in map(int, sys.argv[2:]):
     book.record(number, outcome="slipped", note=f"by {number}")
@@ -78,7 +91,7 @@ def test_what_was_told_before_a_kill_is_there(tmp_path: Path) -> None:
 @pytest.mark.parametrize("step", ["append_entry", "SheetText.with_trial", "atomic_write"])
 def test_a_kill_between_two_steps_leaves_a_sound_file(tmp_path: Path, step: str) -> None:
     path = write_sheet(tmp_path)
-    where = "burg_drake.experiment.trials.book"
+    where = "burg_drake.experiment.trials.trial_book"
     script = f"import os, {where} as b; b.{step} = lambda *_: os.kill(os.getpid(), 9)\n" + WRITER
     ended = subprocess.run([sys.executable, "-c", script, str(path), "2"], check=False)
     assert ended.returncode == -signal.SIGKILL
@@ -113,14 +126,17 @@ def test_all_links_to_a_file_share_its_lock_and_journal(tmp_path: Path) -> None:
     assert len(TrialBook(link).restore()) == 24 and TrialBook(path).missing_values() == []
     photo = tmp_path / "p.png"
     write_image(photo, np.zeros((4, 6, 3), np.uint8))
-    assert keep_evidence(link, 3, photo=photo) == "photos/003.png"
+    assert save_photo_and_placement(link, 3, photo=photo) == "photos/003.png"
     assert (path.parent / "photos" / "003.png").exists()
 
 
 def test_a_lock_that_is_kept_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     book = TrialBook(write_sheet(tmp_path))
-    monkeypatch.setattr("burg_drake.experiment.trials.file_lock.LOCK_TIMEOUT", 0.05)
-    with exclusive(book.path), pytest.raises(InvalidInputError, match="locked by another process"):
+    monkeypatch.setattr("burg_drake.experiment.trials.journal.TRIALS_LOCK_TIMEOUT", 0.05)
+    with (
+        lock_trials_file(book.path),
+        pytest.raises(InvalidInputError, match="locked by another process"),
+    ):
         book.record(1, outcome="lifted")
     assert book.entries() == [] and book.record(1, outcome="lifted").number == 1
 
@@ -296,7 +312,7 @@ def test_each_step_is_on_the_disk_before_the_next_one(
         if os.path.samestat(status, tmp_path.stat()):
             return "folder"
         names = [p.name for p in tmp_path.iterdir() if os.path.samestat(status, p.stat())]
-        return "new file" if UNFINISHED.fullmatch(names[0]) else names[0]
+        return "new file" if UNFINISHED_FILE.fullmatch(names[0]) else names[0]
 
     def logged(name: str) -> Callable[..., object]:
         def call(*arguments: Any) -> object:
@@ -418,9 +434,9 @@ def test_an_entry_is_read_and_written_by_itself(
 
     def counted(text: str, *more: str) -> yaml.Node:
         lengths.append(len(text))
-        return parse_nodes(text, *more)
+        return parse_yaml_node(text, *more)
 
-    monkeypatch.setattr("burg_drake.experiment.trials.sheet_text.parse_nodes", counted)
+    monkeypatch.setattr("burg_drake.experiment.trials.sheet_text.parse_yaml_node", counted)
     for number in range(1, 61):
         writer = other if number % 2 else book
         writer.record(number, outcome="lifted", note="so", placement={"mug": PLACE})

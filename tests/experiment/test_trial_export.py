@@ -9,14 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import grasp_from_axes
-from burg_drake.experiment.planning.plan import plan_trials
-from burg_drake.experiment.trials.export import export_trials
-from burg_drake.experiment.trials.sheet import save_trials
-from burg_drake.motion.plans.grasp_plan import load_plan
-from burg_drake.station.diagram.station_diagram import instance_pose
+from burg_drake.apps import main
+from burg_drake.core import InvalidInputError, grasp_from_axes
+from burg_drake.experiment import export_trials, plan_trials, save_trials
+from burg_drake.motion import load_plan
+from burg_drake.station import instance_pose
 from tests.experiment.known_runs import ended, make_run, make_scene
 
 ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
@@ -56,7 +53,7 @@ def test_motions_go_by_numbers_and_are_kept(
     assert (rows[bad.number]["file"], rows[bad.number]["answer"]) == ("", "collision_table")
 
     stamp = file.stat().st_mtime_ns
-    monkeypatch.setattr("burg_drake.experiment.trials.export.judge_all", _nothing_left)
+    monkeypatch.setattr("burg_drake.experiment.trials.motion_export.judge_all", _nothing_left)
     assert main(words) == 0 and file.stat().st_mtime_ns == stamp
     save_trials(replace(sheet, trials=(good,)), path)
     with pytest.raises(InvalidInputError, match="has plans of another evaluation"):

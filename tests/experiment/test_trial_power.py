@@ -9,16 +9,16 @@ import pytest
 from statsmodels.stats.contingency_tables import mcnemar
 from statsmodels.stats.proportion import proportion_confint
 
-from burg_drake.experiment.planning.power import (
-    difference_text,
+from burg_drake.experiment import (
+    Stratum,
+    detectable_difference_sentence,
     effective_trials,
-    expected_figures,
+    expected_estimates,
     half_width,
     mcnemar_power,
     power_table,
     smallest_difference,
 )
-from burg_drake.experiment.trials.sheet import Stratum
 from tests.experiment.trial_sheets import make_sheet
 
 
@@ -84,9 +84,12 @@ def test_weights_make_some_trials_count_less() -> None:
 
 def test_the_plan_prints_what_is_to_be_expected() -> None:
     sheet = make_sheet(20)
-    rows = {row.name: row.trials for row in expected_figures(sheet)}
+    rows = {row.name: row.trials for row in expected_estimates(sheet)}
     assert rows == {"mug": 20, "all": 20, "precision": 10, "recall": 10}
     text = "\n".join(line for line, _ in power_table(sheet).lines(100))
     assert "± 20 %" in text and "precision" in text
-    assert f"differ by {100 * smallest_difference(20):.0f} points" in difference_text(20)
-    assert "3 trials are too few" in difference_text(3)
+    assert (
+        f"differ by {100 * smallest_difference(20):.0f} points"
+        in detectable_difference_sentence(20)
+    )
+    assert "3 trials are too few" in detectable_difference_sentence(3)

@@ -10,15 +10,19 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.evaluation.records.table_file import write_table
-from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.experiment.planning.plan import plan_trials
-from burg_drake.experiment.planning.settings import SelectionSettings
-from burg_drake.experiment.planning.strata import allocate
-from burg_drake.experiment.trials.book import TrialBook
-from burg_drake.experiment.trials.sheet import TrialSheet, load_trials
-from burg_drake.experiment.trials.sources import grasp_content, load_sources, trial_rows
+from burg_drake.core import InvalidInputError
+from burg_drake.evaluation import Run, write_table
+from burg_drake.experiment import (
+    SelectionSettings,
+    TrialBook,
+    TrialSheet,
+    allocate_to_strata,
+    grasp_content,
+    load_sources,
+    load_trials,
+    plan_trials,
+    trial_rows,
+)
 from tests.experiment.known_runs import ended, failed, make_run, make_scene
 
 MUG = [
@@ -204,7 +208,7 @@ def test_a_grasp_of_two_runs_is_tried_once(folder: Path, hand: Run) -> None:
 )
 @settings(max_examples=60, deadline=None)
 def test_no_stratum_could_give_more_evenly(populations: dict[str, int], wanted: int) -> None:
-    chosen = allocate(populations, wanted, sorted(populations))
+    chosen = allocate_to_strata(populations, wanted, sorted(populations))
     assert sum(chosen.values()) == min(wanted, sum(populations.values()))
     most = max(chosen.values())
     for label, count in chosen.items():

@@ -14,24 +14,25 @@ from sklearn.metrics import cohen_kappa_score
 from statsmodels.stats.proportion import proportion_confint
 
 import burg_drake as burg
-from burg_drake.apps.cli import main
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import grasp_from_axes, make_pose
-from burg_drake.core.grasps import Verdict
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.limit_numbers import AS_MEASURED
-from burg_drake.evaluation.records.run_document import Input, numbers
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.experiment.comparison.comparing import compare
-from burg_drake.experiment.comparison.record import comparison_json
-from burg_drake.experiment.comparison.report.page import comparison_page
-from burg_drake.experiment.comparison.run_agreement import RunAgreement
-from burg_drake.experiment.pairing.phases import UNITS
-from burg_drake.simulation.trials.trial_settings import NO_LIMITS, TrialSettings
-from burg_drake.station.document.engine import ENGINES
-from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.apps import main
+from burg_drake.core import GraspSet, InvalidInputError, Verdict, grasp_from_axes, make_pose
+from burg_drake.evaluation import (
+    MEASURE_NUMBERS,
+    EvaluationSettings,
+    Input,
+    Run,
+    evaluate,
+    settings_numbers,
+)
+from burg_drake.experiment import (
+    TRIAL_SETTING_UNITS,
+    RunAgreement,
+    compare,
+    comparison_json,
+    comparison_page,
+)
+from burg_drake.simulation import NO_GRIP_LIMITS, TrialSettings
+from burg_drake.station import ENGINES, GraspMotion
 from tests.evaluation.inline_executor import Inline
 from tests.experiment import known_runs
 from tests.experiment.test_comparison import Page
@@ -52,7 +53,7 @@ def engines(no_pose_mistakes: None, tmp_path_factory: pytest.TempPathFactory) ->
     high, low = (ABOVE @ make_pose(p_AB=(0.0, 0.0, z)) for z in (-0.1, 0.1))
     grasps = GraspSet.create(np.concatenate([along, [high, low]]), object="box", width=0.06)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("burg_drake.evaluation.run.preparation.write_report", lambda run: None)
+        patch.setattr("burg_drake.evaluation.run_preparation.write_report", lambda run: None)
         found = [
             evaluate(
                 scene,
@@ -296,7 +297,7 @@ USUAL = GraspMotion()
 
 def recorded(motion: GraspMotion = USUAL, **changes: float) -> dict[str, float]:
     """What a run of today records of its trials."""
-    return numbers(TrialSettings(motion=motion, **changes))  # type: ignore[arg-type]
+    return settings_numbers(TrialSettings(motion=motion, **changes))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -340,7 +341,7 @@ def test_every_setting_of_a_trial_is_compared(tmp_path: Path) -> None:
     names = [f.name for f in dataclasses.fields(TrialSettings) if f.name != "motion"]
     for name in names:
         value = getattr(default, name)
-        other = numbers(
+        other = settings_numbers(
             dataclasses.replace(
                 default, **{name: not value if isinstance(value, bool) else 0.9 * value}
             )
@@ -348,7 +349,7 @@ def test_every_setting_of_a_trial_is_compared(tmp_path: Path) -> None:
         made = known_runs.make_run(tmp_path / name, scene, {"mug": LIFTED}, trial=other)
         with pytest.raises(InvalidInputError, match=f"different phases: {name.replace('_', ' ')} "):
             compare(run, made)
-        assert name in UNITS or isinstance(value, bool)
+        assert name in TRIAL_SETTING_UNITS or isinstance(value, bool)
 
 
 def test_all_that_differs_is_named_at_once(
@@ -374,11 +375,11 @@ def test_all_that_differs_is_named_at_once(
 
 def test_what_was_not_recorded_is_what_it_was(tmp_path: Path) -> None:
     """Runs of before there were limits, and directions of another length."""
-    first, second = made_up(tmp_path, LIFTED, LIFTED, trial=recorded(**NO_LIMITS))
+    first, second = made_up(tmp_path, LIFTED, LIFTED, trial=recorded(**NO_GRIP_LIMITS))
     assert first.document.trial == {}
     assert compare(first, second).coverage.compared == 2
     scene = known_runs.make_scene(tmp_path)
-    up = recorded(GraspMotion(lift_direction=(0.0, 0.0, 2.5)), **NO_LIMITS)
+    up = recorded(GraspMotion(lift_direction=(0.0, 0.0, 2.5)), **NO_GRIP_LIMITS)
     longer = known_runs.make_run(tmp_path / "c", scene, {"mug": LIFTED}, trial=up)
     assert compare(first, longer).coverage.compared == 2
 
@@ -426,7 +427,7 @@ def test_the_whole_arm_approaches_anyway(tmp_path: Path) -> None:
 
 
 def test_how_others_were_watched_is_told(tmp_path: Path) -> None:
-    measured = {**recorded(), **AS_MEASURED}
+    measured = {**recorded(), **MEASURE_NUMBERS}
     first, second = made_up(tmp_path, LIFTED, LIFTED, trial=measured)
     first = known_runs.make_run(tmp_path / "c", first.scene(), {"mug": LIFTED}, trial=recorded())
     (told,) = compare(first, second).settings

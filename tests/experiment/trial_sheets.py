@@ -4,16 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.evaluation.records.run_document import Input
-from burg_drake.experiment.trials.sheet import (
-    RealTrial,
-    Selection,
-    SourceRun,
-    Stratum,
-    TrialSheet,
-    save_trials,
-)
+from burg_drake.core import Outcome
+from burg_drake.evaluation import Input
+from burg_drake.experiment import RealTrial, Selection, SourceRun, Stratum, TrialSheet, save_trials
 
 
 def make_sheet(count: int = 4) -> TrialSheet:

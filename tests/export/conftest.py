@@ -7,13 +7,11 @@ from dataclasses import replace
 
 import pytest
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.documents.schema import Pose
-from burg_drake.export.scene_export import FORMATS, Exported, export_scene
-from burg_drake.objects.library.document import load_library
-from burg_drake.objects.library.entry import ContactGeometry
-from burg_drake.scene.document.scene import Board, Instance, Scene, SceneDocument
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.core import Array, Pose
+from burg_drake.export import SCENE_FORMATS, Exported, export_scene
+from burg_drake.objects import ContactGeometry, load_library
+from burg_drake.scene import Board, Instance, Scene, SceneDocument
+from burg_drake.station import Station, load_station
 
 INSTANCES = (
     Instance(object="mug", X_SO=Pose((0.12, 0.11, 0.0), rpy_deg=(0.0, 0.0, 140.0))),
@@ -51,7 +49,7 @@ def exports(
     """By format; the folders are no longer where they were written."""
     written, moved = tmp_path_factory.mktemp("written"), tmp_path_factory.mktemp("moved")
     found = {}
-    for to in FORMATS:
+    for to in SCENE_FORMATS:
         exported = export_scene(scene, written / to, to, station)
         shutil.move(written / to, moved / to)
         found[to] = replace(exported, main=moved / to / exported.main.name)

@@ -12,7 +12,7 @@ from pydrake.multibody.tree import RigidBody
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from burg_drake.core.arrays import Array
+from burg_drake.core import Array
 
 
 @dataclass

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from burg_drake.core.arrays import Array
-from burg_drake.objects.library.entry import Inertia
+from burg_drake.core import Array
+from burg_drake.objects import Inertia
 
 
 def inertia_matrix(inertia: Inertia) -> Array:

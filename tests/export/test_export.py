@@ -9,13 +9,11 @@ from pathlib import Path
 import pytest
 
 import burg_drake as burg
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError, MissingDependencyError, UnknownNameError
-from burg_drake.export.layout import lay_out
-from burg_drake.export.legal_names import LegalNames
-from burg_drake.objects.library.entry import ContactGeometry
-from burg_drake.scene.document.scene import Instance, Scene
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import InvalidInputError, MissingDependencyError, Pose, UnknownNameError
+from burg_drake.export import LegalNames, lay_out
+from burg_drake.objects import ContactGeometry
+from burg_drake.scene import Instance, Scene
+from burg_drake.station import Station
 
 
 def of(scene: Scene, *instances: Instance) -> Scene:

@@ -6,22 +6,21 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.core.documents.schema import load_document
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.export.folder import (
+from burg_drake.core import InvalidInputError, load_document
+from burg_drake.export import (
     ExportRecord,
-    replaced_folder,
+    export_scene,
+    replace_folder,
     require_own_folder,
     write_record,
 )
-from burg_drake.export.scene_export import export_scene
-from burg_drake.scene.document.scene import Scene
+from burg_drake.scene import Scene
 
 RECORD = ExportRecord(format="sdf", scene="s", scene_content="", main="a", software="x")
 
 
 def export(path: Path, **files: str) -> None:
-    with replaced_folder(require_own_folder(path)) as fresh:
+    with replace_folder(require_own_folder(path)) as fresh:
         for name, text in files.items():
             (fresh / name).write_text(text)
         write_record(fresh, RECORD)
@@ -81,7 +80,7 @@ def test_what_fails_half_way_leaves_everything_as_it_was(tmp_path: Path) -> None
     export(tmp_path / "out", a="1")
     with (
         pytest.raises(ZeroDivisionError),
-        replaced_folder(require_own_folder(tmp_path / "out")) as fresh,
+        replace_folder(require_own_folder(tmp_path / "out")) as fresh,
     ):
         (fresh / "a").write_text("2")
         raise ZeroDivisionError

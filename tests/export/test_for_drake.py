@@ -9,12 +9,10 @@ import pytest
 from pydrake.geometry import Role
 from pydrake.multibody.tree import RigidBody
 
-from burg_drake.core.arrays import Array
-from burg_drake.export.scene_export import Exported
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.diagram.station_diagram import StationDiagram
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import Array
+from burg_drake.export import Exported
+from burg_drake.scene import Scene
+from burg_drake.station import Station, StationDiagram, build_station_diagram
 from tests.export.drake_world import DrakeWorld, open_in_drake
 from tests.export.mass_matrix import inertia_matrix
 

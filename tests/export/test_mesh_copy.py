@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.export.mesh_copy import MeshCopies
+from burg_drake.core import InvalidInputError
+from burg_drake.export import MeshCopies
 
 TEXTURED = {
     "mesh.obj": "mtllib mesh.mtl\nv 0 0 0\n",

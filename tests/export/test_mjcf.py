@@ -8,10 +8,10 @@ import pytest
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
-from burg_drake.core.arrays import Array
-from burg_drake.export.scene_export import Exported
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import Array
+from burg_drake.export import Exported
+from burg_drake.scene import Scene
+from burg_drake.station import Station
 from tests.export.mass_matrix import inertia_matrix
 
 

@@ -8,12 +8,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.export.scene_export import Exported, export_scene
-from burg_drake.objects.library.document import load_library
-from burg_drake.scene.document.scene import Board, Instance, Scene, SceneDocument
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.core import InvalidInputError, Pose
+from burg_drake.export import Exported, export_scene
+from burg_drake.objects import load_library
+from burg_drake.scene import Board, Instance, Scene, SceneDocument
+from burg_drake.station import Station, load_station
 
 
 @pytest.fixture(scope="module")

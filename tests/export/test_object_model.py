@@ -7,10 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.core.errors import BurgError
-from burg_drake.core.paths.packages import NO_PACKAGES
-from burg_drake.export.sdf_object import object_model
-from burg_drake.objects.library.document import load_library
+from burg_drake.core import NO_PACKAGES, BurgError
+from burg_drake.export import object_sdf_model
+from burg_drake.objects import load_library
 
 
 @pytest.mark.parametrize(
@@ -34,6 +33,6 @@ def test_what_is_wrong_is_told(tmp_path: Path, old: str, new: str, expected: str
     sdf.write_text(sdf.read_text().replace(old, new))
     library = load_library(tmp_path)
     with pytest.raises(BurgError) as caught:
-        object_model(library, "can", library.entry("can"), tmp_path / "out", NO_PACKAGES)
+        object_sdf_model(library, "can", library.entry("can"), tmp_path / "out", NO_PACKAGES)
     assert expected in str(caught.value)
     assert "\n" not in str(caught.value)

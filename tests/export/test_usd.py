@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from pxr import Gf, Usd, UsdGeom, UsdPhysics, UsdShade
 
-from burg_drake.core.arrays import Array
-from burg_drake.export.scene_export import Exported
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import Array
+from burg_drake.export import Exported
+from burg_drake.scene import Scene
+from burg_drake.station import Station
 from tests.export.mass_matrix import inertia_matrix
 
 LEGAL = {"2-can.b": "_2_can_b"}

@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps.grasp_set import GraspSet
+from burg_drake.core import Array, GraspSet, make_pose
 
 
 @pytest.fixture

@@ -10,11 +10,8 @@ import h5py
 import numpy as np
 import pytest
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.formats.common.grasp_format import PANDA
-from burg_drake.formats.grasps import acronym
+from burg_drake.core import Array, GraspSet, InvalidInputError
+from burg_drake.formats import PANDA_GRIPPER, acronym
 
 MOTIONS = [
     "object_motion_during_closing_angular",
@@ -67,21 +64,21 @@ DOWN = np.array(
 def test_a_grasp_on_a_cube_written_by_hand(
     tmp_path: Path, assert_grips_the_cube: Callable[[Array], None]
 ) -> None:
-    read = acronym.read(dataset_file(tmp_path / "a.h5", DOWN[None], [1]), PANDA)
+    read = acronym.read_acronym(dataset_file(tmp_path / "a.h5", DOWN[None], [1]), PANDA_GRIPPER)
     assert read.frame == "object"
     assert_grips_the_cube(read.grasps.X_OG[0])
     # create_gripper_marker of the data set draws the tips at (+-0.041, 0, 0.11217) of the gripper
     tips = DOWN @ np.array([[0.041, 0.0, 0.11217, 1.0], [-0.041, 0.0, 0.11217, 1.0]]).T
     in_grasp = np.linalg.inv(read.grasps.X_OG[0]) @ tips
     np.testing.assert_allclose(in_grasp[:2], [[0.041, -0.041], [0.0, 0.0]], atol=1e-9)
-    np.testing.assert_allclose(in_grasp[2], PANDA.tip, atol=1e-3)
+    np.testing.assert_allclose(in_grasp[2], PANDA_GRIPPER.tip, atol=1e-3)
 
 
 def test_values_of_a_file_arrive(tmp_path: Path, random_grasps: Callable[..., GraspSet]) -> None:
     T = random_grasps(7, 3).X_OG
     success = np.array([1, 0, 1, 1, 0, 0, 1])
     path = dataset_file(tmp_path / "Mug_10f6_0.00027.h5", T, success)
-    read = acronym.read(path, PANDA)
+    read = acronym.read_acronym(path, PANDA_GRIPPER)
     grasps = read.grasps
     name = "10f6e09036350e92b3f21f1137c3c347"
     assert set(grasps.object.tolist()) == {name}
@@ -101,7 +98,7 @@ def test_values_of_a_file_arrive(tmp_path: Path, random_grasps: Callable[..., Gr
 def test_single_precision_is_read(tmp_path: Path, random_grasps: Callable[..., GraspSet]) -> None:
     T = random_grasps(20, 4).X_OG
     path = dataset_file(tmp_path / "a.h5", T.astype(np.float32), np.ones(20, bool))
-    found = acronym.read(path, PANDA).grasps.X_OG
+    found = acronym.read_acronym(path, PANDA_GRIPPER).grasps.X_OG
     np.testing.assert_allclose(found[:, :3, :3], T[:, :3, :3], atol=1e-6)
     R = found[:, :3, :3]
     np.testing.assert_allclose(
@@ -113,7 +110,7 @@ def test_written_files_are_read_by_the_data_set_s_own_tools(
     tmp_path: Path, random_grasps: Callable[..., GraspSet]
 ) -> None:
     grasps = random_grasps(9, 5, success=True)
-    notes = acronym.write(grasps, tmp_path / "out.h5", PANDA)
+    notes = acronym.write_acronym(grasps, tmp_path / "out.h5", PANDA_GRIPPER)
     T, success = load_grasps(tmp_path / "out.h5")
     np.testing.assert_array_equal(success, grasps.score)
     assert success.dtype.kind == "i"
@@ -132,7 +129,9 @@ def test_a_file_written_from_one_that_was_read_has_its_object_again(
     tmp_path: Path, random_grasps: Callable[..., GraspSet]
 ) -> None:
     path = dataset_file(tmp_path / "a.h5", random_grasps(3, 6).X_OG, [1, 0, 1])
-    notes = acronym.write(acronym.read(path, PANDA).grasps, tmp_path / "b.h5", PANDA)
+    notes = acronym.write_acronym(
+        acronym.read_acronym(path, PANDA_GRIPPER).grasps, tmp_path / "b.h5", PANDA_GRIPPER
+    )
     assert notes == ("ACRONYM has no place for id.",)
     with h5py.File(path) as one, h5py.File(tmp_path / "b.h5") as other:
         for key in ("file", "scale", "mass", "com", "inertia", "volume"):
@@ -147,12 +146,12 @@ def test_scores_that_are_no_success_are_kept_beside_flex(
     tmp_path: Path, random_grasps: Callable[..., GraspSet]
 ) -> None:
     grasps = random_grasps(5, 7).with_columns(epsilon=np.arange(5.0), remark=list("abcde"))
-    notes = acronym.write(grasps, tmp_path / "a.h5", PANDA)
+    notes = acronym.write_acronym(grasps, tmp_path / "a.h5", PANDA_GRIPPER)
     assert any("NaN for 5 grasps" in note for note in notes)
     assert any("remark" in note for note in notes)
     _, success = load_grasps(tmp_path / "a.h5")
     assert np.isnan(success).all()
-    back = acronym.read(tmp_path / "a.h5", PANDA).grasps
+    back = acronym.read_acronym(tmp_path / "a.h5", PANDA_GRIPPER).grasps
     np.testing.assert_array_equal(back.score, grasps.score)
     np.testing.assert_array_equal(back.width, grasps.width)
     np.testing.assert_array_equal(back.columns["epsilon"], np.arange(5.0))
@@ -162,10 +161,10 @@ def test_outcomes_of_trials_become_success(
     tmp_path: Path, random_grasps: Callable[..., GraspSet]
 ) -> None:
     grasps = random_grasps(3, 8).with_columns(outcome=["lifted", "slipped", "no_ik"])
-    acronym.write(grasps, tmp_path / "a.h5", PANDA)
+    acronym.write_acronym(grasps, tmp_path / "a.h5", PANDA_GRIPPER)
     np.testing.assert_array_equal(load_grasps(tmp_path / "a.h5")[1], [1, 0, 0])
     untried = random_grasps(3, 8).with_columns(outcome=["lifted", "", "slipped"])
-    notes = acronym.write(untried, tmp_path / "b.h5", PANDA)
+    notes = acronym.write_acronym(untried, tmp_path / "b.h5", PANDA_GRIPPER)
     assert any("NaN for 1 grasps" in note for note in notes)
     np.testing.assert_array_equal(load_grasps(tmp_path / "b.h5")[1], [1.0, np.nan, 0.0])
 
@@ -179,11 +178,11 @@ def test_qualities_of_other_simulators_keep_their_names(
         "grasps/qualities/flex/width": np.array([3.0, 4.0]),  # whatever that is
     }
     path = dataset_file(tmp_path / "a.h5", T, [1, 1], **extra)
-    grasps = acronym.read(path, PANDA).grasps
+    grasps = acronym.read_acronym(path, PANDA_GRIPPER).grasps
     np.testing.assert_array_equal(grasps.columns["physx.slip"], [0.1, 0.2])
     np.testing.assert_array_equal(grasps.columns["flex.width"], [3.0, 4.0])
     assert np.isnan(grasps.width).all()
-    acronym.write(grasps, tmp_path / "b.h5", PANDA)
+    acronym.write_acronym(grasps, tmp_path / "b.h5", PANDA_GRIPPER)
     with h5py.File(tmp_path / "b.h5") as file:
         np.testing.assert_array_equal(file["grasps/qualities/physx/slip"], [0.1, 0.2])
 
@@ -193,10 +192,10 @@ def test_several_objects_are_refused(
 ) -> None:
     both = GraspSet.concatenate([random_grasps(2, 1), random_grasps(2, 2, object="bowl")])
     with pytest.raises(InvalidInputError, match=r"2 objects \(bowl, mug\).*choose one of them"):
-        acronym.write(both, tmp_path / "a.h5", PANDA)
+        acronym.write_acronym(both, tmp_path / "a.h5", PANDA_GRIPPER)
     assert not list(tmp_path.iterdir())
     with pytest.raises(InvalidInputError, match="no grasps to write"):
-        acronym.write(both.select([]), tmp_path / "a.h5", PANDA)
+        acronym.write_acronym(both.select([]), tmp_path / "a.h5", PANDA_GRIPPER)
 
 
 FLEX = "grasps/qualities/flex/object_in_gripper"
@@ -225,7 +224,7 @@ FLEX = "grasps/qualities/flex/object_in_gripper"
 def test_malformed_files_say_where(tmp_path: Path, changed: dict[str, Any], said: str) -> None:
     path = dataset_file(tmp_path / "bad.h5", np.stack([DOWN, DOWN]), [1, 0], **changed)
     with pytest.raises(InvalidInputError, match=said) as caught:
-        acronym.read(path, PANDA)
+        acronym.read_acronym(path, PANDA_GRIPPER)
     assert str(path) in str(caught.value)
 
 
@@ -234,12 +233,12 @@ def test_groups_in_the_place_of_datasets_and_the_other_way_round(tmp_path: Path)
     with h5py.File(path, "a") as file:
         file.create_group("object/scale")
     with pytest.raises(InvalidInputError, match="object/scale is a group"):
-        acronym.read(path, PANDA)
+        acronym.read_acronym(path, PANDA_GRIPPER)
     with h5py.File(tmp_path / "b.h5", "w") as file:
         file["grasps"] = np.zeros(3)
-    assert not acronym.recognises(tmp_path / "b.h5")
+    assert not acronym.recognise_acronym(tmp_path / "b.h5")
     with pytest.raises(InvalidInputError, match="grasps/transforms is missing"):
-        acronym.read(tmp_path / "b.h5", PANDA)
+        acronym.read_acronym(tmp_path / "b.h5", PANDA_GRIPPER)
 
 
 def test_a_truncated_file_is_one_clear_error(tmp_path: Path) -> None:
@@ -249,7 +248,7 @@ def test_a_truncated_file_is_one_clear_error(tmp_path: Path) -> None:
         cut = tmp_path / "cut.h5"
         cut.write_bytes(content[: int(share * len(content))])
         with pytest.raises(InvalidInputError, match=r"cut\.h5"):
-            acronym.read(cut, PANDA)
+            acronym.read_acronym(cut, PANDA_GRIPPER)
 
 
 def test_another_hand_is_refused(tmp_path: Path) -> None:
@@ -257,9 +256,9 @@ def test_another_hand_is_refused(tmp_path: Path) -> None:
 
     path = dataset_file(tmp_path / "a.h5", DOWN[None], [1])
     with pytest.raises(InvalidInputError, match=r"gripper/type.*panda_hand.*wsg"):
-        acronym.read(path, replace(PANDA, name="wsg_50"))
+        acronym.read_acronym(path, replace(PANDA_GRIPPER, name="wsg_50"))
     path = dataset_file(tmp_path / "b.h5", DOWN[None], [1], **{"gripper/type": "robotiq"})
     assert any(
         "the file names a hand 'robotiq', which was taken to be" in note
-        for note in acronym.read(path, PANDA).notes
+        for note in acronym.read_acronym(path, PANDA_GRIPPER).notes
     )

@@ -8,12 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.formats.common.grasp_format import PANDA
-from burg_drake.formats.grasps.burg_toolkit import FORMAT
+from burg_drake.core import Array, GraspSet, InvalidInputError, make_pose
+from burg_drake.formats import BURG_TOOLKIT_FORMAT, PANDA_GRIPPER
 
 FROM_ABOVE = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
 """x, the closing direction, along y of the world; z up, where the hand comes from."""
@@ -37,7 +33,7 @@ def test_a_cube_from_above(tmp_path: Path, assert_grips_the_cube: Callable[[Arra
     )
     np.testing.assert_allclose(pose[:3, :3], FROM_ABOVE, atol=1e-15)
     np.save(tmp_path / "grasps.npy", np.array([pose], dtype=np.float32))
-    imported = FORMAT.read(tmp_path / "grasps.npy", PANDA)
+    imported = BURG_TOOLKIT_FORMAT.read(tmp_path / "grasps.npy", PANDA_GRIPPER)
     assert (imported.frame, imported.notes) == ("world", ())
     assert_grips_the_cube(imported.grasps.X_OG[0])
     assert np.isnan([imported.grasps.width[0], imported.grasps.score[0]]).all()
@@ -50,8 +46,8 @@ def test_their_franka_hand_grips_where_ours_does(tmp_path: Path) -> None:
         np.array([0.1, -0.02, 0.3]), np.array([0.2, 0.02, 0.4]), np.array([0.3, 0.1, 1.0])
     )
     np.save(tmp_path / "grasps.npy", pose[None])
-    X_WG = FORMAT.read(tmp_path / "grasps.npy", PANDA).grasps.X_OG[0]
-    X_WH = X_WG @ np.linalg.inv(PANDA.X_HG)
+    X_WG = BURG_TOOLKIT_FORMAT.read(tmp_path / "grasps.npy", PANDA_GRIPPER).grasps.X_OG[0]
+    X_WH = X_WG @ np.linalg.inv(PANDA_GRIPPER.X_HG)
     np.testing.assert_allclose(X_WH[:3, :3], (pose @ grasp2ee)[:3, :3], atol=1e-12)
 
 
@@ -60,12 +56,12 @@ def test_rows_of_the_internal_array(tmp_path: Path) -> None:
     rows[:, 0:3] = [[0.0, 0.0, 0.0], [0.1, 0.2, 0.3]]
     rows[:, 3:12] = np.reshape(FROM_ABOVE, 9)
     np.save(tmp_path / "unset.npy", rows)
-    unset = FORMAT.read(tmp_path / "unset.npy", PANDA).grasps
+    unset = BURG_TOOLKIT_FORMAT.read(tmp_path / "unset.npy", PANDA_GRIPPER).grasps
     assert np.isnan(unset.width).all() and np.isnan(unset.score).all()
     rows[:, 12], rows[:, 13] = [0.0, 1.0], [0.04, 0.05]
     np.save(tmp_path / "set.npy", rows)
-    assert FORMAT.recognises(tmp_path / "set.npy")
-    grasps = FORMAT.read(tmp_path / "set.npy", PANDA).grasps
+    assert BURG_TOOLKIT_FORMAT.recognises(tmp_path / "set.npy")
+    grasps = BURG_TOOLKIT_FORMAT.read(tmp_path / "set.npy", PANDA_GRIPPER).grasps
     assert grasps.score.tolist() == [0.0, 1.0]
     np.testing.assert_allclose(grasps.width, [0.04, 0.05], rtol=1e-7)
     np.testing.assert_allclose(grasps.X_OG[1, :3, 3], [0.1, 0.2, 0.3], rtol=1e-7)
@@ -76,21 +72,21 @@ def test_rows_of_the_internal_array(tmp_path: Path) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_round_trip(seed: int, random_grasps: Callable[..., GraspSet], tmp_path: Path) -> None:
     grasps = random_grasps(100, seed)
-    notes = FORMAT.write(grasps, tmp_path / "a.npy", PANDA)
+    notes = BURG_TOOLKIT_FORMAT.write(grasps, tmp_path / "a.npy", PANDA_GRIPPER)
     assert notes == ("BURG-Toolkit has no place for width, id, object, score.",)
-    assert FORMAT.recognises(tmp_path / "a.npy")
+    assert BURG_TOOLKIT_FORMAT.recognises(tmp_path / "a.npy")
     written = np.load(tmp_path / "a.npy")
     np.testing.assert_allclose(written[:, :3, 0], grasps.X_OG[:, :3, 0], atol=1e-15)
     np.testing.assert_allclose(written[:, :3, 2], -grasps.X_OG[:, :3, 2], atol=1e-15)
     np.testing.assert_allclose(written[:, :3, 3], grasps.X_OG[:, :3, 3], atol=1e-15)
-    back = FORMAT.read(tmp_path / "a.npy", PANDA).grasps
+    back = BURG_TOOLKIT_FORMAT.read(tmp_path / "a.npy", PANDA_GRIPPER).grasps
     np.testing.assert_allclose(back.X_OG, grasps.X_OG, atol=1e-14)
 
 
 def test_no_grasps(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", np.zeros((0, 4, 4)))
-    assert FORMAT.recognises(tmp_path / "a.npy")
-    assert len(FORMAT.read(tmp_path / "a.npy", PANDA).grasps) == 0
+    assert BURG_TOOLKIT_FORMAT.recognises(tmp_path / "a.npy")
+    assert len(BURG_TOOLKIT_FORMAT.read(tmp_path / "a.npy", PANDA_GRIPPER).grasps) == 0
 
 
 @pytest.mark.parametrize(
@@ -107,4 +103,4 @@ def test_no_grasps(tmp_path: Path) -> None:
 def test_malformed(values: Array, message: str, tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", values)
     with pytest.raises(InvalidInputError, match=message):
-        FORMAT.read(tmp_path / "a.npy", PANDA)
+        BURG_TOOLKIT_FORMAT.read(tmp_path / "a.npy", PANDA_GRIPPER)

@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import DocumentError
-from burg_drake.formats.collections.burg_document import relocated
-from burg_drake.formats.collections.burg_library import read_burg_library
+from burg_drake.core import DocumentError
+from burg_drake.formats import locate_file, read_burg_library
 
 # What `yaml.dump` makes of an ObjectLibrary: sorted keys, block lists, null for what is not known.
 WRITTEN = """\
@@ -300,4 +299,4 @@ def test_no_file(tmp_path: Path) -> None:
 
 def test_a_name_that_is_too_long_for_a_file_is_one_that_is_not_there(tmp_path: Path) -> None:
     given = "meshes/" + "a" * 5000
-    assert relocated(given, tmp_path) == tmp_path / given
+    assert locate_file(given, tmp_path) == tmp_path / given

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import yaml
 
-from burg_drake.core.errors import DocumentError, InvalidInputError
-from burg_drake.formats.collections.burg_scene import read_burg_scene
+from burg_drake.core import DocumentError, InvalidInputError
+from burg_drake.formats import read_burg_scene
 
 # What `yaml.dump` makes of a Scene: sorted keys, block lists, null for what is not known.
 WRITTEN = """\

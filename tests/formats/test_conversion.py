@@ -9,15 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.formats.common.conversion import (
+from burg_drake.core import GraspSet, InvalidInputError, UnknownNameError
+from burg_drake.formats import (
+    GRASP_FORMATS,
+    PANDA_GRIPPER,
     with_objects_renamed,
     with_success,
     write_each_object,
 )
-from burg_drake.formats.common.grasp_format import PANDA
-from burg_drake.formats.grasp_files import FORMATS
 
 
 @pytest.fixture
@@ -63,7 +62,7 @@ def test_success_is_what_scores_above_the_limit() -> None:
 
 
 def test_a_folder_gets_one_file_an_object(tmp_path: Path, both: GraspSet) -> None:
-    notes = write_each_object(both, tmp_path / "new", FORMATS["graspgen"], PANDA)
+    notes = write_each_object(both, tmp_path / "new", GRASP_FORMATS["graspgen"], PANDA_GRIPPER)
     assert sorted(path.name for path in notes) == ["1a_2b.json", "mug.json"]
     counts = {
         path.name: len(json.loads(path.read_text())["grasps"]["transforms"]) for path in notes
@@ -76,7 +75,7 @@ def test_no_name_of_an_object_leads_elsewhere(
     tmp_path: Path, random_grasps: Callable[..., GraspSet], name: str
 ) -> None:
     grasps = random_grasps(1, 3, object=name, success=True)
-    (path,) = write_each_object(grasps, tmp_path, FORMATS["graspgen"], PANDA)
+    (path,) = write_each_object(grasps, tmp_path, GRASP_FORMATS["graspgen"], PANDA_GRIPPER)
     assert list(tmp_path.iterdir()) == [path] and not path.name.startswith(".")
 
 
@@ -85,5 +84,5 @@ def test_two_objects_never_share_a_file(
 ) -> None:
     clash = GraspSet.concatenate([both, random_grasps(1, 3, object="1a_2b", success=True)])
     with pytest.raises(InvalidInputError, match="'1a/2b' and of '1a_2b' would both be written to"):
-        write_each_object(clash, tmp_path, FORMATS["graspgen"], PANDA)
+        write_each_object(clash, tmp_path, GRASP_FORMATS["graspgen"], PANDA_GRIPPER)
     assert not list(tmp_path.iterdir())

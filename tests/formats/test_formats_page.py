@@ -7,9 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.formats.common.convention import convention_of
-from burg_drake.formats.common.grasp_format import PANDA
-from burg_drake.formats.grasp_files import FORMATS
+from burg_drake.formats import GRASP_FORMATS, PANDA_GRIPPER, convention_of
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "grasp_formats.md"
 
@@ -24,10 +22,10 @@ def anchor(title: str) -> str:
     return re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("name", GRASP_FORMATS)
 def test_tables_are_in_step(page: str, name: str) -> None:
-    format = FORMATS[name]
-    frame = convention_of(format, PANDA)
+    format = GRASP_FORMATS[name]
+    frame = convention_of(format, PANDA_GRIPPER)
     cells = [
         f"[{format.title}](#{anchor(format.title)})",
         f"`{name}`",
@@ -47,12 +45,12 @@ def test_tables_are_in_step(page: str, name: str) -> None:
     assert f"| {' | '.join(cells)} |" in lines
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("name", GRASP_FORMATS)
 def test_each_format_has_a_section_with_its_source(page: str, name: str) -> None:
-    section = page.split(f"\n## {FORMATS[name].title}\n")[1].split("\n## ")[0]
-    assert FORMATS[name].source in " ".join(section.split())
+    section = page.split(f"\n## {GRASP_FORMATS[name].title}\n")[1].split("\n## ")[0]
+    assert GRASP_FORMATS[name].source in " ".join(section.split())
 
 
 def test_no_row_is_left_of_a_format_that_is_gone(page: str) -> None:
     rows = [line for line in page.splitlines() if line.startswith("| [")]
-    assert len(rows) == len(FORMATS)
+    assert len(rows) == len(GRASP_FORMATS)

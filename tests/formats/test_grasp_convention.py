@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.core.frames import make_pose, rot_z
-from burg_drake.formats.common.convention import (
+from burg_drake.core import make_pose, rot_z
+from burg_drake.formats import (
+    GRASP_FORMATS,
+    PANDA_GRIPPER,
     axis_along,
     convention_of,
-    grouped,
+    group_by_convention,
     origin_in_words,
 )
-from burg_drake.formats.common.grasp_format import PANDA
-from burg_drake.formats.grasp_files import FORMATS
 
 
 @pytest.mark.parametrize(
@@ -28,14 +28,14 @@ from burg_drake.formats.grasp_files import FORMATS
     ],
 )
 def test_axes_are_as_documented(name: str, approach: str, closing: str, frame: str) -> None:
-    found = convention_of(FORMATS[name], PANDA)
+    found = convention_of(GRASP_FORMATS[name], PANDA_GRIPPER)
     assert (found.approach, found.closing, found.frame) == (approach, closing, frame)
 
 
 def test_origins() -> None:
     """The base of the Franka hand is 103.4 mm before its tool centre point."""
-    assert convention_of(FORMATS["acronym"], PANDA).origin == "H, 103.4 mm behind G"
-    assert convention_of(FORMATS["burg_drake"], PANDA).origin == "G"
+    assert convention_of(GRASP_FORMATS["acronym"], PANDA_GRIPPER).origin == "H, 103.4 mm behind G"
+    assert convention_of(GRASP_FORMATS["burg_drake"], PANDA_GRIPPER).origin == "G"
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_origins() -> None:
     ],
 )
 def test_origin_in_words(p_GF: tuple[float, float, float], words: str) -> None:
-    assert origin_in_words(np.array(p_GF), PANDA) == words
+    assert origin_in_words(np.array(p_GF), PANDA_GRIPPER) == words
 
 
 def test_an_axis_that_is_off() -> None:
@@ -60,8 +60,8 @@ def test_an_axis_that_is_off() -> None:
 
 
 def test_formats_of_one_convention_are_put_together() -> None:
-    groups = grouped(FORMATS.values(), PANDA)
-    assert sorted(f.name for group in groups for f in group) == sorted(FORMATS)
+    groups = group_by_convention(GRASP_FORMATS.values(), PANDA_GRIPPER)
+    assert sorted(f.name for group in groups for f in group) == sorted(GRASP_FORMATS)
     together = {frozenset(f.name for f in group) for group in groups}
     assert any({"acronym", "graspgen"} <= group for group in together)
     assert frozenset({"isaac_grasp"}) in together

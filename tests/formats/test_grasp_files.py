@@ -16,16 +16,15 @@ import numpy as np
 import pytest
 
 import burg_drake.formats
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import rotation_angle
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.formats.common.grasp_format import PANDA, Gripper, GripperJoint
-from burg_drake.formats.common.one_object import description_of
-from burg_drake.formats.grasp_files import (
-    FORMATS,
+from burg_drake.core import Array, GraspSet, InvalidInputError, UnknownNameError, rotation_angle
+from burg_drake.formats import (
+    GRASP_FORMATS,
+    PANDA_GRIPPER,
+    Gripper,
+    GripperJoint,
     format_by_suffix,
     format_of,
+    object_description,
     read_grasp_file,
     write_grasp_file,
 )
@@ -48,8 +47,8 @@ OTHER = Gripper(
 """A hand whose approach is x of its body, whose fingers run apart from 10 mm on."""
 
 
-def written(grasps: GraspSet, name: str, folder: Path, gripper: Gripper = PANDA) -> Path:
-    path = folder / f"{name}{FORMATS[name].suffixes[0]}"
+def written(grasps: GraspSet, name: str, folder: Path, gripper: Gripper = PANDA_GRIPPER) -> Path:
+    path = folder / f"{name}{GRASP_FORMATS[name].suffixes[0]}"
     write_grasp_file(grasps, path, name, gripper)
     return path
 
@@ -61,14 +60,14 @@ def assert_same_poses(found: Array, expected: Array, *formats: str) -> None:
     assert rotation_angle(R).max() < (1e-6 if rough else 1e-12)
 
 
-@pytest.mark.parametrize("name", FORMATS)
-@pytest.mark.parametrize("gripper", [PANDA, OTHER], ids=lambda gripper: gripper.name)
+@pytest.mark.parametrize("name", GRASP_FORMATS)
+@pytest.mark.parametrize("gripper", [PANDA_GRIPPER, OTHER], ids=lambda gripper: gripper.name)
 def test_what_is_written_is_read_again(
     name: str, gripper: Gripper, tmp_path: Path, random_grasps: Callable[..., GraspSet]
 ) -> None:
     grasps = random_grasps(60, 11, success=name == "graspgen")
     read = read_grasp_file(written(grasps, name, tmp_path, gripper), gripper=gripper)
-    assert read.frame == FORMATS[name].frame
+    assert read.frame == GRASP_FORMATS[name].frame
     assert_same_poses(read.grasps.X_OG, grasps.X_OG, name)
     tolerance = 1e-7 if name in SINGLE_PRECISION else 1e-12
     if name in WITH_WIDTH:
@@ -79,7 +78,7 @@ def test_what_is_written_is_read_again(
         np.testing.assert_array_equal(read.grasps.object, grasps.object)
 
 
-@pytest.mark.parametrize(("one", "other"), list(itertools.permutations(FORMATS, 2)))
+@pytest.mark.parametrize(("one", "other"), list(itertools.permutations(GRASP_FORMATS, 2)))
 def test_ways_through_two_formats_end_where_they_began(
     one: str, other: str, tmp_path: Path, random_grasps: Callable[..., GraspSet]
 ) -> None:
@@ -90,7 +89,7 @@ def test_ways_through_two_formats_end_where_they_began(
     assert_same_poses(last.X_OG, grasps.X_OG, one, other)
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("name", GRASP_FORMATS)
 def test_no_file_tells_where_things_are_on_this_machine(
     name: str, tmp_path: Path, random_grasps: Callable[..., GraspSet]
 ) -> None:
@@ -113,26 +112,26 @@ def test_no_file_tells_where_things_are_on_this_machine(
         assert all(b"../lib/mug/mesh.obj" in text for text in texts[:2])
     assert not any(str(tmp_path).encode() in text for text in texts)
     if name in ("burg_drake", "acronym", "graspgen"):
-        again = description_of(read_grasp_file(path).grasps, "mug")
+        again = object_description(read_grasp_file(path).grasps, "mug")
         assert again["file"] == (str(mesh) if name == "burg_drake" else "../lib/mug/mesh.obj")
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("name", GRASP_FORMATS)
 def test_frames_of_formats_are_rigid_and_follow_the_hand(name: str) -> None:
-    for gripper in (PANDA, OTHER):
-        X_GF = FORMATS[name].X_GF(gripper)
+    for gripper in (PANDA_GRIPPER, OTHER):
+        X_GF = GRASP_FORMATS[name].X_GF(gripper)
         np.testing.assert_allclose(X_GF[:3, :3].T @ X_GF[:3, :3], np.eye(3), atol=1e-12)
         assert np.linalg.det(X_GF[:3, :3]) > 0.0
         np.testing.assert_array_equal(X_GF[3], [0.0, 0.0, 0.0, 1.0])
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("name", GRASP_FORMATS)
 def test_each_file_is_of_one_format(
     name: str, tmp_path: Path, random_grasps: Callable[..., GraspSet]
 ) -> None:
     path = written(random_grasps(3, 13, success=True), name, tmp_path)
     disguised = path.rename(tmp_path / "something.dat")
-    assert [n for n, format in FORMATS.items() if format.recognises(disguised)] == [name]
+    assert [n for n, format in GRASP_FORMATS.items() if format.recognises(disguised)] == [name]
     assert format_of(disguised).name == name
 
 
@@ -154,7 +153,7 @@ def test_other_files_are_of_no_format(tmp_path: Path, content: bytes) -> None:
     path.write_bytes(content)
     with pytest.raises(InvalidInputError, match=r"a\.txt is not a file of grasps") as caught:
         read_grasp_file(path)
-    assert all(name in str(caught.value) for name in FORMATS)
+    assert all(name in str(caught.value) for name in GRASP_FORMATS)
     assert len(str(caught.value)) < len(str(path)) + 200
 
 
@@ -166,7 +165,7 @@ def test_what_is_too_deep_to_be_read_is_said_to_be(tmp_path: Path, suffix: str) 
         read_grasp_file(path)
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("name", GRASP_FORMATS)
 def test_other_files_are_one_clear_error_if_the_format_is_named(name: str, tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
     for content in (b"", b"hello", b"\x00\xff" * 40, b"[]", b"PK\x03\x04abc"):
@@ -176,7 +175,7 @@ def test_other_files_are_one_clear_error_if_the_format_is_named(name: str, tmp_p
         assert str(path) in str(caught.value) and "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("name", GRASP_FORMATS)
 def test_a_file_cut_anywhere_is_an_error_or_holds_the_grasps_before_the_cut(
     name: str, tmp_path: Path, random_grasps: Callable[..., GraspSet]
 ) -> None:
@@ -201,7 +200,7 @@ def test_headers_of_numpy_that_are_no_python(header: str, tmp_path: Path) -> Non
     path = tmp_path / "a.npy"
     path.write_bytes(b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text + bytes(64))
     for name in ("graspnet", "burg"):
-        assert not FORMATS[name].recognises(path)
+        assert not GRASP_FORMATS[name].recognises(path)
         with pytest.raises(InvalidInputError, match=r"a\.npy is not a \.npy file of numbers: ."):
             read_grasp_file(path, name)
 
@@ -212,10 +211,10 @@ def test_large_files_are_not_read_to_tell_their_format(tmp_path: Path, start: by
     with path.open("wb") as stream:
         stream.write(start)
         stream.truncate(1 << 26)
-    for format in FORMATS.values():
+    for format in GRASP_FORMATS.values():
         format.recognises(path)  # whatever it imports is not counted below
     tracemalloc.start()
-    for format in FORMATS.values():
+    for format in GRASP_FORMATS.values():
         format.recognises(path)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
@@ -267,7 +266,7 @@ def test_no_format_needs_drake_and_only_hdf5_needs_h5py(
     tmp_path: Path, random_grasps: Callable[..., GraspSet]
 ) -> None:
     grasps = random_grasps(3, 15, success=True)
-    paths = {name: str(written(grasps, name, tmp_path)) for name in FORMATS}
+    paths = {name: str(written(grasps, name, tmp_path)) for name in GRASP_FORMATS}
     script = f"""
 import pkgutil, importlib, sys
 import burg_drake.formats

@@ -11,11 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.formats.common.grasp_format import PANDA
-from burg_drake.formats.grasps import graspgen
+from burg_drake.core import Array, GraspSet, InvalidInputError
+from burg_drake.formats import PANDA_GRIPPER, graspgen
 
 # Straight down on a cube: the gripper's base 0.1034 m above the centre, its z down, x along y.
 DOWN = [
@@ -67,8 +64,8 @@ def test_a_grasp_on_a_cube_written_by_hand(
     file: Callable[[Any], Path], assert_grips_the_cube: Callable[[Array], None]
 ) -> None:
     path = file(document())
-    assert graspgen.recognises(path)
-    read = graspgen.read(path, PANDA)
+    assert graspgen.recognise_graspgen(path)
+    read = graspgen.read_graspgen(path, PANDA_GRIPPER)
     grasps = read.grasps
     assert read.frame == "object"
     assert_grips_the_cube(grasps.X_OG[0])
@@ -87,12 +84,12 @@ def test_the_offset_of_an_asset_that_closes_along_y_is_applied(
     down_y = [[-1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.1034], DOWN[3]]
     block = {"name": "franka_panda", "file_name": "a.usd", "width": 0.08, OFFSET: offset}
     path = file(document(gripper=block, grasps__transforms=[down_y, down_y]))
-    assert_grips_the_cube(graspgen.read(path, PANDA).grasps.X_OG[0])
+    assert_grips_the_cube(graspgen.read_graspgen(path, PANDA_GRIPPER).grasps.X_OG[0])
 
 
 def test_the_offset_is_applied_from_the_right(file: Callable[[Any], Path]) -> None:
     offset = [[0.01, 0.02, 0.03], [0.0, 0.0, 0.0, 1.0]]
-    read = graspgen.read(file(document(gripper={OFFSET: offset})), PANDA)
+    read = graspgen.read_graspgen(file(document(gripper={OFFSET: offset})), PANDA_GRIPPER)
     # x of the gripper is y of the cube, its y is x, its z points down
     np.testing.assert_allclose(read.grasps.X_OG[0, :3, 3], [0.02, 0.01, -0.03], atol=1e-12)
 
@@ -100,8 +97,8 @@ def test_the_offset_is_applied_from_the_right(file: Callable[[Any], Path]) -> No
 def test_files_of_record_grasp_have_no_object(file: Callable[[Any], Path]) -> None:
     recorded = {"grasps": {"transforms": [DOWN], "object_in_gripper": [1]}}
     path = file(json.dumps(recorded))
-    assert graspgen.recognises(path)
-    read = graspgen.read(path, PANDA)
+    assert graspgen.recognise_graspgen(path)
+    read = graspgen.read_graspgen(path, PANDA_GRIPPER)
     assert read.grasps.object.tolist() == ["grasps"]
     assert any("names no object" in note for note in read.notes)
 
@@ -110,7 +107,7 @@ def test_written_files_are_read_as_the_documentation_reads_them(
     tmp_path: Path, random_grasps: Callable[..., GraspSet]
 ) -> None:
     grasps = random_grasps(12, 3, success=True)
-    notes = graspgen.write(grasps, tmp_path / "a.json", PANDA)
+    notes = graspgen.write_graspgen(grasps, tmp_path / "a.json", PANDA_GRIPPER)
     good, bad = positive_and_negative(tmp_path / "a.json")
     assert (len(good), len(bad)) == ((grasps.score == 1).sum(), (grasps.score == 0).sum())
     good[:, :3, 3] += 0.1034 * good[:, :3, 2]
@@ -123,7 +120,11 @@ def test_written_files_are_read_as_the_documentation_reads_them(
 def test_mesh_and_scale_survive_reading_and_writing(
     file: Callable[[Any], Path], tmp_path: Path
 ) -> None:
-    graspgen.write(graspgen.read(file(document()), PANDA).grasps, tmp_path / "b.json", PANDA)
+    graspgen.write_graspgen(
+        graspgen.read_graspgen(file(document()), PANDA_GRIPPER).grasps,
+        tmp_path / "b.json",
+        PANDA_GRIPPER,
+    )
     loaded = json.loads((tmp_path / "b.json").read_text())
     assert loaded["object"] == {"file": "1a2b3c", "scale": 0.7}
     np.testing.assert_allclose(loaded["grasps"]["transforms"], [DOWN, DOWN], atol=1e-15)
@@ -133,10 +134,10 @@ def test_mesh_and_scale_survive_reading_and_writing(
 def test_scores_that_are_no_success_are_left_behind(
     tmp_path: Path, random_grasps: Callable[..., GraspSet]
 ) -> None:
-    notes = graspgen.write(random_grasps(3, 4), tmp_path / "a.json", PANDA)
+    notes = graspgen.write_graspgen(random_grasps(3, 4), tmp_path / "a.json", PANDA_GRIPPER)
     assert any("no object_in_gripper" in note for note in notes)
     assert any("score" in note and "width" in note for note in notes)
-    read = graspgen.read(tmp_path / "a.json", PANDA)
+    read = graspgen.read_graspgen(tmp_path / "a.json", PANDA_GRIPPER)
     assert np.isnan(read.grasps.score).all()
     assert any("has no object_in_gripper" in note for note in read.notes)
 
@@ -146,19 +147,19 @@ def test_success_known_of_some_is_refused(
 ) -> None:
     some = random_grasps(3, 4, success=True).with_columns(object_in_gripper=[1.0, np.nan, 0.0])
     with pytest.raises(InvalidInputError, match="1 of 3 grasps it is not known"):
-        graspgen.write(some, tmp_path / "a.json", PANDA)
+        graspgen.write_graspgen(some, tmp_path / "a.json", PANDA_GRIPPER)
     assert not list(tmp_path.iterdir())
 
 
 def test_no_grasps_are_no_error(file: Callable[[Any], Path]) -> None:
     empty = document(grasps__transforms=[], grasps__object_in_gripper=[])
-    assert len(graspgen.read(file(empty), PANDA).grasps) == 0
+    assert len(graspgen.read_graspgen(file(empty), PANDA_GRIPPER).grasps) == 0
 
 
 def test_another_hand_is_refused(file: Callable[[Any], Path]) -> None:
     path = file(document(gripper={"name": "franka_panda"}))
     with pytest.raises(InvalidInputError, match=r"gripper\.name.*panda_hand.*wsg_50"):
-        graspgen.read(path, replace(PANDA, name="wsg_50"))
+        graspgen.read_graspgen(path, replace(PANDA_GRIPPER, name="wsg_50"))
 
 
 NAN = [[float("nan")] * 4] * 4
@@ -202,5 +203,5 @@ NAN = [[float("nan")] * 4] * 4
 def test_malformed_files_say_where(file: Callable[[Any], Path], content: Any, said: str) -> None:
     path = file(content)
     with pytest.raises(InvalidInputError, match=said) as caught:
-        graspgen.read(path, PANDA)
+        graspgen.read_graspgen(path, PANDA_GRIPPER)
     assert str(path) in str(caught.value) and "\n" not in str(caught.value)

@@ -10,14 +10,16 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.formats.common.grasp_format import PANDA, Gripper
-from burg_drake.formats.grasp_files import read_grasp_file, write_grasp_file
-from burg_drake.formats.grasps.graspnet import FORMAT, X_FG
-from burg_drake.grasping.sampling.antipodal import sample_antipodal
+from burg_drake.core import Array, GraspSet, InvalidInputError, make_pose
+from burg_drake.formats import (
+    GRASPNET_FORMAT,
+    PANDA_GRIPPER,
+    Gripper,
+    graspnet_X_FG,
+    read_grasp_file,
+    write_grasp_file,
+)
+from burg_drake.grasping import sample_antipodal
 
 DOWN_THE_CAMERA = [[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]
 """Approach along the camera's z, closing along its y: columns are x, y, z of their grasp frame."""
@@ -50,7 +52,7 @@ def test_a_cube_below_the_camera(
         (0.7, 0.06, 0.02, 0.0295, DOWN_THE_CAMERA, (0.0, 0.0, 0.48), 5),
         (0.3, 0.08, 0.02, 0.01, DOWN_THE_CAMERA, (0.0, 0.0, 0.48), -1),
     )
-    imported = FORMAT.read(path, PANDA)
+    imported = GRASPNET_FORMAT.read(path, PANDA_GRIPPER)
     assert (imported.frame, imported.notes) == ("camera", ())
     grasps = imported.grasps
     looking_down = make_pose(np.diag([1.0, -1.0, -1.0]), (0.0, 0.0, 0.5))
@@ -70,7 +72,7 @@ def test_their_finger_tips_are_ours(random_grasps: Callable[..., GraspSet], tmp_
     grasps = random_grasps(50, 0).with_columns(
         depth=np.linspace(0.0, 0.04, 50), pregrasp_width=opening
     )
-    FORMAT.write(grasps, tmp_path / "a.npy", PANDA)
+    GRASPNET_FORMAT.write(grasps, tmp_path / "a.npy", PANDA_GRIPPER)
     for row, X_CG, width in zip(np.load(tmp_path / "a.npy"), grasps.X_OG, opening, strict=True):
         along, approach = X_CG[:3, 0], X_CG[:3, 2]
         tip = X_CG[:3, 3] + 0.0095 * approach
@@ -87,11 +89,11 @@ def test_round_trip(seed: int, random_grasps: Callable[..., GraspSet], tmp_path:
         height=0.02,
         object_id=rng.integers(-1, 80, 200),
     )
-    notes = FORMAT.write(grasps, tmp_path / "a.npy", PANDA)
+    notes = GRASPNET_FORMAT.write(grasps, tmp_path / "a.npy", PANDA_GRIPPER)
     assert notes == ("GraspNet-1Billion has no place for width, id, object.", SINGLE)
     assert np.load(tmp_path / "a.npy").dtype == np.float32
-    assert FORMAT.recognises(tmp_path / "a.npy")
-    back = FORMAT.read(tmp_path / "a.npy", PANDA).grasps
+    assert GRASPNET_FORMAT.recognises(tmp_path / "a.npy")
+    back = GRASPNET_FORMAT.read(tmp_path / "a.npy", PANDA_GRIPPER).grasps
     np.testing.assert_allclose(back.X_OG, grasps.X_OG, atol=1e-6)
     for name in ("pregrasp_width", "score", "depth", "height", "object_id"):
         np.testing.assert_allclose(back.column(name), grasps.column(name), rtol=1e-6)
@@ -100,16 +102,18 @@ def test_round_trip(seed: int, random_grasps: Callable[..., GraspSet], tmp_path:
 def test_each_grasp_is_read_alike_alone(
     random_grasps: Callable[..., GraspSet], tmp_path: Path
 ) -> None:
-    FORMAT.write(random_grasps(20, 1), tmp_path / "a.npy", PANDA)
-    together = FORMAT.read(tmp_path / "a.npy", PANDA).grasps
+    GRASPNET_FORMAT.write(random_grasps(20, 1), tmp_path / "a.npy", PANDA_GRIPPER)
+    together = GRASPNET_FORMAT.read(tmp_path / "a.npy", PANDA_GRIPPER).grasps
     for i, row in enumerate(np.load(tmp_path / "a.npy")):
         np.save(tmp_path / "one.npy", row[None])
-        assert FORMAT.read(tmp_path / "one.npy", PANDA).grasps.id[0] == together.id[i]
+        assert (
+            GRASPNET_FORMAT.read(tmp_path / "one.npy", PANDA_GRIPPER).grasps.id[0] == together.id[i]
+        )
 
 
 def test_what_is_not_known_gets_what_networks_write(tmp_path: Path) -> None:
     grasps = GraspSet.create(make_pose(p_AB=[[0, 0, 0.5], [0, 0, 0.6]]), object="")
-    notes = FORMAT.write(grasps, tmp_path / "a.npy", PANDA)
+    notes = GRASPNET_FORMAT.write(grasps, tmp_path / "a.npy", PANDA_GRIPPER)
     assert notes == (
         "GraspNet-1Billion has no place for id.",
         "2 grasps of unknown width got the hand's opening of 0.08 m.",
@@ -148,7 +152,7 @@ def test_sampled_grasps_do_not_collide_by_their_rules(
     surface: trimesh.Trimesh, tmp_path: Path
 ) -> None:
     sampled = sample_antipodal(surface, 200, np.random.default_rng(0), object="thing")
-    notes = FORMAT.write(sampled, tmp_path / "a.npy", PANDA)
+    notes = GRASPNET_FORMAT.write(sampled, tmp_path / "a.npy", PANDA_GRIPPER)
     assert notes[1].endswith(
         "200 grasps got the distance of their contacts and 20 mm, at most 0.08 m."
     )
@@ -165,7 +169,7 @@ def test_sampled_grasps_do_not_collide_by_their_rules(
 
 def test_the_opening_of_a_network_is_not_taken_for_a_closed_hand(tmp_path: Path) -> None:
     path = grasp_group(tmp_path / "a.npy", (0.7, 0.08, 0.02, 0.02, np.eye(3), (0, 0, 0), -1))
-    read = FORMAT.read(path, PANDA).grasps
+    read = GRASPNET_FORMAT.read(path, PANDA_GRIPPER).grasps
     mug = GraspSet.create(read.X_OG, object="mug", width=read.width, columns=read.columns)
     write_grasp_file(mug, tmp_path / "a.yaml", "isaac_grasp")
     back = read_grasp_file(tmp_path / "a.yaml").grasps
@@ -177,7 +181,7 @@ def test_openings_are_given_known_or_assumed(tmp_path: Path) -> None:
     grasps = GraspSet.create(
         make_pose(p_AB=np.zeros((4, 3))), object="", width=[0.03, 0.03, 0.07, np.nan], score=1.0
     ).with_columns(pregrasp_width=[0.06, np.nan, np.nan, np.nan])
-    notes = FORMAT.write(grasps, tmp_path / "a.npy", PANDA)
+    notes = GRASPNET_FORMAT.write(grasps, tmp_path / "a.npy", PANDA_GRIPPER)
     np.testing.assert_allclose(np.load(tmp_path / "a.npy")[:, 1], [0.06, 0.05, 0.08, 0.08])
     assert notes == (
         "GraspNet-1Billion has no place for width, id.",
@@ -191,20 +195,24 @@ def test_openings_are_given_known_or_assumed(tmp_path: Path) -> None:
 
 
 def test_no_grasps(tmp_path: Path) -> None:
-    FORMAT.write(GraspSet.create(np.empty((0, 4, 4)), object=""), tmp_path / "a.npy", PANDA)
+    GRASPNET_FORMAT.write(
+        GraspSet.create(np.empty((0, 4, 4)), object=""), tmp_path / "a.npy", PANDA_GRIPPER
+    )
     assert np.load(tmp_path / "a.npy").shape == (0, 17)
-    assert FORMAT.recognises(tmp_path / "a.npy")
-    assert len(FORMAT.read(tmp_path / "a.npy", PANDA).grasps) == 0
+    assert GRASPNET_FORMAT.recognises(tmp_path / "a.npy")
+    assert len(GRASPNET_FORMAT.read(tmp_path / "a.npy", PANDA_GRIPPER).grasps) == 0
 
 
 def test_the_tips_of_another_hand(tmp_path: Path) -> None:
-    long = Gripper("long", "hand", PANDA.X_HG, 0.03, (0.0, 0.1), PANDA.joints)
+    long = Gripper("long", "hand", PANDA_GRIPPER.X_HG, 0.03, (0.0, 0.1), PANDA_GRIPPER.joints)
     row = (0.5, 0.06, 0.02, 0.02, np.eye(3), (0.0, 0.0, 0.0), -1)
     path = grasp_group(tmp_path / "a.npy", row)
-    grasps = FORMAT.read(path, long).grasps
+    grasps = GRASPNET_FORMAT.read(path, long).grasps
     np.testing.assert_allclose(grasps.X_OG[0, :3, 3], [-0.01, 0.0, 0.0], atol=1e-9)
     np.testing.assert_array_equal(grasps.X_OG[0, :3, 2], [1.0, 0.0, 0.0])
-    np.testing.assert_allclose(FORMAT.X_GF(long) @ X_FG(0.02, long), np.eye(4), atol=1e-15)
+    np.testing.assert_allclose(
+        GRASPNET_FORMAT.X_GF(long) @ graspnet_X_FG(0.02, long), np.eye(4), atol=1e-15
+    )
 
 
 MIRRORED = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]]
@@ -229,7 +237,7 @@ MIRRORED = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]]
 def test_rows_that_are_no_grasps(row: tuple[Any, ...], message: str, tmp_path: Path) -> None:
     good = (0, 0, 0, 0.02, np.eye(3), (0, 0, 0), 0)
     with pytest.raises(InvalidInputError, match=message):
-        FORMAT.read(grasp_group(tmp_path / "a.npy", good, row), PANDA)
+        GRASPNET_FORMAT.read(grasp_group(tmp_path / "a.npy", good, row), PANDA_GRIPPER)
 
 
 def test_other_files(tmp_path: Path) -> None:
@@ -249,9 +257,11 @@ def test_other_files(tmp_path: Path) -> None:
         "empty.npy": "is not a .npy file of numbers",
         "missing.npy": "cannot read .*: No such file or directory",
     }.items():
-        assert FORMAT.recognises(tmp_path / name) == (name == "cut.npy")  # its header is whole
+        assert GRASPNET_FORMAT.recognises(tmp_path / name) == (
+            name == "cut.npy"
+        )  # its header is whole
         with pytest.raises(InvalidInputError, match=message):
-            FORMAT.read(tmp_path / name, PANDA)
+            GRASPNET_FORMAT.read(tmp_path / name, PANDA_GRIPPER)
     with pytest.raises(InvalidInputError, match="column 'depth' holds text"):
         text = GraspSet.create(np.eye(4), object="").with_columns(depth="deep")
-        FORMAT.write(text, tmp_path / "a.npy", PANDA)
+        GRASPNET_FORMAT.write(text, tmp_path / "a.npy", PANDA_GRIPPER)

@@ -12,12 +12,14 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.formats.common.grasp_format import PANDA
-from burg_drake.formats.grasp_files import read_grasp_file
-from burg_drake.formats.grasps import graspgen_yaml, isaac_grasp
+from burg_drake.core import Array, GraspSet, InvalidInputError
+from burg_drake.formats import (
+    GRASPGEN_YAML_FORMAT,
+    ISAAC_GRASP_FORMAT,
+    PANDA_GRIPPER,
+    GraspFormat,
+    read_grasp_file,
+)
 
 MANUAL = """\
 format: isaac_grasp
@@ -69,7 +71,7 @@ def load_from_isaac_grasp_format(path: Path) -> tuple[Array, Array]:
 
 
 def test_the_manual_s_example(file: Callable[[str], Path]) -> None:
-    read = isaac_grasp.FORMAT.read(file(MANUAL), PANDA)
+    read = ISAAC_GRASP_FORMAT.read(file(MANUAL), PANDA_GRIPPER)
     grasps = read.grasps
     assert (read.frame, len(grasps), grasps.object[0], grasps.score[0]) == ("object", 1, "mug", 1.0)
     assert grasps.width[0] == pytest.approx(2 * 0.00943)
@@ -86,15 +88,15 @@ def test_a_grasp_on_a_cube_written_by_hand(
     file: Callable[[str], Path], assert_grips_the_cube: Callable[[Array], None]
 ) -> None:
     path = file(CUBE)
-    assert isaac_grasp.FORMAT.recognises(path) and not graspgen_yaml.FORMAT.recognises(path)
-    assert_grips_the_cube(isaac_grasp.FORMAT.read(path, PANDA).grasps.X_OG[0])
+    assert ISAAC_GRASP_FORMAT.recognises(path) and not GRASPGEN_YAML_FORMAT.recognises(path)
+    assert_grips_the_cube(ISAAC_GRASP_FORMAT.read(path, PANDA_GRIPPER).grasps.X_OG[0])
 
 
 def test_isaac_ros_names_frames_and_versions_its_own_way(file: Callable[[str], Path]) -> None:
     text = MANUAL.replace("_frame_link", "_frame").replace("1.0\n\n", '"1.0"\n\n')
     path = file(text.replace("grasp_0:", '"grasp_0":'))
-    assert isaac_grasp.FORMAT.recognises(path)
-    assert isaac_grasp.FORMAT.read(path, PANDA).grasps.object[0] == "mug"
+    assert ISAAC_GRASP_FORMAT.recognises(path)
+    assert ISAAC_GRASP_FORMAT.read(path, PANDA_GRIPPER).grasps.object[0] == "mug"
 
 
 def test_files_of_grasp_data_gen(file: Callable[[str], Path], random_grasps: Any) -> None:
@@ -127,7 +129,7 @@ def test_files_of_grasp_data_gen(file: Callable[[str], Path], random_grasps: Any
             "pregrasp_bite_point": [0.0, 0.0, 0.1],
             "group": i,
         }
-    read = isaac_grasp.FORMAT.read(file(yaml.safe_dump(document, sort_keys=False)), PANDA)
+    read = ISAAC_GRASP_FORMAT.read(file(yaml.safe_dump(document, sort_keys=False)), PANDA_GRIPPER)
     np.testing.assert_allclose(read.grasps.width, [0.0, 0.02, 0.04, 0.06], atol=1e-12)
     np.testing.assert_array_equal(read.grasps.score, [0, 1, 0, 1])
     np.testing.assert_array_equal(read.grasps.columns["group"], range(4))
@@ -150,8 +152,8 @@ def test_predictions_of_graspgen_close_along_x(
     }
     data = {"format": "isaac_grasp", "format_version": 1.0, "grasps": {"grasp_0": grasp}}
     path = file(yaml.dump(data, default_flow_style=False, sort_keys=False))
-    assert graspgen_yaml.FORMAT.recognises(path) and not isaac_grasp.FORMAT.recognises(path)
-    read = graspgen_yaml.FORMAT.read(path, PANDA)
+    assert GRASPGEN_YAML_FORMAT.recognises(path) and not ISAAC_GRASP_FORMAT.recognises(path)
+    read = GRASPGEN_YAML_FORMAT.read(path, PANDA_GRIPPER)
     assert_grips_the_cube(read.grasps.X_OG[0])
     assert read.grasps.object[0] == "grasps"  # the file's name: nothing else names the object
 
@@ -166,8 +168,8 @@ grasps:
     orientation: { w: 0.3234007, xyz: [0.7127000, 0.5170539, 0.3465920] }
 """
     path = file(text)
-    assert graspgen_yaml.FORMAT.recognises(path)
-    read = graspgen_yaml.FORMAT.read(path, PANDA)
+    assert GRASPGEN_YAML_FORMAT.recognises(path)
+    read = GRASPGEN_YAML_FORMAT.read(path, PANDA_GRIPPER)
     assert read.grasps.score[0] == 0.9679833054542542
     assert any(
         "no gripper frame; the fingers were taken to close along its x" in n for n in read.notes
@@ -178,30 +180,30 @@ def test_grasps_for_grasp_data_gen_may_name_a_file_instead_of_a_frame(
     file: Callable[[str], Path], assert_grips_the_cube: Callable[[Array], None]
 ) -> None:
     path = file(CUBE.replace("gripper_frame_link: /World/", "gripper_file: bots/"))
-    assert isaac_grasp.FORMAT.recognises(path) and not graspgen_yaml.FORMAT.recognises(path)
-    read = isaac_grasp.FORMAT.read(path, PANDA)
+    assert ISAAC_GRASP_FORMAT.recognises(path) and not GRASPGEN_YAML_FORMAT.recognises(path)
+    read = ISAAC_GRASP_FORMAT.read(path, PANDA_GRIPPER)
     assert_grips_the_cube(read.grasps.X_OG[0])
     assert any(
         "no gripper frame; the fingers were taken to close along its y" in n for n in read.notes
     )
 
 
-@pytest.mark.parametrize("module", [isaac_grasp, graspgen_yaml])
+@pytest.mark.parametrize("format", [ISAAC_GRASP_FORMAT, GRASPGEN_YAML_FORMAT])
 def test_written_files_are_read_by_graspgen_s_reader(
-    module: Any, tmp_path: Path, random_grasps: Callable[..., GraspSet]
+    format: GraspFormat, tmp_path: Path, random_grasps: Callable[..., GraspSet]
 ) -> None:
     grasps = random_grasps(20, 4)
     tiny = grasps.X_OG.copy()
     tiny[0] = np.eye(4)
     tiny[0, :3, 3] = [1e-5, -2e-17, 3e-9]  # numbers that YAML 1.1 can take for text
     grasps = GraspSet.create(tiny, object="mug", width=grasps.width, score=grasps.score)
-    module.FORMAT.write(grasps, tmp_path / "out.yaml", PANDA)
+    format.write(grasps, tmp_path / "out.yaml", PANDA_GRIPPER)
     X_OF, confidence = load_from_isaac_grasp_format(tmp_path / "out.yaml")
     np.testing.assert_array_equal(confidence, grasps.score)
     np.testing.assert_allclose(
         X_OF[:, :3, 3] + 0.1034 * X_OF[:, :3, 2], grasps.X_OG[:, :3, 3], atol=1e-12
     )
-    fingers = 1 if module is isaac_grasp else 0
+    fingers = 1 if format is ISAAC_GRASP_FORMAT else 0
     np.testing.assert_allclose(X_OF[:, :3, fingers], grasps.X_OG[:, :3, 0], atol=1e-12)
 
 
@@ -209,7 +211,7 @@ def test_written_joints_are_those_of_each_finger(
     tmp_path: Path, random_grasps: Callable[..., GraspSet]
 ) -> None:
     grasps = random_grasps(3, 5)
-    notes = isaac_grasp.FORMAT.write(grasps, tmp_path / "out.yaml", PANDA)
+    notes = ISAAC_GRASP_FORMAT.write(grasps, tmp_path / "out.yaml", PANDA_GRIPPER)
     assert notes == ("Isaac Sim grasp editor has no place for id.",)
     data = yaml.safe_load((tmp_path / "out.yaml").read_text())
     assert data["object_frame_link"] == "/World/mug"
@@ -222,15 +224,15 @@ def test_written_joints_are_those_of_each_finger(
 
 def test_unknown_widths_and_scores_are_left_out(tmp_path: Path) -> None:
     grasps = GraspSet.create(np.eye(4), object="mug")
-    notes = isaac_grasp.FORMAT.write(grasps, tmp_path / "out.yaml", PANDA)
+    notes = ISAAC_GRASP_FORMAT.write(grasps, tmp_path / "out.yaml", PANDA_GRIPPER)
     assert notes[0] == "1 grasp has no score: confidence is .nan there."
-    back = isaac_grasp.FORMAT.read(tmp_path / "out.yaml", PANDA).grasps
+    back = ISAAC_GRASP_FORMAT.read(tmp_path / "out.yaml", PANDA_GRIPPER).grasps
     assert np.isnan(back.width[0]) and np.isnan(back.score[0])
 
 
 def test_scores_beyond_1_and_further_columns_are_said(tmp_path: Path) -> None:
     grasps = GraspSet.create(np.eye(4), object="mug", score=3.0, columns={"epsilon": [0.1]})
-    notes = isaac_grasp.FORMAT.write(grasps, tmp_path / "out.yaml", PANDA)
+    notes = ISAAC_GRASP_FORMAT.write(grasps, tmp_path / "out.yaml", PANDA_GRIPPER)
     assert any("from 0 to 1" in note for note in notes)
     assert any("epsilon" in note for note in notes)
 
@@ -245,20 +247,22 @@ def test_widths_that_the_hand_does_not_have_are_said(tmp_path: Path) -> None:
         ),
         "Isaac Sim grasp editor has no place for id.",
     )
-    assert isaac_grasp.FORMAT.write(wide, tmp_path / "a.yaml", PANDA) == expected
+    assert ISAAC_GRASP_FORMAT.write(wide, tmp_path / "a.yaml", PANDA_GRIPPER) == expected
     on_arrival = four.with_columns(pregrasp_width=[0.02, 0.12, -0.01, float(np.float32(0.08))])
-    assert isaac_grasp.FORMAT.write(on_arrival, tmp_path / "b.yaml", PANDA) == expected
-    back = isaac_grasp.FORMAT.read(tmp_path / "a.yaml", PANDA).grasps
+    assert ISAAC_GRASP_FORMAT.write(on_arrival, tmp_path / "b.yaml", PANDA_GRIPPER) == expected
+    back = ISAAC_GRASP_FORMAT.read(tmp_path / "a.yaml", PANDA_GRIPPER).grasps
     np.testing.assert_allclose(back.width, wide.width, atol=1e-12)
 
 
-@pytest.mark.parametrize("module", [isaac_grasp, graspgen_yaml])
-def test_each_format_says_its_own_name(module: Any, tmp_path: Path) -> None:
+@pytest.mark.parametrize("format", [ISAAC_GRASP_FORMAT, GRASPGEN_YAML_FORMAT])
+def test_each_format_says_its_own_name(format: GraspFormat, tmp_path: Path) -> None:
     grasps = GraspSet.create(np.eye(4), object="mug", score=1.0, columns={"epsilon": [0.1]})
-    (note,) = [n for n in module.FORMAT.write(grasps, tmp_path / "a.yaml", PANDA) if "epsilon" in n]
-    assert note.startswith(f"{module.FORMAT.title} has no place for ")
-    read = module.FORMAT.read(tmp_path / "a.yaml", PANDA)
-    assert read.grasps.provenance["format"] == module.FORMAT.name
+    (note,) = [
+        n for n in format.write(grasps, tmp_path / "a.yaml", PANDA_GRIPPER) if "epsilon" in n
+    ]
+    assert note.startswith(f"{format.title} has no place for ")
+    read = format.read(tmp_path / "a.yaml", PANDA_GRIPPER)
+    assert read.grasps.provenance["format"] == format.name
 
 
 def test_a_gripper_named_at_the_end_of_a_long_file_is_seen(file: Callable[[str], Path]) -> None:
@@ -270,18 +274,23 @@ def test_a_gripper_named_at_the_end_of_a_long_file_is_seen(file: Callable[[str],
     document = {"format": "isaac_grasp", "grasps": many, "gripper_frame_link": "panda_hand"}
     path = file(yaml.dump(document, Dumper=yaml.CSafeDumper))
     assert path.stat().st_size > 1 << 17
-    assert isaac_grasp.FORMAT.recognises(path) and not graspgen_yaml.FORMAT.recognises(path)
+    assert ISAAC_GRASP_FORMAT.recognises(path) and not GRASPGEN_YAML_FORMAT.recognises(path)
 
 
 def test_names_survive_if_they_differ(tmp_path: Path) -> None:
     odd = ["null", 'a "b": c', "1e3"]
     grasps = GraspSet.create(np.repeat(np.eye(4)[None], 3, 0), object="mug", columns={"name": odd})
-    isaac_grasp.FORMAT.write(grasps, tmp_path / "a.yaml", PANDA)
+    ISAAC_GRASP_FORMAT.write(grasps, tmp_path / "a.yaml", PANDA_GRIPPER)
     assert (
-        isaac_grasp.FORMAT.read(tmp_path / "a.yaml", PANDA).grasps.columns["name"].tolist() == odd
+        ISAAC_GRASP_FORMAT.read(tmp_path / "a.yaml", PANDA_GRIPPER).grasps.columns["name"].tolist()
+        == odd
     )
-    isaac_grasp.FORMAT.write(grasps.with_columns(name=["a", "a", "b"]), tmp_path / "b.yaml", PANDA)
-    names = isaac_grasp.FORMAT.read(tmp_path / "b.yaml", PANDA).grasps.columns["name"].tolist()
+    ISAAC_GRASP_FORMAT.write(
+        grasps.with_columns(name=["a", "a", "b"]), tmp_path / "b.yaml", PANDA_GRIPPER
+    )
+    names = (
+        ISAAC_GRASP_FORMAT.read(tmp_path / "b.yaml", PANDA_GRIPPER).grasps.columns["name"].tolist()
+    )
     assert names == ["grasp_0", "grasp_1", "grasp_2"]
 
 
@@ -289,27 +298,29 @@ def test_anchors_are_followed(file: Callable[[str], Path]) -> None:
     text = MANUAL.replace("position: [-", "position: &p [-")
     second = MANUAL.split("grasps:\n")[1].replace("grasp_0", "grasp_1")
     second = second.replace("[-0.04346, 0.06759, 0.19895]", "*p")
-    grasps = isaac_grasp.FORMAT.read(file(text + second), PANDA).grasps
+    grasps = ISAAC_GRASP_FORMAT.read(file(text + second), PANDA_GRIPPER).grasps
     np.testing.assert_array_equal(grasps.X_OG[0], grasps.X_OG[1])
 
 
 def test_a_gripper_by_another_name_needs_to_be_named(file: Callable[[str], Path]) -> None:
     path = file(MANUAL.replace("/World/panda_hand", "/World/fr3_hand"))
     with pytest.raises(InvalidInputError, match=r"gripper_frame_link.*name 'fr3_hand' as the g"):
-        isaac_grasp.FORMAT.read(path, PANDA)
-    named = isaac_grasp.FORMAT.read(path, dataclasses.replace(PANDA, body="fr3_hand"))
+        ISAAC_GRASP_FORMAT.read(path, PANDA_GRIPPER)
+    named = ISAAC_GRASP_FORMAT.read(path, dataclasses.replace(PANDA_GRIPPER, body="fr3_hand"))
     assert len(named.grasps) == 1
 
 
 def test_joints_of_another_hand_are_said(file: Callable[[str], Path]) -> None:
-    read = isaac_grasp.FORMAT.read(file(MANUAL.replace("panda_finger_joint1", "fr3_joint")), PANDA)
+    read = ISAAC_GRASP_FORMAT.read(
+        file(MANUAL.replace("panda_finger_joint1", "fr3_joint")), PANDA_GRIPPER
+    )
     assert np.isnan(read.grasps.width[0])
     assert any("fr3_joint" in note for note in read.notes)
 
 
 def test_values_by_the_names_of_our_own_columns_are_left_aside(file: Callable[[str], Path]) -> None:
     text = MANUAL.replace("confidence: 1.0", "confidence: 1.0\n      width: 7\n      group: left")
-    read = isaac_grasp.FORMAT.read(file(text), PANDA)
+    read = ISAAC_GRASP_FORMAT.read(file(text), PANDA_GRIPPER)
     assert read.grasps.width[0] == pytest.approx(2 * 0.00943)
     assert read.grasps.columns["group"].tolist() == ["left"]
     assert any("Ignored: width" in note for note in read.notes)
@@ -317,7 +328,7 @@ def test_values_by_the_names_of_our_own_columns_are_left_aside(file: Callable[[s
 
 def test_no_grasps_are_no_error(file: Callable[[str], Path]) -> None:
     path = file(MANUAL.split("grasps:")[0] + "grasps: {}\n")
-    assert len(isaac_grasp.FORMAT.read(path, PANDA).grasps) == 0
+    assert len(ISAAC_GRASP_FORMAT.read(path, PANDA_GRIPPER).grasps) == 0
 
 
 TWICE = MANUAL + MANUAL.split("grasps:\n")[1]
@@ -395,16 +406,16 @@ QUATERNION = "{w: 0.00332, xyz: [0.98453, 0.16837, 0.04837]}"
 def test_malformed_files_say_where(file: Callable[[str], Path], text: str, said: str) -> None:
     path = file(text)
     with pytest.raises(InvalidInputError, match=said) as caught:
-        isaac_grasp.FORMAT.read(path, PANDA)
+        ISAAC_GRASP_FORMAT.read(path, PANDA_GRIPPER)
     assert str(path) in str(caught.value) and "\n" not in str(caught.value)
 
 
 def test_binary_files_are_one_clear_error(tmp_path: Path) -> None:
     path = tmp_path / "a.yaml"
     path.write_bytes(b"\x00\xff\xfe" * 50)
-    assert not isaac_grasp.FORMAT.recognises(path)
+    assert not ISAAC_GRASP_FORMAT.recognises(path)
     with pytest.raises(InvalidInputError, match="not a text file"):
-        isaac_grasp.FORMAT.read(path, PANDA)
+        ISAAC_GRASP_FORMAT.read(path, PANDA_GRIPPER)
 
 
 def test_every_line_of_a_file_can_be_the_last(file: Callable[[str], Path]) -> None:
@@ -412,15 +423,15 @@ def test_every_line_of_a_file_can_be_the_last(file: Callable[[str], Path]) -> No
     for n in range(len(lines)):
         path = file("\n".join(lines[:n]))
         try:
-            assert len(isaac_grasp.FORMAT.read(path, PANDA).grasps) == 1
+            assert len(ISAAC_GRASP_FORMAT.read(path, PANDA_GRIPPER).grasps) == 1
         except InvalidInputError as error:
             assert str(path) in str(error)
 
 
 def test_widths_beyond_all_numbers_name_the_file(tmp_path: Path) -> None:
     path = tmp_path / "a.yaml"
-    isaac_grasp.FORMAT.write(
-        GraspSet.create(np.eye(4), object="mug", width=0.04, score=1.0), path, PANDA
+    ISAAC_GRASP_FORMAT.write(
+        GraspSet.create(np.eye(4), object="mug", width=0.04, score=1.0), path, PANDA_GRIPPER
     )
     path.write_text(path.read_text().replace("joint1: 0.02", "joint1: 1e308"))
     with pytest.raises(InvalidInputError, match=r"a\.yaml: width\[0\] is inf"):

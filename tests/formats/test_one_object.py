@@ -8,16 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.formats.common.conversion import with_objects_renamed
-from burg_drake.formats.common.grasp_format import PANDA
-from burg_drake.formats.common.one_object import (
-    check_hand,
-    description_of,
+from burg_drake.core import GraspSet, InvalidInputError, Outcome
+from burg_drake.formats import (
+    PANDA_GRIPPER,
+    check_gripper_name,
+    object_description,
     object_name,
-    success_of,
+    success_labels,
+    with_objects_renamed,
 )
 
 THREE = np.repeat(np.eye(4)[None], 3, axis=0)
@@ -51,18 +49,18 @@ def test_descriptions_are_found_in_parts_of_either_kind(parts: str) -> None:
     by_name = dict(zip(("left", "right"), told, strict=True))
     provenance = {"parts": told if parts == "list" else by_name}
     grasps = GraspSet.create(THREE, object="mug", provenance=provenance)
-    assert description_of(grasps, "mug") == mug
+    assert object_description(grasps, "mug") == mug
     renamed = with_objects_renamed(grasps, {"mug": "cup"})
-    assert description_of(renamed, "cup") == mug
-    assert description_of(renamed, "mug") == {}
+    assert object_description(renamed, "cup") == mug
+    assert object_description(renamed, "mug") == {}
 
 
 def test_descriptions_are_found_in_joined_sets() -> None:
     mug = {"file": "mug.obj", "scale": 0.5}
     one = GraspSet.create(THREE, object="mug", provenance={"object_files": {"mug": mug}})
     joined = GraspSet.concatenate([GraspSet.create(THREE, object="bowl"), one])
-    assert description_of(one, "mug") == description_of(joined, "mug") == mug
-    assert description_of(joined, "bowl") == {}
+    assert object_description(one, "mug") == object_description(joined, "mug") == mug
+    assert object_description(joined, "bowl") == {}
 
 
 @pytest.mark.parametrize(
@@ -78,24 +76,24 @@ def test_descriptions_are_found_in_joined_sets() -> None:
 )
 def test_a_provenance_that_says_nonsense_describes_nothing(provenance: dict[str, object]) -> None:
     grasps = GraspSet.create(THREE, object="mug")
-    assert description_of(dataclasses.replace(grasps, provenance=provenance), "mug") == {}
+    assert object_description(dataclasses.replace(grasps, provenance=provenance), "mug") == {}
 
 
 def test_success_comes_from_the_column_then_outcomes_then_scores() -> None:
     grasps = GraspSet.create(THREE, object="mug", score=[1.0, 0.0, np.nan])
-    np.testing.assert_array_equal(success_of(grasps), [1, 0, np.nan])
+    np.testing.assert_array_equal(success_labels(grasps), [1, 0, np.nan])
     judged = grasps.with_columns(outcome=[Outcome.SLIPPED.value, Outcome.LIFTED.value, ""])
-    np.testing.assert_array_equal(success_of(judged), [0, 1, np.nan])
+    np.testing.assert_array_equal(success_labels(judged), [0, 1, np.nan])
     told = judged.with_columns(object_in_gripper=[True, True, False])
-    np.testing.assert_array_equal(success_of(told), [1, 1, 0])
+    np.testing.assert_array_equal(success_labels(told), [1, 1, 0])
     scored = GraspSet.create(THREE, object="mug", score=[1.0, 0.5, 0.0])
-    assert np.isnan(success_of(scored)).all()
+    assert np.isnan(success_labels(scored)).all()
 
 
 def test_lifted_alone_is_success() -> None:
     for outcome in Outcome:
         grasps = GraspSet.create(THREE[:1], object="a", columns={"outcome": [outcome.value]})
-        success = success_of(grasps)[0]
+        success = success_labels(grasps)[0]
         if outcome is Outcome.REACHABLE:  # not tried
             assert np.isnan(success)
         else:
@@ -103,12 +101,12 @@ def test_lifted_alone_is_success() -> None:
 
 
 def test_names_of_hands() -> None:
-    assert check_hand("panda", PANDA, "a.h5") == ()
-    assert check_hand("franka_panda", PANDA, "a.h5") == ()
-    assert check_hand("panda_hand", PANDA, "a.h5") == ()
-    assert check_hand("mine", replace(PANDA, name="mine"), "a.h5") == ()
-    assert len(check_hand("robotiq", PANDA, "a.h5")) == 1
+    assert check_gripper_name("panda", PANDA_GRIPPER, "a.h5") == ()
+    assert check_gripper_name("franka_panda", PANDA_GRIPPER, "a.h5") == ()
+    assert check_gripper_name("panda_hand", PANDA_GRIPPER, "a.h5") == ()
+    assert check_gripper_name("mine", replace(PANDA_GRIPPER, name="mine"), "a.h5") == ()
+    assert len(check_gripper_name("robotiq", PANDA_GRIPPER, "a.h5")) == 1
     with pytest.raises(
         InvalidInputError, match=r"a.h5: the grasps were made for hand 'panda_hand', but hand"
     ):
-        check_hand("panda", replace(PANDA, name="wsg_50"), "a.h5")
+        check_gripper_name("panda", replace(PANDA_GRIPPER, name="wsg_50"), "a.h5")

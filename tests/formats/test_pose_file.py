@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import make_pose
-from burg_drake.formats.common.pose_file import read_poses
+from burg_drake.core import InvalidInputError, make_pose
+from burg_drake.formats import read_poses
 
 RNG = np.random.default_rng(5)
 CAMERAS = make_pose(Rotation.random(4, rng=RNG).as_matrix(), RNG.uniform(-1, 1, (4, 3)))

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import make_pose
-from burg_drake.formats.common.rigid import nearest_rigid
+from burg_drake.core import Array, InvalidInputError, make_pose
+from burg_drake.formats import nearest_rigid
 
 
 @pytest.fixture

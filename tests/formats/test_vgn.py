@@ -10,12 +10,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.formats.common.grasp_format import PANDA
-from burg_drake.formats.grasps.vgn import FORMAT
+from burg_drake.core import Array, GraspSet, InvalidInputError, make_pose
+from burg_drake.formats import PANDA_GRIPPER, VGN_FORMAT
 
 HEADER = "scene_id,qx,qy,qz,qw,x,y,z,width,label"
 DOWN = "0.0,1.0,0.0,0.0"
@@ -40,7 +36,7 @@ def test_a_cube_from_above(tmp_path: Path, assert_grips_the_cube: Callable[[Arra
         f"7f1c,{DOWN},0.0,0.0,0.0405,0.04,1",
         f"7f1c,{DOWN},0.1,0.2,0.3,0.08,0",
     )
-    imported = FORMAT.read(path, PANDA)
+    imported = VGN_FORMAT.read(path, PANDA_GRIPPER)
     assert imported.frame == "world"
     assert imported.notes == ("the width of 1 failed grasps was ignored: it is the open hand's.",)
     grasps = imported.grasps
@@ -56,7 +52,7 @@ def test_the_closing_axis_is_theirs(tmp_path: Path) -> None:
     # a quarter turn about z: their y is -x, and the approach stays +z
     s = 2**-0.5
     path = grasps_csv(tmp_path / "a.csv", f"0,0.0,0.0,{s!r},{s!r},0.0,0.0,0.0,0.08,0")
-    X_VG = FORMAT.read(path, PANDA).grasps.X_OG[0]
+    X_VG = VGN_FORMAT.read(path, PANDA_GRIPPER).grasps.X_OG[0]
     np.testing.assert_allclose(X_VG[:3, 0], [-1.0, 0.0, 0.0], atol=1e-15)
     np.testing.assert_allclose(X_VG[:3, 2], [0.0, 0.0, 1.0], atol=1e-15)
 
@@ -69,12 +65,12 @@ def test_round_trip(seed: int, random_grasps: Callable[..., GraspSet], tmp_path:
     )
     path = tmp_path / "grasps.csv"
     failed = grasps.column("label") == 0
-    assert FORMAT.write(grasps, path, PANDA) == (
+    assert VGN_FORMAT.write(grasps, path, PANDA_GRIPPER) == (
         "VGN and GIGA has no place for id, object, score.",
         f"{failed.sum()} failed grasps got the hand's opening of 0.08 m as width.",
     )
-    assert FORMAT.recognises(path)
-    back = FORMAT.read(path, PANDA).grasps
+    assert VGN_FORMAT.recognises(path)
+    back = VGN_FORMAT.read(path, PANDA_GRIPPER).grasps
     np.testing.assert_allclose(back.X_OG, grasps.X_OG, atol=1e-14)
     np.testing.assert_array_equal(back.width, np.where(failed, np.nan, grasps.width))
     for name in ("label", "scene_id"):
@@ -91,10 +87,10 @@ def test_round_trip(seed: int, random_grasps: Callable[..., GraspSet], tmp_path:
 def test_each_grasp_is_read_alike_alone(
     random_grasps: Callable[..., GraspSet], tmp_path: Path
 ) -> None:
-    FORMAT.write(random_grasps(20, 1), tmp_path / "all.csv", PANDA)
-    together = FORMAT.read(tmp_path / "all.csv", PANDA).grasps
+    VGN_FORMAT.write(random_grasps(20, 1), tmp_path / "all.csv", PANDA_GRIPPER)
+    together = VGN_FORMAT.read(tmp_path / "all.csv", PANDA_GRIPPER).grasps
     for i, line in enumerate((tmp_path / "all.csv").read_text().splitlines()[1:]):
-        alone = FORMAT.read(grasps_csv(tmp_path / "one.csv", line), PANDA).grasps
+        alone = VGN_FORMAT.read(grasps_csv(tmp_path / "one.csv", line), PANDA_GRIPPER).grasps
         assert alone.id[0] == together.id[i]
 
 
@@ -103,18 +99,18 @@ def test_outcomes_of_trials_become_labels(tmp_path: Path) -> None:
     X_OG = make_pose(p_AB=[[0, 0, 0.1], [0, 0, 0.2], [0, 0, 0.3]])
     outcome = ["lifted", "no_contact", "reachable"]
     grasps = GraspSet.create(X_OG, object="").with_columns(outcome=outcome)
-    notes = FORMAT.write(grasps, tmp_path / "scene_7.csv", PANDA)
+    notes = VGN_FORMAT.write(grasps, tmp_path / "scene_7.csv", PANDA_GRIPPER)
     assert notes == (
         "VGN and GIGA has no place for id.",
         "1 failed grasps got the hand's opening of 0.08 m as width.",
         "2 grasps have no width; their cells are empty.",
     )
-    back = FORMAT.read(tmp_path / "scene_7.csv", PANDA).grasps
+    back = VGN_FORMAT.read(tmp_path / "scene_7.csv", PANDA_GRIPPER).grasps
     np.testing.assert_array_equal(back.column("label"), [1.0, 0.0, np.nan])
     assert np.isnan(back.width).all()
     assert set(back.column("scene_id").tolist()) == {"scene_7"}
     plain = GraspSet.create(X_OG, object="", width=0.05)
-    assert FORMAT.write(plain, tmp_path / "b.csv", PANDA) == (
+    assert VGN_FORMAT.write(plain, tmp_path / "b.csv", PANDA_GRIPPER) == (
         "VGN and GIGA has no place for id.",
         "No grasp has a label; the cells for it are empty.",
     )
@@ -123,16 +119,18 @@ def test_outcomes_of_trials_become_labels(tmp_path: Path) -> None:
 def test_further_columns_come_along(tmp_path: Path) -> None:
     header = "x,y,z,qx,qy,qz,qw,quality,planner"  # predictions, in another order
     path = grasps_csv(tmp_path / "a.csv", f"0.1,0.2,0.3,{DOWN},0.93,giga", header=header)
-    assert FORMAT.recognises(path)
-    grasps = FORMAT.read(path, PANDA).grasps
+    assert VGN_FORMAT.recognises(path)
+    grasps = VGN_FORMAT.read(path, PANDA_GRIPPER).grasps
     assert grasps.column("quality").tolist() == [0.93]
     assert grasps.column("planner").tolist() == ["giga"]
     assert np.isnan(grasps.width).all()
 
 
 def test_no_grasps(tmp_path: Path) -> None:
-    FORMAT.write(GraspSet.create(np.empty((0, 4, 4)), object=""), tmp_path / "a.csv", PANDA)
-    assert len(FORMAT.read(tmp_path / "a.csv", PANDA).grasps) == 0
+    VGN_FORMAT.write(
+        GraspSet.create(np.empty((0, 4, 4)), object=""), tmp_path / "a.csv", PANDA_GRIPPER
+    )
+    assert len(VGN_FORMAT.read(tmp_path / "a.csv", PANDA_GRIPPER).grasps) == 0
 
 
 @pytest.mark.parametrize(
@@ -155,7 +153,7 @@ def test_no_grasps(tmp_path: Path) -> None:
 def test_malformed(header: str, line: str, message: str, tmp_path: Path) -> None:
     path = grasps_csv(tmp_path / "a.csv", line, header=header)
     with pytest.raises(InvalidInputError) as error:
-        FORMAT.read(path, PANDA)
+        VGN_FORMAT.read(path, PANDA_GRIPPER)
     assert str(error.value).startswith(f"{path}{message}")
 
 
@@ -163,14 +161,14 @@ def test_empty_lines_are_passed_over_and_counted(tmp_path: Path) -> None:
     good = f"a,{DOWN},0,0,0.1,0.08,1"
     path = grasps_csv(tmp_path / "a.csv", "", good, "", good.replace("0.1,", "high,"))
     with pytest.raises(InvalidInputError, match=r"a\.csv:5: z is 'high', not a number"):
-        FORMAT.read(path, PANDA)
+        VGN_FORMAT.read(path, PANDA_GRIPPER)
     path = grasps_csv(tmp_path / "a.csv", "", good, "", "a,1,1,0,0,0,0,0.1,0.08,1")
     with pytest.raises(InvalidInputError, match=r"a\.csv:5: qx, qy, qz, qw have length"):
-        FORMAT.read(path, PANDA)
+        VGN_FORMAT.read(path, PANDA_GRIPPER)
     path = grasps_csv(tmp_path / "a.csv", "", good, "", "a,1")
     with pytest.raises(InvalidInputError, match=r"a\.csv:5: the row has 2 cells"):
-        FORMAT.read(path, PANDA)
-    assert len(FORMAT.read(grasps_csv(path, "", good, "", good), PANDA).grasps) == 2
+        VGN_FORMAT.read(path, PANDA_GRIPPER)
+    assert len(VGN_FORMAT.read(grasps_csv(path, "", good, "", good), PANDA_GRIPPER).grasps) == 2
 
 
 def test_a_table_of_results_is_not_taken_for_one(tmp_path: Path) -> None:
@@ -178,7 +176,7 @@ def test_a_table_of_results_is_not_taken_for_one(tmp_path: Path) -> None:
     path = tmp_path / "results.csv"
     for name, expected in ((header.removesuffix(",X_OG"), True), (header, False)):
         path.write_text(name + "\n")
-        assert FORMAT.recognises(path) == expected
+        assert VGN_FORMAT.recognises(path) == expected
 
 
 def test_other_files(tmp_path: Path) -> None:
@@ -189,6 +187,6 @@ def test_other_files(tmp_path: Path) -> None:
         "binary.csv": "is not a text file",
         "missing.csv": "cannot read",
     }.items():
-        assert not FORMAT.recognises(tmp_path / name)
+        assert not VGN_FORMAT.recognises(tmp_path / name)
         with pytest.raises(InvalidInputError, match=message):
-            FORMAT.read(tmp_path / name, PANDA)
+            VGN_FORMAT.read(tmp_path / name, PANDA_GRIPPER)

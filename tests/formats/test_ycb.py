@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.formats.collections.ycb import (
-    MASS_SOURCE,
-    NAMES,
-    PUBLISHED_MASSES,
+from burg_drake.core import InvalidInputError
+from burg_drake.formats import (
+    YCB_MASS_SOURCE,
+    YCB_MASSES,
+    YCB_NAMES,
     YcbObject,
     find_ycb,
-    ycb_name,
+    find_ycb_name,
 )
 
 
@@ -52,7 +52,7 @@ def test_an_object_of_the_downloads(tmp_path: Path) -> None:
             mesh=tmp_path / "003_cracker_box/google_16k/textured.obj",
             variant="google_16k",
             mass=0.411,
-            mass_source=MASS_SOURCE,
+            mass_source=YCB_MASS_SOURCE,
         )
     ]
 
@@ -150,14 +150,14 @@ def test_a_set_has_no_published_mass_for_its_parts(tmp_path: Path) -> None:
 
 def test_masses_of_six_objects_known_from_elsewhere() -> None:
     grams = {"003": 411, "004": 514, "005": 349, "006": 603, "009": 97, "010": 370}
-    assert {n: PUBLISHED_MASSES[NAMES[n]] * 1e3 for n in grams} == pytest.approx(grams)
+    assert {n: YCB_MASSES[YCB_NAMES[n]] * 1e3 for n in grams} == pytest.approx(grams)
 
 
 def test_the_table_holds_together() -> None:
-    assert len(PUBLISHED_MASSES) == 70
-    assert all(ycb_name(name) == name for name in NAMES.values())
-    assert all(0.001 <= mass <= 1.2 for mass in PUBLISHED_MASSES.values())
-    cups = [PUBLISHED_MASSES[f"065-{letter}_cups"] for letter in "abcdefghij"]
+    assert len(YCB_MASSES) == 70
+    assert all(find_ycb_name(name) == name for name in YCB_NAMES.values())
+    assert all(0.001 <= mass <= 1.2 for mass in YCB_MASSES.values())
+    cups = [YCB_MASSES[f"065-{letter}_cups"] for letter in "abcdefghij"]
     assert cups == sorted(cups)  # they nest, a in b in c
 
 

@@ -13,41 +13,40 @@ import cv2
 import numpy as np
 import trimesh
 
-from burg_drake.cameras.live.recording_table import read_poses as read_recorded_poses
-from burg_drake.cameras.optics.intrinsics_file import load_intrinsics
-from burg_drake.cameras.placement.document import load_placement
-from burg_drake.cameras.sources.depth_file import read_depth
-from burg_drake.cameras.sources.image_file import read_image
-from burg_drake.core.documents.schema import load_document
-from burg_drake.core.errors import BurgError
-from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps.csv_metadata_file import METADATA_SUFFIX
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.core.paths.resources import data_root
-from burg_drake.evaluation.grasp_sets.input import hand_of
-from burg_drake.evaluation.records.journal import read_journal
-from burg_drake.evaluation.records.origin import read_origin
-from burg_drake.evaluation.records.run_document import RunDocument
-from burg_drake.evaluation.records.table import table_row
-from burg_drake.evaluation.records.table_file import is_table, read_table, write_table
-from burg_drake.evaluation.records.trial import read_trial
-from burg_drake.formats.collections.burg_library import read_burg_library
-from burg_drake.formats.collections.burg_scene import read_burg_scene
-from burg_drake.formats.common.grasp_format import PANDA
-from burg_drake.formats.common.one_object import description_of
-from burg_drake.formats.common.pose_file import read_poses
-from burg_drake.formats.grasp_files import FORMATS, format_of, read_grasp_file
-from burg_drake.motion.ik.limits import ArmLimits
-from burg_drake.motion.plans.grasp_plan import Plan, load_plan
-from burg_drake.motion.plans.planned_motion import PlanOrigin
-from burg_drake.motion.plans.trajectory import Trajectory
-from burg_drake.objects.library.document import load_library
-from burg_drake.objects.meshes.mesh_file import read_mesh
-from burg_drake.pipeline.recipe import load_recipe
-from burg_drake.pipeline.record import read_record
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.document.gripper_document import load_hand
-from burg_drake.station.document.station_document import load_station
+from burg_drake.cameras import (
+    load_intrinsics,
+    load_placement,
+    read_depth,
+    read_image,
+    read_poses as read_recorded_poses,
+)
+from burg_drake.core import BurgError, GraspSet, data_root, load_document, make_pose
+from burg_drake.evaluation import (
+    RunDocument,
+    hand_of,
+    is_table,
+    read_journal,
+    read_origin,
+    read_table,
+    read_trial,
+    table_row,
+    write_table,
+)
+from burg_drake.formats import (
+    GRASP_FORMATS,
+    PANDA_GRIPPER,
+    format_of,
+    object_description,
+    read_burg_library,
+    read_burg_scene,
+    read_grasp_file,
+    read_poses,
+)
+from burg_drake.motion import ArmLimits, Plan, PlanOrigin, Trajectory, load_plan
+from burg_drake.objects import load_library, read_mesh
+from burg_drake.pipeline import load_recipe, read_record
+from burg_drake.scene import load_scene
+from burg_drake.station import load_hand, load_station
 
 EXAMPLES = Path(__file__).parent / "examples"
 
@@ -102,7 +101,7 @@ def _read_grasps(format: str, path: Path) -> None:
         found = read_grasp_file(path, chosen).grasps
         hand_of(found)
         for name in set(found.object.tolist()):
-            description_of(found, name)
+            object_description(found, name)
         found.save(path.with_name("again.npz"))
 
 
@@ -146,11 +145,11 @@ def _plan(path: Path) -> Path:
 
 
 def _plan_beside(path: Path) -> None:
-    _plan(path.with_name(path.name.removesuffix(METADATA_SUFFIX)))
+    _plan(path.with_name(path.name.removesuffix("-metadata.json")))
 
 
 def _load_plan_beside(path: Path) -> None:
-    load_plan(path.with_name(path.name.removesuffix(METADATA_SUFFIX)))
+    load_plan(path.with_name(path.name.removesuffix("-metadata.json")))
 
 
 READERS: tuple[Reader, ...] = (
@@ -159,9 +158,9 @@ READERS: tuple[Reader, ...] = (
             f"grasps {name}",
             f"a{format.suffixes[0]}",
             partial(_read_grasps, name),
-            partial(lambda format, path: format.write(grasps(), path, PANDA), format),
+            partial(lambda format, path: format.write(grasps(), path, PANDA_GRIPPER), format),
         )
-        for name, format in FORMATS.items()
+        for name, format in GRASP_FORMATS.items()
     ),
     Reader("grasps npz", "a.npz", partial(_read_grasps, "burg_drake"), grasps().save),
     Reader("recognition", "a.dat", _recognise, lambda path: grasps().save(path.with_suffix(".h5"))
@@ -193,7 +192,7 @@ READERS: tuple[Reader, ...] = (
            lambda path: write_table(path, read_table(EXAMPLES / "results.csv"), {"a": 1})),
     Reader("plan", "a.json", load_plan, _plan, 0.5),
     Reader("plan csv", "a.csv", load_plan, _plan, 0.5),
-    Reader("plan beside", f"a.csv{METADATA_SUFFIX}", _load_plan_beside, _plan_beside, 0.5),
+    Reader("plan beside", "a.csv-metadata.json", _load_plan_beside, _plan_beside, 0.5),
     Reader("journal", "a.jsonl", read_journal, _example("journal.jsonl")),
     Reader("burg library", "a.yaml", read_burg_library, _example("burg_library.yaml")),
     Reader("burg scene", "a.yaml", read_burg_scene, _example("burg_scene.yaml")),

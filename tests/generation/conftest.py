@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from burg_drake.objects.library.document import ObjectLibrary, load_library
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.objects import ObjectLibrary, load_library
+from burg_drake.station import Station, load_station
 
 
 @pytest.fixture(scope="session")

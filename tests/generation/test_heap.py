@@ -6,15 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.generation.heap import settle_heap
-from burg_drake.objects.library.document import ObjectLibrary
-from burg_drake.scene.arrangement.object_shapes import ObjectShapes
-from burg_drake.scene.document.board import Board
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
-from burg_drake.simulation.rest.still_check import stillness
-from burg_drake.station.checks.scene_check import SceneCheck
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import Pose
+from burg_drake.generation import settle_heap
+from burg_drake.objects import ObjectLibrary
+from burg_drake.scene import Board, Instance, ObjectShapes, Scene, SceneDocument
+from burg_drake.simulation import stillness
+from burg_drake.station import SceneCheck, Station
 
 BESIDE = -3.0
 """x in S of what hangs beside the table [m]."""

@@ -13,12 +13,11 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.core.errors import DocumentError, InvalidInputError
-from burg_drake.generation.many import SampledFolder, sample_scenes
-from burg_drake.objects.library.document import ObjectLibrary
-from burg_drake.scene.document.board import Board
-from burg_drake.scene.document.recipe import SceneRecipe
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import DocumentError, InvalidInputError
+from burg_drake.generation import SampledFolder, sample_scenes
+from burg_drake.objects import ObjectLibrary
+from burg_drake.scene import Board, SceneRecipe
+from burg_drake.station import Station
 
 RECIPE = SceneRecipe(
     library="household",
@@ -56,8 +55,8 @@ def test_the_same_bytes_by_workers_and_after_a_kill(
     part = tmp_path / "part"
     program = (
         "import burg_drake as burg\n"
-        "from burg_drake.core.documents.schema import load_document\n"
-        "from burg_drake.scene.document.origin import SamplingProvenance\n"
+        "from burg_drake.core import load_document\n"
+        "from burg_drake.scene.scene_document import SamplingProvenance\n"
         f"recipe = load_document({str(whole / 'recipe.yaml')!r}, SamplingProvenance).recipe\n"
         "library, station = burg.load_library('household'), burg.load_station('panda_tabletop')\n"
         f"burg.sample_scenes(recipe, library, station, {str(part)!r}, 12, workers=2)\n"

@@ -10,21 +10,17 @@ import pytest
 import trimesh
 from scipy.spatial import cKDTree
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.generation import rules
-from burg_drake.generation.reproduction import sample_again
-from burg_drake.generation.sample import (
+from burg_drake.core import InvalidInputError, Pose, UnknownNameError
+from burg_drake.generation import (
     SceneSampler,
     attempts_with_same_objects,
+    sample_again,
     sample_scene,
+    scene_sampling,
 )
-from burg_drake.objects.library.document import ObjectLibrary
-from burg_drake.scene.document.board import Board
-from burg_drake.scene.document.recipe import SceneRecipe
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
-from burg_drake.station.checks.scene_issues import check_scene
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.objects import ObjectLibrary
+from burg_drake.scene import Board, Instance, Scene, SceneDocument, SceneRecipe
+from burg_drake.station import Station, check_scene, load_station
 
 A3 = Board(size=(0.42, 0.297))
 SMALL = ("can", "marble", "mug")
@@ -201,11 +197,14 @@ def test_rules(household: ObjectLibrary, tabletop: Station) -> None:
             [(0.07, 0.0, 0.0), (-0.07, 0.0, 0.0), (0.0, 0.07, 90.0), (0.0, -0.07, 90.0)]
         )
     ]
-    assert rules.broken_rule(scene(can), tabletop, asked) == ""
+    assert scene_sampling.find_broken_rule(scene(can), tabletop, asked) == ""
     blocked = replace(PLACED, clear_grasps=1)
-    assert rules.broken_rule(scene(can, *boxes), tabletop, blocked) == rules.FEW_GRASPS
+    assert (
+        scene_sampling.find_broken_rule(scene(can, *boxes), tabletop, blocked)
+        == scene_sampling.FEW_GRASPS_REASON
+    )
     away = scene(("can", "can", (3.0, 0.2, 0.0), 0.0))
-    assert rules.broken_rule(away, tabletop, asked) == rules.HIDDEN
+    assert scene_sampling.find_broken_rule(away, tabletop, asked) == scene_sampling.HIDDEN_REASON
     with pytest.raises(
         InvalidInputError, match="within_reach needs an arm, but station 'wsg_tabletop' has none"
     ):

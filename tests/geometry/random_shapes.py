@@ -6,8 +6,8 @@ import numpy as np
 from pydrake.geometry import Box, Convex, Cylinder, Shape as DrakeShape, Sphere
 from pydrake.math import RigidTransform
 
-from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.geometry.shape import Shape
+from burg_drake.core import make_pose, rotation_from_rpy
+from burg_drake.geometry import Shape
 
 KINDS = ("box", "cylinder", "ball", "hull")
 

@@ -18,11 +18,15 @@ from pydrake.math import RigidTransform
 from random_shapes import KINDS, random_pose, random_shape
 from scipy.optimize import minimize, nnls
 
-from burg_drake.core.frames import inverse, make_pose, rotation_from_rpy, transform_points
-from burg_drake.geometry import distance
-from burg_drake.geometry.distance import TOLERANCE, Cores, distances
-from burg_drake.geometry.poses import Poses
-from burg_drake.geometry.shape import Shape
+from burg_drake.core import inverse, make_pose, rotation_from_rpy, transform_points
+from burg_drake.geometry import (
+    DISTANCE_TOLERANCE,
+    Poses,
+    Shape,
+    ShapeBatch,
+    convex_distance,
+    shape_distances,
+)
 
 HERE = np.eye(4)
 CUBE = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
@@ -32,10 +36,10 @@ TURNED = make_pose(rotation_from_rpy((0.4, -1.1, 2.0)), (3.0, -2.0, 0.7))
 def apart(one: Shape, other: Shape, X_BA: np.ndarray = HERE) -> float:
     """Distance of two shapes given in A and B; the same whichever comes first."""
     zero = np.zeros(1, dtype=np.intp)
-    A, B = Cores.of([one]), Cores.of([other])
-    (forth,) = distances(A, zero, B, zero, Poses.of(X_BA[None]))
-    (back,) = distances(B, zero, A, zero, Poses.of(inverse(X_BA)[None]))
-    assert forth == pytest.approx(back, abs=2 * TOLERANCE)
+    A, B = ShapeBatch.of([one]), ShapeBatch.of([other])
+    (forth,) = shape_distances(A, zero, B, zero, Poses.of(X_BA[None]))
+    (back,) = shape_distances(B, zero, A, zero, Poses.of(inverse(X_BA)[None]))
+    assert forth == pytest.approx(back, abs=2 * DISTANCE_TOLERANCE)
     return float(forth)
 
 
@@ -118,7 +122,7 @@ def test_closed_forms(case: str) -> None:
     for X in (HERE, TURNED):
         moved = Shape(X @ other.X_BP, other.half, other.convex, other.polytope, other.curved)
         found = apart(one, moved, X)
-        assert found == pytest.approx(expected, abs=TOLERANCE if curved else 1e-14)
+        assert found == pytest.approx(expected, abs=DISTANCE_TOLERANCE if curved else 1e-14)
 
 
 @pytest.mark.parametrize("case", ["parallel faces", "crossed edges", "two balls"])
@@ -130,7 +134,7 @@ def test_what_overlaps_or_touches_is_not_apart(case: str) -> None:
     for step in (gap, gap + 1e-7, gap + 1e-3, gap + 0.1, gap + 0.5):
         X = make_pose(p_AB=-step * way) @ other.X_BP
         moved = Shape(X, other.half, other.convex, other.polytope, other.curved)
-        assert apart(one, moved) <= TOLERANCE
+        assert apart(one, moved) <= DISTANCE_TOLERANCE
 
 
 def drake_distance(
@@ -173,13 +177,15 @@ def test_agrees_with_drake(kinds: tuple[str, str]) -> None:
         X_BA = np.array([random_pose(rng, 0.1) for _ in range(60)])
         truth = drake_distance((drake_one, X_A), (drake_other, X_B), X_BA)
         zero = np.zeros(len(X_BA), dtype=np.intp)
-        found = distances(Cores.of([one]), zero, Cores.of([other]), zero, Poses.of(X_BA))
+        found = shape_distances(
+            ShapeBatch.of([one]), zero, ShapeBatch.of([other]), zero, Poses.of(X_BA)
+        )
         clear = truth > 1e-5
         assert clear.sum() > 10
-        assert (found[truth < -1e-5] <= TOLERANCE).all()
-        assert (found[clear] <= truth[clear] + TOLERANCE).all()
+        assert (found[truth < -1e-5] <= DISTANCE_TOLERANCE).all()
+        assert (found[clear] <= truth[clear] + DISTANCE_TOLERANCE).all()
         if set(kinds) not in searched:
-            np.testing.assert_allclose(found[clear], truth[clear], atol=TOLERANCE)
+            np.testing.assert_allclose(found[clear], truth[clear], atol=DISTANCE_TOLERANCE)
 
 
 def test_ball_and_hull_by_least_squares() -> None:
@@ -234,32 +240,32 @@ def test_cylinders_by_a_convex_programme() -> None:
     assert clear >= 10
 
 
-def random_pairs(n: int) -> tuple[Cores, np.ndarray, Cores, np.ndarray, Poses]:
+def random_pairs(n: int) -> tuple[ShapeBatch, np.ndarray, ShapeBatch, np.ndarray, Poses]:
     rng = np.random.default_rng(6)
-    sides = [Cores.of([random_shape(kind, rng)[0] for kind in KINDS * 3]) for _ in range(2)]
+    sides = [ShapeBatch.of([random_shape(kind, rng)[0] for kind in KINDS * 3]) for _ in range(2)]
     X_BA = np.array([random_pose(rng, 0.15) for _ in range(n)])
     return sides[0], rng.integers(0, 12, n), sides[1], rng.integers(0, 12, n), Poses.of(X_BA)
 
 
 def test_results_do_not_depend_on_the_batch(monkeypatch: pytest.MonkeyPatch) -> None:
     one, shape, other, piece, X_BA = random_pairs(400)
-    found = distances(one, shape, other, piece, X_BA)
-    assert 100 < (found > TOLERANCE).sum() < 400
+    found = shape_distances(one, shape, other, piece, X_BA)
+    assert 100 < (found > DISTANCE_TOLERANCE).sum() < 400
     for k in range(60):
-        (alone,) = distances(one, shape[k : k + 1], other, piece[k : k + 1], X_BA[k : k + 1])
+        (alone,) = shape_distances(one, shape[k : k + 1], other, piece[k : k + 1], X_BA[k : k + 1])
         assert alone == found[k]
     mixed = np.random.default_rng(0).permutation(400)
-    turned = distances(one, shape[mixed], other, piece[mixed], X_BA[mixed])
+    turned = shape_distances(one, shape[mixed], other, piece[mixed], X_BA[mixed])
     assert turned.tobytes() == found[mixed].tobytes()
-    monkeypatch.setattr(distance, "BLOCK", 200)
-    assert distances(one, shape, other, piece, X_BA).tobytes() == found.tobytes()
-    assert distances(one, shape[:0], other, piece[:0], X_BA[:0]).shape == (0,)
+    monkeypatch.setattr(convex_distance, "VERTEX_BLOCK", 200)
+    assert shape_distances(one, shape, other, piece, X_BA).tobytes() == found.tobytes()
+    assert shape_distances(one, shape[:0], other, piece[:0], X_BA[:0]).shape == (0,)
 
 
 def test_a_ceiling_changes_nothing_below_it() -> None:
     one, shape, other, piece, X_BA = random_pairs(400)
-    found = distances(one, shape, other, piece, X_BA)
-    limited = distances(one, shape, other, piece, X_BA, 0.05)
+    found = shape_distances(one, shape, other, piece, X_BA)
+    limited = shape_distances(one, shape, other, piece, X_BA, 0.05)
     below = found <= 0.05
     assert 50 < below.sum() < 350
     assert limited[below].tobytes() == found[below].tobytes()

@@ -11,11 +11,8 @@ from pydrake.multibody.tree import RigidBody, SpatialInertia
 from pydrake.planning import RobotDiagram, RobotDiagramBuilder
 from random_shapes import KINDS, random_pose, random_shape
 
-from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.geometry import body, hand_screen
-from burg_drake.geometry.body import TOUCHING, Body
-from burg_drake.geometry.hand_screen import HandScreen
-from burg_drake.geometry.shape import Shape
+from burg_drake.core import make_pose, rotation_from_rpy
+from burg_drake.geometry import CONTACT_TOLERANCE, Body, HandScreen, Shape, bodies, hand_screen
 
 FINGER = Shape.box(make_pose(p_AB=(0.04, 0.0, 0.0)), np.array([0.01, 0.01, 0.02]))
 TABLE = Body(make_pose(p_AB=(0.3, 0.0, -0.05)), [Shape.box(np.eye(4), np.array([0.6, 0.7, 0.05]))])
@@ -119,7 +116,7 @@ def test_every_kind_meets_every_kind(part: str, piece: str) -> None:
 
 def test_a_finger_over_a_table_is_clear_when_it_touches() -> None:
     tested = HandScreen([FINGER], {"table": TABLE})
-    heights = np.array([1e-4, 1e-7, 0.0, -TOUCHING / 2, -1e-7, -1e-4, -0.03])
+    heights = np.array([1e-4, 1e-7, 0.0, -CONTACT_TOLERANCE / 2, -1e-7, -1e-4, -0.03])
     X_WG = make_pose(p_AB=heights[:, None] * (0, 0, 1) + (0.1, 0.2, 0.02))
     names, depth = tested.deepest(X_WG, ["table"])
     assert names.tolist() == [""] * 4 + ["table"] * 3
@@ -156,8 +153,8 @@ def test_results_do_not_depend_on_the_batch(monkeypatch: pytest.MonkeyPatch) -> 
     turned = pair.screen.deepest(X_WG[mixed], order)
     assert turned[0].tolist() == names[mixed].tolist()
     assert turned[1].tobytes() == depth[mixed].tobytes()
-    monkeypatch.setattr(hand_screen, "CHUNK", 7)
-    monkeypatch.setattr(body, "BLOCK", 100)
+    monkeypatch.setattr(hand_screen, "GRASP_CHUNK", 7)
+    monkeypatch.setattr(bodies, "NARROW_PHASE_BLOCK", 100)
     cut = Pair(1).screen.deepest(X_WG, order)
     assert (cut[0].tolist(), cut[1].tobytes()) == (names.tolist(), depth.tobytes())
 

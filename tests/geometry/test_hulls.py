@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from scipy.spatial import QhullError
 
-from burg_drake.geometry.hulls import convex_hull, hull_mesh, reduced_hull, thickness
+from burg_drake.geometry import convex_hull, hull_mesh, reduced_hull, thickness
 
 
 def test_box_is_exact() -> None:

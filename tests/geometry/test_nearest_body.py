@@ -6,13 +6,17 @@ import numpy as np
 import pytest
 from random_shapes import KINDS, random_pose, random_shape
 
-from burg_drake.core.frames import make_pose
-from burg_drake.geometry import hand_screen
-from burg_drake.geometry.body import Body
-from burg_drake.geometry.distance import TOLERANCE, Cores, distances
-from burg_drake.geometry.hand_screen import HandScreen
-from burg_drake.geometry.poses import Poses
-from burg_drake.geometry.shape import Shape
+from burg_drake.core import make_pose
+from burg_drake.geometry import (
+    DISTANCE_TOLERANCE,
+    Body,
+    HandScreen,
+    Poses,
+    Shape,
+    ShapeBatch,
+    hand_screen,
+    shape_distances,
+)
 
 
 class World:
@@ -38,13 +42,15 @@ class World:
     def of_all_pairs(self) -> tuple[list[str], np.ndarray]:
         """Name and distance of the nearest body at each grasp."""
         gaps = np.full((len(self.pieces), len(self.X_WG)), np.inf)
-        parts = Cores.of(self.hand)
+        parts = ShapeBatch.of(self.hand)
         for k, (name, pieces) in enumerate(self.pieces.items()):
             X_BG = Poses.of(np.array([np.linalg.inv(self.X_WB[name]) @ X for X in self.X_WG]))
             for part in range(len(self.hand)):
                 for piece in range(len(pieces)):
                     every = np.zeros(len(self.X_WG), dtype=np.intp)
-                    found = distances(parts, every + part, Cores.of(pieces), every + piece, X_BG)
+                    found = shape_distances(
+                        parts, every + part, ShapeBatch.of(pieces), every + piece, X_BG
+                    )
                     gaps[k] = np.minimum(gaps[k], found)
         return [list(self.pieces)[k] for k in gaps.argmin(axis=0)], gaps.min(axis=0)
 
@@ -54,7 +60,7 @@ def test_is_the_least_of_all_pairs(seed: int) -> None:
     world = World(seed)
     names, gaps = world.screen.nearest(world.X_WG)
     expected, least = world.of_all_pairs()
-    np.testing.assert_allclose(gaps, least, atol=2 * TOLERANCE)
+    np.testing.assert_allclose(gaps, least, atol=2 * DISTANCE_TOLERANCE)
     assert names.tolist() == expected
     assert len(set(expected)) == 4 and gaps.min() < 0.01 < 0.1 < gaps.max()
 
@@ -70,7 +76,7 @@ def test_results_do_not_depend_on_the_batch(monkeypatch: pytest.MonkeyPatch) -> 
     turned = world.screen.nearest(world.X_WG[mixed])
     assert turned[0].tolist() == names[mixed].tolist()
     assert turned[1].tobytes() == gaps[mixed].tobytes()
-    monkeypatch.setattr(hand_screen, "CHUNK", 7)
+    monkeypatch.setattr(hand_screen, "GRASP_CHUNK", 7)
     cut = World(1).screen.nearest(world.X_WG)
     assert (cut[0].tolist(), cut[1].tobytes()) == (names.tolist(), gaps.tobytes())
 
@@ -79,7 +85,7 @@ def test_the_scene_may_be_moved_with_the_hand() -> None:
     here, there = World(2), World(2, random_pose(np.random.default_rng(9), 2.0))
     (names, gaps), (names_moved, gaps_moved) = (w.screen.nearest(w.X_WG) for w in (here, there))
     assert names.tolist() == names_moved.tolist()
-    np.testing.assert_allclose(gaps_moved, gaps, atol=2 * TOLERANCE)
+    np.testing.assert_allclose(gaps_moved, gaps, atol=2 * DISTANCE_TOLERANCE)
 
 
 def test_far_bodies_count_and_a_scene_may_be_empty() -> None:

@@ -8,11 +8,17 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog, minimize
 
-from burg_drake.core.frames import inverse, make_pose, rotation_from_rpy
-from burg_drake.geometry.convex import Ball, Boxes, Convex, Cylinder, Hull
-from burg_drake.geometry.penetration import penetration_depths
-from burg_drake.geometry.polytope import Polytope
-from burg_drake.geometry.poses import Poses
+from burg_drake.core import inverse, make_pose, rotation_from_rpy
+from burg_drake.geometry import (
+    Ball,
+    Boxes,
+    Convex,
+    Cylinder,
+    Hull,
+    Polytope,
+    Poses,
+    penetration_depths,
+)
 
 CUBE = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
 PAD = np.array([0.0175, 0.0152, 0.0185])

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.geometry.rays import MAX_HITS, RayCaster
+from burg_drake.geometry import MAX_HITS, RayCaster
 
 
 def plates(heights: np.ndarray) -> np.ndarray:

@@ -5,11 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.core.frames import inverse, make_pose, transform_points
-from burg_drake.geometry.body import Body
-from burg_drake.geometry.convex import Ball, Cylinder
-from burg_drake.geometry.shape import Shape
-from burg_drake.geometry.swept import SIDES, swept_body, swept_shape
+from burg_drake.core import inverse, make_pose, transform_points
+from burg_drake.geometry import (
+    SWEPT_CYLINDER_SIDES,
+    Ball,
+    Body,
+    Cylinder,
+    Shape,
+    swept_body,
+    swept_shape,
+)
 
 
 def support(shape: Shape, u: np.ndarray) -> np.ndarray:
@@ -56,7 +61,11 @@ def test_support_of_a_sum_is_the_sum_of_supports(kind: str) -> None:
         way = 0.2 * one.X_BP[:3, 2] if kind == "upright" else rng.uniform(-0.2, 0.2, 3)
         expected = support(one, u) + np.maximum(u @ way, 0.0)
         found = np.max([support(s, u) for s in swept_shape(one, way)], axis=0)
-        larger = one.half[0] * (1.0 / np.cos(np.pi / SIDES) - 1.0) if kind == "cylinder" else 0.0
+        larger = (
+            one.half[0] * (1.0 / np.cos(np.pi / SWEPT_CYLINDER_SIDES) - 1.0)
+            if kind == "cylinder"
+            else 0.0
+        )
         assert (found >= expected - 1e-9).all() and (found <= expected + larger + 1e-9).all()
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.frames import make_pose
+from burg_drake.core import Array, make_pose
 
 
 def random_grasps(n: int, seed: int, size: float = 0.03) -> Array:

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from burg_drake.core.frames import Array
-from burg_drake.grasping.similarity.pose_distance import (
-    LEVER,
+from burg_drake.core import Array
+from burg_drake.grasping import (
+    DISTANCE_LEVER,
     check_lever,
-    components,
+    grasp_components,
     pair_angle,
     pair_translation,
 )
@@ -32,7 +32,9 @@ class PoseDistances:
     combined: Array
 
 
-def pose_distances(X_OG: ArrayLike, X_OF: ArrayLike, *, lever: float = LEVER) -> PoseDistances:
+def pose_distances(
+    X_OG: ArrayLike, X_OF: ArrayLike, *, lever: float = DISTANCE_LEVER
+) -> PoseDistances:
     """Distances of grasps to grasps, pair by pair.
 
     Args:
@@ -45,6 +47,6 @@ def pose_distances(X_OG: ArrayLike, X_OF: ArrayLike, *, lever: float = LEVER) ->
         InvalidInputError: the lever is negative or not finite.
     """
     check_lever(lever)
-    G, F = components(X_OG), components(X_OF)
+    G, F = grasp_components(X_OG), grasp_components(X_OF)
     translation, angle = pair_translation(G, F), pair_angle(G, F)
     return PoseDistances(translation, angle, translation + lever * angle)

@@ -7,8 +7,8 @@ import trimesh
 from scipy.stats import ks_2samp
 from trimesh import creation
 
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal
+from burg_drake.core import GraspSet
+from burg_drake.grasping import AntipodalSettings, sample_antipodal
 
 
 def box(x: float, y: float, z: float, center=(0.0, 0.0, 0.0)) -> trimesh.Trimesh:

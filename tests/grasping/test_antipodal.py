@@ -17,11 +17,13 @@ from sampled import (
 )
 from trimesh import creation
 
-from burg_drake.core.errors import InvalidInputError, MeshError
-from burg_drake.core.frames import check_pose, swap_fingers
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.grasping.sampling.antipodal import PATIENCE, AntipodalSettings, sample_antipodal
-from burg_drake.grasping.sampling.contact_pairs import FINGER_CLEARANCE, MIN_WIDTH
+from burg_drake.core import GraspSet, InvalidInputError, MeshError, check_pose, swap_fingers
+from burg_drake.grasping import (
+    AntipodalSettings,
+    ContactPairSettings,
+    SamplingEffort,
+    sample_antipodal,
+)
 
 MU = 0.24
 CONE = np.arctan(MU)
@@ -70,7 +72,7 @@ def test_contacts_do_not_lie_inside_of_material(start):
 def test_the_opening_is_respected(mesh, opening):
     widths = grasp(mesh, n=300, opening=opening).width
     assert (widths >= opening[0]).all()
-    assert (widths <= opening[1] - 2.0 * FINGER_CLEARANCE).all()
+    assert (widths <= opening[1] - 2.0 * ContactPairSettings.finger_clearance).all()
 
 
 # --- the mesh as only witness ---------------------------------------------------------------------
@@ -229,7 +231,7 @@ def open_corner() -> trimesh.Trimesh:
     [
         sheet(),
         sheet(double=True),
-        box(0.1, 0.1, 0.5 * MIN_WIDTH),
+        box(0.1, 0.1, 0.5 * ContactPairSettings.min_width),
         creation.icosphere(subdivisions=5, radius=0.05),
         box(0.079, 0.1, 0.1),
         open_corner(),
@@ -240,7 +242,7 @@ def test_an_object_without_grasps_ends_soon_with_an_empty_set(mesh):
     grasps = grasp(mesh, n=100_000)
     assert len(grasps) == 0
     assert grasps.X_OG.shape == (0, 4, 4)
-    assert grasps.provenance["rays"] == PATIENCE
+    assert grasps.provenance["rays"] == SamplingEffort.min_rays
 
 
 def test_a_rare_grasp_is_found():

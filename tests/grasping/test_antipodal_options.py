@@ -8,11 +8,9 @@ from sampled import box, closing, contacts, grasp, lumpy, tube
 from scipy.spatial.distance import pdist
 from scipy.stats import chisquare
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import pregrasp
-from burg_drake.geometry.surface import Surface
-from burg_drake.grasping.sampling import antipodal
-from burg_drake.grasping.sampling.antipodal import PATIENCE, TEST_PATIENCE
+from burg_drake.core import InvalidInputError, pregrasp
+from burg_drake.geometry import Surface
+from burg_drake.grasping import SamplingEffort, antipodal_sampling
 
 # --- weights of faces -----------------------------------------------------------------------------
 
@@ -148,8 +146,8 @@ def test_accepted_grasps_are_those_of_the_same_stream_that_pass():
 def test_a_test_that_nothing_passes_ends_soon():
     grasps = grasp(lumpy(), n=10, accept=lambda X: np.zeros(len(X), bool))
     assert len(grasps) == 0
-    assert TEST_PATIENCE <= grasps.provenance["tried"] < 2 * TEST_PATIENCE
-    assert grasps.provenance["rays"] < PATIENCE
+    assert SamplingEffort.min_tests <= grasps.provenance["tried"] < 2 * SamplingEffort.min_tests
+    assert grasps.provenance["rays"] < SamplingEffort.min_rays
 
 
 @pytest.mark.thorough
@@ -164,8 +162,8 @@ def test_what_one_grasp_in_300_passes_is_found():
 @pytest.mark.parametrize("n", [20, 50])
 def test_the_effort_is_bounded_by_the_grasps_that_are_wanted(n: int, monkeypatch):
     """One in 300 passes, where 20 tries for each grasp that is wanted are allowed."""
-    monkeypatch.setattr(antipodal, "TEST_PATIENCE", 1000)
-    monkeypatch.setattr(antipodal, "TEST_EFFORT", 20)
+    monkeypatch.setattr(antipodal_sampling.SamplingEffort, "min_tests", 1000)
+    monkeypatch.setattr(antipodal_sampling.SamplingEffort, "tests_per_wanted", 20)
     seen = 0
 
     def rare(X_OG: np.ndarray) -> np.ndarray:
@@ -208,7 +206,7 @@ def test_diverse_grasps_pass_the_test():
 @pytest.mark.thorough
 def test_where_there_are_few_the_diverse_are_these():
     """Two of 20,000, and so few more that sampling ends."""
-    edge = np.sort(grasp(lumpy(), n=TEST_PATIENCE).X_OG[:, 0, 3])[-2]
+    edge = np.sort(grasp(lumpy(), n=SamplingEffort.min_tests).X_OG[:, 0, 3])[-2]
 
     def outermost(X_OG: np.ndarray) -> np.ndarray:
         return X_OG[:, 0, 3] >= edge

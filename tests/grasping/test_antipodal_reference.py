@@ -11,8 +11,8 @@ import trimesh
 from sampled import box, center, closing, contacts, grasp
 from trimesh import creation
 
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.grasping.sampling.contact_pairs import FINGER_CLEARANCE, MIN_WIDTH
+from burg_drake.core import GraspSet
+from burg_drake.grasping import ContactPairSettings
 from tests.thorough import thorough
 
 POINTS = 4000  # on all faces together, alike on each
@@ -94,7 +94,10 @@ def exhaustive(mesh, friction, opening, weights=None) -> Reference:
     angle1 = np.arccos(np.clip(-np.einsum("ij,ij->i", normals[face], d), -1, 1))
     angle2 = np.arccos(np.clip(np.einsum("ij,ij->i", normals[other], d), -1, 1))
     needed = np.tan(np.maximum(angle1, angle2))
-    low, high = max(opening[0], MIN_WIDTH), opening[1] - 2 * FINGER_CLEARANCE
+    low, high = (
+        max(opening[0], ContactPairSettings.min_width),
+        opening[1] - 2 * ContactPairSettings.finger_clearance,
+    )
     ok = (np.maximum(angle1, angle2) <= np.arctan(friction)) & (width >= low) & (width <= high)
     p, d, width, share, needed = p[ok], d[ok], width[ok], share[ok], needed[ok]
     p2 = p + width[:, None] * d

@@ -9,10 +9,8 @@ from sampled import assert_same_distribution, box, closing, grasp, lumpy
 from scipy.stats import kstest
 from trimesh import creation
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import check_pose
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.grasping.sampling.approach import ApproachCone
+from burg_drake.core import GraspSet, InvalidInputError, check_pose
+from burg_drake.grasping import ApproachCone
 
 DOWN = (0.0, 0.0, -1.0)
 

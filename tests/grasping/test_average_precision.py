@@ -8,18 +8,14 @@ import numpy as np
 import pytest
 from grasp_samples import about, brute_force, crowded_grasps, random_grasps
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import make_pose, swap_fingers
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.grasping.comparison.average_precision import (
-    FRICTIONS,
-    TOP,
+from burg_drake.core import Array, GraspSet, InvalidInputError, make_pose, swap_fingers
+from burg_drake.grasping import (
+    GraspNetSettings,
     graspnet_ap,
     precision_at_top,
     precision_recall,
-    ranking,
-    suppress,
+    rank_by_score,
+    suppress_near_grasps,
 )
 
 
@@ -50,7 +46,7 @@ def test_fifty_perfect_grasps() -> None:
     names = [f"object {k // 10}" for k in range(60)]
     perfect = graspnet_ap(apart(np.linspace(1, 0, 60).tolist(), names), np.zeros(60))
     assert perfect.ap == perfect.attainable == 1.0
-    assert perfect.precision.shape == (TOP, len(FRICTIONS))
+    assert perfect.precision.shape == (GraspNetSettings.top, len(GraspNetSettings.frictions))
     hopeless = graspnet_ap(apart([0.5] * 60, names), np.full(60, np.inf))
     assert (hopeless.ap, hopeless.attainable) == (0.0, 1.0)
 
@@ -80,14 +76,14 @@ def test_ten_of_an_object() -> None:
 )
 def test_what_is_suppressed(other: Array, stays: bool) -> None:
     grasps = GraspSet.create(np.stack([other, make_pose()]), object="mug", score=[0.4, 0.6])
-    assert suppress(grasps).tolist() == ([1, 0] if stays else [1])
-    assert suppress(GraspSet.create(grasps.X_OG, object=["mug", "box"])).shape == (2,)
+    assert suppress_near_grasps(grasps).tolist() == ([1, 0] if stays else [1])
+    assert suppress_near_grasps(GraspSet.create(grasps.X_OG, object=["mug", "box"])).shape == (2,)
 
 
 def test_what_is_suppressed_suppresses_nothing() -> None:
     spots = np.array([[0.00, 0, 0], [0.02, 0, 0], [0.04, 0, 0], [0.06, 0, 0]])
     grasps = GraspSet.create(make_pose(p_AB=spots), object="mug", score=[4, 3, 2, 1])
-    assert suppress(grasps).tolist() == [0, 2]
+    assert suppress_near_grasps(grasps).tolist() == [0, 2]
 
 
 def straightforward_ap(grasps: GraspSet, needed: Array) -> float:
@@ -139,7 +135,7 @@ def test_order_and_fingers_do_not_matter() -> None:
 
 def test_grasps_without_a_score_come_last() -> None:
     grasps = apart([math.nan, -5.0, math.nan, 2.0])
-    order = ranking(grasps).tolist()
+    order = rank_by_score(grasps).tolist()
     assert order[:2] == [3, 1]
     assert sorted(order[2:]) == [0, 2]
 

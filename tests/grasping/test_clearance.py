@@ -11,26 +11,22 @@ import trimesh
 from pydrake.geometry import Capsule, GeometryInstance, SceneGraph
 from pydrake.math import RigidTransform
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import (
+from burg_drake.core import (
+    InvalidInputError,
+    Outcome,
+    Pose,
     grasp_from_axes,
     inverse,
     make_pose,
+    resolve_reference,
     rotation_from_rpy,
     swap_fingers,
     transform_points,
 )
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.core.paths.resources import resolve
-from burg_drake.grasping.clearance.collision_geometry import shape_of
-from burg_drake.grasping.clearance.hand_clearance import HandClearance
-from burg_drake.pipeline.build import build_library
-from burg_drake.pipeline.source import ObjectSource
-from burg_drake.scene.document.scene import Instance, SceneDocument, load_scene, save_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.gripper_document import load_hand
-from burg_drake.station.document.station_document import Station, StationDocument, Table
+from burg_drake.grasping import HandClearance, shape_of
+from burg_drake.pipeline import ObjectSource, build_library
+from burg_drake.scene import Instance, SceneDocument, load_scene, save_scene
+from burg_drake.station import Station, StationDocument, Table, build_station_diagram, load_hand
 
 SIZES = {"box": (0.05, 0.08, 0.10), "plate": (0.2, 0.2, 0.02)}
 PLACES = {"box": (0.2, 0.2), "plate": (0.38, 0.2)}
@@ -52,7 +48,7 @@ def clearance(tmp_path_factory: pytest.TempPathFactory) -> HandClearance:
     station = Station(
         StationDocument(name="test", table=Table(center=(0.3, 0.2))),
         hand,
-        resolve(hand.model),
+        resolve_reference(hand.model),
         None,
         Path("test.yaml"),
     )
@@ -64,7 +60,7 @@ def hand_points() -> np.ndarray:
     """Points that fill the collision boxes of the open hand, in the grasp frame, from the model
     file alone; boxes written as meshes are taken by their bounds."""
     hand = load_hand("panda_hand")
-    path = resolve(hand.model)
+    path = resolve_reference(hand.model)
     model = ElementTree.parse(path).getroot().find("model")
     assert model is not None
     X_HL = {"panda_hand": np.eye(4)}

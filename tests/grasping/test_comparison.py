@@ -8,17 +8,18 @@ import numpy as np
 import pytest
 from grasp_samples import about, crowded_grasps
 
-from burg_drake.core.frames import make_pose, swap_fingers
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.grasping.comparison.matching import Share, coverage, precision
-from burg_drake.grasping.comparison.summary import (
+from burg_drake.core import GraspSet, make_pose, swap_fingers
+from burg_drake.grasping import (
+    DISTANCE_VERSION,
     QUANTILES,
+    Share,
+    Tolerance,
     compare_grasps,
+    coverage,
     distribution,
+    precision,
     summarize,
 )
-from burg_drake.grasping.similarity.neighbour_search import Tolerance
-from burg_drake.grasping.similarity.pose_distance import DISTANCE_VERSION
 
 NAN = math.nan
 

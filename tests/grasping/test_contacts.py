@@ -10,13 +10,17 @@ import trimesh
 from scipy.integrate import dblquad
 from scipy.optimize import minimize
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import make_pose, rotation_from_rpy, swap_fingers
-from burg_drake.geometry.surface import Surface
-from burg_drake.grasping.quality.contacts import Contacts, grasp_contacts
-from burg_drake.grasping.quality.jaws import PANDA_JAWS, jaws_of
-from burg_drake.grasping.quality.pad_indentation import RESISTANCE, indentation
-from burg_drake.station.document.gripper_document import locate_hand
+from burg_drake.core import InvalidInputError, make_pose, rotation_from_rpy, swap_fingers
+from burg_drake.geometry import Surface
+from burg_drake.grasping import (
+    PANDA_JAWS,
+    TURN_RESISTANCE,
+    Contacts,
+    grasp_contacts,
+    jaws_of,
+    press_pads,
+)
+from burg_drake.station import locate_hand
 
 JAWS = PANDA_JAWS
 CENTER = np.eye(4)[None]
@@ -138,7 +142,7 @@ def test_indentation_has_the_least_energy() -> None:
     gap = rng.uniform(0.0, 0.002, (5, 2, 12))
     gap -= gap.min(axis=2, keepdims=True)
     total = 0.004
-    resistance = RESISTANCE * (yz[0] ** 2).sum()
+    resistance = TURN_RESISTANCE * (yz[0] ** 2).sum()
 
     def energy(v: np.ndarray, own: np.ndarray) -> float:
         lift = np.stack([yz[0] @ v[2:], -yz[1] @ v[2:]])
@@ -147,7 +151,7 @@ def test_indentation_has_the_least_energy() -> None:
             0.5 * (pressed**2).sum() - total * 1e-3 * v[:2].sum() + 0.5 * resistance * v[2:] @ v[2:]
         )
 
-    pressed, slope = indentation(gap, yz, total)
+    pressed, slope = press_pads(gap, yz, total)
     np.testing.assert_allclose(pressed.sum(axis=2), total, rtol=1e-9)
     exact = {"xatol": 1e-9, "fatol": 1e-12, "maxiter": 6000, "maxfev": 6000}
     for i in range(5):

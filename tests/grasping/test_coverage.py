@@ -8,11 +8,16 @@ import numpy as np
 import pytest
 from grasp_samples import about, brute_force, crowded_grasps, random_grasps
 
-from burg_drake.core.frames import make_pose, swap_fingers
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.grasping.comparison.matching import Share, coverage, nearest_grasps, precision
-from burg_drake.grasping.similarity.neighbour_search import Tolerance
-from burg_drake.grasping.similarity.pose_distance import DISTANCE_VERSION, LEVER
+from burg_drake.core import GraspSet, make_pose, swap_fingers
+from burg_drake.grasping import (
+    DISTANCE_LEVER,
+    DISTANCE_VERSION,
+    Share,
+    Tolerance,
+    coverage,
+    nearest_grasps,
+    precision,
+)
 from tests.grasping.pose_distances import pose_distances
 
 STEP = 1 / 128
@@ -144,7 +149,7 @@ def test_results_say_what_they_are() -> None:
     result = coverage(one(0, 0, 0), one(0, 0, 0), translation=0.01)
     assert result.tolerance == Tolerance(translation=0.01)
     assert result.version == nearest_grasps(one(0, 0, 0), one(0, 0, 0)).version == DISTANCE_VERSION
-    assert result.tolerance.lever == LEVER
+    assert result.tolerance.lever == DISTANCE_LEVER
 
 
 def test_nothing_to_cover_is_no_share() -> None:

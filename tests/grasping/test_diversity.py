@@ -9,15 +9,8 @@ import numpy as np
 import pytest
 from grasp_samples import about, crowded_grasps, random_grasps
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import make_pose, swap_fingers
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.grasping.similarity.diversity import (
-    farthest_points,
-    neighbour_distances,
-)
-from burg_drake.grasping.similarity.pose_distance import LEVER
+from burg_drake.core import Array, GraspSet, InvalidInputError, make_pose, swap_fingers
+from burg_drake.grasping import DISTANCE_LEVER, farthest_points, neighbour_distances
 from tests.grasping.pose_distances import pose_distances
 
 
@@ -111,7 +104,7 @@ def test_nothing_can_be_selected_of_nothing() -> None:
 def test_neighbours_are_on_the_same_object_and_instance() -> None:
     X = np.concatenate([on_a_line(3), about_z(2), on_a_line(2)])
     grasps = GraspSet.create(X, object=["mug"] * 5 + ["box"] * 2)
-    far = LEVER * math.pi / 2
+    far = DISTANCE_LEVER * math.pi / 2
     expected = [0.0, 1 / 64, 1 / 64, 0.0, far, 1 / 64, 1 / 64]
     np.testing.assert_allclose(neighbour_distances(grasps), expected, atol=1e-15)
     apart = grasps.with_columns(instance=["a", "a", "a", "b", "b", "c", "d"])

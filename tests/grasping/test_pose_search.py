@@ -9,12 +9,14 @@ import pytest
 from grasp_samples import about, crowded_grasps, random_grasps
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import check_pose, make_pose, swap_fingers
-from burg_drake.grasping.similarity import neighbour_search
-from burg_drake.grasping.similarity.neighbour_search import Tolerance, find_nearest, find_within
-from burg_drake.grasping.similarity.pose_distance import components
+from burg_drake.core import Array, InvalidInputError, check_pose, make_pose, swap_fingers
+from burg_drake.grasping import (
+    Tolerance,
+    find_nearest,
+    find_within,
+    grasp_components,
+    neighbour_search,
+)
 from tests.grasping.pose_distances import pose_distances
 
 TOLERANCES = [
@@ -55,16 +57,16 @@ def assert_nearest(index: Array, distance: Array, d: Array) -> None:
 @pytest.fixture
 def small_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     """Many trees, and few pairs at a time."""
-    monkeypatch.setattr(neighbour_search, "TREE", 70)
-    monkeypatch.setattr(neighbour_search, "PAIRS", 300)
-    monkeypatch.setattr(neighbour_search, "CANDIDATES", 1)
+    monkeypatch.setattr(neighbour_search.NeighbourSearchSettings, "tree_size", 70)
+    monkeypatch.setattr(neighbour_search.NeighbourSearchSettings, "max_pairs", 300)
+    monkeypatch.setattr(neighbour_search.NeighbourSearchSettings, "candidates", 1)
 
 
 @pytest.mark.parametrize("name", SETS)
 @pytest.mark.parametrize("tolerance", TOLERANCES, ids=str)
 def test_find_within_is_brute_force(name: str, tolerance: Tolerance) -> None:
     G, F = SETS[name]
-    found = find_within(components(G), components(F), tolerance)
+    found = find_within(grasp_components(G), grasp_components(F), tolerance)
     assert (found == within(G, F, tolerance)).all()
 
 
@@ -77,24 +79,24 @@ def test_the_tolerances_of_these_tests_tell_grasps_apart() -> None:
 @pytest.mark.parametrize("lever", [0.0, 0.001, 0.0573, 1.0])
 def test_find_nearest_is_brute_force(name: str, lever: float) -> None:
     G, F = SETS[name]
-    index, distance = find_nearest(components(G), components(F), lever=lever)
+    index, distance = find_nearest(grasp_components(G), grasp_components(F), lever=lever)
     d = pose_distances(G[:, None], F[None], lever=lever).combined
     assert_nearest(index, distance, d)
 
 
 def test_small_pieces_change_nothing(small_pieces: None) -> None:
     G, F = SETS["crowded"]
-    index, distance = find_nearest(components(G), components(F))
+    index, distance = find_nearest(grasp_components(G), grasp_components(F))
     d = pose_distances(G[:, None], F[None]).combined
     assert_nearest(index, distance, d)
     for tolerance in TOLERANCES:
-        found = find_within(components(G), components(F), tolerance)
+        found = find_within(grasp_components(G), grasp_components(F), tolerance)
         assert (found == within(G, F, tolerance)).all()
 
 
 def test_a_grasp_does_not_find_itself(small_pieces: None) -> None:
     G = np.concatenate([crowded_grasps(150, 8), random_grasps(50, 9)])
-    index, distance = find_nearest(components(G), components(G), same=True)
+    index, distance = find_nearest(grasp_components(G), grasp_components(G), same=True)
     d = pose_distances(G[:, None], G[None]).combined
     np.fill_diagonal(d, np.inf)
     assert_nearest(index, distance, d)
@@ -103,14 +105,14 @@ def test_a_grasp_does_not_find_itself(small_pieces: None) -> None:
 def test_of_several_as_near_the_first_is_found(small_pieces: None) -> None:
     around = np.stack([make_pose(p_AB=p) for p in np.vstack([np.eye(3), -np.eye(3)]) / 64])
     F = np.concatenate([random_grasps(100, 10) @ make_pose(p_AB=(1, 1, 1)), around, around])
-    index, distance = find_nearest(components(make_pose()[None]), components(F))
+    index, distance = find_nearest(grasp_components(make_pose()[None]), grasp_components(F))
     assert (index[0], distance[0]) == (100, 1 / 64)
     turned = np.stack([about("x", 5.0), about("x", -5.0)] * 50)
-    assert find_nearest(components(make_pose()[None]), components(turned))[0][0] == 0
+    assert find_nearest(grasp_components(make_pose()[None]), grasp_components(turned))[0][0] == 0
 
 
 def test_thousands_of_equal_grasps() -> None:
-    F = components(np.repeat(random_grasps(1, 11), 5000, axis=0))
+    F = grasp_components(np.repeat(random_grasps(1, 11), 5000, axis=0))
     index, distance = find_nearest(F, F, same=True)
     assert (distance == 0.0).all()
     assert (index != np.arange(5000)).all()
@@ -119,12 +121,15 @@ def test_thousands_of_equal_grasps() -> None:
 
 def test_bounds_are_inclusive() -> None:
     # Binary fractions, so that a grasp lies exactly on the bound.
-    G, F = components(make_pose(p_AB=(0.25, 0.0, 0.0))[None]), components(make_pose()[None])
+    G, F = (
+        grasp_components(make_pose(p_AB=(0.25, 0.0, 0.0))[None]),
+        grasp_components(make_pose()[None]),
+    )
     for distance in (0.25, np.nextafter(0.25, 0.0)):
         expected = distance == 0.25
         assert find_within(G, F, Tolerance(distance, 0.0)).tolist() == [expected]
         assert find_within(G, F, Tolerance(math.inf, 0.0, distance)).tolist() == [expected]
-    turned = components(about("x", 20.0)[None])
+    turned = grasp_components(about("x", 20.0)[None])
     angle = float(pose_distances(about("x", 20.0), make_pose()).angle)
     assert find_within(turned, F, Tolerance(0.0, angle)).tolist() == [True]
     assert find_within(turned, F, Tolerance(0.0, np.nextafter(angle, 0.0))).tolist() == [False]
@@ -136,7 +141,7 @@ def test_rotations_may_be_as_coarse_as_grasp_sets_allow() -> None:
     for X in (G, F):
         X[:, :3, :3] += rng.uniform(-2.8e-7, 2.8e-7, (len(X), 3, 3))
         check_pose(X, "X_OG")
-    index, distance = find_nearest(components(G), components(F))
+    index, distance = find_nearest(grasp_components(G), grasp_components(F))
     d = pose_distances(G[:, None], F[None]).combined
     assert_nearest(index, distance, d)
 
@@ -144,7 +149,7 @@ def test_rotations_may_be_as_coarse_as_grasp_sets_allow() -> None:
 def test_wide_bounds_reach_all_turns() -> None:
     G = make_pose(p_AB=(0.31, 0.0, 0.0)) @ about("x", 180.0)
     d = float(pose_distances(G, make_pose()).combined)  # 0.31 m and half a turn: 0.49 m
-    g, f = components(G[None]), components(make_pose()[None])
+    g, f = grasp_components(G[None]), grasp_components(make_pose()[None])
     for angle in (math.inf, math.pi):
         assert find_within(g, f, Tolerance(math.inf, angle, 0.5)).all()
         assert find_within(g, f, Tolerance(0.31, angle, d)).all()
@@ -161,7 +166,7 @@ def test_each_pair_is_within_its_own_distances() -> None:
         X[:, :3, :3] += rng.uniform(-2.8e-7, 2.8e-7, (200, 3, 3))
     d = pose_distances(G, F)
     for k in range(200):
-        g, f = components(G[k : k + 1]), components(F[k : k + 1])
+        g, f = grasp_components(G[k : k + 1]), grasp_components(F[k : k + 1])
         assert find_within(g, f, Tolerance(d.translation[k], d.angle[k])).all()
         assert find_within(g, f, Tolerance(math.inf, math.inf, d.combined[k])).all()
 
@@ -169,13 +174,13 @@ def test_each_pair_is_within_its_own_distances() -> None:
 def test_far_from_the_origin() -> None:
     far = make_pose(p_AB=(1000.0, -2000.0, 500.0))
     G, F = far @ SETS["crowded"][0], far @ SETS["crowded"][1]
-    index, distance = find_nearest(components(G), components(F))
+    index, distance = find_nearest(grasp_components(G), grasp_components(F))
     d = pose_distances(G[:, None], F[None]).combined
     assert_nearest(index, distance, d)
 
 
 def test_nothing_is_found_in_nothing() -> None:
-    some, none = components(random_grasps(3, 15)), components(np.empty((0, 4, 4)))
+    some, none = grasp_components(random_grasps(3, 15)), grasp_components(np.empty((0, 4, 4)))
     index, distance = find_nearest(some, none)
     assert index.tolist() == [-1] * 3
     assert (distance == math.inf).all()

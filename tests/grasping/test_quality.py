@@ -8,21 +8,27 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import make_pose, rotation_from_rpy, swap_fingers
-from burg_drake.geometry.surface import Surface
-from burg_drake.grasping.quality.jaws import PANDA_JAWS
-from burg_drake.grasping.quality.metrics import (
-    GRAVITY,
+from burg_drake.core import (
+    Array,
+    InvalidInputError,
+    UnknownNameError,
+    make_pose,
+    rotation_from_rpy,
+    swap_fingers,
+)
+from burg_drake.geometry import Surface
+from burg_drake.grasping import (
     METRICS,
+    PANDA_JAWS,
+    STANDARD_GRAVITY,
+    AntipodalSettings,
     Payload,
     Quality,
     check_metric,
     grasp_quality,
+    sample_antipodal,
     score_of,
 )
-from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal
 
 BOX = Surface.of(trimesh.creation.box((0.04, 0.1, 0.1)))
 MIDDLE = float(np.mean(PANDA_JAWS.z))
@@ -30,7 +36,7 @@ MIDDLE = float(np.mean(PANDA_JAWS.z))
 HELD = make_pose(None, (0.0, 0.0, -MIDDLE))[None]
 """Holds the box at its centre."""
 PAYLOAD = Payload(mass=0.5, center_of_mass=(0.0, 0.0, 0.0), friction=0.4)
-SQUEEZE = 2.0 * PANDA_JAWS.force / (PAYLOAD.mass * GRAVITY)
+SQUEEZE = 2.0 * PANDA_JAWS.force / (PAYLOAD.mass * STANDARD_GRAVITY)
 """Both pad forces over the weight."""
 
 

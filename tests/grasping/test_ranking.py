@@ -8,11 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.grasping.comparison.average_precision import graspnet_ap
-from burg_drake.grasping.comparison.score_ranking import rank_by
+from burg_drake.core import GraspSet, InvalidInputError, UnknownNameError, make_pose
+from burg_drake.grasping import graspnet_ap, rank_by
 
 
 def with_column(score: ArrayLike, **column: ArrayLike) -> GraspSet:

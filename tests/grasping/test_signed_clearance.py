@@ -5,14 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import make_pose, rotation_from_rpy, swap_fingers
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.grasping.clearance.hand_clearance import HandClearance, hand_clearance_alone
-from burg_drake.objects.library.document import load_library
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import (
+    InvalidInputError,
+    Outcome,
+    UnknownNameError,
+    make_pose,
+    rotation_from_rpy,
+    swap_fingers,
+)
+from burg_drake.grasping import HandClearance, hand_clearance_alone
+from burg_drake.objects import load_library
+from burg_drake.scene import Scene, load_scene
+from burg_drake.station import build_station_diagram, load_station
 
 DOWN = np.diag([1.0, -1.0, -1.0])
 """Grasp frame with its approach along -z of the world."""

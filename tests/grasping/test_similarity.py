@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from grasp_samples import about, brute_force, crowded_grasps, random_grasps
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import make_pose, swap_fingers
-from burg_drake.grasping.similarity.pose_distance import LEVER
+from burg_drake.core import InvalidInputError, make_pose, swap_fingers
+from burg_drake.grasping import DISTANCE_LEVER
 from tests.grasping.pose_distances import pose_distances
 
 HERE = make_pose()
@@ -33,7 +32,7 @@ def test_turns_about_the_axes(axis: str, degrees: float, expected: float) -> Non
     distances = pose_distances(HERE, about(axis, degrees))
     assert math.degrees(distances.angle) == pytest.approx(expected, abs=1e-12)
     assert distances.translation == 0.0
-    assert distances.combined == pytest.approx(LEVER * math.radians(expected), abs=1e-15)
+    assert distances.combined == pytest.approx(DISTANCE_LEVER * math.radians(expected), abs=1e-15)
 
 
 @pytest.mark.parametrize("degrees", [1e-9, 1e-6, 1e-3, 179.999999, 180.0 - 1e-9])

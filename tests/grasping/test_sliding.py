@@ -9,16 +9,21 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.frames import make_pose, rotation_from_rpy, swap_fingers
-from burg_drake.geometry.surface import Surface
-from burg_drake.grasping.quality.contacts import Contacts, friction_needed, grasp_contacts
-from burg_drake.grasping.quality.jaws import PANDA_JAWS
-from burg_drake.grasping.quality.metrics import Payload, grasp_quality
-from burg_drake.grasping.quality.sliding import STEPS, slide_to_rest
+from burg_drake.core import Array, make_pose, rotation_from_rpy, swap_fingers
+from burg_drake.geometry import Surface
+from burg_drake.grasping import (
+    PANDA_JAWS,
+    SLIDE_STEPS,
+    Contacts,
+    Payload,
+    friction_needed,
+    grasp_contacts,
+    grasp_quality,
+    slide_to_rest,
+)
 
 MU = 0.3
-STEP = min(np.ptp(PANDA_JAWS.y), np.ptp(PANDA_JAWS.z)) / STEPS
+STEP = min(np.ptp(PANDA_JAWS.y), np.ptp(PANDA_JAWS.z)) / SLIDE_STEPS
 BITE = 0.0008
 """How deep the edge of a pad may be pressed in before its flat part bears enough [m]."""
 

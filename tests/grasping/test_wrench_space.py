@@ -7,17 +7,18 @@ import pytest
 from scipy.optimize import minimize
 from scipy.spatial import ConvexHull
 
-from burg_drake.core.arrays import Array
-from burg_drake.grasping.quality.contacts import Contacts
-from burg_drake.grasping.quality.triangulation import triangulated_ball
-from burg_drake.grasping.quality.wrench_margins import (
+from burg_drake.core import Array
+from burg_drake.grasping import (
     ANY_FORCE,
     ANY_WRENCH,
+    Contacts,
+    WrenchSpace,
     epsilon_bracket,
     force_along,
-    reaches,
+    hull_volume,
+    triangulated_ball,
+    wrench_reaches,
 )
-from burg_drake.grasping.quality.wrench_space import WrenchSpace, hull_volume
 
 
 def random_contacts(n: int, seed: int = 0, spread: float = 0.2) -> Contacts:
@@ -135,7 +136,7 @@ def smallest_support(basis: Array, rows: int, direction: Array | None = None) ->
 def test_reaches_are_those_of_a_general_optimiser() -> None:
     space = random_space(2, seed=2)
     up = np.tile([0.0, 0.6, 0.8], (2, 1))
-    found = reaches(space, [ANY_WRENCH, ANY_FORCE, force_along(up)])
+    found = wrench_reaches(space, [ANY_WRENCH, ANY_FORCE, force_along(up)])
     for i, basis in enumerate(space.basis):
         assert found[0][i] == pytest.approx(smallest_support(basis, 6), rel=1e-3)
         assert found[1][i] == pytest.approx(smallest_support(basis, 3), rel=1e-3)
@@ -150,7 +151,7 @@ def test_epsilon_is_between_its_bounds() -> None:
 
 def test_torsion_limits_a_centred_grasp() -> None:
     """A pure turn about the closing line is the shortest way out: mu r / length."""
-    (found,) = reaches(symmetric_space(0.5, 0.006, 0.04, 0.05), [ANY_WRENCH])
+    (found,) = wrench_reaches(symmetric_space(0.5, 0.006, 0.04, 0.05), [ANY_WRENCH])
     assert found[0] == pytest.approx(0.5 * 0.006 / 0.05, rel=1e-6)
 
 
@@ -158,21 +159,21 @@ def test_lever_limits_a_narrow_grasp() -> None:
     """Turning about one contact that rests, the other slides by q and the middle moves by a, half
     of mu q: of all such twists of unit length, a^2 + q^2 / 4 + (length q / width)^2 = 1."""
     mu, width, length = 0.5, 0.01, 0.05
-    (found,) = reaches(symmetric_space(mu, 0.02, width, length), [ANY_WRENCH])
+    (found,) = wrench_reaches(symmetric_space(mu, 0.02, width, length), [ANY_WRENCH])
     assert found[0] == pytest.approx(mu / np.sqrt(1 + mu**2 + 4 * (length / width) ** 2), rel=1e-4)
 
 
 def test_batches_do_not_matter() -> None:
     space, polytope = random_space(40, seed=4), triangulated_ball(1)
     goals = [ANY_WRENCH, ANY_FORCE]
-    together = [*reaches(space, goals), hull_volume(space, polytope)]
+    together = [*wrench_reaches(space, goals), hull_volume(space, polytope)]
     for i in (0, 7, 39):
         single = space.select(slice(i, i + 1))
-        alone = [*reaches(single, goals), hull_volume(single, polytope)]
+        alone = [*wrench_reaches(single, goals), hull_volume(single, polytope)]
         np.testing.assert_array_equal([v[0] for v in alone], [v[i] for v in together])
 
 
 def test_no_grasps() -> None:
     none = random_space(2).select(slice(0, 0))
-    assert all(len(v) == 0 for v in reaches(none, [ANY_WRENCH, ANY_FORCE]))
+    assert all(len(v) == 0 for v in wrench_reaches(none, [ANY_WRENCH, ANY_FORCE]))
     assert len(hull_volume(none, triangulated_ball(1))) == 0

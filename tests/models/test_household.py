@@ -14,7 +14,7 @@ import trimesh
 from scipy import ndimage
 from scipy.spatial import ConvexHull
 
-from burg_drake.objects.library.document import load_library
+from burg_drake.objects import load_library
 from tests.thorough import thorough
 
 pytest.importorskip("manifold3d")

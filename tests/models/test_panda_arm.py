@@ -14,7 +14,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.tree import BodyIndex, JointActuatorIndex
 from pydrake.planning import RobotDiagramBuilder
 
-from burg_drake.core.paths.resources import resolve
+from burg_drake.core import resolve_reference
 from tools.panda_model.hand_document import hand_yaml
 from tools.panda_model.sdf import arm_sdf, hand_sdf
 from tools.robot_model.obj import mtl_text
@@ -51,8 +51,12 @@ class Robot:
     def __init__(self) -> None:
         builder = RobotDiagramBuilder(time_step=0.002)
         self.plant = plant = builder.plant()
-        builder.parser().AddModels(str(resolve("package://burg_drake/models/panda/panda_arm.sdf")))
-        builder.parser().AddModels(str(resolve("package://burg_drake/models/panda/panda_hand.sdf")))
+        builder.parser().AddModels(
+            str(resolve_reference("package://burg_drake/models/panda/panda_arm.sdf"))
+        )
+        builder.parser().AddModels(
+            str(resolve_reference("package://burg_drake/models/panda/panda_hand.sdf"))
+        )
         plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("panda_link0"))
         plant.WeldFrames(
             plant.GetFrameByName("panda_link8"),
@@ -212,7 +216,7 @@ def test_folded_postures_collide(robot: Robot, q: list[float], pair: tuple[str, 
 @pytest.mark.parametrize("link", [f"panda_link{i}" for i in range(8)] + ["panda_hand"])
 def test_looks_lie_inside_the_collision_geometry(robot: Robot, link: str) -> None:
     robot.put(np.zeros(7))
-    mesh = resolve("package://burg_drake/models/panda/meshes/" + _mesh_name(link))
+    mesh = resolve_reference("package://burg_drake/models/panda/meshes/" + _mesh_name(link))
     vertices, _ = read_obj(mesh)
     body = robot.plant.GetBodyByName(link)
     points = (body.EvalPoseInWorld(robot.plant_context) @ vertices[::3].T).T
@@ -246,7 +250,7 @@ def read_obj(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_meshes_are_light_and_have_normals_and_materials() -> None:
-    folder = resolve("package://burg_drake/models/panda/meshes")
+    folder = resolve_reference("package://burg_drake/models/panda/meshes")
     materials = (folder / "panda.mtl").read_text()
     files = sorted(folder.glob("*.obj"))
     assert len(files) == 10

@@ -32,8 +32,8 @@ from pydrake.multibody.tree import (
 from pydrake.planning import RobotDiagramBuilder
 from pydrake.systems.analysis import Simulator
 
-from burg_drake.core.paths.resources import resolve
-from burg_drake.station.document.gripper_document import Hand, load_hand
+from burg_drake.core import resolve_reference
+from burg_drake.station import Hand, load_hand
 
 FORCE = 40.0
 """Force limit of each finger in the tests [N]."""
@@ -52,7 +52,9 @@ class Gripper:
         self.plant = plant = builder.plant()
         plant.set_contact_model(ContactModel.kHydroelasticWithFallback)
         plant.set_discrete_contact_approximation(DiscreteContactApproximation.kLagged)
-        builder.parser().AddModels(str(resolve("package://burg_drake/models/panda/panda_hand.sdf")))
+        builder.parser().AddModels(
+            str(resolve_reference("package://burg_drake/models/panda/panda_hand.sdf"))
+        )
         plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("panda_hand"))
         plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, 0.0])
         self.joints = [plant.GetJointByName(f"panda_finger_joint{i}") for i in (1, 2)]
@@ -176,7 +178,11 @@ def test_fronts_of_the_pads_look_at_each_other(document: Hand) -> None:
 
 def test_fronts_of_the_pads_carry_the_torsion_of_a_patch() -> None:
     """One point a triangle, against the integral over the rectangle."""
-    lines = resolve("package://burg_drake/models/panda/meshes/pad.vtk").read_text().splitlines()
+    lines = (
+        resolve_reference("package://burg_drake/models/panda/meshes/pad.vtk")
+        .read_text()
+        .splitlines()
+    )
     count = int(next(x for x in lines if x.startswith("POINTS")).split()[1])
     points = np.array([[float(v) for v in x.split()] for x in lines[5 : 5 + count]])
     cells = np.array([[int(v) for v in x.split()[2:]] for x in lines if x.startswith("4 ")])
@@ -263,7 +269,7 @@ def test_right_finger_follows_the_left_one() -> None:
 
 def test_standard_mimic_is_still_ignored() -> None:
     """Drake 1.51 reads drake:mimic only; when this fails, the plain SDF element will do."""
-    text = resolve("package://burg_drake/models/panda/panda_hand.sdf").read_text()
+    text = resolve_reference("package://burg_drake/models/panda/panda_hand.sdf").read_text()
     own = '      <drake:mimic joint="panda_finger_joint1" multiplier="1" offset="0"/>\n'
     plain = '<mimic joint="panda_finger_joint1"><multiplier>1</multiplier></mimic>'
     assert own in text

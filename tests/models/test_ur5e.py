@@ -11,7 +11,7 @@ from pydrake.geometry import Cylinder, Role
 from pydrake.multibody.tree import BodyIndex
 from pydrake.planning import RobotDiagramBuilder
 
-from burg_drake.core.paths.resources import resolve
+from burg_drake.core import resolve_reference
 from tools.ur5e_model.__main__ import model_texts
 
 # Universal Robots, "DH Parameters for calculations of kinematics and dynamics", UR5e: a, d, alpha
@@ -51,7 +51,7 @@ class Robot:
         builder = RobotDiagramBuilder(time_step=0.002)
         self.plant = plant = builder.plant()
         (self.arm,) = builder.parser().AddModels(
-            str(resolve("package://burg_drake/models/ur5e/ur5e.urdf"))
+            str(resolve_reference("package://burg_drake/models/ur5e/ur5e.urdf"))
         )
         plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("base"))
         plant.Finalize()
@@ -121,7 +121,7 @@ def far_ends(q: np.ndarray) -> list[np.ndarray]:
 
 def test_file_is_what_the_generator_writes() -> None:
     for path, text in model_texts().items():
-        assert resolve(f"package://burg_drake/models/{path}").read_text("utf-8") == text
+        assert resolve_reference(f"package://burg_drake/models/{path}").read_text("utf-8") == text
 
 
 def test_flange_is_where_the_dh_table_puts_it(robot: Robot) -> None:

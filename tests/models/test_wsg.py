@@ -10,9 +10,8 @@ from pydrake.geometry import Box, Role, VolumeMesh
 from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.planning import RobotDiagram, RobotDiagramBuilder
 
-from burg_drake.core.paths.resources import resolve
-from burg_drake.station.document.gripper_document import Hand, load_hand
-from burg_drake.station.world.hand_check import check_hand
+from burg_drake.core import resolve_reference
+from burg_drake.station import Hand, check_hand, load_hand
 from tools.wsg_model.__main__ import model_texts
 
 FINGERS = ("wsg_left_finger", "wsg_right_finger")
@@ -26,7 +25,7 @@ def hand() -> Hand:
 @pytest.fixture(scope="module")
 def diagram(hand: Hand) -> RobotDiagram:
     builder = RobotDiagramBuilder(time_step=0.001)
-    builder.parser().AddModels(str(resolve(hand.model)))
+    builder.parser().AddModels(str(resolve_reference(hand.model)))
     builder.plant().WeldFrames(
         builder.plant().world_frame(), builder.plant().GetFrameByName(hand.body)
     )
@@ -39,8 +38,10 @@ def test_files_are_what_the_tool_writes() -> None:
     for path, text in texts.items():
         if path.endswith(".obj"):  # another platform may round a vertex otherwise
             continue
-        assert resolve(f"package://burg_drake/models/{path}").read_text("utf-8") == text, path
-    folder = resolve("package://burg_drake/models/wsg/wsg_50.sdf").parent
+        assert (
+            resolve_reference(f"package://burg_drake/models/{path}").read_text("utf-8") == text
+        ), path
+    folder = resolve_reference("package://burg_drake/models/wsg/wsg_50.sdf").parent
     written = {name for name in texts if name.startswith("wsg/")}
     assert {f"wsg/{p.relative_to(folder)}" for p in folder.rglob("*") if p.is_file()} == written
 
@@ -69,7 +70,7 @@ def test_figures_of_the_data_sheet(hand: Hand, diagram: RobotDiagram) -> None:
 
 
 def test_pads_meet_when_closed_and_open_to_110_mm(hand: Hand) -> None:
-    figures = check_hand(hand, resolve(hand.model))
+    figures = check_hand(hand, resolve_reference(hand.model))
     assert figures.opening == pytest.approx((0.0, 0.110), abs=1e-9)
     assert figures.pad_size == pytest.approx((0.008, 0.020, 0.020), abs=1e-9)
 
@@ -137,6 +138,6 @@ def test_collision_geometry_covers_the_looks(diagram: RobotDiagram) -> None:
 def test_parses_without_a_word(hand: Hand, caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING, logger="drake"):
         builder = RobotDiagramBuilder(time_step=0.001)
-        builder.parser().AddModels(str(resolve(hand.model)))
+        builder.parser().AddModels(str(resolve_reference(hand.model)))
         assert builder.plant().num_constraints() == 1
     assert [record.getMessage() for record in caplog.records] == []

@@ -9,14 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.motion.collision.checker import ArmCollision
-from burg_drake.motion.collision.edge_checker import EdgeChecker
-from burg_drake.motion.proximity.clearance_bounds import ArmProximity
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.diagram.station_diagram import StationDiagram
-from burg_drake.station.document.station_document import Arm, Obstacle, load_station
+from burg_drake.core import Pose
+from burg_drake.motion import ArmCollision, ArmProximity, EdgeChecker
+from burg_drake.scene import Instance, Scene, SceneDocument, load_scene
+from burg_drake.station import Arm, Obstacle, StationDiagram, build_station_diagram, load_station
 
 LOWER = np.array([0.1, -0.5, 0.15])
 UPPER = np.array([0.9, 0.5, 0.9])

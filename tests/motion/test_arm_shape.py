@@ -7,14 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.motion.proximity import arm_shape
-from burg_drake.motion.proximity.arm_shape import ArmShape
-from burg_drake.motion.proximity.clearance_bounds import ArmProximity
-from burg_drake.scene.document.scene import Scene, SceneDocument, load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.diagram.station_diagram import StationDiagram
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.core import Pose
+from burg_drake.motion import ArmProximity, ArmShape, arm_shape
+from burg_drake.scene import Scene, SceneDocument, load_scene
+from burg_drake.station import Station, StationDiagram, build_station_diagram, load_station
 
 SIX = load_scene("tabletop_six")
 EMPTY = Scene(SceneDocument(name="empty", library="household"), SIX.library, Path("empty.yaml"))

@@ -7,14 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import transform_points
-from burg_drake.motion.ik.numeric import ArmKinematics
-from burg_drake.motion.workspace.arm_span import ArmSpan, unreachable_board, unreachable_objects
-from burg_drake.motion.workspace.station_check import empty_scene
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.core import Pose, transform_points
+from burg_drake.motion import (
+    ArmKinematics,
+    ArmSpan,
+    empty_scene,
+    unreachable_board,
+    unreachable_objects,
+)
+from burg_drake.scene import load_scene
+from burg_drake.station import Station, build_station_diagram, load_station
 
 
 def kinematics(station: Station) -> ArmKinematics:

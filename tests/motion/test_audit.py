@@ -12,13 +12,11 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from burg_drake.core.content import rng_from
-from burg_drake.core.documents.schema import Pose
-from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal
-from burg_drake.motion.reach.arm_reach import ArmReach
-from burg_drake.motion.reach.witness import Witness
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.document.station_document import Obstacle, Station, load_station
+from burg_drake.core import Pose, rng_from
+from burg_drake.grasping import AntipodalSettings, sample_antipodal
+from burg_drake.motion import ArmReach, Witness
+from burg_drake.scene import Scene, load_scene
+from burg_drake.station import Obstacle, Station, load_station
 
 SOURCE = Path(__file__).resolve().parents[2] / "benchmarks" / "reach_audit.py"
 STEP = 0.03

@@ -5,12 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.core.frames import grasp_from_axes
-from burg_drake.core.paths.resources import builtin_names
-from burg_drake.motion.reach.arm_reach import ArmReach
-from burg_drake.motion.workspace.reachability import ReachabilitySettings, map_reachability
-from burg_drake.motion.workspace.station_check import empty_scene
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import builtin_names, grasp_from_axes
+from burg_drake.motion import ArmReach, ReachabilitySettings, empty_scene, map_reachability
+from burg_drake.station import load_station
 from tests.thorough import thorough
 
 LIKE_ANOTHER = {"panda_bin", "panda_offset", "panda_pedestal"}

@@ -8,12 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.frames import grasp_from_axes
-from burg_drake.motion.proximity import arm_shape
-from burg_drake.motion.reach.arm_reach import ArmReach
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.diagram.station_diagram import instance_pose
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import grasp_from_axes
+from burg_drake.motion import ArmReach, arm_shape
+from burg_drake.scene import Scene, load_scene
+from burg_drake.station import instance_pose, load_station
 
 KINDS = {"distances", "postures", "roadmap", "robot"}
 

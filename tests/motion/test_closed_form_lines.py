@@ -7,20 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.frames import grasp_from_axes, swap_fingers
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.motion.ik.numeric import ArmKinematics
-from burg_drake.motion.ik.panda import PandaIk, panda_forward
-from burg_drake.motion.lines.closed_form import ClosedFormLineSearch
-from burg_drake.motion.lines.line_poses import LinePoses
-from burg_drake.motion.lines.line_search import LineSearchBatch
-from burg_drake.motion.lines.reach_settings import ReachSettings
-from burg_drake.motion.proximity.clearance_bounds import ArmProximity
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.grasp_motion import GraspMotion
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import Array, Outcome, grasp_from_axes, swap_fingers
+from burg_drake.motion import (
+    ArmKinematics,
+    ArmProximity,
+    ClosedFormLineSearch,
+    LinePoses,
+    LineSearchBatch,
+    PandaIk,
+    ReachSettings,
+    panda_forward,
+)
+from burg_drake.scene import load_scene
+from burg_drake.station import GraspMotion, build_station_diagram, load_station
 
 DOWN = (0.0, 0.0, -1.0)
 STATION = load_station("panda_tabletop")

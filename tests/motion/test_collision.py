@@ -8,14 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import inverse
-from burg_drake.motion.collision.checker import ArmCollision
-from burg_drake.motion.proximity.clearance_bounds import ArmProximity
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import Obstacle, Station, load_station
+from burg_drake.core import InvalidInputError, Pose, UnknownNameError, inverse
+from burg_drake.motion import ArmCollision, ArmProximity
+from burg_drake.scene import Instance, Scene, SceneDocument, load_scene
+from burg_drake.station import Obstacle, Station, build_station_diagram, load_station
 
 HOME = np.array((0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4))
 HAND = (0.30689, 0.0, 0.59028)

@@ -7,9 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from burg_drake.motion.ik.limits import ArmLimits
-from burg_drake.motion.timing.corners import distance_to_polyline, time_polyline
-from burg_drake.motion.timing.cubics import Cubics
+from burg_drake.motion import ArmLimits, Cubics, distance_to_polyline, time_polyline
 
 
 def anything(q: np.ndarray) -> bool:

@@ -19,8 +19,8 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.motion.proximity.cover import cover_body
+from burg_drake.core import InvalidInputError
+from burg_drake.motion import cover_body
 from tests.thorough import thorough
 
 X_BP = RigidTransform(RollPitchYaw(0.3, -0.7, 1.1), [0.1, -0.2, 0.3])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.motion.timing.cubics import Cubics, DoubleS, smoothed
+from burg_drake.motion import Cubics, DoubleS, smooth_polyline
 
 
 def checked(profile: DoubleS, v: float, a: float, j: float) -> Cubics:
@@ -72,7 +72,7 @@ def test_more_of_any_limit_never_takes_longer() -> None:
 @pytest.fixture
 def wiggle() -> Cubics:
     q = np.random.default_rng(1).uniform(-1.0, 1.0, (5, 3))
-    return smoothed(q, np.array([0.3, 0.2, 0.4, 0.1]), DoubleS(0.0, 0.25, 0.05), np.zeros(3))
+    return smooth_polyline(q, np.array([0.3, 0.2, 0.4, 0.1]), DoubleS(0.0, 0.25, 0.05), np.zeros(3))
 
 
 def test_derivatives_are_those_of_differences(wiggle: Cubics) -> None:
@@ -95,7 +95,7 @@ def test_peaks_are_those_of_dense_samples(wiggle: Cubics) -> None:
 def test_smoothing_is_the_mean_over_both_windows() -> None:
     q = np.array([[0.0], [1.0], [0.5]])
     travel, rise, ramp = np.array([0.4, 0.3]), 0.2, 0.05
-    motion = smoothed(q, travel, DoubleS(0.0, rise, ramp))
+    motion = smooth_polyline(q, travel, DoubleS(0.0, rise, ramp))
     h = 1e-4  # the polyline over time, delayed by half of both windows, averaged by brute force
     time = np.arange(-0.5, 1.5, h)
     line = np.interp(time, [0.0, 0.4, 0.7], q[:, 0])
@@ -108,7 +108,7 @@ def test_smoothing_is_the_mean_over_both_windows() -> None:
 
 def test_a_stop_as_long_as_the_windows_meets_the_waypoint() -> None:
     q = np.array([[0.0, 0.0], [1.0, 0.2], [0.5, 1.0]])
-    motion = smoothed(q, np.array([0.4, 0.3]), DoubleS(0.0, 0.2, 0.05), np.array([0.25]))
+    motion = smooth_polyline(q, np.array([0.4, 0.3]), DoubleS(0.0, 0.2, 0.05), np.array([0.25]))
     at, v, a, _ = motion.at(np.array([0.4 + 0.25]))
     np.testing.assert_allclose(at[0], q[1], atol=1e-12)
     np.testing.assert_allclose([v[0], a[0]], np.zeros((2, 2)), atol=1e-9)
@@ -116,6 +116,6 @@ def test_a_stop_as_long_as_the_windows_meets_the_waypoint() -> None:
 
 def test_reversed_in_time_it_is_the_same_way_back(wiggle: Cubics) -> None:
     q = np.random.default_rng(1).uniform(-1.0, 1.0, (5, 3))
-    back = smoothed(q[::-1], np.array([0.1, 0.4, 0.2, 0.3]), DoubleS(0.0, 0.25, 0.05))
+    back = smooth_polyline(q[::-1], np.array([0.1, 0.4, 0.2, 0.3]), DoubleS(0.0, 0.25, 0.05))
     t = np.linspace(0.0, wiggle.duration, 333)
     np.testing.assert_allclose(back.at(back.duration - t)[0], wiggle.at(t)[0], atol=1e-9)

@@ -5,10 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.geometry.shape import Shape
-from burg_drake.motion.proximity.distance_field import CELL, DistanceField
-from burg_drake.motion.proximity.solids import HullSolid, ProximitySolid, solid_of
+from burg_drake.core import make_pose, rotation_from_rpy
+from burg_drake.geometry import Shape
+from burg_drake.motion import (
+    DistanceField,
+    DistanceFieldSettings,
+    HullSolid,
+    ProximitySolid,
+    solid_of,
+)
 
 X_WP = make_pose(rotation_from_rpy((0.3, -0.5, 0.8)), (0.4, 0.1, 0.2))
 HALF = np.array((0.03, 0.05, 0.02))
@@ -66,8 +71,8 @@ def test_bounds_hold_and_are_tight(case: str) -> None:
     assert np.all(upper >= true - 1e-6)
     near = np.abs(true) < 0.05
     assert np.isfinite(upper[near]).all()
-    assert (upper - lower)[near].max() < 6.0 * CELL
-    assert np.median((upper - lower)[near]) < 3.0 * CELL
+    assert (upper - lower)[near].max() < 6.0 * DistanceFieldSettings.cell_size
+    assert np.median((upper - lower)[near]) < 3.0 * DistanceFieldSettings.cell_size
 
 
 def test_large_boxes_are_exact() -> None:

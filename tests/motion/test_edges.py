@@ -10,12 +10,10 @@ import pytest
 from gantry import FINGERTIP, HALF_PAD, HOME, LOWER, UPPER, box, gantry_edges
 from numpy.typing import ArrayLike
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import inverse
-from burg_drake.motion.collision.edge_checker import ROWS, EdgeChecker
-from burg_drake.motion.collision.edge_screen import FINE, screen_edges
-from burg_drake.scene.document.scene import Instance
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import Pose, inverse
+from burg_drake.motion import EdgeChecker, EdgeCheckSettings, screen_edges
+from burg_drake.scene import Instance
+from burg_drake.station import load_station
 
 AHEAD = np.array([1.0, 0.0, 0.0])
 WALL = box((0.5, -0.6, 0.0), (0.502, 0.6, 0.5))
@@ -100,7 +98,7 @@ def test_proofs_of_the_screen_hold(posts: EdgeChecker) -> None:
         if not together.blocked[k]:
             np.testing.assert_array_equal(alone.open_shares(0), together.open_shares(k))
     stretch = (together.open_to - together.open_from) * together.length[together.open_edge]
-    assert (stretch <= FINE * (1.0 + 1e-9)).all()
+    assert (stretch <= EdgeCheckSettings.fine_length * (1.0 + 1e-9)).all()
 
 
 def test_how_often_drake_is_asked(walled: EdgeChecker) -> None:
@@ -115,8 +113,8 @@ def test_how_often_drake_is_asked(walled: EdgeChecker) -> None:
         assert np.array_equal(rows[0], corners[0]) and np.array_equal(rows[-1], corners[-1])
         gaps = np.abs(np.diff(rows, axis=0)).sum(axis=1)
         length = np.abs(np.diff(corners, axis=0)).sum()
-        assert gaps.max() <= ROWS * (1.0 + 1e-9)
-        assert len(rows) <= 2 * length / ROWS + 3
+        assert gaps.max() <= EdgeCheckSettings.row_spacing * (1.0 + 1e-9)
+        assert len(rows) <= 2 * length / EdgeCheckSettings.row_spacing + 3
     quick = EdgeChecker(walled.proximity, walled.collision, exact=False)
     assert quick.first_blocked(q) is None and quick.checks == 0
     assert not quick.is_free(HOME, HOME + 0.6 * AHEAD) and quick.checks == 0
@@ -158,7 +156,7 @@ def test_what_is_carried_counts_against_the_links_alone(tmp_path: Path) -> None:
         for a, b in zip(q, rise, strict=True)
     ]
     assert found is not None
-    assert free.index(False) <= found <= free.index(False) + ROWS / 0.01
+    assert free.index(False) <= found <= free.index(False) + EdgeCheckSettings.row_spacing / 0.01
 
 
 def test_several_paths_at_once(posts: EdgeChecker) -> None:

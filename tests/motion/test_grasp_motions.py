@@ -12,20 +12,20 @@ import numpy as np
 import pytest
 from gantry import UPPER, box, gantry_diagram
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.content import rng_from
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import grasp_from_axes, make_pose, rot_z, swap_fingers
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.grasping.clearance.hand_clearance import HandClearance
-from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal
-from burg_drake.motion.planner import Planner
-from burg_drake.motion.plans.grasp_plan import load_plan
-from burg_drake.motion.reach.arm_reach import ArmReach, Reach, ReachSettings
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.grasp_motion import GraspMotion
-from burg_drake.station.document.station_document import Obstacle, Station, load_station
+from burg_drake.core import (
+    Array,
+    Outcome,
+    Pose,
+    grasp_from_axes,
+    make_pose,
+    rng_from,
+    rot_z,
+    swap_fingers,
+)
+from burg_drake.grasping import AntipodalSettings, HandClearance, sample_antipodal
+from burg_drake.motion import ArmReach, Planner, Reach, ReachSettings, load_plan
+from burg_drake.scene import Scene, load_scene
+from burg_drake.station import GraspMotion, Obstacle, Station, build_station_diagram, load_station
 
 DOWN = (0.0, 0.0, -1.0)
 Z, TCP = 0.3, 0.1034

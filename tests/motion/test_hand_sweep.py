@@ -9,16 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import grasp_from_axes, pregrasp, swap_fingers
-from burg_drake.grasping.clearance.hand_clearance import HandClearance
-from burg_drake.motion.sweep.hand_sweep import HandSweep, Sweep
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.grasp_motion import GraspMotion
-from burg_drake.station.document.station_document import Obstacle, Station, load_station
+from burg_drake.core import (
+    Array,
+    InvalidInputError,
+    Pose,
+    UnknownNameError,
+    grasp_from_axes,
+    pregrasp,
+    swap_fingers,
+)
+from burg_drake.grasping import HandClearance
+from burg_drake.motion import HandSweep, SweepResult
+from burg_drake.scene import Instance, Scene, SceneDocument, load_scene
+from burg_drake.station import GraspMotion, Obstacle, Station, build_station_diagram, load_station
 
 MOTION = GraspMotion()
 STANDOFF, LIFT = MOTION.standoff, MOTION.lift_height
@@ -53,7 +56,7 @@ def block(center: tuple[float, float, float], size: tuple[float, float, float]) 
 
 def both(
     swept: HandSweep, X: Array, width: float = 0.068, name: str = "can"
-) -> tuple[Sweep, Sweep]:
+) -> tuple[SweepResult, SweepResult]:
     return swept.approach(name, X[None]), swept.lift(name, X[None], np.array([width]))
 
 

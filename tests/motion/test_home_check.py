@@ -8,19 +8,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.motion.collision.checker import ArmCollision
-from burg_drake.motion.collision.home_posture import (
+from burg_drake.core import InvalidInputError, Pose
+from burg_drake.motion import (
+    ArmCollision,
     base_overlaps,
+    empty_scene,
     home_clearance,
     require_free_home,
 )
-from burg_drake.motion.workspace.station_check import empty_scene
-from burg_drake.scene.document.scene import Instance, load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.diagram.station_diagram import StationDiagram
-from burg_drake.station.document.station_document import Obstacle, Station, load_station
+from burg_drake.scene import Instance, load_scene
+from burg_drake.station import (
+    Obstacle,
+    Station,
+    StationDiagram,
+    build_station_diagram,
+    load_station,
+)
 
 TIP = 0.487
 """Roughly the height of the lowest points of the fingers at home [m]."""

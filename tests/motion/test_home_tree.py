@@ -11,17 +11,18 @@ import numpy as np
 import pytest
 from gantry import HOME, LOWER, UPPER, box, gantry_edges
 
-from burg_drake.core.frames import grasp_from_axes
-from burg_drake.motion.collision.checker import ArmCollision
-from burg_drake.motion.collision.edge_checker import EdgeChecker
-from burg_drake.motion.ik.numeric import ArmKinematics
-from burg_drake.motion.ik.panda import PandaIk
-from burg_drake.motion.proximity.clearance_bounds import ArmProximity
-from burg_drake.motion.transit.home_tree import HomeTree
-from burg_drake.motion.transit.object_postures import postures_over_objects
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import Obstacle, Station, load_station
+from burg_drake.core import grasp_from_axes
+from burg_drake.motion import (
+    ArmCollision,
+    ArmKinematics,
+    ArmProximity,
+    EdgeChecker,
+    HomeTree,
+    PandaIk,
+    postures_over_objects,
+)
+from burg_drake.scene import load_scene
+from burg_drake.station import Obstacle, Station, build_station_diagram, load_station
 from tests.thorough import thorough
 
 GOALS = 8

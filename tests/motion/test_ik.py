@@ -19,13 +19,10 @@ from pydrake.multibody.tree import (
 from pydrake.planning import RobotDiagramBuilder
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.core.paths.resources import resolve
-from burg_drake.motion.ik.numeric import ArmKinematics, rotation_vector, solve_ik
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import InvalidInputError, make_pose, resolve_reference, rotation_from_rpy
+from burg_drake.motion import ArmKinematics, rotation_vector, solve_ik
+from burg_drake.scene import load_scene
+from burg_drake.station import build_station_diagram, load_station
 
 # Craig's DH table (a, d, alpha) of frankaemika.github.io/docs/control_parameters.html; flange last.
 DH = [
@@ -54,7 +51,9 @@ def panda() -> ArmKinematics:
     """The arm with its flange for a hand, on a base that does not stand at the world's origin."""
     builder = RobotDiagramBuilder()
     plant = builder.plant()
-    builder.parser().AddModels(str(resolve("package://burg_drake/models/panda/panda_arm.sdf")))
+    builder.parser().AddModels(
+        str(resolve_reference("package://burg_drake/models/panda/panda_arm.sdf"))
+    )
     base = plant.GetFrameByName("panda_link0")
     plant.WeldFrames(plant.world_frame(), base, RigidTransform([0.3, -0.2, 0.5]))
     plant.Finalize()
@@ -157,7 +156,7 @@ def test_half_a_turn_is_not_taken_for_none() -> None:
 
 def test_joints_without_limits_turn_once_either_way(tmp_path: Path) -> None:
     """A `continuous` joint of a URDF."""
-    urdf = resolve("package://burg_drake/models/ur5e/ur5e.urdf").read_text("utf-8")
+    urdf = resolve_reference("package://burg_drake/models/ur5e/ur5e.urdf").read_text("utf-8")
     endless = urdf.replace('"wrist_3_joint" type="revolute"', '"wrist_3_joint" type="continuous"')
     endless = re.sub(r'(continuous".*?)lower="\S+" upper="\S+" ', r"\1", endless, flags=re.DOTALL)
     (tmp_path / "arm.urdf").write_text(endless, encoding="utf-8")

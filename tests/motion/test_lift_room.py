@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.motion.reach.lift_height import lift_heights, raise_lifts
-from burg_drake.motion.reach.verdict import Reach
+from burg_drake.core import Outcome
+from burg_drake.motion import Reach, lift_heights, raise_lifts
 
 TRIED = lift_heights(0.02, 0.30)
 HAND, ARM = Reach(Outcome.HAND_COLLISION_LIFT, "roof"), Reach(Outcome.LIFT_LINE, "link vs roof")

@@ -9,13 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import DocumentError, InvalidInputError
-from burg_drake.core.paths.resources import resolve
-from burg_drake.motion.ik.limits import ArmLimits
-from burg_drake.motion.ik.numeric import ArmKinematics
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.core import DocumentError, InvalidInputError, resolve_reference
+from burg_drake.motion import ArmKinematics, ArmLimits
+from burg_drake.scene import Scene, load_scene
+from burg_drake.station import Station, build_station_diagram, load_station
 
 
 def limits(station: Station) -> ArmLimits:
@@ -88,7 +85,7 @@ def test_limits_for_another_number_of_joints() -> None:
 
 def test_a_station_file_states_limits(tmp_path: Path) -> None:
     path = tmp_path / "slow.yaml"
-    text = resolve("panda_tabletop", "stations").read_text(encoding="utf-8")
+    text = resolve_reference("panda_tabletop", "stations").read_text(encoding="utf-8")
     path.write_text(text.replace("  home:", "  jerk: [1, 2, 3, 4, 5, 6, 7]\n  home:"))
     assert limits(load_station(path)).jerk.tolist() == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]
     path.write_text(text.replace("  home:", "  jerk: [1, 2, 3, 4, 5, 6, 0]\n  home:"))

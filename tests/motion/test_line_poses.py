@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from burg_drake.core.frames import inverse, make_pose, pregrasp, rotation_from_rpy
-from burg_drake.motion.lines.line_poses import LinePoses
-from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.core import inverse, make_pose, pregrasp, rotation_from_rpy
+from burg_drake.motion import LinePoses
+from burg_drake.station import GraspMotion
 
 X_HG = make_pose(rotation_from_rpy((0.0, 0.0, np.pi / 2)), (0.0, 0.0, 0.1034))
 X_WA = make_pose(rotation_from_rpy((0.4, -0.2, 1.1)), (0.3, -0.1, 0.05))

@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.motion.ik.links import ArmLinks
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import load_station
+from burg_drake.motion import ArmLinks
+from burg_drake.scene import load_scene
+from burg_drake.station import build_station_diagram, load_station
 from tests.motion.gantry import gantry_diagram
 
 

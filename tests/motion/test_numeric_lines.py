@@ -9,22 +9,22 @@ import numpy as np
 import pytest
 import ur_ik
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import inverse, swap_fingers
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.motion.ik.numeric import ArmKinematics
-from burg_drake.motion.ik.panda import PandaIk
-from burg_drake.motion.ik.routine import IkRoutine, RoutineSolutions
-from burg_drake.motion.lines.closed_form import ClosedFormLineSearch
-from burg_drake.motion.lines.line_poses import LinePoses
-from burg_drake.motion.lines.line_search import Chain, LineSearch
-from burg_drake.motion.lines.numeric_search import NumericLineSearch
-from burg_drake.motion.lines.reach_settings import ReachSettings
-from burg_drake.motion.proximity.clearance_bounds import ArmProximity
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.grasp_motion import GraspMotion
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import InvalidInputError, Outcome, inverse, swap_fingers
+from burg_drake.motion import (
+    ArmKinematics,
+    ArmProximity,
+    Chain,
+    ClosedFormLineSearch,
+    IkRoutine,
+    LinePoses,
+    LineSearch,
+    NumericLineSearch,
+    PandaIk,
+    ReachSettings,
+    RoutineSolutions,
+)
+from burg_drake.scene import load_scene
+from burg_drake.station import GraspMotion, build_station_diagram, load_station
 
 SETTINGS = ReachSettings()
 MOTION = GraspMotion()

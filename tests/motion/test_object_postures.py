@@ -4,16 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from burg_drake.motion.ik.links import ArmLinks
-from burg_drake.motion.transit.object_postures import (
-    COSINE,
-    FARTHEST,
-    NEAREST,
-    postures_over_objects,
-)
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import load_station
+from burg_drake.motion import ArmLinks, ObjectViewLimits, postures_over_objects
+from burg_drake.scene import load_scene
+from burg_drake.station import build_station_diagram, load_station
 
 
 def test_the_hand_looks_at_an_object() -> None:
@@ -36,5 +29,7 @@ def test_the_hand_looks_at_an_object() -> None:
         X_WG = plant.EvalBodyPoseInWorld(context, hand).GetAsMatrix4() @ station.hand.X_HG.matrix()
         way = objects - X_WG[:3, 3]
         distance = np.linalg.norm(way, axis=1)
-        near = (distance > NEAREST - 1e-5) & (distance < FARTHEST + 1e-5)
-        assert (near & (way @ X_WG[:3, 2] > (COSINE - 1e-4) * distance)).any()
+        near = (distance > ObjectViewLimits.min_distance - 1e-5) & (
+            distance < ObjectViewLimits.max_distance + 1e-5
+        )
+        assert (near & (way @ X_WG[:3, 2] > (ObjectViewLimits.min_cosine - 1e-4) * distance)).any()

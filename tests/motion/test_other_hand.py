@@ -5,14 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.core.frames import grasp_from_axes
-from burg_drake.motion.collision.checker import ArmCollision
-from burg_drake.motion.reach.arm_reach import ArmReach
-from burg_drake.motion.workspace.station_check import empty_scene
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.diagram.station_diagram import StationDiagram
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import grasp_from_axes
+from burg_drake.motion import ArmCollision, ArmReach, empty_scene
+from burg_drake.scene import Scene
+from burg_drake.station import StationDiagram, build_station_diagram, load_station
 
 OWN, OTHER = "panda_tabletop", "panda_wsg"
 

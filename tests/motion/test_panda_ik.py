@@ -9,11 +9,8 @@ import pytest
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.planning import RobotDiagramBuilder
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import inverse, make_pose, rot_z
-from burg_drake.core.paths.resources import resolve
-from burg_drake.motion.ik.numeric import ArmKinematics
-from burg_drake.motion.ik.panda import PandaIk, Postures, panda_forward
+from burg_drake.core import InvalidInputError, inverse, make_pose, resolve_reference, rot_z
+from burg_drake.motion import ArmKinematics, PandaIk, PandaPostures, panda_forward
 
 FINE = 1e-9
 """What the closed form promises [m and of matrix entries]."""
@@ -22,7 +19,9 @@ FINE = 1e-9
 @pytest.fixture(scope="module")
 def plant() -> MultibodyPlant:
     builder = RobotDiagramBuilder()
-    builder.parser().AddModels(str(resolve("package://burg_drake/models/panda/panda_arm.sdf")))
+    builder.parser().AddModels(
+        str(resolve_reference("package://burg_drake/models/panda/panda_arm.sdf"))
+    )
     plant = builder.plant()
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("panda_link0"))
     plant.Finalize()
@@ -56,7 +55,7 @@ def flange_by_drake(plant: MultibodyPlant, q: np.ndarray) -> np.ndarray:
     return np.array(poses)
 
 
-def nearest(found: Postures, wanted: np.ndarray) -> np.ndarray:
+def nearest(found: PandaPostures, wanted: np.ndarray) -> np.ndarray:
     """Largest joint error of the solution nearest to each wanted posture [rad]."""
     distance = np.full(len(wanted), np.inf)
     np.minimum.at(distance, found.pose, np.abs(found.q - wanted[found.pose]).max(axis=1))

@@ -7,16 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import grasp_from_axes, rotation_angle, swap_fingers
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.motion.planner import Planner, plan
-from burg_drake.motion.plans.grasp_plan import Plan
-from burg_drake.motion.reach.arm_reach import ArmReach, Reach
-from burg_drake.motion.timing.timing_settings import TimingSettings
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.diagram.station_diagram import instance_pose
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.core import (
+    InvalidInputError,
+    Outcome,
+    UnknownNameError,
+    grasp_from_axes,
+    rotation_angle,
+    swap_fingers,
+)
+from burg_drake.motion import ArmReach, Plan, Planner, Reach, TimingSettings, plan
+from burg_drake.scene import Scene, load_scene
+from burg_drake.station import Station, instance_pose, load_station
 
 DOWN = (0.0, 0.0, -1.0)
 EVERY = 10

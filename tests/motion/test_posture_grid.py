@@ -5,9 +5,8 @@ import heapq
 import numpy as np
 import pytest
 
-from burg_drake.core.frames import grasp_from_axes
-from burg_drake.motion.ik.panda import PandaIk
-from burg_drake.motion.lines.posture_grid import DEEP, GridChain, PostureGrid
+from burg_drake.core import grasp_from_axes
+from burg_drake.motion import DEEP_PENETRATION, GridChain, PandaIk, PostureGrid
 
 LOWER = np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973])
 UPPER = np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973])
@@ -133,7 +132,9 @@ def test_postures_between_deep_ones_are_taken_for_blocked(grid: PostureGrid) -> 
         crossing=CROSSING,
     )
     fine.solve(np.arange(5), np.arange(3))
-    grid.upper[:] = np.random.default_rng(7).uniform(-3.0 * DEEP, DEEP, grid.upper.shape)
+    grid.upper[:] = np.random.default_rng(7).uniform(
+        -3.0 * DEEP_PENETRATION, DEEP_PENETRATION, grid.upper.shape
+    )
     fine.take_over(1, grid, 1, [0, 3])
     taken = np.isfinite(fine.upper)
     np.testing.assert_array_equal(taken, np.isfinite(fine.lower))
@@ -142,7 +143,7 @@ def test_postures_between_deep_ones_are_taken_for_blocked(grid: PostureGrid) -> 
         for way, branch, k in np.argwhere(fine.exists[pose, 1]).tolist():
             value, known = fine.parameter[k], grid.upper[pose, 1, way, branch]
             below, above = known[grid.parameter <= value][-1], known[grid.parameter >= value][0]
-            assert taken[pose, 1, way, branch, k] == (max(below, above) < -DEEP)
+            assert taken[pose, 1, way, branch, k] == (max(below, above) < -DEEP_PENETRATION)
 
 
 def test_out_of_reach_there_is_none(grid: PostureGrid) -> None:

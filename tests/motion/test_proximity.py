@@ -9,14 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.motion.collision.checker import ArmCollision
-from burg_drake.motion.proximity.clearance_bounds import ArmProximity
-from burg_drake.scene.document.scene import Scene, SceneDocument, load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.diagram.station_diagram import StationDiagram
-from burg_drake.station.document.station_document import Obstacle, Station, load_station
+from burg_drake.core import InvalidInputError, Pose
+from burg_drake.motion import ArmCollision, ArmProximity
+from burg_drake.scene import Scene, SceneDocument, load_scene
+from burg_drake.station import (
+    Obstacle,
+    Station,
+    StationDiagram,
+    build_station_diagram,
+    load_station,
+)
 from tests.thorough import thorough
 
 SHELF = {

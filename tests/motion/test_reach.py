@@ -10,9 +10,10 @@ from math import pi
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import (
+from burg_drake.core import (
+    InvalidInputError,
+    Outcome,
+    Pose,
     grasp_from_axes,
     make_pose,
     rot_z,
@@ -20,13 +21,10 @@ from burg_drake.core.frames import (
     rotation_from_rpy,
     swap_fingers,
 )
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.grasping.clearance.hand_clearance import HandClearance
-from burg_drake.motion.reach.arm_reach import ArmReach, Reach, ReachSettings
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.grasp_motion import GraspMotion
-from burg_drake.station.document.station_document import Obstacle, Station, load_station
+from burg_drake.grasping import HandClearance
+from burg_drake.motion import ArmReach, Reach, ReachSettings
+from burg_drake.scene import Scene, load_scene
+from burg_drake.station import GraspMotion, Obstacle, Station, build_station_diagram, load_station
 
 # Craig's DH table (a, d, alpha) of frankaemika.github.io/docs/control_parameters.html; flange last.
 DH = [

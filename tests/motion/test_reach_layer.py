@@ -7,20 +7,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import make_pose, rot_z, rotation_from_rpy, transform_points
-from burg_drake.motion.reach.arm_reach import ArmReach
-from burg_drake.motion.workspace.reach_layer import (
+from burg_drake.core import (
+    InvalidInputError,
+    Pose,
+    make_pose,
+    rot_z,
+    rotation_from_rpy,
+    transform_points,
+)
+from burg_drake.motion import (
+    ArmReach,
     ReachLayer,
     answers_by_refinement,
+    empty_scene,
     reach_from_above,
 )
-from burg_drake.motion.workspace.station_check import empty_scene
-from burg_drake.scene.document.scene import Board
-from burg_drake.station.document.station_document import Station, load_station
-from burg_drake.visualization.pictures.reach_raster import reach_image
-from burg_drake.visualization.style.color_map import map_colors
+from burg_drake.scene import Board
+from burg_drake.station import Station, load_station
+from burg_drake.visualization import map_colors, reach_image
 
 BOARD = Board(size=(0.5, 0.3))
 

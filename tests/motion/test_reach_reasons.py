@@ -13,12 +13,10 @@ import numpy as np
 import pytest
 from gantry import UPPER, box, gantry_diagram
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import grasp_from_axes
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.motion.reach.arm_reach import ArmReach, Reach, ReachSettings
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.document.station_document import Obstacle, load_station
+from burg_drake.core import Outcome, Pose, grasp_from_axes
+from burg_drake.motion import ArmReach, Reach, ReachSettings
+from burg_drake.scene import Scene, load_scene
+from burg_drake.station import Obstacle, load_station
 
 DOWN = (0.0, 0.0, -1.0)
 Z = 0.3

@@ -10,14 +10,10 @@ import numpy as np
 import pytest
 import ur_ik
 
-from burg_drake.core.frames import inverse, make_pose, rot_z
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.motion.collision.checker import ArmCollision
-from burg_drake.motion.reach.arm_reach import ArmReach, Reach
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.diagram.station_diagram import instance_pose
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.core import Outcome, inverse, make_pose, rot_z
+from burg_drake.motion import ArmCollision, ArmReach, Reach
+from burg_drake.scene import Scene, load_scene
+from burg_drake.station import Station, build_station_diagram, instance_pose, load_station
 
 DOWN = np.diag([1.0, -1.0, -1.0])
 

@@ -7,22 +7,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import inverse, make_pose, swap_fingers, transform_points
-from burg_drake.motion.collision.checker import ArmCollision
-from burg_drake.motion.ik.numeric import ArmKinematics, solve_ik
-from burg_drake.motion.workspace.arm_span import ArmSpan
-from burg_drake.motion.workspace.reachability import (
+from burg_drake.core import (
+    InvalidInputError,
+    Pose,
+    inverse,
+    make_pose,
+    swap_fingers,
+    transform_points,
+)
+from burg_drake.motion import (
+    ArmCollision,
+    ArmKinematics,
+    ArmSpan,
     ReachabilityMap,
     ReachabilitySettings,
-    cleared,
+    empty_scene,
     map_reachability,
+    solve_ik,
+    without_free_objects,
 )
-from burg_drake.motion.workspace.station_check import empty_scene
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.scene import Scene, load_scene
+from burg_drake.station import Station, build_station_diagram, load_station
 
 COARSE = ReachabilitySettings(
     spacing=0.2, heights=(0.06, 0.2), tilts_deg=(0.0, 50.0), headings=(1, 3), yaws=2
@@ -108,7 +113,9 @@ def test_nothing_is_reached_beyond_the_span() -> None:
 
 
 def test_objects_are_in_the_way(six: Scene, shelf_map: ReachabilityMap) -> None:
-    empty = map_reachability(cleared(six), load_station("panda_shelf"), settings=COARSE)
+    empty = map_reachability(
+        without_free_objects(six), load_station("panda_shelf"), settings=COARSE
+    )
     assert not (shelf_map.reached & ~empty.reached).any()
     assert shelf_map.reached.mean() < 0.95 * empty.reached.mean()
 

@@ -10,17 +10,20 @@ import numpy as np
 import pytest
 from pydrake.multibody.tree import BodyIndex
 
-from burg_drake.core.arrays import Array
-from burg_drake.motion.collision.checker import ArmCollision
-from burg_drake.motion.proximity.arm_shape import ArmShape
-from burg_drake.motion.proximity.ball_tree import BallTrees, BodyBalls
-from burg_drake.motion.proximity.link_distance import LinkDistance
-from burg_drake.motion.proximity.pair_table import JointGrid, PairTable, may_meet
-from burg_drake.motion.proximity.self_clearance import counted_pairs
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.diagram.station_diagram import StationDiagram
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import Array
+from burg_drake.motion import (
+    ArmCollision,
+    ArmShape,
+    BallTrees,
+    BodyBalls,
+    JointGrid,
+    LinkDistance,
+    PairTable,
+    collision_pairs,
+    may_collide,
+)
+from burg_drake.scene import load_scene
+from burg_drake.station import StationDiagram, build_station_diagram, load_station
 from tests.motion.gantry import gantry_diagram
 from tests.thorough import thorough
 
@@ -39,7 +42,7 @@ def names(built: StationDiagram, trees: BallTrees) -> list[str]:
 def test_pairs_are_those_of_drakes_checker() -> None:
     built = diagram("panda_tabletop")
     inspector = built.scene_graph.model_inspector()
-    found = {frozenset(p) for p in counted_pairs(built.plant, inspector, built.robot_bodies)}
+    found = {frozenset(p) for p in collision_pairs(built.plant, inspector, built.robot_bodies)}
     checker = ArmCollision(built).checker
     expected = {
         frozenset((a, b))
@@ -57,7 +60,7 @@ def test_only_pairs_that_cannot_meet_are_left_out() -> None:
     known = names(built, shape.trees)
     counted = {
         frozenset(built.plant.get_body(body).name() for body in pair)
-        for pair in counted_pairs(
+        for pair in collision_pairs(
             built.plant, built.scene_graph.model_inspector(), [b.body for b in shape.trees.bodies]
         )
     }
@@ -122,7 +125,7 @@ def test_tables_bound_distances(station: str, first: str, second: str, tmp_path:
     built = gantry_diagram(tmp_path, blocks=("x_link", "z_link")) if gantry else diagram(station)
     shape = ArmShape.of(built)
     a, b, grid, distance = pair(built, shape, first, second)
-    assert may_meet(grid, distance)
+    assert may_collide(grid, distance)
     table = PairTable.of(grid, distance)
     q = np.random.default_rng(1).uniform(*shape.limits.T, (3000, len(shape.limits)))
     lower, upper = table.bounds(q)
@@ -178,7 +181,7 @@ def test_links_that_stay_apart_never_meet() -> None:
     built = diagram("panda_tabletop")
     shape = ArmShape.of(built)
     a, b, grid, distance = pair(built, shape, "panda_link3", "panda_link5")
-    assert not may_meet(grid, distance)
+    assert not may_collide(grid, distance)
     q = np.random.default_rng(3).uniform(*shape.limits.T, (300, 7))
     assert oracle(built, a.body, b.body, q).min() > 0.0
 

@@ -13,11 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.frames import grasp_from_axes
-from burg_drake.motion.ik.numeric import ArmKinematics
-from burg_drake.motion.reach.arm_reach import ArmReach
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import grasp_from_axes
+from burg_drake.motion import ArmKinematics, ArmReach
+from burg_drake.scene import load_scene
+from burg_drake.station import load_station
 
 pytestmark = pytest.mark.thorough
 

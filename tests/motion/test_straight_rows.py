@@ -3,11 +3,16 @@
 import numpy as np
 import pytest
 
-from burg_drake.core.frames import grasp_from_axes
-from burg_drake.motion.ik.panda import PandaIk, panda_forward
-from burg_drake.motion.lines.dense_rows import ClosedFormFiller, DenseRows, straighten
-from burg_drake.motion.lines.line_poses import LinePoses
-from burg_drake.station.document.grasp_motion import GraspMotion
+from burg_drake.core import grasp_from_axes
+from burg_drake.motion import (
+    ClosedFormFiller,
+    DenseRows,
+    LinePoses,
+    PandaIk,
+    panda_forward,
+    straighten_rows,
+)
+from burg_drake.station import GraspMotion
 
 LOWER = np.array([-2.8973, -1.7628, -2.8973, -3.0718, -2.8973, -0.0175, -2.8973])
 UPPER = np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973])
@@ -34,7 +39,7 @@ def rows(tolerance: float, change: float) -> DenseRows:
 
 def filled(q: np.ndarray, tolerance: float) -> DenseRows:
     filler = ClosedFormFiller(LINES, X_AG[None], q, LAYERS, IK)
-    return straighten(filler, np.linspace(0.0, 4.0, 9), np.array([tolerance]))
+    return straighten_rows(filler, np.linspace(0.0, 4.0, 9), np.array([tolerance]))
 
 
 @pytest.mark.parametrize("change", [0.0, 0.1])

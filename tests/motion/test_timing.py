@@ -8,20 +8,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import inverse, rotation_from_rpy
-from burg_drake.motion.ik.limits import ArmLimits
-from burg_drake.motion.ik.numeric import ArmKinematics
-from burg_drake.motion.ik.panda import PandaIk
-from burg_drake.motion.plans.grasp_plan import Plan
-from burg_drake.motion.plans.trajectory import Trajectory
-from burg_drake.motion.reach.witness import Witness
-from burg_drake.motion.timing.grasp_timing import PathChecks, time_motion
-from burg_drake.motion.timing.timing_settings import TimingSettings
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.simulation.trials.trial_settings import DEFAULT_TRIAL
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import InvalidInputError, inverse, rotation_from_rpy
+from burg_drake.motion import (
+    ArmKinematics,
+    ArmLimits,
+    PandaIk,
+    PathChecks,
+    Plan,
+    TimingSettings,
+    Trajectory,
+    Witness,
+    time_motion,
+)
+from burg_drake.scene import Scene, load_scene
+from burg_drake.simulation import DEFAULT_TRIAL
+from burg_drake.station import build_station_diagram, load_station
 
 HOME = np.array([0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4])
 ANYTHING = PathChecks(*[lambda q: True] * 3)

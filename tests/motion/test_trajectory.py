@@ -12,14 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.motion.ik.limits import ArmLimits
-from burg_drake.motion.plans.grasp_plan import Plan, load_plan
-from burg_drake.motion.plans.planned_motion import PHASES, PlanOrigin
-from burg_drake.motion.plans.trajectory import Trajectory
-from burg_drake.motion.timing.cubics import DoubleS
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import InvalidInputError
+from burg_drake.motion import PHASES, ArmLimits, DoubleS, Plan, PlanOrigin, Trajectory, load_plan
+from burg_drake.scene import load_scene
+from burg_drake.station import load_station
 
 LIMITS = ArmLimits(
     np.full(2, -3.0),

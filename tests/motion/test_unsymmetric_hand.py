@@ -8,14 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.frames import grasp_from_axes, swap_fingers
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.core.paths.resources import data_root
-from burg_drake.motion.reach.arm_reach import ArmReach
-from burg_drake.motion.sweep.hand_sweep import HandSweep
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.document.grasp_motion import GraspMotion
-from burg_drake.station.document.station_document import Station, load_station
+from burg_drake.core import Outcome, data_root, grasp_from_axes, swap_fingers
+from burg_drake.motion import ArmReach, HandSweep
+from burg_drake.scene import Scene, load_scene
+from burg_drake.station import GraspMotion, Station, load_station
 
 CAMERA = """
       <collision name="camera">

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.objects.meshes.surface import Preparation, load_mesh
+from burg_drake.objects import Preparation, load_mesh
 
 SIZE = np.array([0.1, 0.06, 0.04])
 VOLUME = float(SIZE.prod())

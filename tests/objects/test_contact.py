@@ -8,17 +8,18 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from burg_drake.core.errors import MeshError
-from burg_drake.objects.collision.contact import (
+from burg_drake.core import MeshError
+from burg_drake.objects import (
     CONTACT_FILE,
-    MESH_FACES,
+    CONTACT_MESH_FACES,
+    MAX_CONTACT_DISTANCE,
+    ContactGeometry,
+    ObjectLibrary,
+    contact_fallback_message,
     contact_geometry,
-    pieces_instead,
-    touched_by_pads,
+    describe_pad_contact,
+    load_library,
 )
-from burg_drake.objects.collision.contact_surface import MOST_DISTANCE
-from burg_drake.objects.library.document import ObjectLibrary, load_library
-from burg_drake.objects.library.entry import ContactGeometry
 
 
 def cylinder() -> trimesh.Trimesh:
@@ -36,7 +37,7 @@ def test_by_itself_it_is_a_primitive_where_one_fits(tmp_path: Path) -> None:
     assert contact.fit is not None and contact.fit.hausdorff < 1e-4
     contact, written = contact_geometry(None, torus(), True, [cylinder()], tmp_path)
     assert contact.kind == "surface" and written == (contact.mesh,) == (CONTACT_FILE,)
-    assert contact.fit is not None and contact.fit.hausdorff <= MOST_DISTANCE
+    assert contact.fit is not None and contact.fit.hausdorff <= MAX_CONTACT_DISTANCE
     assert contact.reason == "" and (tmp_path / CONTACT_FILE).exists()
 
 
@@ -44,12 +45,12 @@ def test_pads_meet_the_pieces_where_there_is_no_surface(tmp_path: Path) -> None:
     holey = trimesh.Trimesh(torus().vertices, torus().faces[1:], process=False)
     contact, written = contact_geometry(None, holey, False, [torus()], tmp_path)
     assert contact == ContactGeometry(reason="its surface is not closed") and written == ()
-    assert pieces_instead(contact, 12) == (
+    assert contact_fallback_message(contact, 12) == (
         "finger pads touch 12 convex pieces, because its surface is not closed; make the"
         " mesh watertight and smooth it, or accept that by 'contact: pieces' in an"
         " objects.yaml"
     )
-    assert pieces_instead(ContactGeometry(), 12) == ""
+    assert contact_fallback_message(ContactGeometry(), 12) == ""
 
 
 def test_what_pads_touch_is_told(tmp_path: Path) -> None:
@@ -61,11 +62,11 @@ def test_what_pads_touch_is_told(tmp_path: Path) -> None:
     expected = (
         f"a surface with {faces} faces, at most {1000.0 * fit.hausdorff:.2g} mm from the mesh"
     )
-    assert touched_by_pads(household, "mug") == expected
-    assert touched_by_pads(household, "can").startswith("a cylinder, at most 1.")
+    assert describe_pad_contact(household, "mug") == expected
+    assert describe_pad_contact(household, "can").startswith("a cylinder, at most 1.")
     entry = replace(household.entry("mug"), contact=ContactGeometry())
     document = replace(household.document, objects={"mug": entry})
-    assert touched_by_pads(ObjectLibrary(document, tmp_path), "mug") == (
+    assert describe_pad_contact(ObjectLibrary(document, tmp_path), "mug") == (
         f"{len(entry.pieces)} convex pieces"
     )
 
@@ -85,7 +86,7 @@ def test_pieces_are_taken_as_they_are(tmp_path: Path, kind: str) -> None:
 
 def test_a_mesh_is_written_with_few_faces(tmp_path: Path) -> None:
     fine = torus()
-    assert len(fine.faces) > 4 * MESH_FACES
+    assert len(fine.faces) > 4 * CONTACT_MESH_FACES
     contact, written = contact_geometry("mesh", fine, True, [], tmp_path)
     assert written == (contact.mesh,) == (CONTACT_FILE,)
     mesh = trimesh.load_mesh(tmp_path / CONTACT_FILE)

@@ -6,18 +6,17 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import MeshError
-from burg_drake.objects.collision.contact_surface import (
-    MOST_ANGLE,
-    MOST_DISTANCE,
-    TURNED,
+from burg_drake.core import Array, MeshError
+from burg_drake.objects import (
+    MAX_CONTACT_DISTANCE,
+    MAX_NORMAL_ANGLE,
+    MAX_TURNED_SHARE,
     SurfaceNormals,
     contact_surface,
-    excess,
-    thinnest,
+    load_library,
+    max_excess,
+    min_face_height,
 )
-from burg_drake.objects.library.document import load_library
 from tests.thorough import thorough
 
 RADIUS, TUBE = 0.04, 0.012
@@ -69,10 +68,10 @@ def test_distance_and_normals_are_those_of_the_closed_form(surface, off, most_fa
     points, face = trimesh.sample.sample_surface(mesh, 20_000, seed=7)
     away, normals = off(points)
     given = off(surface.triangles_center)[0].max()  # the surface itself has faces
-    assert away.max() <= MOST_DISTANCE + given
-    assert fit.hausdorff <= MOST_DISTANCE
+    assert away.max() <= MAX_CONTACT_DISTANCE + given
+    assert fit.hausdorff <= MAX_CONTACT_DISTANCE
     cosine = (mesh.face_normals[face] * normals).sum(axis=1)
-    assert (cosine < np.cos(MOST_ANGLE + 0.02)).mean() <= TURNED + 0.01
+    assert (cosine < np.cos(MAX_NORMAL_ANGLE + 0.02)).mean() <= MAX_TURNED_SHARE + 0.01
     assert len(mesh.faces) <= most_faces
 
 
@@ -85,14 +84,14 @@ def test_household_objects_keep_their_shape(name: str) -> None:
     assert mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0.0
     assert mesh.euler_number == surface.euler_number
     assert 500 <= len(mesh.faces) <= 3000
-    assert thinnest(mesh) > 1e-5
+    assert min_face_height(mesh) > 1e-5
     for one, other in ((mesh, surface), (surface, mesh)):  # rays along the normal, both ways
         points, face = trimesh.sample.sample_surface(one, 1500, seed=3)
         step = one.face_normals[face]
         first = [nearest_hit(other, points, sign * step) for sign in (1.0, -1.0)]
         away = np.minimum(*first)
-        assert np.quantile(away, 0.95) < MOST_DISTANCE  # at edges a ray may pass beside
-    assert entry.contact.fit.hausdorff <= MOST_DISTANCE
+        assert np.quantile(away, 0.95) < MAX_CONTACT_DISTANCE  # at edges a ray may pass beside
+    assert entry.contact.fit.hausdorff <= MAX_CONTACT_DISTANCE
 
 
 def nearest_hit(mesh: trimesh.Trimesh, origins: Array, directions: Array) -> Array:
@@ -128,7 +127,7 @@ def test_noise_does_not_keep_the_faces_of_a_scan() -> None:
     scan, rng = sphere(), np.random.default_rng(0)
     scan.vertices += rng.normal(0.0, 5e-5, scan.vertices.shape)
     mesh, fit = contact_surface(scan, True)
-    assert len(mesh.faces) < len(scan.faces) / 5 and fit.hausdorff <= MOST_DISTANCE
+    assert len(mesh.faces) < len(scan.faces) / 5 and fit.hausdorff <= MAX_CONTACT_DISTANCE
     away, _ = off_sphere(mesh.triangles_center)
     assert np.sqrt((away**2).mean()) < 1.5e-4
 
@@ -156,7 +155,7 @@ def test_why_there_is_none() -> None:
 def test_a_mesh_of_a_million_faces() -> None:
     mesh, fit = contact_surface(sphere(8), True)
     assert len(mesh.faces) < 2_000
-    assert fit.hausdorff <= MOST_DISTANCE
+    assert fit.hausdorff <= MAX_CONTACT_DISTANCE
 
 
 def test_of_bodies_that_were_united() -> None:
@@ -177,10 +176,10 @@ def test_the_same_surface_twice() -> None:
 def test_excess_is_how_far_it_stands_out_of_the_pieces() -> None:
     inner = trimesh.creation.box((0.1, 0.1, 0.1))
     outer = trimesh.creation.box((0.1, 0.1, 0.106))
-    assert excess(outer, [inner]) == pytest.approx(3e-3, rel=1e-6)
-    assert excess(inner, [outer]) == 0.0
+    assert max_excess(outer, [inner]) == pytest.approx(3e-3, rel=1e-6)
+    assert max_excess(inner, [outer]) == 0.0
     halves = [
         trimesh.creation.box(bounds=[(-0.05, -0.05, -0.053), (0.01, 0.05, 0.053)]),
         trimesh.creation.box(bounds=[(-0.01, -0.05, -0.053), (0.048, 0.05, 0.053)]),
     ]
-    assert excess(outer, halves) == pytest.approx(2e-3, rel=1e-6)
+    assert max_excess(outer, halves) == pytest.approx(2e-3, rel=1e-6)

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core.errors import MeshError
-from burg_drake.objects.collision import decomposition
-from burg_drake.objects.collision.coacd_process import DecompositionFailed, run_coacd
-from burg_drake.objects.collision.decomposition import (
+from burg_drake.core import MeshError
+from burg_drake.objects import (
     Decomposition,
+    DecompositionFailed,
+    check_given_pieces,
+    convex_decomposition,
     convex_pieces,
-    given_pieces,
-    joined_parts,
+    join_parts,
+    run_coacd,
 )
 
 
@@ -50,29 +51,29 @@ def test_convex_things_are_their_hull() -> None:
 
 
 @pytest.fixture(scope="module")
-def corner_pieces() -> decomposition.Pieces:
+def corner_pieces() -> convex_decomposition.Pieces:
     return convex_pieces(_corner(), closed=True)
 
 
-def test_a_corner_is_two_bars(corner_pieces: decomposition.Pieces) -> None:
+def test_a_corner_is_two_bars(corner_pieces: convex_decomposition.Pieces) -> None:
     assert _corner().volume == pytest.approx(CORNER_VOLUME)
     assert len(corner_pieces.meshes) == 2
     total = sum(p.volume for p in corner_pieces.meshes)
     assert total == pytest.approx(CORNER_VOLUME, rel=0.05)
 
 
-def test_pieces_are_convex_and_wound_outward(corner_pieces: decomposition.Pieces) -> None:
+def test_pieces_are_convex_and_wound_outward(corner_pieces: convex_decomposition.Pieces) -> None:
     for piece in corner_pieces.meshes:
         assert piece.is_volume
         assert piece.volume == pytest.approx(piece.convex_hull.volume, rel=1e-9)
 
 
-def test_the_notch_stays_free(corner_pieces: decomposition.Pieces) -> None:
+def test_the_notch_stays_free(corner_pieces: convex_decomposition.Pieces) -> None:
     for piece in corner_pieces.meshes:
         assert not piece.contains([[0.06, 0.06, 0.01]])[0]
 
 
-def test_the_same_mesh_gives_the_same_pieces(corner_pieces: decomposition.Pieces) -> None:
+def test_the_same_mesh_gives_the_same_pieces(corner_pieces: convex_decomposition.Pieces) -> None:
     again = convex_pieces(_corner(), closed=True)
     for a, b in zip(corner_pieces.meshes, again.meshes, strict=True):
         np.testing.assert_array_equal(a.vertices, b.vertices)
@@ -81,7 +82,7 @@ def test_the_same_mesh_gives_the_same_pieces(corner_pieces: decomposition.Pieces
 
 def test_open_surfaces_become_walls(monkeypatch: pytest.MonkeyPatch) -> None:
     """A box without a lid stays open."""
-    monkeypatch.setitem(decomposition.REMESHED, "preprocess_resolution", 15)
+    monkeypatch.setitem(convex_decomposition.COACD_REMESHING, "preprocess_resolution", 15)
     box = trimesh.creation.box((0.1, 0.08, 0.06))
     box.update_faces(box.triangles_center[:, 2] < 0.029)
     pieces = convex_pieces(box, closed=False, parameters=Decomposition(threshold=0.3)).meshes
@@ -92,7 +93,7 @@ def test_open_surfaces_become_walls(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_joining_undoes_a_needless_cut() -> None:
     parts = [np.asarray(_bar((0.02, 0.02, 0.02), (0.02 * i, 0, 0)).vertices) for i in range(5)]
-    joined = joined_parts(parts, 0.001)
+    joined = join_parts(parts, 0.001)
     assert len(joined) == 1
     np.testing.assert_allclose(np.ptp(joined[0], axis=0), [0.1, 0.02, 0.02])
 
@@ -100,13 +101,13 @@ def test_joining_undoes_a_needless_cut() -> None:
 def test_joining_keeps_to_its_budget() -> None:
     bars = [_bar((0.1, 0.02, 0.02), (0.05, 0.01, 0.0)), _bar((0.02, 0.08, 0.02), (0.01, 0.06, 0.0))]
     parts = [np.asarray(b.vertices) for b in bars]
-    assert len(joined_parts(parts, 0.01)) == 2
-    assert len(joined_parts(parts, 5.0)) == 1
+    assert len(join_parts(parts, 0.01)) == 2
+    assert len(join_parts(parts, 5.0)) == 1
 
 
 def test_given_pieces_are_taken_as_they_are() -> None:
     piece = _bar((0.02, 0.02, 0.02), (0, 0, 0))
-    (taken,) = given_pieces([piece]).meshes
+    (taken,) = check_given_pieces([piece]).meshes
     np.testing.assert_array_equal(taken.vertices, piece.vertices)
 
 
@@ -114,11 +115,11 @@ def test_given_pieces_that_are_none() -> None:
     inverted = _bar((0.02, 0.02, 0.02), (0, 0, 0))
     inverted.invert()
     with pytest.raises(MeshError, match="piece 1 is not convex: its hull has 1"):
-        given_pieces([_bar((0.02, 0.02, 0.02), (0, 0, 0)), _corner()])
+        check_given_pieces([_bar((0.02, 0.02, 0.02), (0, 0, 0)), _corner()])
     with pytest.raises(MeshError, match="piece 0 is not a closed surface with outward winding"):
-        given_pieces([inverted])
+        check_given_pieces([inverted])
     with pytest.raises(MeshError, match="pieces is empty"):
-        given_pieces([])
+        check_given_pieces([])
 
 
 def test_a_crash_of_the_library_is_an_error() -> None:

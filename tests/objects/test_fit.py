@@ -6,14 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core.errors import MeshError
-from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.objects.collision.fit import (
-    measure_fit,
-    surface_distance,
-    surface_overlap,
-    union_mesh,
-)
+from burg_drake.core import MeshError, make_pose, rotation_from_rpy
+from burg_drake.objects import measure_fit, surface_distance, surface_overlap, union_mesh
 
 RADIUS = 0.03
 

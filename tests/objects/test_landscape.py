@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core.arrays import Array
-from burg_drake.objects.physics.landscape import PotentialLandscape
+from burg_drake.core import Array
+from burg_drake.objects import PotentialLandscape
 
 X, Y, Z = np.eye(3)
 SIZE = np.array([0.1, 0.08, 0.06])

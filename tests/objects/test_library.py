@@ -8,10 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import DocumentError, InvalidInputError, MeshError, UnknownNameError
-from burg_drake.objects.library.document import LibraryDocument, ObjectLibrary, load_library
-from burg_drake.objects.library.entry import MassProperties, ObjectEntry, Source, StablePose
+from burg_drake.core import DocumentError, InvalidInputError, MeshError, Pose, UnknownNameError
+from burg_drake.objects import (
+    LibraryDocument,
+    MassProperties,
+    ObjectEntry,
+    ObjectLibrary,
+    Source,
+    StablePose,
+    load_library,
+)
 
 
 @pytest.fixture

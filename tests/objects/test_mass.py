@@ -8,10 +8,10 @@ import trimesh
 from pydrake.geometry import Mesh as DrakeMesh
 from pydrake.multibody.tree import CalcSpatialInertia
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.objects.physics.mass import (
+from burg_drake.core import InvalidInputError
+from burg_drake.objects import (
     DEFAULT_DENSITY,
-    implausible,
+    implausible_properties,
     inertia_matrix,
     mass_properties,
     solid_of_pieces,
@@ -209,7 +209,7 @@ def test_centres_of_mass_outside_the_bounding_box() -> None:
 def _remarks(size: float, **given: object) -> tuple[str, ...]:
     box = trimesh.creation.box((size, size, size))
     m = mass_properties(solid_of_surface(box), **given)  # type: ignore[arg-type]
-    return implausible(m, *(tuple(b) for b in box.bounds.tolist()))
+    return implausible_properties(m, *(tuple(b) for b in box.bounds.tolist()))
 
 
 @pytest.mark.parametrize("density", [15.0, 300.0, 1000.0, 7850.0, 8960.0])
@@ -221,7 +221,7 @@ def test_ycb_masses_are_plausible() -> None:
     """A cracker box, 0.411 kg and 60 x 158 x 210 mm, as published with the YCB set."""
     box = trimesh.creation.box((0.06, 0.158, 0.21))
     m = mass_properties(solid_of_surface(box), mass=0.411)
-    assert implausible(m, *(tuple(b) for b in box.bounds.tolist())) == ()
+    assert implausible_properties(m, *(tuple(b) for b in box.bounds.tolist())) == ()
 
 
 def test_what_is_implausible_is_said() -> None:

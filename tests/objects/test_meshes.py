@@ -11,14 +11,14 @@ import pytest
 import trimesh
 from PIL import Image
 
-from burg_drake.core.errors import MeshError, UnknownNameError
-from burg_drake.objects.library.obj_file import write_visual
-from burg_drake.objects.meshes.surface import (
+from burg_drake.core import MeshError, UnknownNameError
+from burg_drake.objects import (
     Preparation,
     load_mesh,
     mesh_hash,
     texture_image,
     unit_scale,
+    write_visual,
 )
 
 SIZE = (0.10, 0.06, 0.03)

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 from PIL import Image
 
-from burg_drake.objects.library.obj_file import corner_normals, write_piece, write_visual
+from burg_drake.objects import corner_normals, write_piece, write_visual
 
 
 def test_pieces_come_back(tmp_path: Path) -> None:

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.objects.meshes.cleaning import Repaired, repair
-from burg_drake.objects.meshes.openings import close_openings
-from burg_drake.objects.meshes.solids import is_closed
+from burg_drake.objects import RepairedMesh, close_openings, is_closed, repair
 
 
 def _without(mesh: trimesh.Trimesh, drop: np.ndarray) -> trimesh.Trimesh:
@@ -18,7 +16,7 @@ def _without(mesh: trimesh.Trimesh, drop: np.ndarray) -> trimesh.Trimesh:
     return part
 
 
-def _closed(mesh: trimesh.Trimesh) -> Repaired:
+def _closed(mesh: trimesh.Trimesh) -> RepairedMesh:
     result = repair(mesh)
     assert close_openings(result, "close", None) is None
     return result

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.objects.meshes.overlap import SELF_OVERLAP, self_overlap
+from burg_drake.objects import MAX_SELF_OVERLAP, self_overlap
 
 
 def _torus(reach: float) -> trimesh.Trimesh:
@@ -23,7 +23,7 @@ def _torus(reach: float) -> trimesh.Trimesh:
     ],
 )
 def test_sound_surfaces_do_not(sound: trimesh.Trimesh) -> None:
-    assert self_overlap(sound) < 0.1 * SELF_OVERLAP
+    assert self_overlap(sound) < 0.1 * MAX_SELF_OVERLAP
 
 
 def test_the_share_is_that_of_the_volume() -> None:

@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core.arrays import Array
-from burg_drake.objects.physics.landscape import PotentialLandscape
-from burg_drake.objects.physics.pose_classes import PoseClasses, angle_between
-from burg_drake.objects.physics.stability import stable_poses
-from burg_drake.objects.physics.symmetry import SymmetrySearch
+from burg_drake.core import Array
+from burg_drake.objects import (
+    PoseClasses,
+    PotentialLandscape,
+    SymmetrySearch,
+    angle_between,
+    stable_poses,
+)
 
 X, Y, Z = np.eye(3)
 

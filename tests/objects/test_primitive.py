@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core.frames import inverse, make_pose, transform_points
-from burg_drake.objects.collision.fit import surface_distance
-from burg_drake.objects.collision.primitive import (
+from burg_drake.core import inverse, make_pose, transform_points
+from burg_drake.objects import (
+    Primitive,
     fit_primitive,
+    load_library,
     nearest_primitive,
     primitive_mesh,
     primitive_volume,
+    surface_distance,
 )
-from burg_drake.objects.library.document import load_library
-from burg_drake.objects.library.entry import Primitive
 
 
 def random_pose(seed: int) -> np.ndarray:

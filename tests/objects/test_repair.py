@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.objects.meshes.cleaning import bodies, boundary_loops, repair
+from burg_drake.objects import boundary_loops, connected_bodies, repair
 
 BOX = (0.1, 0.06, 0.04)
 VOLUME = 0.1 * 0.06 * 0.04
@@ -134,5 +134,5 @@ def test_one_inverted_body_of_two_is_turned(box: trimesh.Trimesh) -> None:
 
 def test_bodies_are_found_by_their_edges(box: trimesh.Trimesh) -> None:
     other = trimesh.creation.icosphere(subdivisions=1).apply_translation([3, 0, 0])
-    groups = bodies(trimesh.util.concatenate([box, other]))
+    groups = connected_bodies(trimesh.util.concatenate([box, other]))
     assert [len(g) for g in groups] == [len(box.faces), 80]

@@ -26,17 +26,19 @@ from pydrake.multibody.plant import (
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.objects.library.entry import ContactGeometry, Primitive
-from burg_drake.objects.library.obj_file import write_piece, write_visual
-from burg_drake.objects.library.sdf import (
+from burg_drake.core import Pose, make_pose, rotation_from_rpy
+from burg_drake.objects import (
     DEFAULT_CONTACT,
+    ContactGeometry,
     ContactParameters,
+    Primitive,
+    mass_properties,
     model_sdf,
     resolution_hint,
+    solid_of_surface,
+    write_piece,
+    write_visual,
 )
-from burg_drake.objects.physics.mass import mass_properties, solid_of_surface
 
 
 @pytest.fixture

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.objects.physics.shell import solid_of_shell
+from burg_drake.core import InvalidInputError
+from burg_drake.objects import solid_of_shell
 
 BOX = (0.1, 0.06, 0.03)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.objects.meshes.solids import decimated, is_closed, one_sided_hausdorff, united
+from burg_drake.objects import decimate, is_closed, one_sided_hausdorff, unite_bodies
 
 
 def _box(*corners: float) -> trimesh.Trimesh:
@@ -15,7 +15,7 @@ def _box(*corners: float) -> trimesh.Trimesh:
 
 
 def _united(*parts: trimesh.Trimesh) -> tuple[trimesh.Trimesh, list[str]]:
-    return united(trimesh.util.concatenate(parts))
+    return unite_bodies(trimesh.util.concatenate(parts))
 
 
 def test_overlap_counts_once() -> None:
@@ -65,7 +65,7 @@ def test_a_body_inside_another_counts_once() -> None:
 
 def test_fine_spheres_become_coarser_and_stay_where_they_are() -> None:
     sphere = trimesh.creation.icosphere(subdivisions=6, radius=0.05)
-    coarse, (said,) = decimated(sphere, 20_000)
+    coarse, (said,) = decimate(sphere, 20_000)
     assert is_closed(coarse)
     assert len(coarse.faces) <= 20_000
     start, _, away = said.partition(" faces, at most ")
@@ -83,7 +83,7 @@ def test_flat_faces_are_decimated_without_deviation() -> None:
     box = _box(0, 0, 0, 0.1, 0.06, 0.03)
     for _ in range(6):
         box = box.subdivide()
-    coarse, (said,) = decimated(box, 20_000)
+    coarse, (said,) = decimate(box, 20_000)
     assert len(coarse.faces) < 200
     assert coarse.volume == pytest.approx(0.1 * 0.06 * 0.03, rel=1e-9)
     assert said.endswith("at most 0.001 mm off")
@@ -91,7 +91,7 @@ def test_flat_faces_are_decimated_without_deviation() -> None:
 
 def test_surfaces_with_few_faces_stay() -> None:
     sphere = trimesh.creation.icosphere(subdivisions=3)
-    assert decimated(sphere, 2000) == (sphere, [])
+    assert decimate(sphere, 2000) == (sphere, [])
 
 
 def test_what_is_too_rough_stays() -> None:
@@ -100,7 +100,7 @@ def test_what_is_too_rough_stays() -> None:
     rough = trimesh.Trimesh(
         sphere.vertices * rng.uniform(0.95, 1.05, (len(sphere.vertices), 1)), sphere.faces
     )
-    same, said = decimated(rough, 5000)
+    same, said = decimate(rough, 5000)
     assert same is rough
     assert said == ["kept all 20480 faces, as the surface is too rough to reduce"]
 

@@ -7,11 +7,8 @@ import pytest
 import trimesh
 from trimesh.poses import compute_stable_poses
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.frames import rotation_angle, transform_points
-from burg_drake.objects.library.entry import StablePose
-from burg_drake.objects.physics.landscape import PotentialLandscape
-from burg_drake.objects.physics.stability import resting_pose, stable_poses
+from burg_drake.core import Array, rotation_angle, transform_points
+from burg_drake.objects import PotentialLandscape, StablePose, resting_pose, stable_poses
 from tests.thorough import thorough
 
 

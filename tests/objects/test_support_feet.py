@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core.arrays import Array
-from burg_drake.objects.collision.feet import FLAT, ROUND, carrying_corners, support_feet
+from burg_drake.core import Array
+from burg_drake.objects import (
+    ROLLING_TOLERANCE,
+    SUPPORT_HEIGHT_TOLERANCE,
+    carrying_corners,
+    support_feet,
+)
 
 UP = np.array((0.0, 0.0, 1.0))
 SETTLED = 1e-3
@@ -24,7 +29,7 @@ def block(*heights: float) -> Array:
 @pytest.mark.parametrize(
     ("heights", "x", "expected"),
     [
-        ((0.0, 0.0, FLAT / 2, FLAT / 2), 0.0, [0, 1, 2, 3]),
+        ((0.0, 0.0, SUPPORT_HEIGHT_TOLERANCE / 2, SUPPORT_HEIGHT_TOLERANCE / 2), 0.0, [0, 1, 2, 3]),
         ((0.0, 0.0, 6e-4, 6e-4), 0.0, [0, 1, 2, 3]),  # on the left edge alone it would tip
         ((0.0, 0.0, 0.0, 6e-4), -0.01, [0, 1, 2]),  # over these three it stands
         ((0.0, 0.0, 0.0, 6e-4), 0.01, [0, 1, 2, 3]),  # to the right of their diagonal
@@ -62,7 +67,7 @@ def test_what_rolls_on_a_point_keeps_its_shape_about_two_axes() -> None:
             across = np.array((np.cos(heading), np.sin(heading), 0.0))
             circle = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * UP
             missing = (corners @ circle.T).max(axis=0) - (feet @ circle.T).max(axis=0)
-            worst.append(missing.max() <= 1.5 * ROUND)
+            worst.append(missing.max() <= 1.5 * ROLLING_TOLERANCE)
         assert (np.array(worst) & np.roll(worst, 45)).any()  # a heading, and the one across it
 
 
@@ -73,4 +78,4 @@ def test_what_rolls_on_a_line_keeps_its_shape_about_it() -> None:
     angle = np.linspace(0.0, 2.0 * np.pi, 720)
     circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(720)], axis=1)
     missing = (corners @ circle.T).max(axis=0) - (feet @ circle.T).max(axis=0)
-    assert missing.max() <= 1.5 * ROUND
+    assert missing.max() <= 1.5 * ROLLING_TOLERANCE

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core.arrays import Array
-from burg_drake.objects.physics.symmetry import Symmetries, SymmetrySearch, sample_surface
+from burg_drake.core import Array
+from burg_drake.objects import Symmetries, SymmetrySearch, sample_surface
 from tests.thorough import thorough
 
 X, Y, Z = np.eye(3)

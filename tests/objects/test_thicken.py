@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.objects.meshes.solids import is_closed, united
-from burg_drake.objects.meshes.walls import default_wall, separated, thickened
+from burg_drake.objects import default_wall, is_closed, separate_faces, thicken_sheet, unite_bodies
 
 
 def _grid(height: np.ndarray, step: float) -> trimesh.Trimesh:
@@ -29,7 +28,7 @@ def _joined(*quads: list[list[float]]) -> trimesh.Trimesh:
 
 
 def test_a_square_sheet_becomes_a_slab_centred_on_it() -> None:
-    slab = thickened(_grid(np.zeros((9, 9)), 0.025), 0.002)
+    slab = thicken_sheet(_grid(np.zeros((9, 9)), 0.025), 0.002)
     assert slab is not None and is_closed(slab)
     assert slab.volume == pytest.approx(0.2 * 0.2 * 0.002, rel=1e-9)
     np.testing.assert_allclose(slab.bounds, [[0, 0, -0.001], [0.2, 0.2, 0.001]], atol=1e-12)
@@ -42,7 +41,7 @@ def test_a_hemisphere_becomes_a_bowl(inverted: bool) -> None:
     sphere.remove_unreferenced_vertices()
     if inverted:
         sphere.invert()
-    bowl = thickened(sphere, 0.004)
+    bowl = thicken_sheet(sphere, 0.004)
     assert bowl is not None and is_closed(bowl)
     # the mesh's rim zigzags about the equator, hence the area of the mesh rather than 2 pi r^2
     expected = sphere.area * 0.004 * (1.0 + 0.004**2 / (12.0 * 0.05**2))
@@ -58,7 +57,7 @@ def test_a_bent_sheet_keeps_its_thickness_at_the_bend() -> None:
     angle = _joined(
         [[0, 0, 0], [a, 0, 0], [a, a, 0], [0, a, 0]], [[0, 0, 0], [0, a, 0], [0, a, a], [0, 0, a]]
     )
-    bent = thickened(angle, 0.002)
+    bent = thicken_sheet(angle, 0.002)
     assert bent is not None and is_closed(bent)
     assert bent.volume == pytest.approx(2.0 * a * a * 0.002, rel=1e-9)
     np.testing.assert_allclose(bent.bounds, [[-0.001, 0, -0.001], [a, a, a]], atol=1e-12)
@@ -71,10 +70,10 @@ def test_three_sheets_on_one_edge_become_walls_that_overlap_there() -> None:
         [[0, 0, 0], [0, a, 0], [-a, a, 0], [-a, 0, 0]],
         [[0, 0, 0], [0, 0, a], [0, a, a], [0, a, 0]],
     )
-    walls = thickened(tee, t)
+    walls = thicken_sheet(tee, t)
     assert walls is not None and is_closed(walls)
     # half of the upright wall's foot lies in each of the two others
-    whole, said = united(walls)
+    whole, said = unite_bodies(walls)
     assert whole.volume == pytest.approx((3.0 * a * t - t * t / 2.0) * a, rel=1e-9)
     assert said == [
         "united 3 bodies that overlap (they share 0.33 % of their volume, which now counts once)"
@@ -84,14 +83,14 @@ def test_three_sheets_on_one_edge_become_walls_that_overlap_there() -> None:
 def test_rough_sheets_become_walls() -> None:
     rng = np.random.default_rng(2)
     sheet = _grid(rng.normal(0.0, 5e-4, (40, 40)), 0.002)
-    rough = thickened(sheet, 0.003)
+    rough = thicken_sheet(sheet, 0.003)
     assert rough is not None and is_closed(rough)
     assert rough.volume == pytest.approx(sheet.area * 0.003, rel=0.05)
 
 
 def test_a_crumpled_sheet_is_left_alone() -> None:
     sheet = _grid(np.random.default_rng(2).normal(0.0, 0.02, (30, 30)), 0.002)
-    assert thickened(sheet, 0.01) is None
+    assert thicken_sheet(sheet, 0.01) is None
 
 
 def _strip(twists: int) -> trimesh.Trimesh:
@@ -114,9 +113,9 @@ def _strip(twists: int) -> trimesh.Trimesh:
 
 
 def test_a_band_becomes_a_wall_unless_it_has_only_one_side() -> None:
-    band = thickened(_strip(2), 0.002)
+    band = thicken_sheet(_strip(2), 0.002)
     assert band is not None and band.volume == pytest.approx(_strip(2).area * 0.002, rel=0.02)
-    assert thickened(_strip(1), 0.002) is None
+    assert thicken_sheet(_strip(1), 0.002) is None
 
 
 def test_fans_that_share_a_vertex_are_separated() -> None:
@@ -125,7 +124,7 @@ def test_fans_that_share_a_vertex_are_separated() -> None:
         [[0, 2, 1], [0, 3, 4]],
         process=False,
     )
-    apart = separated(bow)
+    apart = separate_faces(bow)
     assert len(apart.vertices) == 6
     np.testing.assert_array_equal(apart.triangles, bow.triangles)
 

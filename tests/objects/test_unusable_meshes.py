@@ -15,10 +15,15 @@ import pytest
 import trimesh
 from PIL import Image
 
-from burg_drake.core.errors import MeshError
-from burg_drake.objects.meshes import size_limits
-from burg_drake.objects.meshes.size_limits import STL_HEADER, STL_TRIANGLE, announced_triangles
-from burg_drake.objects.meshes.surface import load_mesh, texture_image
+from burg_drake.core import MeshError
+from burg_drake.objects import (
+    STL_HEADER_BYTES,
+    STL_TRIANGLE_BYTES,
+    announced_triangle_count,
+    load_mesh,
+    mesh_file,
+    texture_image,
+)
 
 SIZE = np.array([0.1, 0.06, 0.04])
 
@@ -183,12 +188,12 @@ HEADERS = {
 @pytest.mark.parametrize("name", HEADERS)
 def test_triangles_are_counted_before_a_file_is_read(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
-    path.write_bytes(HEADERS[name].ljust(STL_HEADER + 12 * STL_TRIANGLE))
-    assert announced_triangles(path) == (0 if name == "a.glb" else 12)
+    path.write_bytes(HEADERS[name].ljust(STL_HEADER_BYTES + 12 * STL_TRIANGLE_BYTES))
+    assert announced_triangle_count(path) == (0 if name == "a.glb" else 12)
 
 
 def test_meshes_of_too_many_triangles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(size_limits, "MOST_TRIANGLES", 100)
+    monkeypatch.setattr(mesh_file, "MAX_MESH_TRIANGLES", 100)
     _box(2).export(tmp_path / "box.ply")
     with pytest.raises(
         MeshError, match=r"box.ply: 192 triangles; a mesh may have 100: reduce the number of faces"
@@ -216,7 +221,7 @@ def test_textures_of_too_many_pixels(
 ) -> None:
     mesh = _with_texture(tmp_path, suffix)
     assert texture_image(load_mesh(mesh).visual) is not None
-    monkeypatch.setattr(size_limits, "MOST_PIXELS", 1000)
+    monkeypatch.setattr(mesh_file, "MAX_TEXTURE_PIXELS", 1000)
     with pytest.raises(MeshError, match=": 40 x 30 pixels; a texture may have 31 x 31: scale it"):
         load_mesh(mesh)
 

@@ -14,16 +14,17 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.objects.library.document import ObjectLibrary, load_library
-from burg_drake.objects.library.entry import StablePose
-from burg_drake.objects.physics.stability import stable_poses
-from burg_drake.objects.physics.symmetry import SymmetrySearch
-from burg_drake.pipeline import cutting, geometry, keys
-from burg_drake.pipeline.build import BuildReport, build_library
-from burg_drake.pipeline.source import ObjectSource
-from burg_drake.pipeline.target import SCRATCH
-from burg_drake.simulation.settling.resting_poses import Confirmation
+from burg_drake.core import InvalidInputError
+from burg_drake.objects import ObjectLibrary, StablePose, SymmetrySearch, load_library, stable_poses
+from burg_drake.pipeline import (
+    BuildReport,
+    ObjectSource,
+    build_library,
+    build_record,
+    decomposition,
+    object_build,
+)
+from burg_drake.simulation import Confirmation
 
 
 def _box(size: tuple[float, float, float] = (0.1, 0.06, 0.03)) -> trimesh.Trimesh:
@@ -118,7 +119,9 @@ def test_a_new_mass_rewrites_the_sdf_and_nothing_else(
 ) -> None:
     first = build(_sources(meshes), tmp_path / "lib").library.entry("box")
     before = _times(tmp_path / "lib")
-    monkeypatch.setattr(geometry, "load_mesh", None)  # neither the mesh nor the pieces are needed
+    monkeypatch.setattr(
+        object_build, "load_mesh", None
+    )  # neither the mesh nor the pieces are needed
     report = build(_sources(meshes, mass=0.4), tmp_path / "lib")
     assert (report.built, report.cached) == (("box",), ("can",))
     changed = {k for k, t in _times(tmp_path / "lib").items() if before.get(k) != t}
@@ -138,7 +141,7 @@ def test_a_new_colour_keeps_the_pieces(
     source = _sources(meshes)[0]
     build([source], tmp_path / "lib")
     pieces = (tmp_path / "lib/box/pieces/000.obj").read_bytes()
-    monkeypatch.setattr(geometry, "cut", None)
+    monkeypatch.setattr(object_build, "cut_into_pieces", None)
     report = build([replace(source, rgba=(1.0, 0.0, 0.0, 1.0))], tmp_path / "lib")
     assert report.built == ("box",)
     assert "Kd 1 0 0" in (tmp_path / "lib/box/mesh.mtl").read_text()
@@ -219,14 +222,14 @@ def test_a_failure_keeps_the_earlier_object(meshes: Path, tmp_path: Path) -> Non
 def test_programming_errors_in_one_object_do_not_stop_the_others(
     meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    original = cutting.convex_pieces
+    original = decomposition.convex_pieces
 
     def fails_for_cans(surface, *args):  # type: ignore[no-untyped-def]
         if len(surface.vertices) > 8:
             raise TypeError("incompatible arguments, supported are:\n  1. (int) -> str\n")
         return original(surface, *args)
 
-    monkeypatch.setattr(cutting, "convex_pieces", fails_for_cans)
+    monkeypatch.setattr(decomposition, "convex_pieces", fails_for_cans)
     report = build(_sources(meshes), tmp_path / "lib")
     assert report.built == ("box",)
     expected = "TypeError: incompatible arguments, supported are: 1. (int) -> str"
@@ -236,14 +239,14 @@ def test_programming_errors_in_one_object_do_not_stop_the_others(
 def test_a_file_that_breaks_its_reader_fails_alone(
     meshes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    original = keys.mesh_hash
+    original = build_record.mesh_hash
 
     def fails_for_cans(mesh):  # type: ignore[no-untyped-def]
         if "box" not in str(mesh).lower():
             raise RecursionError("too deep")
         return original(mesh)
 
-    monkeypatch.setattr(keys, "mesh_hash", fails_for_cans)
+    monkeypatch.setattr(build_record, "mesh_hash", fails_for_cans)
     report = build(_sources(meshes), tmp_path / "lib")
     assert report.built == ("box",)
     assert report.failed == {"can": "RecursionError: too deep"}
@@ -265,7 +268,7 @@ def test_a_kill_loses_nothing_that_was_finished(
 
 @pytest.mark.usefixtures("built")
 def test_what_a_killed_build_left_lying_is_removed(meshes: Path, tmp_path: Path) -> None:
-    dead = tmp_path / "lib" / f"{SCRATCH}999999999-abc"
+    dead = tmp_path / "lib" / ".building-999999999-abc"
     (dead / "box").mkdir(parents=True)
     build(_sources(meshes), tmp_path / "lib")
     assert sorted(p.name for p in (tmp_path / "lib").iterdir()) == [
@@ -362,9 +365,9 @@ def test_another_coacd_version_cuts_again_what_it_cut(
     given = ObjectSource(name="given", mesh=_box(), pieces=(_box(),), mass=0.1)
     sources = [*_sources(meshes), given]
     build(sources, tmp_path / "lib")
-    true = keys.metadata.version
+    true = build_record.metadata.version
     monkeypatch.setattr(
-        keys.metadata, "version", lambda name: "another" if name == "coacd" else true(name)
+        build_record.metadata, "version", lambda name: "another" if name == "coacd" else true(name)
     )
     report = build(sources, tmp_path / "lib")
     assert (report.built, report.cached) == (("box", "can"), ("given",))
@@ -386,7 +389,7 @@ def test_a_new_mass_needs_no_new_simulation(
 ) -> None:
     source = _sources(meshes)[0]
     first = build_library([source], tmp_path / "lib").library.entry("box")
-    monkeypatch.setattr(geometry, "_confirmed", None)
+    monkeypatch.setattr(object_build, "_confirm_poses", None)
     changed = replace(source, mass=2.0, friction=0.7, inertia=(2e-3, 2e-3, 3e-3, 0.0, 0.0, 0.0))
     second = build_library([changed], tmp_path / "lib").library.entry("box")
     assert second.stable_poses == first.stable_poses
@@ -462,8 +465,8 @@ def test_symmetries_are_searched_once(tmp_path: Path, monkeypatch: pytest.Monkey
         searches.append(args[3])
         return stable_poses(*args)
 
-    monkeypatch.setattr("burg_drake.simulation.settling.confirm_poses", confirmed)
-    monkeypatch.setattr(geometry, "stable_poses", merged)
+    monkeypatch.setattr("burg_drake.simulation.confirm_poses", confirmed)
+    monkeypatch.setattr(object_build, "stable_poses", merged)
     build([ObjectSource(name="box", mesh=_box())], tmp_path / "lib", confirm=True)
     first, second = searches
     assert first is second

@@ -12,14 +12,16 @@ import pytest
 import trimesh
 from PIL import Image
 
-from burg_drake.core.documents.schema import save_document
-from burg_drake.objects.collision.fit import deviation_warning
-from burg_drake.objects.library.document import ObjectLibrary, load_library
-from burg_drake.objects.library.entry import ContactGeometry, Fit
-from burg_drake.objects.meshes.mesh_file import missing_textures
-from burg_drake.pipeline.build import build_library
-from burg_drake.pipeline.check import check_library
-from burg_drake.pipeline.source import ObjectSource
+from burg_drake.core import save_document
+from burg_drake.objects import (
+    ContactGeometry,
+    Fit,
+    ObjectLibrary,
+    deviation_warning,
+    load_library,
+    missing_textures,
+)
+from burg_drake.pipeline import ObjectSource, build_library, check_library
 
 Fault = Callable[[ObjectLibrary], None]
 

@@ -7,11 +7,8 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from burg_drake.objects.collision.fit import union_mesh
-from burg_drake.objects.library.entry import Decomposition
-from burg_drake.pipeline.build import build_library
-from burg_drake.pipeline.check import check_library
-from burg_drake.pipeline.source import ObjectSource
+from burg_drake.objects import Decomposition, union_mesh
+from burg_drake.pipeline import ObjectSource, build_library, check_library
 
 
 @pytest.fixture(scope="module")

@@ -9,14 +9,17 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import make_pose
-from burg_drake.formats.collections.burg_library import BurgLibrary, BurgObject
-from burg_drake.formats.collections.ycb import MASS_SOURCE, YcbObject
-from burg_drake.objects.library.document import LibraryDocument, ObjectLibrary
-from burg_drake.objects.library.entry import MassProperties, ObjectEntry, Source, StablePose
-from burg_drake.pipeline.object_imports import burg_sources, compare_poses, fixed_note, ycb_sources
+from burg_drake.core import InvalidInputError, Pose, UnknownNameError, make_pose
+from burg_drake.formats import YCB_MASS_SOURCE, BurgLibrary, BurgObject, YcbObject
+from burg_drake.objects import (
+    LibraryDocument,
+    MassProperties,
+    ObjectEntry,
+    ObjectLibrary,
+    Source,
+    StablePose,
+)
+from burg_drake.pipeline import burg_sources, compare_poses, fixed_note, ycb_sources
 
 
 def burg(*objects: BurgObject) -> BurgLibrary:
@@ -107,7 +110,7 @@ def ycb(name: str, mass: float | None, variant: str = "") -> YcbObject:
         mesh=Path("textured.obj"),
         variant=variant,
         mass=mass,
-        mass_source=MASS_SOURCE if mass else "",
+        mass_source=YCB_MASS_SOURCE if mass else "",
     )
 
 
@@ -115,7 +118,7 @@ def test_ycb_objects() -> None:
     objects = [ycb("025_mug", 0.118, "google_16k"), ycb("063-a_marbles", None)]
     mug, marble = ycb_sources(objects, density=2500.0, friction=0.5)
     assert (mug.name, mug.mass, mug.density, mug.scale) == ("025_mug", 0.118, None, 1.0)
-    assert mug.description == f"YCB 025 mug, google_16k scan; mass: {MASS_SOURCE}"
+    assert mug.description == f"YCB 025 mug, google_16k scan; mass: {YCB_MASS_SOURCE}"
     assert (marble.name, marble.mass, marble.density) == ("063_a_marbles", None, 2500.0)
     assert marble.description == "YCB 063-a marbles"
     assert mug.friction == marble.friction == 0.5

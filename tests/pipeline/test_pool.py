@@ -10,10 +10,8 @@ from typing import Any
 import pytest
 import trimesh
 
-from burg_drake.core.errors import SimulationError
-from burg_drake.pipeline import pool
-from burg_drake.pipeline.build import build_library
-from burg_drake.pipeline.source import ObjectSource
+from burg_drake.core import SimulationError
+from burg_drake.pipeline import ObjectSource, build_library, library_build
 
 
 def boxes(count: int) -> list[ObjectSource]:
@@ -71,7 +69,7 @@ def test_drake_giving_up_is_a_failure(tmp_path: Path, monkeypatch: pytest.Monkey
     def gives_up(*_: object) -> None:
         raise SystemExit("abort: Failure at plant.cc")
 
-    monkeypatch.setattr(pool, "build_object", gives_up)
+    monkeypatch.setattr(library_build, "build_object", gives_up)
     report = build_library(boxes(1), tmp_path / "lib")
     assert report.failed == {"box_0": "Drake failed: abort: Failure at plant.cc"}
     assert issubclass(SimulationError, RuntimeError)

@@ -8,12 +8,18 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from burg_drake.core.documents.schema import save_document
-from burg_drake.core.errors import DocumentError
-from burg_drake.objects.library.entry import Decomposition
-from burg_drake.pipeline.build import build_library
-from burg_drake.pipeline.recipe import Cutting, Defaults, RecipeDocument, RecipeObject, load_recipe
-from burg_drake.pipeline.source import ObjectSource, check_source
+from burg_drake.core import DocumentError, save_document
+from burg_drake.objects import Decomposition
+from burg_drake.pipeline import (
+    Cutting,
+    Defaults,
+    ObjectSource,
+    RecipeDocument,
+    RecipeObject,
+    build_library,
+    check_source,
+    load_recipe,
+)
 
 FULL = """\
 version: 1

@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.formats.collections.burg_scene import BurgInstance, BurgPrintout, BurgScene
-from burg_drake.objects.library.document import load_library
-from burg_drake.pipeline.scene_imports import import_burg_scene
-from burg_drake.station.document.station_document import MODEL_NAMES
+from burg_drake.core import InvalidInputError, Pose, UnknownNameError
+from burg_drake.formats import BurgInstance, BurgPrintout, BurgScene
+from burg_drake.objects import load_library
+from burg_drake.pipeline import import_burg_scene
+from burg_drake.station import MODEL_NAMES
 
 
 def placed(*types: str) -> tuple[BurgInstance, ...]:

@@ -7,8 +7,8 @@ import math
 import pytest
 import trimesh
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.pipeline.source import ObjectSource, check_source, object_name
+from burg_drake.core import InvalidInputError
+from burg_drake.pipeline import ObjectSource, check_source, object_name
 
 BOX = trimesh.creation.box((0.1, 0.1, 0.1))
 

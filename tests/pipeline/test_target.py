@@ -10,11 +10,9 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.objects.library.document import load_library
-from burg_drake.pipeline.build import build_library
-from burg_drake.pipeline.source import ObjectSource
-from burg_drake.pipeline.target import LOCK_FILE, opened_for_build
+from burg_drake.core import InvalidInputError
+from burg_drake.objects import load_library
+from burg_drake.pipeline import ObjectSource, build_library, open_for_build
 
 
 def _contents(root: Path) -> dict[str, bytes | None]:
@@ -126,25 +124,25 @@ def test_a_library_that_was_there_stays(tmp_path: Path) -> None:
 
 def test_one_build_at_a_time(tmp_path: Path) -> None:
     build_library([_source()], tmp_path / "lib")
-    with opened_for_build(tmp_path / "lib"):
+    with open_for_build(tmp_path / "lib"):
         before = _contents(tmp_path)
         with pytest.raises(InvalidInputError, match="lib is being written by another build; wait"):
             build_library([_source("other")], tmp_path / "lib")
         assert _contents(tmp_path) == before
     report = build_library([_source("other")], tmp_path / "lib")
     assert list(report.library.objects) == ["cube", "other"]
-    assert not (tmp_path / "lib" / LOCK_FILE).exists()
+    assert not (tmp_path / "lib" / ".library.lock").exists()
 
 
 @pytest.mark.thorough
 def test_the_lock_of_a_killed_build_is_free(tmp_path: Path) -> None:
     script = (
-        "import os, sys; from burg_drake.pipeline.target import opened_for_build\n"
-        "with opened_for_build(sys.argv[1]): os._exit(9)"
+        "import os, sys; from burg_drake.pipeline.library_build import open_for_build\n"
+        "with open_for_build(sys.argv[1]): os._exit(9)"
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
     command = [sys.executable, "-c", script, str(tmp_path / "lib")]
     assert subprocess.run(command, env=environment, check=False).returncode == 9
-    assert (tmp_path / "lib" / LOCK_FILE).exists()
+    assert (tmp_path / "lib" / ".library.lock").exists()
     assert build_library([_source()], tmp_path / "lib").built == ("cube",)
-    assert not (tmp_path / "lib" / LOCK_FILE).exists()
+    assert not (tmp_path / "lib" / ".library.lock").exists()

@@ -11,13 +11,23 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.printout import drawings
-from burg_drake.printout.board_printout import Printout, PrintSettings, print_board
-from burg_drake.printout.drawings import FINENESS
-from burg_drake.scene.document.markers import MarkerLayout, Markers, marker_dictionary
-from burg_drake.scene.document.scene import Board, Instance, Scene, load_scene
+from burg_drake.core import InvalidInputError, Pose
+from burg_drake.printout import (
+    OUTLINE_RESOLUTION,
+    Printout,
+    PrintSettings,
+    object_drawings,
+    print_board,
+)
+from burg_drake.scene import (
+    Board,
+    Instance,
+    MarkerLayout,
+    Markers,
+    Scene,
+    load_scene,
+    marker_dictionary,
+)
 from tests.printout.paper import rasterised, words
 from tests.thorough import thorough
 
@@ -28,7 +38,7 @@ BURG = Board(markers=Markers(dictionary="4X4_250", side=0.057, spacing=0.019, co
 def _coarse_outlines() -> Iterator[None]:
     """Outlines of objects along pixels of 0.4 mm, which are traced in a tenth of the time."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(drawings, "FINENESS", 4 * FINENESS)
+        patch.setattr(object_drawings, "OUTLINE_RESOLUTION", 4 * OUTLINE_RESOLUTION)
         yield
 
 
@@ -124,7 +134,7 @@ def longest_run(line: np.ndarray) -> int:
 def test_height_map_on_paper(monkeypatch: pytest.MonkeyPatch) -> None:
     """Under the mug's body the paper is darker than under its handle, and white beside both; white
     cells stay far brighter than black ones everywhere. Outlines are as fine as for users."""
-    monkeypatch.setattr(drawings, "FINENESS", FINENESS)
+    monkeypatch.setattr(object_drawings, "OUTLINE_RESOLUTION", OUTLINE_RESOLUTION)
     scene, dpi = load_scene("tabletop_six"), 100
     printout = print_board(scene, PrintSettings(page="A1", names=False))
     (image,) = rasterised(printout.pdf, dpi)

@@ -10,11 +10,14 @@ import pypdfium2
 import pypdfium2.raw as pdfium
 import pytest
 
-from burg_drake.printout import drawings
-from burg_drake.printout.board_printout import Printout, PrintSettings, print_board
-from burg_drake.printout.drawings import FINENESS
-from burg_drake.scene.document.markers import Markers
-from burg_drake.scene.document.scene import Board, Scene, load_scene
+from burg_drake.printout import (
+    OUTLINE_RESOLUTION,
+    Printout,
+    PrintSettings,
+    object_drawings,
+    print_board,
+)
+from burg_drake.scene import Board, Markers, Scene, load_scene
 from tests.printout.paper import rasterised, words
 from tests.thorough import thorough
 
@@ -26,7 +29,7 @@ CAPITALS = 0.718
 def _coarse_outlines() -> Iterator[None]:
     """Outlines of objects along pixels of 0.4 mm, which are traced in a tenth of the time."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(drawings, "FINENESS", 4 * FINENESS)
+        patch.setattr(object_drawings, "OUTLINE_RESOLUTION", 4 * OUTLINE_RESOLUTION)
         yield
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from burg_drake.printout.labels import FreeSpace
+from burg_drake.printout import FreeSpace
 
 
 def test_words_stand_beside_what_they_name_and_on_nothing_else() -> None:

@@ -6,9 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.printout.outlines import cell_outlines, mask_outlines
-from burg_drake.printout.projection import Grid, Layer
-from burg_drake.scene.document.markers import Markers, marker_layout
+from burg_drake.printout import SheetGrid, SheetLayer, cell_outlines, mask_outlines
+from burg_drake.scene import Markers, marker_layout
 
 
 def area(polygon: np.ndarray) -> float:
@@ -43,12 +42,12 @@ def test_random_patterns_with_touching_corners() -> None:
 
 
 def test_a_ring() -> None:
-    grid = Grid((0.1, 0.1), 1e-4)
+    grid = SheetGrid((0.1, 0.1), 1e-4)
     rows, columns = np.indices(grid.shape)
     points = grid.points(np.stack([columns, rows], axis=-1))
     distance = np.linalg.norm(points - [0.05, 0.06], axis=-1)
     height = np.where((distance < 0.03) & (distance > 0.01), 0.0, np.inf).astype(np.float32)
-    layer = Layer(grid, 0, 0, height, 0.0)
+    layer = SheetLayer(grid, 0, 0, height, 0.0)
     outer, inner = sorted(mask_outlines(layer, layer.covered), key=lambda p: -abs(area(p)))
     for polygon, radius in ((outer, 0.03), (inner, 0.01)):
         reach = np.linalg.norm(polygon - [0.05, 0.06], axis=1)

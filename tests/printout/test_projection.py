@@ -7,17 +7,22 @@ import pytest
 import trimesh
 from scipy.spatial import Delaunay
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import transform_points
-from burg_drake.printout.projection import Grid, Layer, lowest_of, lowest_surface
-from burg_drake.printout.relief import height_map
-from burg_drake.printout.tints import LUMA, luma_at
-from burg_drake.scene.document.scene import load_scene
+from burg_drake.core import InvalidInputError, transform_points
+from burg_drake.printout import (
+    BT601_LUMA_WEIGHTS,
+    SheetGrid,
+    SheetLayer,
+    height_map,
+    lowest_surface,
+    luma_at,
+    visible_layers,
+)
+from burg_drake.scene import load_scene
 
-GRID = Grid((0.2, 0.1), 1e-3)
+GRID = SheetGrid((0.2, 0.1), 1e-3)
 
 
-def project(mesh: trimesh.Trimesh, grid: Grid = GRID) -> tuple[Layer, np.ndarray]:
+def project(mesh: trimesh.Trimesh, grid: SheetGrid = GRID) -> tuple[SheetLayer, np.ndarray]:
     """The layer, and its heights on the whole grid."""
     layer = lowest_surface(grid, np.asarray(mesh.vertices), mesh.faces)
     height = np.full(grid.shape, np.inf)
@@ -25,7 +30,7 @@ def project(mesh: trimesh.Trimesh, grid: Grid = GRID) -> tuple[Layer, np.ndarray
     return layer, height
 
 
-def centres(grid: Grid) -> tuple[np.ndarray, np.ndarray]:
+def centres(grid: SheetGrid) -> tuple[np.ndarray, np.ndarray]:
     rows, columns = grid.shape
     x = (np.arange(columns) + 0.5) * grid.resolution
     y = grid.size[1] - (np.arange(rows) + 0.5) * grid.resolution
@@ -92,7 +97,7 @@ def test_no_cracks_between_triangles() -> None:
 @pytest.mark.parametrize("name", ["mug", "bowl", "scissors"])
 def test_library_objects_against_rays_from_below(name: str) -> None:
     scene = load_scene("tabletop_twelve")
-    grid = Grid(scene.board.size, 1e-3)
+    grid = SheetGrid(scene.board.size, 1e-3)
     surface = scene.library.surface(scene.instance(name).object)
     p_SV = transform_points(scene.X_SO(name), surface.vertices)
     mesh = trimesh.Trimesh(p_SV, surface.faces, process=False)
@@ -117,7 +122,7 @@ def test_of_two_objects_the_lower_one_is_seen() -> None:
         box((0.05, 0.0, 0.03), (0.15, 0.1, 0.05)),
     )
     layers = [project(mesh)[0] for mesh in (high, low)]
-    seen = [layer.covered.sum() for layer in lowest_of(layers)]
+    seen = [layer.covered.sum() for layer in visible_layers(layers)]
     assert seen == [100 * 100 - 30 * 60, 60 * 60]
 
 
@@ -129,13 +134,13 @@ def test_the_height_map_of_a_scene() -> None:
     bare = made.instance < 0
     np.testing.assert_array_equal(bare, np.isnan(made.height))
     assert (made.image[bare] == 255).all()
-    column, row = np.rint(Grid(scene.board.size, 1e-3).pixels(scene.X_SO("bowl")[:3, 3])).astype(
-        int
-    )
+    column, row = np.rint(
+        SheetGrid(scene.board.size, 1e-3).pixels(scene.X_SO("bowl")[:3, 3])
+    ).astype(int)
     assert made.names[made.instance[row, column]] == "bowl"
     # The mug's handle is off the sheet, its floor on it: lighter, by luma as OpenCV computes grey.
     mug = made.instance == made.names.index("mug")
-    luma = made.image[mug] @ LUMA / 255
+    luma = made.image[mug] @ BT601_LUMA_WEIGHTS / 255
     handle = made.height[mug] > 0.015
     assert 100 < handle.sum() < 0.3 * mug.sum()
     assert luma[handle].min() > luma[made.height[mug] < 1e-3].max() + 0.05

@@ -8,11 +8,17 @@ import numpy as np
 import pytest
 from reportlab.pdfgen.canvas import Canvas
 
-from burg_drake.printout.drawings import Drawing
-from burg_drake.printout.pen import POINT, Pen, rectangle
-from burg_drake.printout.projection import Grid, Layer
-from burg_drake.printout.sheet import Sheet, draw_sheet
-from burg_drake.scene.document.markers import Markers, marker_layout
+from burg_drake.printout import (
+    POINT,
+    ObjectDrawing,
+    Pen,
+    Sheet,
+    SheetGrid,
+    SheetLayer,
+    draw_sheet,
+    rectangle,
+)
+from burg_drake.scene import Markers, marker_layout
 from tests.printout.paper import rasterised
 from tests.thorough import thorough
 
@@ -20,13 +26,13 @@ DPI = 600
 SIZE = (0.06, 0.06)
 
 
-def lines_everywhere() -> Drawing:
+def lines_everywhere() -> ObjectDrawing:
     """An object whose lines, red on white and light blue on black, cover the sheet."""
     ys = np.arange(0.0, SIZE[1], 1.5e-4)
     hatching = tuple(rectangle((0.0, y), (SIZE[0], y + 1e-6)) for y in ys)
     red, blue = (1.0, 0.0, 0.0), (0.5, 0.5, 1.0)
-    nothing = Layer(Grid(SIZE, 1e-3), 0, 0, np.full((1, 1), np.inf, np.float32), 0.0)
-    return Drawing("all", "all", nothing, (), hatching, red, (), red, blue, fixed=False)
+    nothing = SheetLayer(SheetGrid(SIZE, 1e-3), 0, 0, np.full((1, 1), np.inf, np.float32), 0.0)
+    return ObjectDrawing("all", "all", nothing, (), hatching, red, (), red, blue, fixed=False)
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,17 @@ import itertools
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.printout.paper import PAPERS, orientations, paper_size
-from burg_drake.printout.tiling import BLEED, FLAP, cut_axis, tile_board
-from burg_drake.scene.document.markers import Markers, marker_layout
+from burg_drake.core import InvalidInputError, UnknownNameError
+from burg_drake.printout import (
+    BLEED,
+    MAX_FLAP_WIDTH,
+    PAPERS,
+    cut_axis,
+    page_orientations,
+    paper_size,
+    tile_board,
+)
+from burg_drake.scene import Markers, marker_layout
 
 A2 = (0.594, 0.420)
 
@@ -40,7 +47,7 @@ def test_fewest_cuts_against_all_sets_of_cuts() -> None:
         starts = 0.03 + np.arange(count) * (side + gap)
         bars = [(s, s + side) for s in starts.tolist()]
         span = (bars[0][0], bars[-1][1])
-        room, flap = rng.uniform(0.05, 0.4), min(FLAP, gap / 2 - 5e-4)
+        room, flap = rng.uniform(0.05, 0.4), min(MAX_FLAP_WIDTH, gap / 2 - 5e-4)
         cuts = cut_axis(span, bars, room, flap)
         expected = fewest_by_trial(span, bars, room, flap)
         assert (None if cuts is None else len(cuts)) == expected
@@ -55,8 +62,8 @@ def test_fewest_cuts_against_all_sets_of_cuts() -> None:
 )
 def test_the_default_board(page: str, pages: int) -> None:
     layout = marker_layout(A2, Markers())
-    tiling = tile_board(A2, layout, corners(layout), orientations(page, 5e-3))
-    assert len(tiling.tiles) == pages and tiling.flap == pytest.approx(FLAP)
+    tiling = tile_board(A2, layout, corners(layout), page_orientations(page, 5e-3))
+    assert len(tiling.tiles) == pages and tiling.flap == pytest.approx(MAX_FLAP_WIDTH)
     paper, whole = tiling.paper, np.zeros(len(layout.ids), dtype=int)
     for tile in tiling.tiles:
         lower, upper = np.array(tile.lower), np.array(tile.upper)
@@ -75,36 +82,36 @@ def test_the_default_board(page: str, pages: int) -> None:
 
 def test_a_board_of_the_papers_size_lies_on_it() -> None:
     layout = marker_layout(A2, Markers())
-    (tile,) = tile_board(A2, layout, corners(layout), orientations("A2", 5e-3)).tiles
+    (tile,) = tile_board(A2, layout, corners(layout), page_orientations("A2", 5e-3)).tiles
     np.testing.assert_allclose(tile.p_PS, 0.0, atol=1e-12)
 
 
 def test_narrow_gaps_leave_no_strip_for_glue() -> None:
     layout = marker_layout(A2, Markers(spacing=0.004))
-    tiling = tile_board(A2, layout, corners(layout), orientations("A4", 5e-3))
+    tiling = tile_board(A2, layout, corners(layout), page_orientations("A4", 5e-3))
     assert tiling.flap == 0.0 and len(tiling.tiles) > 1
 
 
 def test_mistakes() -> None:
     large = marker_layout(A2, Markers(side=0.3))
     with pytest.raises(InvalidInputError, match=r"300 mm.* does not fit on page A4; A2 would be"):
-        tile_board(A2, large, corners(large), orientations("A4", 5e-3))
+        tile_board(A2, large, corners(large), page_orientations("A4", 5e-3))
     size = (2.0, 2.0)
     huge = marker_layout(size, Markers(side=1.8))
     with pytest.raises(InvalidInputError, match=r"larger paper as WxH in mm, or smaller"):
-        tile_board(size, huge, corners(huge), orientations("A4", 5e-3))
+        tile_board(size, huge, corners(huge), page_orientations("A4", 5e-3))
     size = (4.4, 3.2)
     wide = marker_layout(size, Markers(spacing=0.2))
     with pytest.raises(
         InvalidInputError, match=r"needs .* pages A4, but at most 100 .* board.size"
     ):
-        tile_board(size, wide, corners(wide), orientations("A4", 5e-3))
+        tile_board(size, wide, corners(wide), page_orientations("A4", 5e-3))
     with pytest.raises(UnknownNameError, match="page 'A44' does not exist; did you mean 'A4'"):
         paper_size("A44")
     with pytest.raises(InvalidInputError, match="at least 180 x 140 mm"):
         paper_size("100x200")
     with pytest.raises(InvalidInputError, match="margins of 45 mm leave too little of page A4"):
-        orientations("A4", 0.045)
+        page_orientations("A4", 0.045)
 
 
 def test_papers() -> None:

@@ -7,17 +7,17 @@ import itertools
 import cv2
 import numpy as np
 
-from burg_drake.printout.tints import DARKEST, FIXED_HUE, HUES, height_at, luma_at, tint
+from burg_drake.printout import FIXED_HUE, HUES, MIN_LUMA, height_at, luma_at, tint_colors
 
 
 def test_grey_is_the_luma_for_every_hue() -> None:
-    luma = np.linspace(DARKEST, 1.0, 50)
+    luma = np.linspace(MIN_LUMA, 1.0, 50)
     for hue in (*HUES, FIXED_HUE):
-        colors = tint(hue, luma)
+        colors = tint_colors(hue, luma)
         assert colors.min() >= 0.0 and colors.max() <= 1.0
         grey = cv2.cvtColor(colors[None].astype(np.float32), cv2.COLOR_RGB2GRAY)[0]
         np.testing.assert_allclose(grey, luma, atol=1e-5)
-        dark = tint(hue, 0.1)
+        dark = tint_colors(hue, 0.1)
         assert dark.min() >= 0.0 and abs(dark @ [0.299, 0.587, 0.114] - 0.1) < 1e-12
 
 
@@ -25,7 +25,7 @@ def test_darker_is_closer_to_the_sheet() -> None:
     heights = np.linspace(0.0, 0.1, 100)
     assert (np.diff(luma_at(heights)) > 0.0).all()
     np.testing.assert_allclose(height_at(luma_at(heights)), heights, atol=1e-12)
-    assert luma_at(-0.001) == luma_at(0.0) == DARKEST
+    assert luma_at(-0.001) == luma_at(0.0) == MIN_LUMA
     assert luma_at(0.5) == luma_at(np.inf) < 1.0
 
 
@@ -60,7 +60,7 @@ Simulation of Color Vision Deficiency" (2009), at severity 1."""
 def test_hues_differ_for_every_kind_of_color_vision() -> None:
     """By 5 in CIELAB where tints are light, and 10 where they are dark; 2.3 can be noticed."""
     for luma, least in ((0.72, 10.0), (0.85, 5.0)):
-        colors = np.array([tint(hue, luma) for hue in HUES])
+        colors = np.array([tint_colors(hue, luma) for hue in HUES])
         linear = np.where(colors <= 0.04045, colors / 12.92, ((colors + 0.055) / 1.055) ** 2.4)
         for vision, seen in COLOR_VISION.items():
             rgb = np.clip(linear @ seen.T, 0.0, 1.0)

@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.core.arrays import Array
-from burg_drake.core.frames import grasp_from_axes
-from burg_drake.ros.messages import MessageClasses
-from burg_drake.scene.document.scene import Scene, load_scene
+from burg_drake.cameras import Intrinsics
+from burg_drake.core import Array, grasp_from_axes
+from burg_drake.ros import MessageClasses
+from burg_drake.scene import Scene, load_scene
 from tests.cameras.synthetic import board_image
 
 INTRINSICS = Intrinsics(

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.core.arrays import Array
-from burg_drake.ros.board_node import BoardNode
-from burg_drake.scene.document.scene import Scene
+from burg_drake.cameras import Intrinsics
+from burg_drake.core import Array
+from burg_drake.ros import BoardNode
+from burg_drake.scene import Scene
 from tests.cameras.synthetic import board_image
 
 Make = Callable[..., Any]

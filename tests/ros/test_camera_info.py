@@ -11,14 +11,14 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.ros.camera_info import intrinsics_of
+from burg_drake.cameras import Intrinsics
+from burg_drake.core import InvalidInputError
+from burg_drake.ros import intrinsics_from_camera_info
 
 
 def test_fields_of_ros_2(intrinsics: Intrinsics, info_message: Callable[..., Any]) -> None:
     expected = replace(intrinsics, camera="camera_optical")
-    assert intrinsics_of(info_message(intrinsics)) == expected
+    assert intrinsics_from_camera_info(info_message(intrinsics)) == expected
 
 
 def test_fields_of_ros_1(intrinsics: Intrinsics, info_message: Callable[..., Any]) -> None:
@@ -26,7 +26,7 @@ def test_fields_of_ros_1(intrinsics: Intrinsics, info_message: Callable[..., Any
     for name in "dkp":
         setattr(message, name.upper(), tuple(getattr(message, name)))
         delattr(message, name)
-    assert intrinsics_of(message) == replace(intrinsics, camera="camera_optical")
+    assert intrinsics_from_camera_info(message) == replace(intrinsics, camera="camera_optical")
 
 
 def test_eight_coefficients(intrinsics: Intrinsics, info_message: Callable[..., Any]) -> None:
@@ -36,7 +36,9 @@ def test_eight_coefficients(intrinsics: Intrinsics, info_message: Callable[..., 
     p_CQ = np.array([[0.2, -0.1, 0.7], [-0.3, 0.2, 0.9]])
     K = np.array(message.k).reshape(3, 3)
     expected, _ = cv2.projectPoints(p_CQ, np.zeros(3), np.zeros(3), K, np.array(coefficients))
-    assert intrinsics_of(message).project(p_CQ) == pytest.approx(expected[:, 0], abs=1e-9)
+    assert intrinsics_from_camera_info(message).project(p_CQ) == pytest.approx(
+        expected[:, 0], abs=1e-9
+    )
 
 
 @pytest.mark.parametrize("model", ["", "plumb_bob", "equidistant"])
@@ -45,7 +47,7 @@ def test_no_distortion_whatever_the_model(
 ) -> None:
     for d in ([], [0.0] * 5):
         message = info_message(intrinsics, distortion_model=model, d=d)
-        assert intrinsics_of(message).is_pinhole
+        assert intrinsics_from_camera_info(message).is_pinhole
 
 
 def test_a_fisheye(intrinsics: Intrinsics, info_message: Callable[..., Any]) -> None:
@@ -55,8 +57,10 @@ def test_a_fisheye(intrinsics: Intrinsics, info_message: Callable[..., Any]) -> 
     p_CQ = np.array([[1.2, -0.1, 0.3], [-0.3, 0.2, 0.9]])
     K, k = np.array(message.k).reshape(3, 3), np.array(coefficients)
     expected, _ = cv2.fisheye.projectPoints(p_CQ[:, None], np.zeros(3), np.zeros(3), K, k)
-    assert intrinsics_of(message).project(p_CQ) == pytest.approx(expected[:, 0], abs=1e-9)
-    straight = intrinsics_of(message, rectified=True)
+    assert intrinsics_from_camera_info(message).project(p_CQ) == pytest.approx(
+        expected[:, 0], abs=1e-9
+    )
+    straight = intrinsics_from_camera_info(message, rectified=True)
     assert straight.is_pinhole
 
 
@@ -65,7 +69,7 @@ def test_rectified_images_have_the_projection_matrix(
 ) -> None:
     """A stereo camera's baseline, -30, is not of the image."""
     p = [500.0, 0.0, 310.0, -30.0, 0.0, 505.0, 236.0, 0.0, 0.0, 0.0, 1.0, 0.0]
-    found = intrinsics_of(info_message(intrinsics, p=p), rectified=True)
+    found = intrinsics_from_camera_info(info_message(intrinsics, p=p), rectified=True)
     assert (found.focal, found.center, found.distortion) == ((500.0, 505.0), (310.0, 236.0), ())
 
 
@@ -75,7 +79,7 @@ def test_binning_and_region(intrinsics: Intrinsics, info_message: Callable[..., 
     pinhole = replace(intrinsics, distortion=())
     region = SimpleNamespace(x_offset=80, y_offset=60, width=480, height=360, do_rectify=False)
     message = info_message(pinhole, binning_x=4, binning_y=2, roi=region, d=[])
-    found = intrinsics_of(message)
+    found = intrinsics_from_camera_info(message)
     p_CQ = np.array([0.05, -0.06, 0.8])
     x, y = pinhole.project(p_CQ)
     columns, rows = np.meshgrid(np.arange(640), np.arange(480))
@@ -111,4 +115,4 @@ def test_what_cannot_be_used(
     info_message: Callable[..., Any],
 ) -> None:
     with pytest.raises(InvalidInputError, match=text):
-        intrinsics_of(info_message(intrinsics, **fields), rectified=rectified)
+        intrinsics_from_camera_info(info_message(intrinsics, **fields), rectified=rectified)

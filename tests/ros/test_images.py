@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.ros.images import ENCODINGS, jpeg, pixels
+from burg_drake.core import InvalidInputError
+from burg_drake.ros import IMAGE_ENCODINGS, decode_image_message, jpeg_bytes
 
 RGB = np.random.default_rng(5).integers(0, 256, (4, 6, 3), dtype=np.uint8)
 OPAQUE = np.full((4, 6, 1), 255, np.uint8)
@@ -39,12 +39,12 @@ def mosaic(pattern: str) -> np.ndarray:
 @pytest.mark.parametrize("encoding", LAID_OUT)
 def test_colours_come_in_their_order(encoding: str, image_message: Callable[..., Any]) -> None:
     message = image_message(np.ascontiguousarray(LAID_OUT[encoding]).tobytes(), (4, 6), encoding)
-    assert (pixels(message) == RGB).all()
+    assert (decode_image_message(message) == RGB).all()
 
 
 @pytest.mark.parametrize("encoding", ["mono8", "8UC1"])
 def test_gray(encoding: str, image_message: Callable[..., Any]) -> None:
-    image = pixels(image_message(GRAY.tobytes(), (4, 6), encoding))
+    image = decode_image_message(image_message(GRAY.tobytes(), (4, 6), encoding))
     assert (image == GRAY[..., None]).all() and image.shape == (4, 6, 3)
 
 
@@ -53,13 +53,15 @@ def test_16_bits_in_either_order_of_bytes(
     order: str, big: int, image_message: Callable[..., Any]
 ) -> None:
     wide = (GRAY.astype(np.uint16) << 8 | 0x21).astype(f"{order}u2")
-    image = pixels(image_message(wide.tobytes(), (4, 6), "mono16", is_bigendian=big))
+    image = decode_image_message(image_message(wide.tobytes(), (4, 6), "mono16", is_bigendian=big))
     assert (image == GRAY[..., None]).all()
 
 
 @pytest.mark.parametrize("name", MOSAICS)
 def test_mosaic_of_one_colour(name: str, image_message: Callable[..., Any]) -> None:
-    image = pixels(image_message(mosaic(MOSAICS[name]).tobytes(), (8, 10), f"bayer_{name}8"))
+    image = decode_image_message(
+        image_message(mosaic(MOSAICS[name]).tobytes(), (8, 10), f"bayer_{name}8")
+    )
     assert image.shape == (8, 10, 3) and (image == COLOR).all()
 
 
@@ -76,23 +78,23 @@ def test_yuv_of_one_colour(encoding: str, order: str, image_message: Callable[..
         "V": 128 + 224 * (r - luma) / 1.402,
     }
     cell = np.array([round(values[letter]) for letter in order], np.uint8)
-    image = pixels(image_message(np.tile(cell, (4, 3)).tobytes(), (4, 6), encoding))
+    image = decode_image_message(image_message(np.tile(cell, (4, 3)).tobytes(), (4, 6), encoding))
     assert np.abs(image.astype(int) - COLOR).max() <= 2
 
 
-@pytest.mark.parametrize("encoding", ENCODINGS)
+@pytest.mark.parametrize("encoding", IMAGE_ENCODINGS)
 def test_rows_may_be_padded(encoding: str, image_message: Callable[..., Any]) -> None:
-    entry = ENCODINGS[encoding]
+    entry = IMAGE_ENCODINGS[encoding]
     row = 6 * entry.channels * np.dtype(entry.dtype).itemsize
     data = np.random.default_rng(2).integers(0, 256, (4, row), dtype=np.uint8)
     padded = np.pad(data, ((0, 0), (0, 7)), constant_values=9)
-    plain = pixels(image_message(data.tobytes(), (4, 6), encoding))
-    assert (pixels(image_message(padded.tobytes(), (4, 6), encoding)) == plain).all()
+    plain = decode_image_message(image_message(data.tobytes(), (4, 6), encoding))
+    assert (decode_image_message(image_message(padded.tobytes(), (4, 6), encoding)) == plain).all()
 
 
 def test_the_image_is_the_callers_own(image_message: Callable[..., Any]) -> None:
     data = bytearray(RGB.tobytes())
-    image = pixels(image_message(data, (4, 6), "rgb8"))
+    image = decode_image_message(image_message(data, (4, 6), "rgb8"))
     data[:] = bytes(len(data))
     image += 1
     assert (image == RGB + 1).all()
@@ -113,18 +115,18 @@ def test_what_cannot_be_read(
     message = image_message(RGB.tobytes(), (4, 6), "rgb8")
     vars(message).update(fields)
     with pytest.raises(InvalidInputError, match=text):
-        pixels(message)
+        decode_image_message(message)
 
 
 def test_colours_in_pairs_of_pixels_need_pairs(image_message: Callable[..., Any]) -> None:
     with pytest.raises(InvalidInputError, match="1 x 1 pixels cannot have encoding yuyv"):
-        pixels(image_message(bytes(2), (1, 1), "yuyv"))
+        decode_image_message(image_message(bytes(2), (1, 1), "yuyv"))
 
 
 def test_compressed() -> None:
     _, octets = cv2.imencode(".png", RGB[..., ::-1])
     message = SimpleNamespace(format="rgb8; png compressed bgr8", data=octets.tobytes())
-    assert (pixels(message) == RGB).all()
+    assert (decode_image_message(message) == RGB).all()
 
 
 @pytest.mark.parametrize(
@@ -137,10 +139,10 @@ def test_compressed() -> None:
 )
 def test_what_is_not_a_compressed_image(form: str, data: bytes, text: str) -> None:
     with pytest.raises(InvalidInputError, match=text):
-        pixels(SimpleNamespace(format=form, data=data))
+        decode_image_message(SimpleNamespace(format=form, data=data))
 
 
 def test_jpeg_keeps_the_order_of_colours() -> None:
     image = np.full((16, 16, 3), COLOR, np.uint8)
-    decoded = pixels(SimpleNamespace(format="jpeg", data=jpeg(image)))
+    decoded = decode_image_message(SimpleNamespace(format="jpeg", data=jpeg_bytes(image)))
     assert np.abs(decoded.astype(int) - COLOR).max() <= 4

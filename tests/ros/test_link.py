@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.core.errors import InvalidInputError, MissingDependencyError
-from burg_drake.ros.board_node import BoardNode, Sighting
-from burg_drake.ros.link import Names, Parent, Publications
-from burg_drake.ros.messages import MessageClasses
+from burg_drake.cameras import Intrinsics
+from burg_drake.core import InvalidInputError, MissingDependencyError
+from burg_drake.ros import BoardNode, MessageClasses, NodeNames, ParentFrame, Publications, Sighting
 
 
 @pytest.mark.parametrize(
@@ -27,9 +25,9 @@ from burg_drake.ros.messages import MessageClasses
     ],
 )
 def test_topics_beside_the_images(image: str, compressed: bool, info: str) -> None:
-    names = Names(image=image)
+    names = NodeNames(image=image)
     assert (names.compressed, names.info_topic) == (compressed, info)
-    assert Names(image=image, camera_info="/other").info_topic == "/other"
+    assert NodeNames(image=image, camera_info="/other").info_topic == "/other"
 
 
 @pytest.mark.parametrize(
@@ -46,7 +44,7 @@ def test_topics_beside_the_images(image: str, compressed: bool, info: str) -> No
 )
 def test_what_is_no_name(fields: dict[str, Any], text: str) -> None:
     with pytest.raises(InvalidInputError, match=text):
-        Names(**{"image": "/image"} | fields)
+        NodeNames(**{"image": "/image"} | fields)
 
 
 # --- what is published ----------------------------------------------------------------------------
@@ -64,7 +62,7 @@ class Graph:
     listeners: int = 1
     sent: dict[str, list[Any]] = field(default_factory=dict)
 
-    def publications(self, names: Names, classes: MessageClasses) -> Publications:
+    def publications(self, names: NodeNames, classes: MessageClasses) -> Publications:
         return Publications(names, classes, self.advertise, lambda publisher: self.listeners)
 
     def advertise(self, topic: str, message_class: type, queue: int) -> Any:
@@ -98,7 +96,7 @@ def sighting(
 def test_nobody_listens(node: BoardNode, sighting: Sighting, ros2_classes: MessageClasses) -> None:
     """No overlay is drawn then; and tf is left alone where that is wanted."""
     graph = Graph(listeners=0)
-    names = Names(image="/image", parent=Parent.NONE)
+    names = NodeNames(image="/image", parent=ParentFrame.NONE)
     graph.publications(names, ros2_classes).publish(sighting, node.draw)
     assert not graph.sent["~/overlay"] and not graph.sent["~/overlay/compressed"]
     assert len(graph.sent["~/camera_pose"]) == len(graph.sent["~/status"]) == 1
@@ -109,7 +107,7 @@ def test_images_without_a_frame_stay_off_tf(
     node: BoardNode, sighting: Sighting, ros2_classes: MessageClasses
 ) -> None:
     graph = Graph()
-    publications = graph.publications(Names(image="/image"), ros2_classes)
+    publications = graph.publications(NodeNames(image="/image"), ros2_classes)
     publications.publish(sighting, node.draw)
     publications.publish(replace(sighting, camera_frame=""), node.draw)
     assert len(graph.sent["~/camera_pose"]) == 2
@@ -120,5 +118,5 @@ def test_images_without_a_frame_stay_off_tf(
 def test_tf_needs_its_messages(ros2_classes: MessageClasses) -> None:
     classes = replace(ros2_classes, TFMessage=None)
     with pytest.raises(MissingDependencyError, match=r"tf2_msgs .* parent frame"):
-        Graph().publications(Names(image="/image"), classes)
-    Graph().publications(Names(image="/image", parent=Parent.NONE), classes)
+        Graph().publications(NodeNames(image="/image"), classes)
+    Graph().publications(NodeNames(image="/image", parent=ParentFrame.NONE), classes)

@@ -9,16 +9,16 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.pose.estimate import BoardEstimate
-from burg_drake.core.frames import make_pose, rot_z
-from burg_drake.ros.board_node import Sighting
-from burg_drake.ros.messages import (
+from burg_drake.cameras import BoardEstimate
+from burg_drake.core import make_pose, rot_z
+from burg_drake.ros import (
     MessageClasses,
+    Sighting,
     camera_pose_message,
     compressed_message,
-    frames_message,
     image_message,
     status_message,
+    transform_message,
 )
 
 DOWN = np.diag([1.0, -1.0, -1.0])
@@ -69,7 +69,7 @@ def test_covariance_has_the_translation_first(
 @pytest.mark.parametrize("board_is_parent", [False, True])
 def test_frames(ros2_classes: MessageClasses, sighting: Sighting, board_is_parent: bool) -> None:
     """The origin of the parent, seen from the child, and back."""
-    message = frames_message(ros2_classes, sighting, "board", board_is_parent=board_is_parent)
+    message = transform_message(ros2_classes, sighting, "board", board_is_parent=board_is_parent)
     (transform,) = message.transforms
     parent, child = ("board", "eye") if board_is_parent else ("eye", "board")
     assert (transform.header.frame_id, transform.child_frame_id) == (parent, child)

@@ -20,11 +20,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.overlay.renderer import Overlay
-from burg_drake.core.arrays import Array
-from burg_drake.core.frames import inverse, make_pose, rotation_angle, rotation_from_quaternion
-from burg_drake.scene.document.scene import Scene
+from burg_drake.cameras import Intrinsics, Overlay
+from burg_drake.core import Array, inverse, make_pose, rotation_angle, rotation_from_quaternion
+from burg_drake.scene import Scene
 from tests.hang_guard import HANG_GUARD
 
 ROBOT = Path(__file__).with_name("robot.py")

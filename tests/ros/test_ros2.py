@@ -19,9 +19,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.core.arrays import Array
-from burg_drake.core.frames import inverse, make_pose, rotation_angle, rotation_from_quaternion
+from burg_drake.cameras import Intrinsics
+from burg_drake.core import Array, inverse, make_pose, rotation_angle, rotation_from_quaternion
 from tests.hang_guard import HANG_GUARD
 from tests.ros.test_ros1 import camera_info
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from burg_drake.cameras.pose.estimate import BoardEstimate
-from burg_drake.ros.board_node import Sighting
-from burg_drake.ros.loop import HINT_AFTER, RATE_EVERY, REASON_AFTER, REASON_EVERY, StatusLog
+from burg_drake.cameras import BoardEstimate
+from burg_drake.ros import Sighting, StatusLog, StatusLogIntervals
 
 SEEN = BoardEstimate(X_SC=np.eye(4), valid=True, reprojection_error=0.123, ids=tuple(range(52)))
 FOUND, LOST, BLURRED = (
@@ -35,34 +34,39 @@ def test_a_change_is_told_once() -> None:
 def test_warnings_are_marked() -> None:
     account = StatusLog(0.0)
     assert account.record_image(LOST, 0.0) is None
-    news = account.record_image(LOST, REASON_AFTER)
+    news = account.record_image(LOST, StatusLogIntervals.no_pose)
     assert news is not None and news[1]
     news = account.record_image(FOUND, 1.0)
     assert news is not None and not news[1]
 
 
 def test_a_moment_is_not_told() -> None:
-    looks = [(0.0, FOUND), (1.0, LOST), (1.0 + 0.9 * REASON_AFTER, LOST), (1.6, FOUND)]
+    looks = [
+        (0.0, FOUND),
+        (1.0, LOST),
+        (1.0 + 0.9 * StatusLogIntervals.no_pose, LOST),
+        (1.6, FOUND),
+    ]
     assert told(StatusLog(0.0), *looks) == ["the board is in sight: 52 markers, 0.12 px"]
 
 
 def test_reasons_that_alternate_do_not_flood_the_log() -> None:
     looks = [(t, LOST if int(t) % 2 else BLURRED) for t in np.arange(0.0, 60.0, 0.25)]
-    assert 2 <= len(told(StatusLog(0.0), *looks)) <= 60.0 / REASON_EVERY
+    assert 2 <= len(told(StatusLog(0.0), *looks)) <= 60.0 / StatusLogIntervals.repeat
 
 
 def test_silence_is_told_once_and_again_after_images() -> None:
     account = StatusLog(0.0)
     topics = {"/camera/image_raw": 0, "/camera/camera_info": 0}
-    assert account.record_silence(topics, 0.9 * HINT_AFTER) is None
-    assert account.record_silence(topics, 1.1 * HINT_AFTER) == (
+    assert account.record_silence(topics, 0.9 * StatusLogIntervals.no_image) is None
+    assert account.record_silence(topics, 1.1 * StatusLogIntervals.no_image) == (
         "nothing publishes /camera/image_raw and /camera/camera_info; is the camera running?"
         " Still waiting"
     )
-    assert account.record_silence(topics, 9.0 * HINT_AFTER) is None
-    account.record_image(FOUND, 10.0 * HINT_AFTER)
-    assert account.record_silence({"/image": 1}, 10.5 * HINT_AFTER) is None
-    assert account.record_silence({"/image": 1}, 11.5 * HINT_AFTER) == (
+    assert account.record_silence(topics, 9.0 * StatusLogIntervals.no_image) is None
+    account.record_image(FOUND, 10.0 * StatusLogIntervals.no_image)
+    assert account.record_silence({"/image": 1}, 10.5 * StatusLogIntervals.no_image) is None
+    assert account.record_silence({"/image": 1}, 11.5 * StatusLogIntervals.no_image) == (
         "/image has a publisher, but no images arrive; still waiting"
     )
 
@@ -71,9 +75,9 @@ def test_rate() -> None:
     account = StatusLog(0.0)
     for number in range(60):
         account.record_image(FOUND if number % 4 else LOST, 0.5 * number)
-    assert account.rate(0.9 * RATE_EVERY) is None
-    assert account.rate(RATE_EVERY) == "2.0 images a second, 75 % with a pose"
-    assert account.rate(RATE_EVERY + 1.0) is None
+    assert account.rate(0.9 * StatusLogIntervals.rate) is None
+    assert account.rate(StatusLogIntervals.rate) == "2.0 images a second, 75 % with a pose"
+    assert account.rate(StatusLogIntervals.rate + 1.0) is None
 
 
 def test_the_last_rate_counts_from_the_first_image() -> None:

@@ -8,17 +8,16 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.objects.library.document import LibraryDocument, ObjectLibrary
-from burg_drake.objects.library.entry import MassProperties, ObjectEntry, Source, StablePose
-from burg_drake.scene.document.scene import (
-    Board,
-    Instance,
-    Scene,
-    SceneDocument,
-    load_scene,
-    save_scene,
+from burg_drake.core import Pose
+from burg_drake.objects import (
+    LibraryDocument,
+    MassProperties,
+    ObjectEntry,
+    ObjectLibrary,
+    Source,
+    StablePose,
 )
+from burg_drake.scene import Board, Instance, Scene, SceneDocument, load_scene, save_scene
 
 SIZES = {"cube": (0.06, 0.06, 0.06), "slab": (0.20, 0.10, 0.02)}
 """Extents [m]; the object frame is in the centre of the lower face."""

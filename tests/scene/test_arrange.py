@@ -10,15 +10,20 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 from scipy.stats import chisquare, kstest
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import transform_points
-from burg_drake.objects.library.document import ObjectLibrary, load_library
-from burg_drake.scene.arrangement.arranging import arrange, choose
-from burg_drake.scene.arrangement.object_shapes import ObjectShapes
-from burg_drake.scene.arrangement.occupancy import Arrangement, ObjectRequest, draw_pose
-from burg_drake.scene.document.layout import LAYOUTS, LayoutName, PoseChoice
-from burg_drake.scene.document.scene import Board
+from burg_drake.core import Array, InvalidInputError, UnknownNameError, transform_points
+from burg_drake.objects import ObjectLibrary, load_library
+from burg_drake.scene import (
+    LAYOUTS,
+    Arrangement,
+    Board,
+    LayoutName,
+    ObjectRequest,
+    ObjectShapes,
+    PoseChoice,
+    arrange,
+    choose_objects,
+    draw_pose,
+)
 
 BOARD = Board(size=(0.594, 0.42))
 
@@ -40,7 +45,7 @@ def laid_out(
     only: tuple[str, ...] = (*OF_PIECES, "box", "can"),
 ) -> Arrangement:
     rng = np.random.default_rng(seed)
-    wanted = choose(shapes.library, count, rng, only=only)
+    wanted = choose_objects(shapes.library, count, rng, only=only)
     return arrange(wanted, shapes, BOARD, rng, layout=layout)
 
 
@@ -194,7 +199,7 @@ def test_what_cannot_be_laid_out(shapes: ObjectShapes) -> None:
         arrange([ObjectRequest(name="box", object="box", pose=9)], shapes, BOARD, rng)
     with pytest.raises(UnknownNameError, match=r"object 'cup' is not in library"):
         arrange([ObjectRequest(name="cup", object="cup")], shapes, BOARD, rng)
-    names = [one.name for one in choose(shapes.library, 3, rng, only=["can"], repeat=True)]
+    names = [one.name for one in choose_objects(shapes.library, 3, rng, only=["can"], repeat=True)]
     assert names == ["can", "can_2", "can_3"]
-    taken = choose(shapes.library, 1, rng, only=["can"], taken=["can", "can_2"])
+    taken = choose_objects(shapes.library, 1, rng, only=["can"], taken=["can", "can_2"])
     assert taken[0].name == "can_3"

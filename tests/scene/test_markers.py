@@ -6,9 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.scene.document.markers import Markers, marker_dictionary, marker_layout
-from burg_drake.scene.document.scene import Board
+from burg_drake.core import InvalidInputError
+from burg_drake.scene import Board, Markers, marker_dictionary, marker_layout
 
 A2 = (0.594, 0.420)
 

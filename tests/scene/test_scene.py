@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import DocumentError, UnknownNameError
-from burg_drake.objects.library.document import ObjectLibrary
-from burg_drake.scene.document.scene import Instance, Scene, load_scene, save_scene
+from burg_drake.core import DocumentError, UnknownNameError
+from burg_drake.objects import ObjectLibrary
+from burg_drake.scene import Instance, Scene, load_scene, save_scene
 
 MakeScene = Callable[..., Scene]
 

@@ -7,10 +7,9 @@ import pytest
 import scipy.optimize
 from scipy.spatial import ConvexHull
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.frames import make_pose, rotation_from_rpy, transform_points
-from burg_drake.objects.library.document import load_library
-from burg_drake.scene.arrangement.sweep import ConvexShapes, contact_distances
+from burg_drake.core import Array, make_pose, rotation_from_rpy, transform_points
+from burg_drake.objects import load_library
+from burg_drake.scene import ConvexShapes, contact_distances
 
 UP = np.array([0.0, 0.0, 1.0])
 FLAT = np.zeros((3, 3))

@@ -7,9 +7,8 @@ from collections.abc import Callable
 
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.scene.document.scene import Scene
-from burg_drake.scene.document.validation import read_vertices, require_no_errors, validate_scene
+from burg_drake.core import InvalidInputError
+from burg_drake.scene import Scene, read_vertices, require_no_errors, validate_scene
 
 MakeScene = Callable[..., Scene]
 

@@ -10,18 +10,13 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 from trial_world import make_station
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import inverse, make_pose, rot_z
-from burg_drake.core.paths.resources import resolve
-from burg_drake.motion.ik.panda import PandaIk
-from burg_drake.motion.plans.grasp_plan import Plan
-from burg_drake.motion.plans.trajectory import Trajectory
-from burg_drake.simulation.trials.arm_trial import ArmTrial
-from burg_drake.station.document.station_document import Arm, Obstacle, Station
+from burg_drake.core import Array, Pose, inverse, make_pose, resolve_reference, rot_z
+from burg_drake.motion import PandaIk, Plan, Trajectory
+from burg_drake.simulation import ArmTrial
+from burg_drake.station import Arm, Obstacle, Station
 
 HOME = (0.0, -np.pi / 4, 0.0, -3 * np.pi / 4, 0.0, np.pi / 2, np.pi / 4)
-PANDA = resolve("package://burg_drake/models/panda/panda_arm.sdf")
+PANDA = resolve_reference("package://burg_drake/models/panda/panda_arm.sdf")
 STANDOFF, LIFT = 0.1, 0.3
 APPROACH_TIME, LIFT_TIME = 0.8, 1.4
 

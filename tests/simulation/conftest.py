@@ -9,18 +9,10 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.pipeline.build import build_library
-from burg_drake.pipeline.source import ObjectSource
-from burg_drake.scene.document.scene import (
-    Board,
-    Instance,
-    Scene,
-    SceneDocument,
-    load_scene,
-    save_scene,
-)
-from burg_drake.simulation.trials.hand_trial import HandTrial
+from burg_drake.core import Pose
+from burg_drake.pipeline import ObjectSource, build_library
+from burg_drake.scene import Board, Instance, Scene, SceneDocument, load_scene, save_scene
+from burg_drake.simulation import HandTrial
 
 # Tests import what they share by name.
 sys.path.insert(0, str(Path(__file__).parent))

@@ -10,13 +10,10 @@ import pytest
 from pydrake.math import RigidTransform
 from trial_world import CENTRE, QUICK, from_above, make_station
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.simulation.trials import grasp_trial, hand_trial
-from burg_drake.simulation.trials.hand_trial import HandTrial
-from burg_drake.simulation.trials.lift_clearance import HandLiftClearance
-from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.core import InvalidInputError, Outcome, UnknownNameError
+from burg_drake.scene import Scene, load_scene
+from burg_drake.simulation import HandLiftClearance, HandTrial, grasp_trial
+from burg_drake.station import build_station_diagram
 
 MakeScene = Callable[..., Scene]
 
@@ -48,8 +45,8 @@ def test_worlds_that_were_dropped_are_built_again_with_the_same_results(
     make_scene: MakeScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The one that was not used for longest is dropped, with the check of the way ahead in it."""
-    monkeypatch.setattr(grasp_trial, "KEPT_WORLDS", 2)
-    monkeypatch.setattr(hand_trial, "KEPT_WORLDS", 2)
+    monkeypatch.setattr(grasp_trial, "MAX_KEPT_WORLDS", 2)
+    monkeypatch.setattr(grasp_trial, "MAX_KEPT_WORLDS", 2)
     names = ("box", "block", "can")
     scene = make_scene(*((name, 0.1 + 0.2 * k, 0.2, 0.0) for k, name in enumerate(names)))
     trial, built = HandTrial(scene, make_station(), engine=QUICK), []

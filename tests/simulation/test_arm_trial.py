@@ -13,25 +13,18 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.analysis import Simulator
 from trial_world import BOX_MASS, CENTRE, FORCE, GRAVITY, POST, QUICK, from_above
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.motion.ik.limits import ArmLimits
-from burg_drake.motion.plans.grasp_plan import Plan
-from burg_drake.motion.plans.planned_motion import PlanOrigin
-from burg_drake.scene.document.scene import Scene
-from burg_drake.simulation.trials.arm_trial import ArmTrial
-from burg_drake.simulation.trials.contacts import BodyContact
-from burg_drake.simulation.trials.execution import Execution
-from burg_drake.simulation.trials.hand_trial import HandTrial
-from burg_drake.simulation.trials.result import TrialResult
-from burg_drake.simulation.trials.robot_contacts import RobotContactWatch
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.arm_control import ARM_STIFFNESS
-from burg_drake.station.document.grasp_motion import GraspMotion
-from burg_drake.station.document.station_document import Obstacle
+from burg_drake.core import Array, InvalidInputError, Outcome, Pose, make_pose, rotation_from_rpy
+from burg_drake.motion import ArmLimits, Plan, PlanOrigin
+from burg_drake.scene import Scene
+from burg_drake.simulation import (
+    ArmTrial,
+    BodyContact,
+    Execution,
+    HandTrial,
+    RobotContactWatch,
+    TrialResult,
+)
+from burg_drake.station import DEFAULT_JOINT_STIFFNESS, GraspMotion, Obstacle, build_station_diagram
 from tests.thorough import thorough
 
 WHOLE = replace(QUICK, whole_trial=True)
@@ -233,7 +226,7 @@ def test_the_load_turns_the_joints_against_their_servos(whole_trial: ArmTrial) -
         context, JacobianWrtVariable.kV, trial.hand.body.body_frame(), p_HCo, world, world
     )
     columns = [joint.velocity_start() for joint in trial.diagram.arm_joints]
-    torque = ARM_STIFFNESS * (plan.lift.q[-1] - trial.hand.q(context))
+    torque = DEFAULT_JOINT_STIFFNESS * (plan.lift.q[-1] - trial.hand.q(context))
     assert torque == pytest.approx(mass * GRAVITY * J[2, columns], abs=0.02)
     assert np.abs(torque).max() > 5.0
     actuation = trial.diagram.diagram.GetOutputPort("arm.actuation").Eval(trial.context)
@@ -257,7 +250,7 @@ def largest_lag(trial: ArmTrial, plan: Plan, mass: float) -> float:
             )[:, moving]
             torque = plant.CalcMassMatrix(context)[np.ix_(moving, moving)] @ a
             torque += load * J.T @ (J @ a + [0.0, 0.0, GRAVITY])
-            lag = max(lag, float(np.linalg.norm(J @ (torque / ARM_STIFFNESS))))
+            lag = max(lag, float(np.linalg.norm(J @ (torque / DEFAULT_JOINT_STIFFNESS))))
     return lag
 
 
@@ -290,7 +283,7 @@ def test_feedforward_adds_to_the_servos(arm_trial: ArmTrial) -> None:
     built.diagram.GetInputPort("hand.desired_state").FixValue(context, np.zeros(4))
     Simulator(built.diagram, context).AdvanceTo(0.6)
     q = built.diagram.GetOutputPort("arm.state").Eval(context)[:7]
-    assert ARM_STIFFNESS * (q - home) == pytest.approx(extra, abs=0.02)
+    assert DEFAULT_JOINT_STIFFNESS * (q - home) == pytest.approx(extra, abs=0.02)
     assert built.diagram.GetOutputPort("arm.actuation").Eval(context) == pytest.approx(
         0.0, abs=0.05
     )

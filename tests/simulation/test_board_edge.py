@@ -7,12 +7,10 @@ import pytest
 from pydrake.multibody.math import SpatialVelocity
 from trial_world import make_station
 
-from burg_drake.core.arrays import Array
-from burg_drake.scene.arrangement.object_shapes import ObjectShapes
-from burg_drake.simulation.rest.relaxation import RELAXING, relax
-from burg_drake.simulation.settling.board_edge import BoardEdgeGuard
-from burg_drake.simulation.settling.landing import drop_onto_scene
-from burg_drake.station.diagram.builder import build_station_diagram
+from burg_drake.core import Array
+from burg_drake.scene import ObjectShapes
+from burg_drake.simulation import RELAXING_ENGINE, BoardEdgeGuard, drop_onto_scene, relax
+from burg_drake.station import build_station_diagram
 
 EDGE = 0.05
 """Of the block [m]."""
@@ -76,7 +74,7 @@ def test_what_lands_too_far_out_slides_back_and_not_much_further(make_scene, bey
 
 def test_what_relaxes_beyond_the_edge_comes_back(make_scene) -> None:
     scene, station = make_scene(("block", WIDTH - EDGE / 2 + 0.02, 0.2, 0.0)), make_station()
-    built = build_station_diagram(scene, station, robot="none", engine=RELAXING)
+    built = build_station_diagram(scene, station, robot="none", engine=RELAXING_ENGINE)
     herd = BoardEdgeGuard(built, ObjectShapes(scene.library), margin=0.003, share=1.0)
     relaxed = relax(built, ["block"], 1.0, before_window=herd.push_back)
     X_SO = np.linalg.inv(station.document.X_WS.matrix()) @ relaxed.X_WO["block"]

@@ -10,13 +10,9 @@ from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 from trial_world import BOX, POST, QUICK, from_above, make_station
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import rotation_angle
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.scene.document.scene import Instance, Scene
-from burg_drake.simulation.rest.body_motions import MotionTracker
-from burg_drake.simulation.trials.hand_trial import HandTrial
+from burg_drake.core import Array, Outcome, Pose, rotation_angle
+from burg_drake.scene import Instance, Scene
+from burg_drake.simulation import HandTrial, MotionTracker
 
 BAR = (0.03, 0.30)
 """Size of the bar on the table [m]."""

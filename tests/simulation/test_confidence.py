@@ -10,21 +10,20 @@ import numpy as np
 import pytest
 from trial_world import BOX_MASS, FORCE, GRAVITY, from_above, make_station
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import make_pose, rot_z
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.core.grasps.verdict import Margins
-from burg_drake.scene.document.scene import Scene
-from burg_drake.simulation.confidence.calibration import (
-    UNSURE,
+from burg_drake.core import Margins, Outcome, Pose, make_pose, rot_z
+from burg_drake.scene import Scene
+from burg_drake.simulation import (
+    DEFAULT_TRIAL,
+    OUTCOMES_WITHOUT_VERDICT,
+    PAD_FRICTION_LEVER,
+    GripLoad,
+    HandTrial,
     calibration,
     confidence,
-    confidence_of,
+    confidence_from_signs,
+    grip_signs,
 )
-from burg_drake.simulation.confidence.grip_signs import RIM, GripLoad, grip_signs
-from burg_drake.simulation.trials.hand_trial import HandTrial
-from burg_drake.simulation.trials.trial_settings import DEFAULT_TRIAL
-from burg_drake.station.document.engine import ENGINES
+from burg_drake.station import ENGINES
 
 LOAD = BOX_MASS * (GRAVITY + DEFAULT_TRIAL.acceleration)
 LIMIT = LOAD / (2 * FORCE)
@@ -100,8 +99,8 @@ def test_each_preset_is_calibrated(engine: str, held: bool) -> None:
 
 @pytest.mark.parametrize("outcome", [o for o in Outcome if o.stage.value == "executed"])
 def test_every_outcome_of_a_trial_has_one(outcome: Outcome) -> None:
-    found = confidence_of("standard", outcome, grip_signs(Margins(), GRIP))
-    assert (found is None) is (outcome in UNSURE)
+    found = confidence_from_signs("standard", outcome, grip_signs(Margins(), GRIP))
+    assert (found is None) is (outcome in OUTCOMES_WITHOUT_VERDICT)
 
 
 def test_the_load_by_hand() -> None:
@@ -117,7 +116,7 @@ def test_the_load_by_hand() -> None:
     )
     assert load.lever == pytest.approx(0.03)
     assert load.carried == pytest.approx(2.0 * 10.0 / 40.0)
-    assert load.turned == pytest.approx(0.5 * 0.03 / RIM)
+    assert load.turned == pytest.approx(0.5 * 0.03 / PAD_FRICTION_LEVER)
     slippery = dataclasses.replace(load, friction=0.0)
     assert math.isfinite(slippery.carried) and slippery.carried > load.carried
 
@@ -130,11 +129,16 @@ def test_the_limit_is_as_far_away_from_both_sides(share: float) -> None:
     load = dataclasses.replace(GRIP, mass=share * carries / GRAVITY)
     expected = abs(math.log10(share))
     assert grip_signs(Margins(), load)["limit"] == pytest.approx(expected)
-    beside = dataclasses.replace(load, lever=0.75 * RIM)  # 3, 4 and 5 parts of one triangle
+    beside = dataclasses.replace(
+        load, lever=0.75 * PAD_FRICTION_LEVER
+    )  # 3, 4 and 5 parts of one triangle
     signs = grip_signs(Margins(), beside)
     assert signs["turned"] == pytest.approx(signs["carried"] + math.log10(0.75))
     assert signs["limit"] == pytest.approx(min(0.4, abs(math.log10(1.25 * share))))
-    for far in (dataclasses.replace(load, lever=1.5 * RIM), dataclasses.replace(load, mass=1e-3)):
+    for far in (
+        dataclasses.replace(load, lever=1.5 * PAD_FRICTION_LEVER),
+        dataclasses.replace(load, mass=1e-3),
+    ):
         assert grip_signs(Margins(), far)["limit"] == 0.4
 
 

@@ -175,7 +175,7 @@ simulator.AdvanceTo(0.01)
 
 
 def test_locking_with_geometry_on_the_world_body_crashes() -> None:
-    """Fixed: `station.world.surroundings` may put table and obstacles on the world body
+    """Fixed: `station.surroundings` may put table and obstacles on the world body
     (drake#24773)."""
     ended = subprocess.run([sys.executable, "-c", LOCK], capture_output=True)
     assert ended.returncode == 0 if changed_in(1, 58) else ended.returncode < 0, ended.stderr
@@ -247,7 +247,7 @@ def test_failed_checks_end_as_system_exit() -> None:
 
 
 def test_actuators_of_a_model_are_unknown_before_finalize() -> None:
-    """Fixed: use `GetJointActuatorIndices(model)` in `station.world.robot.joint_actuators`."""
+    """Fixed: use `GetJointActuatorIndices(model)` in `station.robot.joint_actuators`."""
     plant = MultibodyPlant(0.001)
     add_slider(plant, add_body(plant, "slider"))
     model = plant.GetModelInstanceByName("model")
@@ -257,7 +257,7 @@ def test_actuators_of_a_model_are_unknown_before_finalize() -> None:
 
 
 def test_depth_of_an_overlap_is_not_the_shortest_way_out(tmp_path: Path) -> None:
-    """Fixed: take Drake's depth in place of `geometry.penetration`. A convex pad reaches 20 mm into
+    """Fixed: take Drake's depth in place of `geometry.convex_shapes`. A convex pad reaches 20 mm into
     a table top, and its way out to the side is ten times as long."""
     builder = RobotDiagramBuilder(time_step=0.001)
     plant = builder.plant()
@@ -291,7 +291,7 @@ def trough(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 @pytest.mark.parametrize("modulus", [None, 1e6])
 def test_of_a_mesh_point_queries_see_the_hull(trough: str, modulus: float | None) -> None:
-    """Fixed: `station.world.mesh_pieces` need not put pieces in a mesh's place for point queries,
+    """Fixed: `station.object_bodies` need not put pieces in a mesh's place for point queries,
     and where both are rigid, meshes need no pieces to meet. The block hangs free in the middle of
     the U."""
     builder = RobotDiagramBuilder(time_step=0.001)
@@ -314,7 +314,7 @@ def test_of_a_mesh_point_queries_see_the_hull(trough: str, modulus: float | None
 def test_friction_of_convex_pieces_on_a_stiff_table(
     tmp_path: Path, modulus: float, share: float
 ) -> None:
-    """Fixed: `station.world.surroundings.TABLE_MODULUS` may be as high as the pads'. A thrown brick
+    """Fixed: `station.surroundings.TABLE_MODULUS` may be as high as the pads'. A thrown brick
     is braked by mu g; on the stiff table, at 5 ms, by more than three times as much."""
     builder = RobotDiagramBuilder(time_step=0.005)
     plant = builder.plant()

@@ -13,22 +13,18 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.analysis import Simulator
 from trial_world import BOX_MASS, CENTRE, FORCE, GRAVITY
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.motion.ik.limits import ArmLimits
-from burg_drake.motion.plans.grasp_plan import Plan
-from burg_drake.motion.plans.planned_motion import PlanOrigin
-from burg_drake.motion.plans.trajectory import Trajectory
-from burg_drake.motion.reach.verdict import Reach
-from burg_drake.scene.document.scene import Scene
-from burg_drake.simulation.trials.arm_trial import ArmTrial
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.diagram.mounted_hand import MountedHand
-from burg_drake.station.diagram.station_diagram import StationDiagram
-from burg_drake.station.document.arm_control import ArmControl
-from burg_drake.station.document.engine import ENGINES
-from burg_drake.station.document.station_document import Station
+from burg_drake.core import Array, InvalidInputError, Outcome
+from burg_drake.motion import ArmLimits, Plan, PlanOrigin, Reach, Trajectory
+from burg_drake.scene import Scene
+from burg_drake.simulation import ArmTrial
+from burg_drake.station import (
+    ENGINES,
+    ArmControl,
+    MountedHand,
+    Station,
+    StationDiagram,
+    build_station_diagram,
+)
 from tests.thorough import thorough
 
 MakeScene = Callable[..., Scene]

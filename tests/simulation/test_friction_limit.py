@@ -7,16 +7,8 @@ import math
 import pytest
 from trial_world import FORCE, GRAVITY, QUICK, SLOW, from_above, make_station
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import make_pose
-from burg_drake.simulation.robustness.friction_search import (
-    friction_limit,
-    friction_to_carry,
-)
-from burg_drake.simulation.robustness.settings import (
-    FrictionSettings,
-)
-from burg_drake.simulation.trials.hand_trial import HandTrial
+from burg_drake.core import InvalidInputError, make_pose
+from burg_drake.simulation import FrictionSettings, HandTrial, friction_limit, friction_to_carry
 
 CENTRE = from_above(0.025)
 """At the block's centre of mass."""

@@ -9,18 +9,11 @@ import numpy as np
 import pytest
 from trial_world import CENTRE, QUICK, from_above, make_station
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import grasp_from_axes, swap_fingers
-from burg_drake.core.grasps.outcome import Outcome, Stage
-from burg_drake.evaluation.stages.judge import trial_verdict
-from burg_drake.scene.document.scene import Scene
-from burg_drake.simulation.trials.execution import Execution
-from burg_drake.simulation.trials.hand_trial import HandTrial
-from burg_drake.simulation.trials.result import TrialResult
-from burg_drake.simulation.trials.trial_settings import TrialSettings
-from burg_drake.station.document.grasp_motion import GraspMotion
-from burg_drake.station.document.station_document import Obstacle, Station
+from burg_drake.core import Array, Outcome, Pose, Stage, grasp_from_axes, swap_fingers
+from burg_drake.evaluation import trial_verdict
+from burg_drake.scene import Scene
+from burg_drake.simulation import Execution, HandTrial, TrialResult, TrialSettings
+from burg_drake.station import GraspMotion, Obstacle, Station
 from tests.thorough import thorough
 
 APPROACH = TrialSettings(approach=True)

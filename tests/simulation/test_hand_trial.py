@@ -8,16 +8,10 @@ import numpy as np
 import pytest
 from trial_world import BOX, CENTRE, FORCE, GRAVITY, PAD, QUICK, from_above, lifting, make_station
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import grasp_from_axes, swap_fingers
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.scene.document.scene import Instance
-from burg_drake.simulation.trials.execution import Execution
-from burg_drake.simulation.trials.hand_trial import HandTrial
-from burg_drake.simulation.trials.result import TrialResult
-from burg_drake.simulation.trials.trial_settings import DEFAULT_TRIAL, NO_LIMITS
-from burg_drake.station.document.station_document import Obstacle
+from burg_drake.core import InvalidInputError, Outcome, Pose, grasp_from_axes, swap_fingers
+from burg_drake.scene import Instance
+from burg_drake.simulation import DEFAULT_TRIAL, NO_GRIP_LIMITS, Execution, HandTrial, TrialResult
+from burg_drake.station import Obstacle
 
 
 def margins(result) -> np.ndarray:
@@ -84,7 +78,7 @@ def test_half_of_the_lift_is_lifted(make_scene, share: float, outcome: str) -> N
     height, time, mass = 0.1, 0.35, 0.3
     A = 4 * height / time**2
     a = share * A / (2 - share)
-    settings = lifting(height, time, **NO_LIMITS)
+    settings = lifting(height, time, **NO_GRIP_LIMITS)
     trial = HandTrial(
         make_scene(("post", 0.3, 0.2, 0.0)), make_station(), settings=settings, engine=QUICK
     )

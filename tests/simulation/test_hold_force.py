@@ -11,22 +11,19 @@ import numpy as np
 import pytest
 from trial_world import FORCE, GRAVITY, QUICK, from_above, make_station
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.scene.document.scene import Instance, load_scene
-from burg_drake.simulation.robustness.grip import Grip, take_grip
-from burg_drake.simulation.robustness.hold_force import (
+from burg_drake.core import InvalidInputError, Outcome, Pose, UnknownNameError
+from burg_drake.scene import Instance, load_scene
+from burg_drake.simulation import (
+    Grip,
+    HandTrial,
     HoldForces,
+    LoadSettings,
+    TrialResult,
     shake,
+    take_grip,
     tug,
 )
-from burg_drake.simulation.robustness.settings import (
-    LoadSettings,
-)
-from burg_drake.simulation.trials.hand_trial import HandTrial
-from burg_drake.simulation.trials.result import TrialResult
-from burg_drake.station.document.station_document import load_station
+from burg_drake.station import load_station
 
 CENTRE = from_above(0.025)
 """At the block's centre of mass."""

@@ -13,12 +13,9 @@ import numpy as np
 import pytest
 from trial_world import QUICK, from_above, make_station
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.scene.document.scene import Instance, Scene
-from burg_drake.simulation.trials.execution import Execution
-from burg_drake.simulation.trials.hand_trial import HandTrial
-from burg_drake.simulation.trials.result import TrialResult
+from burg_drake.core import Outcome, Pose
+from burg_drake.scene import Instance, Scene
+from burg_drake.simulation import Execution, HandTrial, TrialResult
 
 GRASPS = {
     "lifted": ("box", from_above(0.065), None, None),
@@ -126,7 +123,7 @@ print(json.dumps({name: execute(trial, name) for name in list(GRASPS)[::-2]}))
 
 def load_scene_trial(path: str) -> HandTrial:
     """For another process."""
-    from burg_drake.scene.document.scene import load_scene
+    from burg_drake.scene import load_scene
 
     return HandTrial(load_scene(path), make_station(), engine=QUICK)
 

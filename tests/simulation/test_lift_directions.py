@@ -8,16 +8,10 @@ import numpy as np
 import pytest
 from trial_world import CENTRE, FORCE, GRAVITY, QUICK, from_above, lifting, make_station
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import grasp_from_axes, make_pose, rot_z
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.scene.document.scene import Instance
-from burg_drake.simulation.trials.hand_trial import HandTrial
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.diagram.floating_hand import FloatingHand
-from burg_drake.station.document.grasp_motion import GraspMotion
-from burg_drake.station.document.station_document import Obstacle
+from burg_drake.core import InvalidInputError, Outcome, Pose, grasp_from_axes, make_pose, rot_z
+from burg_drake.scene import Instance
+from burg_drake.simulation import HandTrial
+from burg_drake.station import FloatingHand, GraspMotion, Obstacle, build_station_diagram
 from tests.thorough import thorough
 
 WHOLE = replace(QUICK, whole_trial=True)

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 from trial_world import CENTRE, QUICK, from_above, make_station
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.scene.document.scene import Instance
-from burg_drake.simulation.trials.hand_trial import HandTrial
-from burg_drake.simulation.trials.result import TrialResult
-from burg_drake.station.document.station_document import Obstacle
+from burg_drake.core import Outcome, Pose
+from burg_drake.scene import Instance
+from burg_drake.simulation import HandTrial, TrialResult
+from burg_drake.station import Obstacle
 from tests.thorough import thorough
 
 UNDECIDED = 0.6

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from burg_drake.simulation.robustness.bisection import largest_passing
+from burg_drake.simulation import largest_passing
 
 
 @pytest.mark.parametrize("limit", [0.0511, 0.3, 7.0, 49.9])

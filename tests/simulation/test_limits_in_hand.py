@@ -11,15 +11,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 from trial_world import QUICK, from_above, make_station
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import inverse, make_pose
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.scene.document.scene import Instance, Scene
-from burg_drake.simulation.trials.grip_motion import GripMotion
-from burg_drake.simulation.trials.hand_trial import HandTrial
-from burg_drake.simulation.trials.result import TrialResult
-from burg_drake.simulation.trials.trial_settings import NO_LIMITS, TrialSettings
+from burg_drake.core import Array, Outcome, Pose, inverse, make_pose
+from burg_drake.scene import Instance, Scene
+from burg_drake.simulation import NO_GRIP_LIMITS, GripMotion, HandTrial, TrialResult, TrialSettings
 from tests.thorough import thorough
 
 OFF_CENTRE = from_above(0.02, y=0.05)
@@ -33,7 +27,7 @@ def run(make_scene: Callable[..., Scene]) -> Callable[..., TrialResult]:
     scene = make_scene(("bar", 0.3, 0.2, 0.0))
 
     def run(friction: float, whole: bool = False, **limits: float) -> TrialResult:
-        settings = replace(TrialSettings(), **{**NO_LIMITS, **limits})
+        settings = replace(TrialSettings(), **{**NO_GRIP_LIMITS, **limits})
         engine = replace(QUICK, whole_trial=whole)
         trial = HandTrial(scene, make_station(), engine=engine, settings=settings)
         return trial.run("bar", OFF_CENTRE, friction=friction)
@@ -146,7 +140,7 @@ def test_whatever_a_target_turns_about_it_stays_where_that_was_foretold() -> Non
 
 
 def test_no_limit_is_none_for_a_target_that_hangs_upside_down() -> None:
-    settings = replace(SETTINGS, **NO_LIMITS)
+    settings = replace(SETTINGS, **NO_GRIP_LIMITS)
     motion = creeping(math.pi - 1e-3, 0.5, 1e-4, settings)
     assert motion.stays_on_one_side(10.0) and not motion.is_beyond_limits
 

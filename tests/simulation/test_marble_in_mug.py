@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.objects.library.document import load_library
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
-from burg_drake.simulation.rest.criterion import settle
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import Pose
+from burg_drake.objects import load_library
+from burg_drake.scene import Instance, Scene, SceneDocument
+from burg_drake.simulation import settle
+from burg_drake.station import build_station_diagram, load_station
 
 LIBRARY = load_library("household")
 MUG_AT, BESIDE = (0.3, 0.2), 0.012

@@ -10,20 +10,18 @@ import pytest
 import trimesh
 from trial_world import BOX_MASS, CENTRE, FORCE, GRAVITY, PAD, from_above, lifting, make_station
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import swap_fingers
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.scene.document.scene import Instance, Scene
-from burg_drake.simulation.mujoco.mujoco_trial import MujocoTrial
-from burg_drake.simulation.mujoco.objects_check import check_objects
-from burg_drake.simulation.trials.hand_trial import HandTrial
-from burg_drake.simulation.trials.result import TrialResult
-from burg_drake.simulation.trials.trial_settings import DEFAULT_TRIAL, NO_LIMITS, TrialSettings
-from burg_drake.station.document.engine import ENGINES
-from burg_drake.station.document.grasp_motion import GraspMotion
-from burg_drake.station.document.station_document import Obstacle
+from burg_drake.core import Array, InvalidInputError, Outcome, Pose, swap_fingers
+from burg_drake.scene import Instance, Scene
+from burg_drake.simulation import (
+    DEFAULT_TRIAL,
+    NO_GRIP_LIMITS,
+    HandTrial,
+    MujocoTrial,
+    TrialResult,
+    TrialSettings,
+    check_objects,
+)
+from burg_drake.station import ENGINES, GraspMotion, Obstacle
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -251,7 +249,7 @@ def test_a_neighbour_in_the_way_of_a_finger_is_pushed(crowd: Scene) -> None:
 
 
 def test_what_lies_on_the_target_goes_up_with_it(crowd: Scene) -> None:
-    trial = MujocoTrial(crowd, make_station(), settings=TrialSettings(**NO_LIMITS))
+    trial = MujocoTrial(crowd, make_station(), settings=TrialSettings(**NO_GRIP_LIMITS))
     result = trial.run("carrier", from_above(0.05, y=-0.03), friction=0.8)
     assert result.outcome is Outcome.LIFTED_DISTURBED
     assert result.displacements["on_top"] > 0.2
@@ -260,7 +258,7 @@ def test_what_lies_on_the_target_goes_up_with_it(crowd: Scene) -> None:
 def test_what_turns_in_the_hand_is_not_lifted(scene: Scene) -> None:
     """The tilt that limits forbid is the one that is measured without them."""
     beside, friction = from_above(0.02, y=LEVER), 0.6 * turning_friction()
-    free = MujocoTrial(scene, make_station(), settings=TrialSettings(**NO_LIMITS))
+    free = MujocoTrial(scene, make_station(), settings=TrialSettings(**NO_GRIP_LIMITS))
     strict = MujocoTrial(scene, make_station(), settings=TrialSettings(tilt_limit=0.02))
     one, other = (trial.run("bar", beside, friction=friction) for trial in (free, strict))
     assert (one.outcome, other.outcome) == (Outcome.LIFTED, Outcome.LIFTED_TURNED)

@@ -10,18 +10,11 @@ import pytest
 import trimesh
 from trial_world import BOX_MASS, GRAVITY, SLOW, WIDE, from_above
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import swap_fingers
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.core.paths.resources import resolve
-from burg_drake.grasping.sampling.antipodal import AntipodalSettings, sample_antipodal
-from burg_drake.scene.document.scene import Board, Instance, SceneDocument, load_scene, save_scene
-from burg_drake.simulation.mujoco.mujoco_trial import MujocoTrial
-from burg_drake.simulation.mujoco.trial_of_engine import hand_trial_of
-from burg_drake.simulation.trials.hand_trial import HandTrial
-from burg_drake.simulation.trials.trial_settings import TrialSettings
-from burg_drake.station.document.gripper_document import load_hand
-from burg_drake.station.document.station_document import Station, StationDocument, Table
+from burg_drake.core import Outcome, Pose, resolve_reference, swap_fingers
+from burg_drake.grasping import AntipodalSettings, sample_antipodal
+from burg_drake.scene import Board, Instance, SceneDocument, load_scene, save_scene
+from burg_drake.simulation import HandTrial, MujocoTrial, TrialSettings, hand_trial_of
+from burg_drake.station import Station, StationDocument, Table, load_hand
 from tests.pages import ROOT
 
 NORMAL = TrialSettings()
@@ -141,7 +134,9 @@ def make_station(reference: str, X_WS: Pose = Pose()) -> Station:
     table = Table(center=(0.3, 0.2), size=(3.0, 3.0, 0.1))
     document = StationDocument(name="test", hand=reference, X_WS=X_WS, table=table)
     base = Path(reference).parent
-    return Station(document, hand, resolve(hand.model, base=base), None, Path("test.yaml"))
+    return Station(
+        document, hand, resolve_reference(hand.model, base=base), None, Path("test.yaml")
+    )
 
 
 CENTRE = from_above(0.05)

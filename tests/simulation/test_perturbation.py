@@ -9,19 +9,8 @@ import numpy as np
 import pytest
 from trial_world import FORCE, GRAVITY, QUICK, from_above, make_station
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import inverse, make_pose, rotation_angle
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.simulation.robustness.perturbation import (
-    Perturbed,
-    SuccessRate,
-    perturb,
-    success_rate,
-)
-from burg_drake.simulation.robustness.settings import (
-    Noise,
-)
-from burg_drake.simulation.trials.hand_trial import HandTrial
+from burg_drake.core import InvalidInputError, Outcome, inverse, make_pose, rotation_angle
+from burg_drake.simulation import HandTrial, Noise, Perturbed, SuccessRate, perturb, success_rate
 
 CENTRE = from_above(0.025)
 """At the block's centre of mass."""

@@ -13,16 +13,21 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.documents.schema import Pose
-from burg_drake.objects.library.document import LibraryDocument, ObjectLibrary
-from burg_drake.objects.library.entry import ObjectEntry, Source, StablePose
-from burg_drake.objects.library.obj_file import write_piece
-from burg_drake.objects.library.sdf import model_sdf
-from burg_drake.objects.physics.mass import mass_properties, solid_of_surface
-from burg_drake.objects.physics.stability import resting_pose, stable_poses
-from burg_drake.simulation.settling.drop_test import TILT
-from burg_drake.simulation.settling.resting_poses import Confirmation, confirm_poses
+from burg_drake.core import Array, Pose
+from burg_drake.objects import (
+    LibraryDocument,
+    ObjectEntry,
+    ObjectLibrary,
+    Source,
+    StablePose,
+    mass_properties,
+    model_sdf,
+    resting_pose,
+    solid_of_surface,
+    stable_poses,
+    write_piece,
+)
+from burg_drake.simulation import Confirmation, DropSettings, confirm_poses
 
 X, Y, Z = np.eye(3)
 
@@ -88,7 +93,7 @@ def test_a_plate_on_edge_stands_if_its_tilt_is_below_the_closed_form(
     tmp_path: Path, share: float
 ) -> None:
     height = 0.2
-    width = height * np.tan(share * TILT)  # it topples at this share of the tilt
+    width = height * np.tan(share * DropSettings.tilt)  # it topples at this share of the tilt
     plate = trimesh.creation.box((height, 0.08, width))
     found = confirm(tmp_path, plate, {0.9: -Z, 0.1: -X})
     if share > 1.0:
@@ -101,7 +106,7 @@ def test_a_plate_on_edge_stands_if_its_tilt_is_below_the_closed_form(
             " to the poses in which the object ends up",
         )
     for pose in found.poses:
-        assert pose.residual is not None and pose.residual < TILT
+        assert pose.residual is not None and pose.residual < DropSettings.tilt
 
 
 @pytest.mark.parametrize(("share", "stands"), [(0.5, False), (8.0, True)])
@@ -111,7 +116,7 @@ def test_a_weighted_box_topples_over_the_edge_that_is_near(
     """Seen from outside it is a cube. It has to be far within the closed form here: tilted sideways
     it lands on a corner that is nearly below its centre of mass."""
     half = 0.03
-    p_OOcm = np.array([half - half * np.tan(share * TILT), 0.0, 0.0])
+    p_OOcm = np.array([half - half * np.tan(share * DropSettings.tilt), 0.0, 0.0])
     cube = trimesh.creation.box((2 * half,) * 3)
     found = confirm(tmp_path, cube, {0.7: X, 0.3: -Z}, p_OOcm=p_OOcm)
     assert [p.probability for p in found.poses] == ([0.7, 0.3] if stands else [1.0])
@@ -119,7 +124,9 @@ def test_a_weighted_box_topples_over_the_edge_that_is_near(
 
 def test_a_rod_does_not_stand_and_rolls(tmp_path: Path) -> None:
     length = 0.18
-    rod = trimesh.creation.cylinder(0.5 * length * np.tan(0.5 * TILT), length, sections=32)
+    rod = trimesh.creation.cylinder(
+        0.5 * length * np.tan(0.5 * DropSettings.tilt), length, sections=32
+    )
     (quasi_static,) = make_library(tmp_path, rod).entry("thing").stable_poses
     poses = {0.4: -Z, 0.6: -quasi_static.X_SO.matrix()[2, :3]}
     library = make_library(tmp_path, rod, poses)
@@ -159,7 +166,7 @@ def test_a_roly_poly_rights_itself(tmp_path: Path) -> None:
 
 @pytest.mark.thorough
 def test_where_it_ends_up_is_not_a_known_pose(tmp_path: Path) -> None:
-    plate = trimesh.creation.box((0.1, 0.04, 0.1 * np.tan(0.5 * TILT)))
+    plate = trimesh.creation.box((0.1, 0.04, 0.1 * np.tan(0.5 * DropSettings.tilt)))
     found = confirm(tmp_path, plate, {0.25: -X, 0.75: -Y})  # both are edges, neither stands
     assert len(found.poses) == 1
     assert found.poses[0].probability == 1.0
@@ -168,7 +175,7 @@ def test_where_it_ends_up_is_not_a_known_pose(tmp_path: Path) -> None:
 
 
 def test_shares_that_are_lost(tmp_path: Path) -> None:
-    plate = trimesh.creation.box((0.1, 0.1 * np.tan(3.0 * TILT), 0.2))
+    plate = trimesh.creation.box((0.1, 0.1 * np.tan(3.0 * DropSettings.tilt), 0.2))
     slab = np.array([0.0, -1.0, 0.0])
     # upright on the small face it topples onto the large one, which is not among the poses
     bent = np.array([np.sin(0.5), 0.0, -np.cos(0.5)])
@@ -213,7 +220,7 @@ def test_a_failure_of_the_simulator_is_a_note(
     def fail(*_: object) -> None:
         raise SystemExit("Failure at multibody/plant: condition 'x > 0' failed.")
 
-    monkeypatch.setattr("burg_drake.simulation.settling.drop_test.DropTest.run", fail)
+    monkeypatch.setattr("burg_drake.simulation.stable_pose_drops.DropTest.run", fail)
     found = confirm_poses(library, "thing")
     assert found.poses == poses
     assert found.notes == (

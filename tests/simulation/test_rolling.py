@@ -15,16 +15,18 @@ from pydrake.multibody.math import SpatialVelocity
 from pydrake.systems.analysis import Simulator
 from trial_world import GRAVITY, make_station
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.objects.library.document import ObjectLibrary, load_library
-from burg_drake.pipeline.build import build_library
-from burg_drake.pipeline.source import ObjectSource
-from burg_drake.scene.document.scene import Board, Instance, Scene, SceneDocument
-from burg_drake.simulation.rest.rolling_resistance import ROLLING_RESISTANCE, resist_rolling
-from burg_drake.simulation.rest.still_check import is_still, stillness
-from burg_drake.simulation.settling.settled_scene import settle_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import Obstacle, load_station
+from burg_drake.core import Pose
+from burg_drake.objects import ObjectLibrary, load_library
+from burg_drake.pipeline import ObjectSource, build_library
+from burg_drake.scene import Board, Instance, Scene, SceneDocument
+from burg_drake.simulation import (
+    ROLLING_RESISTANCE,
+    is_still,
+    resist_rolling,
+    settle_scene,
+    stillness,
+)
+from burg_drake.station import Obstacle, build_station_diagram, load_station
 from tools.household.curves import ellipse
 from tools.household.solids import hulls, rings_along, tube, union
 

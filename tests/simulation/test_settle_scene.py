@@ -7,21 +7,24 @@ import pytest
 from scipy.spatial.transform import Rotation
 from trial_world import GRAVITY, from_above, make_station
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import inverse
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.objects.library.document import load_library
-from burg_drake.scene.arrangement.object_shapes import ObjectShapes
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
-from burg_drake.simulation.rest.still_check import is_still, stillness
-from burg_drake.simulation.settling.landing import drop_onto_scene
-from burg_drake.simulation.settling.settled_scene import SettledScene, settle_scene
-from burg_drake.simulation.trials.hand_trial import HandTrial
-from burg_drake.station.checks.scene_issues import check_scene, overlaps
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.engine import ENGINES
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import InvalidInputError, Outcome, Pose, inverse
+from burg_drake.objects import load_library
+from burg_drake.scene import Instance, ObjectShapes, Scene, SceneDocument
+from burg_drake.simulation import (
+    HandTrial,
+    SettledScene,
+    drop_onto_scene,
+    is_still,
+    settle_scene,
+    stillness,
+)
+from burg_drake.station import (
+    ENGINES,
+    build_station_diagram,
+    check_scene,
+    find_overlaps,
+    load_station,
+)
 from tests.thorough import thorough
 
 EDGE = 0.05
@@ -89,7 +92,7 @@ def test_a_heap_of_household_objects(tmp_path) -> None:
     assert not settled.fallen
     assert all(v.speed < 1e-3 and v.turning < 0.02 for v in settled.moving.values())
     assert settled.displacements["screwdriver"].distance > 0.2
-    depths = overlaps(build_station_diagram(settled.scene, make_station(), robot="none"))
+    depths = find_overlaps(build_station_diagram(settled.scene, make_station(), robot="none"))
     assert max(depths.values()) < 1e-3
 
 

@@ -25,12 +25,10 @@ from trial_world import (
     make_station,
 )
 
-from burg_drake.core.frames import grasp_from_axes
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.scene.document.scene import Scene
-from burg_drake.simulation.mujoco.trial_of_engine import hand_trial_of
-from burg_drake.simulation.trials.hand_trial import HandTrial
-from burg_drake.station.document.engine import ENGINES
+from burg_drake.core import Outcome, grasp_from_axes
+from burg_drake.scene import Scene
+from burg_drake.simulation import HandTrial, hand_trial_of
+from burg_drake.station import ENGINES
 from tests.thorough import thorough
 
 STIFFNESS = 1e7 / 0.0076

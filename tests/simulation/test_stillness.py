@@ -8,17 +8,19 @@ import numpy as np
 import pytest
 from trial_world import GRAVITY, make_station
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.objects.library.document import load_library
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
-from burg_drake.simulation.rest.drift import predict_drift
-from burg_drake.simulation.rest.relaxation import RELAXING
-from burg_drake.simulation.rest.still_check import STILL_ANGLE, STILL_DURATION, is_still, stillness
-from burg_drake.simulation.settling.reduced_friction import reduce_friction
-from burg_drake.simulation.settling.settled_scene import settle_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import InvalidInputError, Pose
+from burg_drake.objects import load_library
+from burg_drake.scene import Instance, Scene, SceneDocument
+from burg_drake.simulation import (
+    RELAXING_ENGINE,
+    StillnessLimits,
+    is_still,
+    predict_drift,
+    reduce_friction,
+    settle_scene,
+    stillness,
+)
+from burg_drake.station import build_station_diagram, load_station
 
 EDGE = 0.05
 """Of the blocks [m]."""
@@ -66,10 +68,10 @@ def test_what_will_not_stay_is_foretold(make_scene) -> None:
     """A block that is tilted by 1 degree falls back onto its face; one that stands on it stays."""
     tilted = Instance(name="tilted", object="block", X_SO=Pose((0.4, 0.2, 0), rpy_deg=(1.0, 0, 0)))
     scene = make_scene(placed("block", "block", 0.3, 0.0), tilted)
-    built = build_station_diagram(scene, make_station(), robot="none", engine=RELAXING)
+    built = build_station_diagram(scene, make_station(), robot="none", engine=RELAXING_ENGINE)
     moving = predict_drift(built).moving
     assert list(moving) == ["tilted"]
-    assert moving["tilted"].turning > STILL_ANGLE / STILL_DURATION
+    assert moving["tilted"].turning > StillnessLimits.angle / StillnessLimits.duration
 
 
 def test_what_is_known_to_stay_is_not_looked_at(make_scene) -> None:
@@ -79,13 +81,15 @@ def test_what_is_known_to_stay_is_not_looked_at(make_scene) -> None:
     one = Instance(name="one", object="block", X_SO=Pose((0.4, 0.2, 0.0), rpy_deg=tilt))
     other = Instance(name="other", object="block", X_SO=Pose((0.2, 0.2, 0.0), rpy_deg=tilt))
     scene = make_scene(one, other, placed("beside", "block", 0.4 + EDGE + 2e-4, 0.0))
-    built = build_station_diagram(scene, make_station(), robot="none", engine=RELAXING)
+    built = build_station_diagram(scene, make_station(), robot="none", engine=RELAXING_ENGINE)
     foretold = predict_drift(built, among=["one"])
     assert list(foretold.moving) == ["one"]
     assert foretold.doubtful == {"one", "beside"}
     assert foretold.X_WO.keys() == scene.instances.keys()
     assert (foretold.X_WO["other"] == built.X_WO("other")).all()
-    assert foretold.pace == pytest.approx(foretold.moving["one"].turning * 5.0 / STILL_ANGLE)
+    assert foretold.pace == pytest.approx(
+        foretold.moving["one"].turning * 5.0 / StillnessLimits.angle
+    )
     assert predict_drift(built, among=["other"]).moving.keys() == {"other"}
 
 
@@ -96,7 +100,7 @@ def test_what_rocks_until_it_rests_is_no_creep() -> None:
     document = SceneDocument(name="banana", library="household", instances=(banana,))
     scene = Scene(document, load_library("household"), Path("banana.yaml"))
     station = load_station("panda_tabletop")
-    built = build_station_diagram(scene, station, robot="none", engine=RELAXING)
+    built = build_station_diagram(scene, station, robot="none", engine=RELAXING_ENGINE)
     assert predict_drift(built, once=True).moving  # as far as one can tell so soon
     assert not predict_drift(built).moving
     assert is_still(stillness(scene, station, duration=1.0))
@@ -104,7 +108,7 @@ def test_what_rocks_until_it_rests_is_no_creep() -> None:
 
 def test_friction_is_slackened(make_scene) -> None:
     scene = make_scene(placed("block", "block", 0.3, 0.0))
-    built = build_station_diagram(scene, make_station(), robot="none", engine=RELAXING)
+    built = build_station_diagram(scene, make_station(), robot="none", engine=RELAXING_ENGINE)
     reduce_friction(built, 0.25)
     inspector = built.scene_graph.model_inspector()
     body = built.plant.get_body(built.free["block"])

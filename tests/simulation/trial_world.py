@@ -7,15 +7,17 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import grasp_from_axes
-from burg_drake.core.paths.resources import resolve
-from burg_drake.simulation.trials.trial_settings import USUAL_LIFT, TrialSettings
-from burg_drake.station.document.engine import ENGINES
-from burg_drake.station.document.grasp_motion import GraspMotion
-from burg_drake.station.document.gripper_document import load_hand
-from burg_drake.station.document.station_document import Obstacle, Station, StationDocument, Table
+from burg_drake.core import Array, Pose, grasp_from_axes, resolve_reference
+from burg_drake.simulation import REFERENCE_LIFT_LENGTH, TrialSettings
+from burg_drake.station import (
+    ENGINES,
+    GraspMotion,
+    Obstacle,
+    Station,
+    StationDocument,
+    Table,
+    load_hand,
+)
 
 QUICK = ENGINES["screening"]
 """Of most trials; `test_statics` holds all engines against closed forms."""
@@ -36,7 +38,9 @@ POST = (0.04, 0.04, 0.42)
 def lifting(height: float, time: float, **others: float) -> TrialSettings:
     """Phases with a lift of a height [m] in a time [s]."""
     motion = GraspMotion(lift_height=height)
-    return TrialSettings(motion=motion, lift_time=time * (USUAL_LIFT / height) ** 0.5, **others)
+    return TrialSettings(
+        motion=motion, lift_time=time * (REFERENCE_LIFT_LENGTH / height) ** 0.5, **others
+    )
 
 
 SLOW = lifting(0.01, 1.0, hold_time=0.3)
@@ -59,7 +63,7 @@ def make_station(X_WS: Pose = Pose(), obstacles: dict[str, Obstacle] | None = No
         table=Table(center=(0.3, 0.2), size=(3.0, 3.0, 0.1)),
         background=obstacles or {},
     )
-    return Station(document, hand, resolve(hand.model), None, Path("test.yaml"))
+    return Station(document, hand, resolve_reference(hand.model), None, Path("test.yaml"))
 
 
 def from_above(z: float, x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> Array:

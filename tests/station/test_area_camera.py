@@ -9,13 +9,16 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from burg_drake.cameras.optics.intrinsics import of_camera
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import FieldError
-from burg_drake.scene.document.scene import Scene, SceneDocument, load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import Camera, Station, load_station
-from burg_drake.station.world.area_camera import finer
+from burg_drake.cameras import camera_intrinsics
+from burg_drake.core import FieldError, Pose
+from burg_drake.scene import Scene, SceneDocument, load_scene
+from burg_drake.station import (
+    Camera,
+    Station,
+    build_station_diagram,
+    load_station,
+    supersampled_camera,
+)
 from burg_drake.system_libraries import missing_render_libraries
 from tests.cameras.synthetic import levels, light_of
 
@@ -40,10 +43,10 @@ def station_with(**cameras: Camera) -> Station:
 def test_a_finer_pixel_lies_within_its_pixel() -> None:
     """Along each side n fine pixels fill a pixel: their centres have the pixel's as their mean."""
     n, p_CQ = 3, np.array([[0.02, -0.07, 0.6], [0.1, 0.03, 1.1]])
-    coarse = of_camera(CAMERA).project(p_CQ)
-    fine = of_camera(finer(replace(CAMERA, samples=n))).project(p_CQ)
+    coarse = camera_intrinsics(CAMERA).project(p_CQ)
+    fine = camera_intrinsics(supersampled_camera(replace(CAMERA, samples=n))).project(p_CQ)
     np.testing.assert_allclose(fine, n * coarse + (n - 1) / 2, atol=1e-9)
-    first = of_camera(finer(replace(CAMERA, center=None, samples=n)))
+    first = camera_intrinsics(supersampled_camera(replace(CAMERA, center=None, samples=n)))
     assert (first.width, first.height) == (480, 360)
     assert first.center == (239.5, 179.5)  # the middle stays the middle
 
@@ -54,7 +57,7 @@ def test_mean_of_the_fine_image(n: int) -> None:
     document = SceneDocument(name="empty", library="household")
     scene = Scene(document, load_scene("tabletop_six").library, Path("empty.yaml"))
     area = replace(CAMERA, samples=n)
-    station = station_with(area=area, fine=finer(area), plain=CAMERA)
+    station = station_with(area=area, fine=supersampled_camera(area), plain=CAMERA)
     diagram = build_station_diagram(scene, station, robot="none", cameras=True).diagram
     context = diagram.CreateDefaultContext()
 

@@ -10,14 +10,16 @@ import numpy as np
 import pytest
 from pydrake.geometry import Meshcat, Role
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import inverse
-from burg_drake.scene.document.markers import Markers, marker_dictionary
-from burg_drake.scene.document.scene import Board, Scene, SceneDocument, load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.diagram.station_diagram import StationDiagram
-from burg_drake.station.document.station_document import Camera, Station, load_station
-from burg_drake.station.world.board_visual import board_meshes
+from burg_drake.core import Pose, inverse
+from burg_drake.scene import Board, Markers, Scene, SceneDocument, load_scene, marker_dictionary
+from burg_drake.station import (
+    Camera,
+    Station,
+    StationDiagram,
+    board_meshes,
+    build_station_diagram,
+    load_station,
+)
 from burg_drake.system_libraries import missing_render_libraries
 
 needs_renderer = pytest.mark.skipif(

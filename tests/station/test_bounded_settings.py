@@ -8,13 +8,10 @@ from dataclasses import replace
 
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.scene.document.scene import Board
-from burg_drake.simulation.trials.trial_settings import TrialSettings
-from burg_drake.station.document.arm_control import ArmControl
-from burg_drake.station.document.engine import Engine
-from burg_drake.station.document.gripper_document import load_hand
-from burg_drake.station.document.station_document import Arm, Camera, Pose
+from burg_drake.core import InvalidInputError, Pose
+from burg_drake.scene import Board
+from burg_drake.simulation import TrialSettings
+from burg_drake.station import Arm, ArmControl, Camera, Engine, load_hand
 
 
 @pytest.mark.parametrize(

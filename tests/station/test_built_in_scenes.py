@@ -6,12 +6,9 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from burg_drake.core.frames import inverse, rotation_angle, transform_points
-from burg_drake.core.paths.resources import builtin_names
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.checks.scene_check import SceneCheck
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import builtin_names, inverse, rotation_angle, transform_points
+from burg_drake.scene import load_scene
+from burg_drake.station import SceneCheck, build_station_diagram, load_station
 from tests.thorough import thorough
 
 SECONDS = 0.4

@@ -8,15 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import MissingDependencyError
-from burg_drake.core.frames import inverse
-from burg_drake.scene.document.scene import Scene, SceneDocument, load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.diagram.station_diagram import StationDiagram
-from burg_drake.station.document.station_document import Camera, Obstacle, Station, load_station
-from burg_drake.station.world.camera_sensors import render_cameras
-from burg_drake.station.world.surroundings import PAPER
+from burg_drake.core import MissingDependencyError, Pose, inverse
+from burg_drake.scene import Scene, SceneDocument, load_scene
+from burg_drake.station import (
+    Camera,
+    Obstacle,
+    Station,
+    StationDiagram,
+    SurroundingsProperties,
+    build_station_diagram,
+    load_station,
+    render_cameras,
+)
 from burg_drake.system_libraries import missing_render_libraries
 
 needs_renderer = pytest.mark.skipif(
@@ -83,9 +86,13 @@ def test_label_and_depth_by_the_pinhole_model(
     for pixels, c in zip((columns, rows), middle, strict=True):
         assert (pixels.min(), pixels.max()) == (np.ceil(c - half), np.floor(c + half))
     depth = image(built, "top", "depth")
-    assert depth[rows, columns] == pytest.approx(np.full(len(rows), 0.8 + PAPER), abs=1e-5)
+    assert depth[rows, columns] == pytest.approx(
+        np.full(len(rows), 0.8 + SurroundingsProperties.paper_thickness), abs=1e-5
+    )
     table = image(built, "top", "label") == int(built.table)
-    assert depth[table] == pytest.approx(np.full(table.sum(), 0.9 + PAPER), abs=1e-5)
+    assert depth[table] == pytest.approx(
+        np.full(table.sum(), 0.9 + SurroundingsProperties.paper_thickness), abs=1e-5
+    )
 
 
 @needs_renderer
@@ -110,7 +117,7 @@ def test_every_camera_of_the_built_in_station(empty: Scene) -> None:
 
 def test_missing_libraries_are_named(empty: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        "burg_drake.station.world.camera_sensors.missing_render_libraries", lambda: ["libEGL.so.1"]
+        "burg_drake.station.camera_sensors.missing_render_libraries", lambda: ["libEGL.so.1"]
     )
     with pytest.raises(
         MissingDependencyError, match=r"cameras need the system libraries libEGL\.so\.1; run: "

@@ -9,24 +9,20 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import inverse
-from burg_drake.objects.library.document import load_library
-from burg_drake.pipeline.build import build_library
-from burg_drake.pipeline.source import ObjectSource
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene, save_scene
-from burg_drake.scene.document.validation import SceneIssue
-from burg_drake.station.checks.scene_check import SceneCheck
-from burg_drake.station.checks.scene_issues import check_scene
-from burg_drake.station.checks.valid_scene import require_valid_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import (
+from burg_drake.core import InvalidInputError, Pose, inverse
+from burg_drake.objects import load_library
+from burg_drake.pipeline import ObjectSource, build_library
+from burg_drake.scene import Instance, Scene, SceneDocument, SceneIssue, load_scene, save_scene
+from burg_drake.station import (
     Obstacle,
+    SceneCheck,
     Station,
     StationDocument,
     Table,
+    build_station_diagram,
+    check_scene,
     load_station,
+    require_valid_scene,
 )
 
 EDGE = 0.06

@@ -7,8 +7,7 @@ import pytest
 from pydrake.geometry import Box, Sphere
 from pydrake.math import RigidTransform
 
-from burg_drake.station.checks.body_shapes import PosedShapes
-from burg_drake.station.checks.collision_world import CollisionWorld
+from burg_drake.station import CollisionWorld, PosedShapes
 
 RADII = {"pea": 0.01, "egg": 0.02}
 FLOOR = {"floor": ((RigidTransform([0.0, 0.0, -0.5]), Box(4.0, 4.0, 1.0)),)}

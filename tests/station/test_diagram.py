@@ -17,15 +17,14 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument, load_scene, save_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.diagram.station_diagram import StationDiagram
-from burg_drake.station.document.station_document import (
+from burg_drake.core import InvalidInputError, Pose, UnknownNameError
+from burg_drake.scene import Instance, Scene, SceneDocument, load_scene, save_scene
+from burg_drake.station import (
     MODEL_NAMES,
     Obstacle,
     Station,
+    StationDiagram,
+    build_station_diagram,
     load_station,
 )
 

@@ -13,14 +13,17 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.scene.document.scene import Scene, SceneDocument, load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.diagram.mounted_hand import MountedHand
-from burg_drake.station.diagram.station_diagram import StationDiagram
-from burg_drake.station.document.station_document import Arm, Obstacle, Station, load_station
+from burg_drake.core import Array, InvalidInputError, Pose, UnknownNameError
+from burg_drake.scene import Scene, SceneDocument, load_scene
+from burg_drake.station import (
+    Arm,
+    MountedHand,
+    Obstacle,
+    Station,
+    StationDiagram,
+    build_station_diagram,
+    load_station,
+)
 from tests.thorough import thorough
 
 BLOCK = 0.04

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.engine import ENGINES, Engine, as_engine
+from burg_drake.core import InvalidInputError, UnknownNameError
+from burg_drake.station import ENGINES, Engine, as_engine, build_station_diagram
 
 
 def test_presets_go_by_their_own_names_and_get_coarser() -> None:

@@ -6,10 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import DocumentError
-from burg_drake.core.paths.resources import resolve
-from burg_drake.station.document.grasp_motion import GraspMotion
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import DocumentError, resolve_reference
+from burg_drake.station import GraspMotion, load_station
 
 
 def test_the_usual_motion_is_that_of_the_paper() -> None:
@@ -20,7 +18,7 @@ def test_the_usual_motion_is_that_of_the_paper() -> None:
 
 def with_motion(tmp_path: Path, text: str) -> Path:
     station = tmp_path / "own.yaml"
-    built_in = resolve("panda_tabletop", "stations").read_text()
+    built_in = resolve_reference("panda_tabletop", "stations").read_text()
     station.write_text(f"{built_in}\nmotion: {text}\n")
     return station
 

@@ -5,17 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.formats.common.grasp_format import PANDA
-from burg_drake.station.document.gripper_document import locate_hand
-from burg_drake.station.world.gripper import gripper_of
+from burg_drake.formats import PANDA_GRIPPER
+from burg_drake.station import gripper_of, locate_hand
 
 
 def test_the_panda_is_the_built_in_hand() -> None:
     built_in = gripper_of(*locate_hand("panda_hand"))
-    assert (built_in.name, built_in.body) == (PANDA.name, PANDA.body)
-    np.testing.assert_allclose(built_in.X_HG, PANDA.X_HG, atol=1e-12)
-    assert built_in.tip == pytest.approx(PANDA.tip, abs=1e-9)
-    assert (built_in.opening, built_in.joints) == (PANDA.opening, PANDA.joints)
+    assert (built_in.name, built_in.body) == (PANDA_GRIPPER.name, PANDA_GRIPPER.body)
+    np.testing.assert_allclose(built_in.X_HG, PANDA_GRIPPER.X_HG, atol=1e-12)
+    assert built_in.tip == pytest.approx(PANDA_GRIPPER.tip, abs=1e-9)
+    assert (built_in.opening, built_in.joints) == (PANDA_GRIPPER.opening, PANDA_GRIPPER.joints)
 
 
 def test_the_wsg_closes_along_x_of_its_body_with_one_finger_running_backwards() -> None:

@@ -11,15 +11,27 @@ import pytest
 from pydrake.planning import RobotDiagramBuilder
 from pydrake.systems.analysis import Simulator
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import BurgError, DocumentError, InvalidInputError, UnknownNameError
-from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.core.paths.resources import builtin_names, resolve
-from burg_drake.station.document.gripper_document import Finger, Hand, load_hand, locate_hand
-from burg_drake.station.document.station_document import load_station
-from burg_drake.station.world.hand_check import check_hand
-from burg_drake.station.world.hand_model import add_hand
-from burg_drake.station.world.robot import add_robot
+from burg_drake.core import (
+    BurgError,
+    DocumentError,
+    InvalidInputError,
+    Pose,
+    UnknownNameError,
+    builtin_names,
+    make_pose,
+    resolve_reference,
+    rotation_from_rpy,
+)
+from burg_drake.station import (
+    Finger,
+    Hand,
+    add_hand,
+    add_robot,
+    check_hand,
+    load_hand,
+    load_station,
+    locate_hand,
+)
 from tests.pages import ROOT
 
 STUCK = Finger(body="a", joint="j", pad="pad", closed=0.02, open=0.02)
@@ -80,7 +92,7 @@ def test_bad_figures(panda: Hand, wrong: dict[str, object], message: str) -> Non
 
 
 def test_unknown_key_and_name(tmp_path: Path) -> None:
-    text = resolve("panda_hand", "models/hands").read_text(encoding="utf-8")
+    text = resolve_reference("panda_hand", "models/hands").read_text(encoding="utf-8")
     file = tmp_path / "mine.yaml"
     file.write_text(text.replace("closing_speed:", "closing_sped:"), encoding="utf-8")
     with pytest.raises(
@@ -95,7 +107,9 @@ def test_unknown_key_and_name(tmp_path: Path) -> None:
 def test_built_in_hands_fit_their_models(name: str) -> None:
     hand = load_hand(name)
     assert hand.name == name
-    assert check_hand(hand, resolve(hand.model)).opening == pytest.approx(hand.opening, abs=1e-9)
+    assert check_hand(hand, resolve_reference(hand.model)).opening == pytest.approx(
+        hand.opening, abs=1e-9
+    )
 
 
 def one_finger(hand: Hand, index: int = 1, **changed: object) -> Hand:
@@ -179,7 +193,7 @@ WRONG_DOCUMENTS = {
 def test_document_that_does_not_fit_its_model(panda: Hand, wrong: str) -> None:
     change, message = WRONG_DOCUMENTS[wrong]
     with pytest.raises(InvalidInputError) as error:
-        check_hand(change(panda), resolve(panda.model))
+        check_hand(change(panda), resolve_reference(panda.model))
     assert str(error.value).startswith("hand 'panda_hand': " + message)
 
 
@@ -227,7 +241,7 @@ def test_document_that_does_not_fit_its_model(panda: Hand, wrong: str) -> None:
 def test_the_file_is_named_through_a_station_too(
     tmp_path: Path, old: str, new: str, message: str
 ) -> None:
-    text = resolve("wsg_50", "models/hands").read_text(encoding="utf-8")
+    text = resolve_reference("wsg_50", "models/hands").read_text(encoding="utf-8")
     assert text.count(old) == 1
     file = tmp_path / "mine.yaml"
     file.write_text(text.replace(old, new), encoding="utf-8")
@@ -252,7 +266,7 @@ LOOSE_LINK = """
 
 def changed_model(folder: Path, old: str, new: str) -> Path:
     """The Panda hand's model with other text in it."""
-    path = resolve("package://burg_drake/models/panda/panda_hand.sdf")
+    path = resolve_reference("package://burg_drake/models/panda/panda_hand.sdf")
     text = path.read_text(encoding="utf-8")
     assert old in text
     text = text.replace("meshes/", f"{path.parent}/meshes/").replace(old, new)

@@ -8,16 +8,18 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core import transform_points
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.paths.resources import resolve
-from burg_drake.export.mjcf.hand import pad_spheres
-from burg_drake.objects.library.document import LibraryDocument, ObjectLibrary
-from burg_drake.scene.document.scene import Board, Scene, SceneDocument
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.diagram.hand_description import HandDescription, read_hand
-from burg_drake.station.document.gripper_document import load_hand
-from burg_drake.station.document.station_document import Station, StationDocument
+from burg_drake.core import InvalidInputError, resolve_reference, transform_points
+from burg_drake.export import pad_spheres
+from burg_drake.objects import LibraryDocument, ObjectLibrary
+from burg_drake.scene import Board, Scene, SceneDocument
+from burg_drake.station import (
+    HandDescription,
+    Station,
+    StationDocument,
+    build_station_diagram,
+    load_hand,
+    read_hand,
+)
 
 COMPLIANT = """<drake:proximity_properties><drake:compliant_hydroelastic/>
 <drake:hydroelastic_modulus>1e7</drake:hydroelastic_modulus>
@@ -74,7 +76,9 @@ def described(station: Station) -> HandDescription:
 def station_of(reference: str) -> Station:
     hand, base = load_hand(reference), Path(reference).parent
     document = StationDocument(name="test", hand=reference)
-    return Station(document, hand, resolve(hand.model, base=base), None, Path("test.yaml"))
+    return Station(
+        document, hand, resolve_reference(hand.model, base=base), None, Path("test.yaml")
+    )
 
 
 def pincer(folder: Path, shape: str = BOX, more: str = "") -> Station:

@@ -9,18 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import make_pose, rot_z, swap_fingers
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.grasping.clearance.hand_clearance import HandClearance
-from burg_drake.motion.collision.checker import ArmCollision
-from burg_drake.objects.collision.contact import contact_geometry
-from burg_drake.objects.library.document import ObjectLibrary, load_library
-from burg_drake.objects.library.sdf import model_sdf
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
-from burg_drake.station.checks.scene_issues import check_scene, overlaps
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import Outcome, Pose, make_pose, rot_z, swap_fingers
+from burg_drake.grasping import HandClearance
+from burg_drake.motion import ArmCollision
+from burg_drake.objects import ObjectLibrary, contact_geometry, load_library, model_sdf
+from burg_drake.scene import Instance, Scene, SceneDocument
+from burg_drake.station import build_station_diagram, check_scene, find_overlaps, load_station
 
 FLOOR = 0.0065
 """Just above the floor of the household mug [m]."""
@@ -61,7 +55,7 @@ def test_the_mesh_is_one_collision_geometry(scene: Scene) -> None:
 
 def test_an_object_may_stand_in_another(scene: Scene) -> None:
     diagram = build_station_diagram(scene, load_station("panda_tabletop"), robot="none")
-    found = overlaps(diagram)
+    found = find_overlaps(diagram)
     assert not any(depth > 1e-4 for depth in found.values()), found
     assert check_scene(scene, load_station("panda_tabletop")) == ()
 

@@ -15,14 +15,18 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
-from burg_drake.core.documents.schema import load_document
-from burg_drake.core.errors import DocumentError, InvalidInputError
-from burg_drake.scene.document.scene import Scene, SceneDocument, load_scene
-from burg_drake.station.control.inverse_dynamics import controller_plant
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.diagram.station_diagram import StationDiagram
-from burg_drake.station.document.arm_control import ACCELERATION_KP, ArmControl
-from burg_drake.station.document.station_document import Station, StationDocument, load_station
+from burg_drake.core import DocumentError, InvalidInputError, load_document
+from burg_drake.scene import Scene, SceneDocument, load_scene
+from burg_drake.station import (
+    DEFAULT_ACCELERATION_GAIN,
+    ArmControl,
+    Station,
+    StationDiagram,
+    StationDocument,
+    build_station_diagram,
+    load_station,
+    make_controller_plant,
+)
 from tests.thorough import thorough
 
 GRAVITY = 9.81
@@ -85,8 +89,8 @@ def test_at_rest_the_torque_carries_the_weight(built: StationDiagram) -> None:
 def test_torques_are_those_of_drakes_controller(built: StationDiagram) -> None:
     """In any state, for any desired one, as long as limits do not matter."""
     models = {name: built.plant.GetModelInstanceByName(name) for name in ("arm", "hand")}
-    plant = controller_plant(built.plant, built.station, models)
-    kp = np.full(7, ACCELERATION_KP)
+    plant = make_controller_plant(built.plant, built.station, models)
+    kp = np.full(7, DEFAULT_ACCELERATION_GAIN)
     theirs = InverseDynamicsController(plant, kp, np.zeros(7), 2.0 * np.sqrt(kp), False)
     rng = np.random.default_rng(0)
     for _ in range(5):
@@ -126,7 +130,9 @@ def test_tracking_error_is_the_acceleration_over_the_gain(empty: Scene, referenc
     diagram = builder.Build()
     simulator = Simulator(diagram)
     context = built.diagram.GetMyContextFromRoot(simulator.get_context())
-    bound = 5.78 * np.abs(way) / ACCELERATION_KP + 0.5 * built.engine.time_step * 1.88 * abs(way)
+    bound = 5.78 * np.abs(
+        way
+    ) / DEFAULT_ACCELERATION_GAIN + 0.5 * built.engine.time_step * 1.88 * abs(way)
     errors = []
     for time in np.arange(0.02, 1.2, 0.02):
         simulator.AdvanceTo(time)

@@ -9,9 +9,8 @@ import pytest
 from pydrake.geometry import Mesh, Role
 from pydrake.planning import RobotDiagramBuilder
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.paths.resources import data_root
-from burg_drake.station.world.model_file import add_models
+from burg_drake.core import InvalidInputError, data_root
+from burg_drake.station import add_models
 
 OBJECTS = ("box", "mug", "scissors")
 

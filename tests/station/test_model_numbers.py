@@ -9,13 +9,8 @@ from pathlib import Path
 import pytest
 from pydrake.planning import RobotDiagramBuilder
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.paths.resources import builtin_names, data_root, resolve
-from burg_drake.station.document.gripper_document import load_hand
-from burg_drake.station.document.station_document import load_station
-from burg_drake.station.world.hand_check import check_hand
-from burg_drake.station.world.model_numbers import require_sound_numbers
-from burg_drake.station.world.robot import add_robot
+from burg_drake.core import InvalidInputError, builtin_names, data_root, resolve_reference
+from burg_drake.station import add_robot, check_hand, load_hand, load_station, require_valid_numbers
 
 SDF = """\
 <sdf version="1.9"><model name="m">
@@ -65,7 +60,7 @@ def found_wrong(folder: Path, text: str) -> str:
     path = folder / ("m.urdf" if "<robot" in text else "m.sdf")
     path.write_text(text, encoding="utf-8")
     try:
-        require_sound_numbers(path)
+        require_valid_numbers(path)
     except InvalidInputError as error:
         return str(error).removeprefix(f"{path}:")
     return ""
@@ -177,7 +172,7 @@ def test_deeply_nested_elements(tmp_path: Path, depth: int) -> None:
 
 @pytest.mark.parametrize("name", builtin_names("models/hands"))
 def test_built_in_hands_are_sound(name: str) -> None:
-    require_sound_numbers(resolve(load_hand(name).model))
+    require_valid_numbers(resolve_reference(load_hand(name).model))
 
 
 def test_what_a_model_includes_is_checked(tmp_path: Path) -> None:

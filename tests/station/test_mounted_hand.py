@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.diagram.floating_hand import FloatingHand
-from burg_drake.station.diagram.mounted_hand import MountedHand
-from burg_drake.station.diagram.station_diagram import StationDiagram
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import InvalidInputError
+from burg_drake.scene import load_scene
+from burg_drake.station import (
+    FloatingHand,
+    MountedHand,
+    StationDiagram,
+    build_station_diagram,
+    load_station,
+)
 
 Q = np.array([0.3, -0.5, 0.2, -2.0, 0.1, 1.7, -0.4])
 

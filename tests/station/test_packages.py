@@ -9,13 +9,10 @@ import pytest
 from pydrake.geometry import Mesh
 from pydrake.multibody.parsing import PackageMap
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.paths.resources import resolve
-from burg_drake.objects.library.document import load_library
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.diagram.station_diagram import StationDiagram
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import InvalidInputError, UnknownNameError, resolve_reference
+from burg_drake.objects import load_library
+from burg_drake.scene import load_scene
+from burg_drake.station import StationDiagram, build_station_diagram, load_station
 
 STATION = """\
 version: 1
@@ -33,7 +30,7 @@ MANIFEST = "<package format='3'><name>{}</name></package>\n"
 def place(tmp_path: Path) -> Path:
     """An arm in ws/src/arm_1, its meshes in ws/src/arm_meshes; a hand in hands, its meshes in
     pads; each group of meshes a package."""
-    models = resolve("package://burg_drake/models/panda/panda_arm.sdf").parent.parent
+    models = resolve_reference("package://burg_drake/models/panda/panda_arm.sdf").parent.parent
     arm, meshes = tmp_path / "ws/src/arm_1", tmp_path / "ws/src/arm_meshes"
     hands, pads = tmp_path / "hands", tmp_path / "share/pads"
     shutil.copytree(models / "panda/meshes", meshes / "panda")

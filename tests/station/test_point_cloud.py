@@ -8,11 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.scene.document.scene import Scene, SceneDocument, load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import Camera, Obstacle, load_station
-from burg_drake.station.world.surroundings import PAPER
+from burg_drake.core import Pose
+from burg_drake.scene import Scene, SceneDocument, load_scene
+from burg_drake.station import (
+    Camera,
+    Obstacle,
+    SurroundingsProperties,
+    build_station_diagram,
+    load_station,
+)
 from burg_drake.system_libraries import missing_render_libraries
 
 CENTRE, SIZE = np.array([0.4, 0.0, 0.05]), np.array([0.2, 0.16, 0.1])
@@ -65,7 +69,7 @@ def test_points_lie_on_the_surfaces_that_the_camera_sees() -> None:
     assert np.abs(p_W[over_board, 2]).max() < 1e-4
     # All points of the box are on one of its faces, less the paper under it.
     beyond = np.abs(p_W[at["box"]] - CENTRE) - SIZE / 2.0
-    assert beyond.max(axis=1) == pytest.approx(-PAPER, abs=2e-6)
+    assert beyond.max(axis=1) == pytest.approx(-SurroundingsProperties.paper_thickness, abs=2e-6)
     faces = np.bincount(beyond.argmax(axis=1), minlength=3)
     assert faces.min() > 300
 

@@ -9,17 +9,18 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import make_pose, rotation_angle, rotation_from_rpy, swap_fingers
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.grasping.clearance.hand_clearance import HandClearance
-from burg_drake.objects.collision.contact import contact_geometry
-from burg_drake.objects.library.document import ObjectLibrary, load_library
-from burg_drake.objects.library.sdf import model_sdf
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
-from burg_drake.station.checks.scene_issues import overlaps
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import (
+    Outcome,
+    Pose,
+    make_pose,
+    rotation_angle,
+    rotation_from_rpy,
+    swap_fingers,
+)
+from burg_drake.grasping import HandClearance
+from burg_drake.objects import ObjectLibrary, contact_geometry, load_library, model_sdf
+from burg_drake.scene import Instance, Scene, SceneDocument
+from burg_drake.station import build_station_diagram, find_overlaps, load_station
 
 CAN, LYING = (0.2, 0.2), (0.4, 0.1)
 RADIUS, HEIGHT, BALL = 0.034, 0.102, 0.015
@@ -55,7 +56,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 def test_nothing_overlaps_on_the_table(scene: Scene) -> None:
     diagram = build_station_diagram(scene, load_station("panda_tabletop"), robot="none")
-    found = overlaps(diagram)
+    found = find_overlaps(diagram)
     assert not any(depth > 1e-6 for depth in found.values()), found
 
 

@@ -14,21 +14,10 @@ import pytest
 import scipy.optimize
 from scipy.spatial import ConvexHull
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import transform_points
-from burg_drake.objects.library.document import ObjectLibrary, load_library
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
-from burg_drake.scene.document.validation import SceneIssue
-from burg_drake.station.checks.scene_check import SceneCheck
-from burg_drake.station.document.station_document import (
-    Obstacle,
-    Station,
-    StationDocument,
-    Table,
-    load_station,
-)
+from burg_drake.core import Array, InvalidInputError, Pose, UnknownNameError, transform_points
+from burg_drake.objects import ObjectLibrary, load_library
+from burg_drake.scene import Instance, Scene, SceneDocument, SceneIssue
+from burg_drake.station import Obstacle, SceneCheck, Station, StationDocument, Table, load_station
 
 CUT = ("mug", "bowl", "banana", "scissors", "screwdriver", "airplane")
 """Objects that touch others with convex pieces, which the linear program reads from their files."""

@@ -8,18 +8,18 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import inverse, transform_points
-from burg_drake.core.paths.resources import builtin_names
-from burg_drake.scene.document.scene import Board
-from burg_drake.station.document.board_visibility import (
+from burg_drake.core import Pose, builtin_names, inverse, transform_points
+from burg_drake.scene import Board
+from burg_drake.station import (
+    Camera,
+    Obstacle,
+    are_points_in_view,
     board_points,
-    crosses,
     frustum,
-    in_view,
-    seen_share,
+    lines_through_box,
+    load_station,
+    visible_board_share,
 )
-from burg_drake.station.document.station_document import Camera, Obstacle, load_station
 
 SKEW = Camera(
     X_WC=Pose((0.1, -0.3, 0.6), rpy_deg=(-140.0, 10.0, 20.0)),
@@ -47,7 +47,7 @@ def test_in_view_is_what_opencv_projects_into_the_image() -> None:
     z = transform_points(inverse(SKEW.X_WC.matrix()), p_WQ)[:, 2]
     inside = (pixels(SKEW, p_WQ) > -0.5) & (pixels(SKEW, p_WQ) < (319.5, 199.5))
     expected = inside.all(axis=1) & (z > 0.3) & (z < 0.9)
-    np.testing.assert_array_equal(in_view(SKEW, p_WQ), expected)
+    np.testing.assert_array_equal(are_points_in_view(SKEW, p_WQ), expected)
     assert 0.05 < expected.mean() < 0.9
 
 
@@ -69,7 +69,7 @@ def test_crossed_boxes_hold_points_of_the_ray() -> None:
     )
     depth = (np.array(box.size) / 2 - np.abs(p_B)).min(axis=1).reshape(400, -1).max(axis=0)
     clear = np.abs(depth) > 2e-3  # what only touches may be called either way
-    np.testing.assert_array_equal(crosses(box, p_WA, p_WQ)[clear], depth[clear] > 0.0)
+    np.testing.assert_array_equal(lines_through_box(box, p_WA, p_WQ)[clear], depth[clear] > 0.0)
     assert 0.02 < (depth > 0.0).mean() < 0.5
 
 
@@ -77,10 +77,13 @@ def test_along_a_face() -> None:
     """Rays parallel to two pairs of faces, between them and beside them."""
     box = Obstacle(X_WB=Pose((1.0, 0.0, 0.0)), size=(0.2, 0.2, 0.2))
     p_WA = np.zeros(3)
-    assert crosses(box, p_WA, np.array([[2.0, 0.0, 0.0]])).all()
-    assert not crosses(box, np.array([0.0, 0.2, 0.0]), np.array([[2.0, 0.2, 0.0]])).any()
+    assert lines_through_box(box, p_WA, np.array([[2.0, 0.0, 0.0]])).all()
+    assert not lines_through_box(box, np.array([0.0, 0.2, 0.0]), np.array([[2.0, 0.2, 0.0]])).any()
     behind, short = np.array([[-2.0, 0.0, 0.0]]), np.array([[0.8, 0.0, 0.0]])
-    assert not crosses(box, p_WA, behind).any() and not crosses(box, p_WA, short).any()
+    assert (
+        not lines_through_box(box, p_WA, behind).any()
+        and not lines_through_box(box, p_WA, short).any()
+    )
 
 
 def test_half_of_the_board() -> None:
@@ -88,14 +91,14 @@ def test_half_of_the_board() -> None:
     station = load_station("wsg_tabletop")
     station = replace(station, document=replace(station.document, X_WS=Pose((-0.297, -0.21, 0.0))))
     camera = Camera(X_WC=Pose((0.0, 0.0, 1.0), rpy_deg=DOWN), width=640, height=480)
-    assert seen_share(camera, station, Board()) == 1.0
+    assert visible_board_share(camera, station, Board()) == 1.0
     plate = Obstacle(X_WB=Pose((0.5, 0.0, 0.5)), size=(1.0, 1.0, 0.01))
     hidden = replace(station, document=replace(station.document, background={"plate": plate}))
-    assert seen_share(camera, hidden, Board()) == pytest.approx(0.5, abs=0.02)
+    assert visible_board_share(camera, hidden, Board()) == pytest.approx(0.5, abs=0.02)
     half = replace(camera, center=(639.4, 239.5))
-    assert seen_share(half, station, Board()) == pytest.approx(0.5, abs=0.02)
+    assert visible_board_share(half, station, Board()) == pytest.approx(0.5, abs=0.02)
     away = replace(camera, X_WC=Pose((0.0, 0.0, 1.0)))
-    assert seen_share(away, station, Board()) == 0.0
+    assert visible_board_share(away, station, Board()) == 0.0
 
 
 def test_board_points_are_all_over_the_sheet() -> None:
@@ -108,5 +111,7 @@ def test_board_points_are_all_over_the_sheet() -> None:
 @pytest.mark.parametrize("name", builtin_names("stations"))
 def test_every_built_in_station_has_a_camera_that_sees_the_board(name: str) -> None:
     station = load_station(name)
-    seen = {k: seen_share(c, station, Board()) for k, c in station.document.cameras.items()}
+    seen = {
+        k: visible_board_share(c, station, Board()) for k, c in station.document.cameras.items()
+    }
     assert max(seen.values()) > 0.9 and min(seen.values()) > 0.75, seen

@@ -9,24 +9,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.frames import make_pose, transform_points
-from burg_drake.objects.library.document import ObjectLibrary, load_library
-from burg_drake.objects.library.entry import Decomposition
-from burg_drake.pipeline.build import build_library
-from burg_drake.pipeline.source import ObjectSource
-from burg_drake.scene.document.board import Board
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
-from burg_drake.scene.document.validation import surface_vertices, validate_scene
-from burg_drake.simulation.settling.settled_scene import settle_scene
-from burg_drake.station.checks.scene_check import SceneCheck
-from burg_drake.station.document.station_document import (
-    Station,
-    StationDocument,
-    Table,
-    load_station,
-)
+from burg_drake.core import Array, Pose, make_pose, transform_points
+from burg_drake.objects import Decomposition, ObjectLibrary, load_library
+from burg_drake.pipeline import ObjectSource, build_library
+from burg_drake.scene import Board, Instance, Scene, SceneDocument, surface_vertices, validate_scene
+from burg_drake.simulation import settle_scene
+from burg_drake.station import SceneCheck, Station, StationDocument, Table, load_station
 
 SIZE = (0.08, 0.06, 0.04)
 """Of a brick, whose pieces reach beyond it, or not as far [m]."""

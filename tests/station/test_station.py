@@ -11,12 +11,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import DocumentError, FieldError, UnknownNameError
-from burg_drake.core.frames import inverse
-from burg_drake.core.paths.resources import builtin_names, resolve
-from burg_drake.scene.document.board import Board
-from burg_drake.station.document.station_document import Camera, Station, load_station
+from burg_drake.core import (
+    DocumentError,
+    FieldError,
+    Pose,
+    UnknownNameError,
+    builtin_names,
+    inverse,
+    resolve_reference,
+)
+from burg_drake.scene import Board
+from burg_drake.station import Camera, Station, load_station
 
 A2 = np.array([[0, 0, 0], [0.594, 0, 0], [0.594, 0.42, 0], [0, 0.42, 0]])
 """Corners of the sheet in the scene frame [m]."""
@@ -92,8 +97,10 @@ def test_names_are_those_of_the_files(builtin: Station) -> None:
 def test_a_station_of_ones_own(tmp_path: Path) -> None:
     station = load_station(station_file(tmp_path))
     assert station.hand.name == "panda_hand"
-    assert station.hand_model == resolve("package://burg_drake/models/panda/panda_hand.sdf")
-    assert station.arm_model == resolve("package://burg_drake/models/panda/panda_arm.sdf")
+    assert station.hand_model == resolve_reference(
+        "package://burg_drake/models/panda/panda_hand.sdf"
+    )
+    assert station.arm_model == resolve_reference("package://burg_drake/models/panda/panda_arm.sdf")
     assert station.document.background["wall"].size == (0.02, 1.0, 0.4)
 
 
@@ -110,8 +117,10 @@ def test_content_is_that_of_what_is_placed(tmp_path: Path) -> None:
 
 def test_content_counts_the_meshes_of_the_hand(tmp_path: Path) -> None:
     """What the pads are made of decides whether they hold."""
-    shutil.copytree(resolve("package://burg_drake/models/wsg/wsg_50.sdf").parent, tmp_path / "wsg")
-    document = resolve("wsg_50", "models/hands").read_text(encoding="utf-8")
+    shutil.copytree(
+        resolve_reference("package://burg_drake/models/wsg/wsg_50.sdf").parent, tmp_path / "wsg"
+    )
+    document = resolve_reference("wsg_50", "models/hands").read_text(encoding="utf-8")
     hand = document.replace("package://burg_drake/models/wsg", "wsg")
     (tmp_path / "hand.yaml").write_text(hand, encoding="utf-8")
     station = station_file(tmp_path, ("hand: panda_hand", "hand: hand.yaml"))

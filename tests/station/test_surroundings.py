@@ -10,13 +10,10 @@ import trimesh
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.systems.analysis import Simulator
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.pipeline.build import build_library
-from burg_drake.pipeline.source import ObjectSource
-from burg_drake.scene.document.scene import Instance, SceneDocument, load_scene, save_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.engine import ENGINES
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import Pose
+from burg_drake.pipeline import ObjectSource, build_library
+from burg_drake.scene import Instance, SceneDocument, load_scene, save_scene
+from burg_drake.station import ENGINES, build_station_diagram, load_station
 from tests.thorough import thorough
 
 OBJECT_FRICTION, GRAVITY = 0.24, 9.81

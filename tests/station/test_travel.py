@@ -10,19 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import make_pose, rot_z
-from burg_drake.objects.library.document import ObjectLibrary, load_library
-from burg_drake.scene.document.scene import Instance, Scene, SceneDocument
-from burg_drake.station.checks.scene_check import SceneCheck
-from burg_drake.station.checks.scene_issues import overlaps
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.document.station_document import (
+from burg_drake.core import InvalidInputError, Pose, UnknownNameError, make_pose, rot_z
+from burg_drake.objects import ObjectLibrary, load_library
+from burg_drake.scene import Instance, Scene, SceneDocument
+from burg_drake.station import (
     Obstacle,
+    SceneCheck,
     Station,
     StationDocument,
     Table,
+    build_station_diagram,
+    find_overlaps,
     load_station,
 )
 
@@ -143,7 +141,7 @@ def test_mug_and_bowl_touch_there_and_not_before(
             p = (np.array(mug[:3]) + moved * unit).tolist()
             there = scene(**start | {"mug": (*p, *mug[3:])})
             built = build_station_diagram(there, station, robot="none")
-            met.append(overlaps(built).get(("mug", "bowl"), 0.0) > 1e-5)
+            met.append(find_overlaps(built).get(("mug", "bowl"), 0.0) > 1e-5)
         assert met == [False, True], direction
 
 

@@ -10,12 +10,9 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.paths.resources import resolve
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.diagram.builder import build_station_diagram
-from burg_drake.station.diagram.station_diagram import StationDiagram
-from burg_drake.station.document.station_document import load_station
+from burg_drake.core import InvalidInputError, resolve_reference
+from burg_drake.scene import Scene, load_scene
+from burg_drake.station import StationDiagram, build_station_diagram, load_station
 
 HOME = [0.0, -np.pi / 2, np.pi / 2, -np.pi / 2, -np.pi / 2, 0.0]
 
@@ -92,7 +89,7 @@ BOLTED = (
 def test_a_urdf_that_is_no_arm_for_a_station(
     scene: Scene, tmp_path: Path, pattern: str, replacement: str, expected: str
 ) -> None:
-    urdf = resolve("package://burg_drake/models/ur5e/ur5e.urdf").read_text("utf-8")
+    urdf = resolve_reference("package://burg_drake/models/ur5e/ur5e.urdf").read_text("utf-8")
     other = re.sub(pattern, replacement, urdf, flags=re.DOTALL)
     assert other != urdf
     (tmp_path / "arm.urdf").write_text(other, encoding="utf-8")

@@ -11,7 +11,7 @@ from pydrake.systems.framework import Diagram
 
 import burg_drake as burg
 from burg_drake.cameras import Intrinsics, load_intrinsics
-from burg_drake.grasps import read_grasps
+from burg_drake.evaluation import read_grasps
 
 reveal_type(burg.evaluate)
 reveal_type(burg.HandTrial)

@@ -65,7 +65,7 @@ def browser(playwright: sync_api.Playwright, chromium: str) -> Iterator[sync_api
 def lamps_alone() -> Iterator[None]:
     """Pages are lit by lamps alone: without a graphics processor Chromium takes seconds for every
     picture of the surroundings that viser adds, and draws one frame a second meanwhile."""
-    from burg_drake.ui.server import guarded_viser
+    from burg_drake.ui import guarded_viser
 
     with pytest.MonkeyPatch.context() as patch:
         guarded_server = guarded_viser.guarded_server

@@ -16,7 +16,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
-from burg_drake.ui.server.door import ServedPage
+from burg_drake.ui import ServedPage
 from tests.hang_guard import HANG_GUARD, until
 
 POSING = ("SetSceneNodeVisibilityMessage", "SetPositionMessage", "SetOrientationMessage")

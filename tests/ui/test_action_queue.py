@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import threading
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.ui.widgets.action_queue import ActionQueue
+from burg_drake.core import InvalidInputError
+from burg_drake.ui import ActionQueue
 from tests.hang_guard import HANG_GUARD
 
 

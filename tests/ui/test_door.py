@@ -13,10 +13,8 @@ from pathlib import Path
 import pytest
 import viser
 
-from burg_drake.core.errors import InvalidInputError, MissingDependencyError
-from burg_drake.ui.server import admission
-from burg_drake.ui.server.access_test import require_guarded
-from burg_drake.ui.server.door import ServedPage, serve
+from burg_drake.core import InvalidInputError, MissingDependencyError
+from burg_drake.ui import ServedPage, admission, require_guarded, serve_page
 from tests.hang_guard import HANG_GUARD
 
 HANDSHAKE = {
@@ -30,7 +28,7 @@ HANDSHAKE = {
 
 @pytest.fixture(scope="module")
 def door() -> Iterator[ServedPage]:
-    with serve(port=0) as door:
+    with serve_page(port=0) as door:
         door.server.gui.add_markdown("Nothing here yet.")
         yield door
 
@@ -38,7 +36,7 @@ def door() -> Iterator[ServedPage]:
 @pytest.fixture
 def open_to_all() -> Iterator[ServedPage]:
     """A door that other machines can reach."""
-    with serve("0.0.0.0", port=0) as door:
+    with serve_page("0.0.0.0", port=0) as door:
         door.server.gui.add_markdown("Nothing here yet.")
         yield door
 
@@ -175,7 +173,7 @@ def test_a_door_that_lets_others_in_does_not_open(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(admission, "require_local_host", lambda *headers, **served: None)
     threads = threading.active_count()
     with pytest.raises(MissingDependencyError, match="was not opened, because other web sites"):
-        serve(port=7449)
+        serve_page(port=7449)
     assert threading.active_count() == threads
     with socket.create_server(("127.0.0.1", 7449)):
         pass
@@ -237,15 +235,15 @@ def test_browsers_are_counted(door: ServedPage, monkeypatch: pytest.MonkeyPatch)
 
 def test_a_port_that_is_taken_is_named(door: ServedPage) -> None:
     with pytest.raises(InvalidInputError, match=f"port {door.port} of 127.0.0.1 is in use"):
-        serve(port=door.port)
+        serve_page(port=door.port)
     with pytest.raises(InvalidInputError, match=r"cannot be served on 192\.0\.2\.1"):
-        serve("192.0.2.1")
-    with serve() as first, serve() as second:
+        serve_page("192.0.2.1")
+    with serve_page() as first, serve_page() as second:
         assert 7200 <= first.port < second.port < 7250
 
 
 def test_the_terminal_stays_clean(capfd: pytest.CaptureFixture[str]) -> None:
-    with serve(port=0) as door:
+    with serve_page(port=0) as door:
         own = ("Origin", "http://127.0.0.1")
         old = {**HANDSHAKE, "Sec-WebSocket-Protocol": "viser-v0.1"}
         assert answer(door, "/", own, *old.items())[0] == 101

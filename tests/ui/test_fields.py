@@ -13,11 +13,13 @@ import pytest
 viser = pytest.importorskip("viser", reason="pages need viser: pip install 'burg-drake[ui]'")
 
 from burg_drake.compose import AddObject, ComposeSession  # noqa: E402
-from burg_drake.core.paths.resources import resolve  # noqa: E402
-from burg_drake.station.document.station_document import load_station  # noqa: E402
-from burg_drake.ui.server.door import serve  # noqa: E402
-from burg_drake.ui.setup_page import SetupPage  # noqa: E402
-from burg_drake.ui.widgets.typed_field import TypedField  # noqa: E402
+from burg_drake.core import resolve_reference  # noqa: E402
+from burg_drake.station import load_station  # noqa: E402
+from burg_drake.ui import (  # noqa: E402
+    SetupPage,
+    TypedField,
+    serve_page,
+)
 from tests.hang_guard import HANG_GUARD  # noqa: E402
 
 
@@ -25,9 +27,9 @@ from tests.hang_guard import HANG_GUARD  # noqa: E402
 def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SetupPage]:
     """On a scene whose file has another name than the scene in it."""
     file = tmp_path_factory.mktemp("scenes") / "my_scene.yaml"
-    file.write_text(resolve("tabletop_six", "scenes").read_text())
+    file.write_text(resolve_reference("tabletop_six", "scenes").read_text())
     session = ComposeSession.open(file, load_station("wsg_tabletop"))
-    with session, serve(port=0) as door:
+    with session, serve_page(port=0) as door:
         page = SetupPage(door.server, session)
         yield page
         page.close()

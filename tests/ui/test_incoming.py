@@ -16,17 +16,23 @@ from viser._messages import FileTransferStartUpload, Message, ShareUrlRequest
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
-from burg_drake.ui.server import guarded_viser
-from burg_drake.ui.server.door import ServedPage, serve
-from burg_drake.ui.server.messages import BURST, LARGEST_MESSAGE, RATE
-from burg_drake.ui.server.uploads import ALL_UPLOADS, LARGEST_UPLOAD
+from burg_drake.ui import (
+    MAX_ALL_UPLOADS_BYTES,
+    MAX_MESSAGE_BYTES,
+    MAX_UPLOAD_BYTES,
+    MESSAGE_BURST,
+    MESSAGE_RATE,
+    ServedPage,
+    guarded_viser,
+    serve_page,
+)
 from tests.hang_guard import HANG_GUARD
 from tests.ui.page_client import CAMERA, coming_in, send, unpacked
 
 
 @pytest.fixture(scope="module")
 def door() -> Iterator[ServedPage]:
-    with serve(port=0) as door:
+    with serve_page(port=0) as door:
         yield door
 
 
@@ -80,7 +86,7 @@ def test_a_browser_uploads_what_is_small_enough(
     photo, film = tmp_path / "photo.png", tmp_path / "film.png"
     photo.write_bytes(bytes(range(256)) * 4000)
     with film.open("wb") as file:
-        file.truncate(LARGEST_UPLOAD + 1)
+        file.truncate(MAX_UPLOAD_BYTES + 1)
     page.goto(door.url)
     page.get_by_role("button", name="Load a photo").wait_for()
     page.set_input_files("input[type=file]", film)
@@ -96,7 +102,7 @@ def test_a_browser_uploads_what_is_small_enough(
 @pytest.mark.parametrize(
     ("fields", "reason"),
     [
-        ({"size_bytes": LARGEST_UPLOAD + 1, "part_count": 100}, "bytes is refused"),
+        ({"size_bytes": MAX_UPLOAD_BYTES + 1, "part_count": 100}, "bytes is refused"),
         ({"size_bytes": -1, "part_count": 1}, "bytes is refused"),
         ({"size_bytes": 10, "part_count": 1 << 40}, "parts is refused"),
         ({"size_bytes": 10, "part_count": 0}, "parts is refused"),
@@ -124,8 +130,8 @@ def test_more_than_was_announced_is_refused(button, client: ClientConnection) ->
 
 
 def test_many_files_at_once_are_bounded(button, client: ClientConnection) -> None:
-    for k in range(ALL_UPLOADS // LARGEST_UPLOAD + 1):
-        announce(client, button, transfer_uuid=str(k), size_bytes=LARGEST_UPLOAD, part_count=64)
+    for k in range(MAX_ALL_UPLOADS_BYTES // MAX_UPLOAD_BYTES + 1):
+        announce(client, button, transfer_uuid=str(k), size_bytes=MAX_UPLOAD_BYTES, part_count=64)
     assert closed(client) == (1008, "the files uploaded at once are too large")
 
 
@@ -136,7 +142,7 @@ def test_who_goes_away_leaves_nothing_behind(door: ServedPage, button) -> None:
     for key in ("b", "c", "d"):  # more than may be on their way at once
         with coming_in(door) as client:
             send(client, "ViewerCameraMessage", **CAMERA)
-            announce(client, button, transfer_uuid=key, size_bytes=LARGEST_UPLOAD, part_count=64)
+            announce(client, button, transfer_uuid=key, size_bytes=MAX_UPLOAD_BYTES, part_count=64)
             part(client, button, bytes(1000), transfer_uuid=key)
             wait_for(client, key)
     end = time.monotonic() + HANG_GUARD
@@ -179,7 +185,7 @@ def test_a_flood_is_paced(
     door: ServedPage, button, client: ClientConnection, caplog: pytest.LogCaptureFixture
 ) -> None:
     begun = time.monotonic()
-    for _ in range(int(BURST + RATE)):
+    for _ in range(int(MESSAGE_BURST + MESSAGE_RATE)):
         send(client, "ShareUrlRequest")
     with coming_in(door) as other:  # meanwhile others get on
         send(other, "ViewerCameraMessage", **CAMERA)
@@ -250,7 +256,7 @@ def test_only_values_of_controls_are_set(door: ServedPage, client: ClientConnect
         (b"\x91" * 100_000, 1007),
         (msgspec.msgpack.encode({"type": 1}), 1007),
         (msgspec.msgpack.encode({"type": "FileTransferPart", "content": [1]}), 1007),
-        (bytes(LARGEST_MESSAGE + 1), 1009),
+        (bytes(MAX_MESSAGE_BYTES + 1), 1009),
     ],
     ids=["text", "empty", "invalid", "nested", "type", "content", "large"],
 )

@@ -9,9 +9,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
-from burg_drake.core.grasps.outcome import RealOutcome
-from burg_drake.experiment.trials.entries import journal_path, read_entries
-from burg_drake.experiment.trials.sheet import load_trials, save_trials
+from burg_drake.core import RealOutcome
+from burg_drake.experiment import journal_path, load_trials, read_entries, save_trials
 from tests.apps.test_lab_server import free_port, kill, serve_again, start
 from tests.experiment.pages.conftest import made as made, trials as trials
 

@@ -9,19 +9,19 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
-from burg_drake.apps.ar.server import ViewServer
-from burg_drake.cameras.live.actions import ViewActions
-from burg_drake.cameras.live.event_log import EventLog
-from burg_drake.cameras.live.frame_processing import FrameProcessor
-from burg_drake.cameras.live.session import LiveSession
-from burg_drake.cameras.placement.document import (
+from burg_drake.apps import ViewServer
+from burg_drake.cameras import (
     CheckedImage,
     CheckedScene,
+    EventLog,
+    FrameProcessor,
+    LiveSession,
     Placement,
     PlacementCheck,
+    ViewActions,
 )
-from burg_drake.core.documents.schema import Pose
-from burg_drake.scene.document.scene import load_scene
+from burg_drake.core import Pose
+from burg_drake.scene import load_scene
 from tests.apps.ar_views import photo
 from tests.cameras.live_views import CAMERA, Pictures
 from tests.hang_guard import HANG_GUARD

@@ -12,24 +12,21 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from burg_drake import load_scene
-from burg_drake.compose import AddObject, ComposeSession, MoveObjects, SetBoard
-from burg_drake.compose.document.bounds_on_board import bounds
-from burg_drake.core.frames import (
-    make_pose,
-    quaternion_from_rotation,
-    rot_z,
-    rotation_from_quaternion,
+from burg_drake.compose import AddObject, ComposeSession, MoveObjects, SetBoard, instance_bounds
+from burg_drake.core import make_pose, quaternion_from_rotation, rot_z, rotation_from_quaternion
+from burg_drake.scene import Board, load_scene, validate_scene
+from burg_drake.station import load_station
+from burg_drake.ui import (
+    FRONT_FOV,
+    STATUS_STYLES,
+    ObjectPictures,
+    ServedPage,
+    SetupPage,
+    direction_to_camera,
+    serve_page,
+    sheet_picture,
+    viewpoint,
 )
-from burg_drake.scene.document.scene import Board
-from burg_drake.scene.document.validation import validate_scene
-from burg_drake.station.document.station_document import load_station
-from burg_drake.ui.server.door import ServedPage, serve
-from burg_drake.ui.setup_page import SetupPage
-from burg_drake.ui.view.board import sheet_picture
-from burg_drake.ui.view.object_pictures import ObjectPictures
-from burg_drake.ui.view.viewpoints import FRONT_FOV, direction_from, viewpoint
-from burg_drake.ui.widgets.status_colors import STATUS_STYLES
 from tests.hang_guard import HANG_GUARD, until
 from tests.ui.page_client import PageClient
 
@@ -46,7 +43,7 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[SetupPage
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(ObjectPictures, "get", lambda self, name, stable_pose=None: None)
         session = ComposeSession.open("household", load_station("panda_tabletop"), folder=folder)
-        with session, serve(port=0) as door:
+        with session, serve_page(port=0) as door:
             page = SetupPage(door.server, session)
             yield page, door
             page.close()
@@ -80,7 +77,7 @@ def test_a_page_has_the_stated_view_whatever_it_shows_while_it_loads(
 
     def given(aspect: float) -> bool:
         position, target = viewpoint(
-            session.view.document.board, direction_from(above=False), FRONT_FOV, aspect
+            session.view.document.board, direction_to_camera(above=False), FRONT_FOV, aspect
         )
         camera = client.camera
         return np.allclose([camera["position"], camera["look_at"]], [position, target], atol=1e-6)
@@ -370,7 +367,7 @@ def test_what_is_kept_upright_is_raised_by_its_arrow_by_keys_and_by_a_number(
     start = session.do(AddObject("can", position=(0.2, 0.15))).X_SO("can")
     until(lambda: client.nodes.get(ARROWS, {}).get("visible"), "an arrow")
     assert client.nodes[ARROWS]["active_axes"] == [False, False, True]
-    right = bounds(session.view.state, "can")[1, 0]
+    right = instance_bounds(session.view.state, "can")[1, 0]
     assert client.nodes[ARROWS]["position"][0] > right  # from above it must not cover the can
     up = {"position": np.add(client.nodes[ARROWS]["position"], (0.0, 0.0, 0.05)).tolist()}
     client.drag_handles(ARROWS, "Start")
@@ -382,7 +379,7 @@ def test_what_is_kept_upright_is_raised_by_its_arrow_by_keys_and_by_a_number(
     label = "/heights/can/label"
     until(lambda: client.nodes.get(label, {}).get("text") == "50.0 mm", "how high it is")
     until(lambda: "/heights/can" in client.nodes, "a line")
-    middle = bounds(session.view.state, "can").mean(axis=0)
+    middle = instance_bounds(session.view.state, "can").mean(axis=0)
     np.testing.assert_allclose(client.nodes[label]["position"], (*middle[:2], 0.025), atol=1e-4)
     client.press("pagedown")
     until(lambda: client.nodes.get(label, {}).get("text") == "45.0 mm", "lower")

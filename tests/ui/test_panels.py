@@ -9,18 +9,23 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake import load_station
-from burg_drake.cameras.rectification.top_view import BoardPicture
+from burg_drake.cameras import BoardPicture
 from burg_drake.compose import AddObject, ComposeSession
-from burg_drake.core.frames import make_pose, rot_z
-from burg_drake.scene.document.scene import Board
-from burg_drake.ui.panels.check import findings
-from burg_drake.ui.view.board import sheet_picture
-from burg_drake.ui.view.live_picture import LivePicture
-from burg_drake.ui.view.objects import footprint
-from burg_drake.ui.widgets.scene_files import scene_names
-from burg_drake.ui.widgets.shortcuts import SHORTCUTS, overlay_text
-from burg_drake.ui.widgets.texts import all_of, notice, table
+from burg_drake.core import make_pose, rot_z
+from burg_drake.scene import Board
+from burg_drake.station import load_station
+from burg_drake.ui import (
+    SHORTCUTS,
+    LivePicture,
+    footprint,
+    html_table,
+    issues_html,
+    join_html,
+    notice_html,
+    scene_names,
+    sheet_picture,
+    shortcut_list_html,
+)
 from tests.hang_guard import HANG_GUARD
 
 
@@ -70,8 +75,8 @@ def test_a_live_picture_is_the_board_rectified_until_there_is_no_more(tmp_path: 
 def test_what_cannot_be_checked_is_not_called_sound(tmp_path: Path) -> None:
     with ComposeSession.open("household", load_station("wsg_tabletop"), folder=tmp_path) as session:
         view = session.do(AddObject("mug"))
-    assert "free and supported" in all_of(*findings(view))
-    text = all_of(*findings(replace(view, status={"mug": "unknown"})))
+    assert "free and supported" in join_html(*issues_html(view))
+    text = join_html(*issues_html(replace(view, status={"mug": "unknown"})))
     assert "cannot be checked: mug" in text and "supported" not in text
 
 
@@ -88,9 +93,9 @@ def test_only_files_that_name_a_library_are_offered_as_scenes(tmp_path: Path) ->
 def test_no_two_actions_have_the_same_key_and_all_are_listed() -> None:
     pressed = [(s.key, s.modifier) for s in SHORTCUTS]
     assert len(set(pressed)) == len(pressed)
-    text = overlay_text()
+    text = shortcut_list_html()
     assert all(shortcut.label in text for shortcut in SHORTCUTS)
 
 
 def test_names_from_files_are_no_markup() -> None:
-    assert "<img" not in notice("<img src=x>") + table(["a"], [["<img src=x>"]])
+    assert "<img" not in notice_html("<img src=x>") + html_table(["a"], [["<img src=x>"]])

@@ -8,11 +8,17 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.core.frames import inverse, make_pose, rotation_from_rpy
-from burg_drake.scene.document.scene import Board
-from burg_drake.ui.pointing.handles import Handle, handle_under
-from burg_drake.ui.pointing.pointer import PageCamera
-from burg_drake.ui.view.viewpoints import FRONT_FOV, TOP_FOV, direction_from, viewpoint
+from burg_drake.core import inverse, make_pose, rotation_from_rpy
+from burg_drake.scene import Board
+from burg_drake.ui import (
+    FRONT_FOV,
+    TOP_FOV,
+    Handle,
+    PageCamera,
+    direction_to_camera,
+    handle_under,
+    viewpoint,
+)
 
 WIDTH, HEIGHT = 1200.0, 800.0
 FOV = 0.8
@@ -101,7 +107,7 @@ def test_no_handle_is_found_beside_them_and_none_in_the_middle() -> None:
 def test_a_view_has_all_of_the_board(aspect: float, above: bool, size: tuple[float, float]) -> None:
     """The corners by OpenCV's pinhole camera; where the page is a phone's, above the sheet."""
     board, fov = Board(size=size), FRONT_FOV if not above else TOP_FOV
-    position, target = viewpoint(board, direction_from(above=above), fov, aspect)
+    position, target = viewpoint(board, direction_to_camera(above=above), fov, aspect)
     z = (target - position) / np.linalg.norm(target - position)
     x = np.cross(z, (0.0, 0.0, 1.0))
     x /= np.linalg.norm(x)

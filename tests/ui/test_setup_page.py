@@ -16,17 +16,11 @@ import numpy as np
 import pytest
 import yaml
 
-from burg_drake.compose.commands.board import SetBoard
-from burg_drake.compose.commands.moving import MoveObjects
-from burg_drake.compose.commands.placing import AddObject
-from burg_drake.compose.editing.view import SessionView
-from burg_drake.compose.session import ComposeSession
-from burg_drake.core.frames import rotation_from_quaternion
-from burg_drake.scene.document.scene import Board
-from burg_drake.station.document.station_document import load_station
-from burg_drake.ui.pointing.pointer import PageCamera
-from burg_drake.ui.server.door import ServedPage, serve
-from burg_drake.ui.setup_page import SetupPage
+from burg_drake.compose import AddObject, ComposeSession, MoveObjects, SessionView, SetBoard
+from burg_drake.core import rotation_from_quaternion
+from burg_drake.scene import Board
+from burg_drake.station import load_station
+from burg_drake.ui import PageCamera, ServedPage, SetupPage, serve_page
 from tests.hang_guard import until
 from tests.ui.conftest import open_page
 
@@ -131,7 +125,7 @@ class Setup:
 @contextlib.contextmanager
 def open_setup(tab: Any, folder: Path) -> Iterator[Setup]:
     session = ComposeSession.open("household", load_station("panda_tabletop"), folder=folder)
-    with serve(port=0) as door:
+    with serve_page(port=0) as door:
         page = SetupPage(door.server, session)
         yield Setup(session, page, door, tab)
         page.close()
@@ -261,7 +255,7 @@ def test_two_pages_show_the_same_and_come_back_after_a_kill(
     setup.session.close()  # nothing was saved
     with (
         ComposeSession.open("household", setup.session.station, folder=tmp_path) as session,
-        serve(port=port) as door,
+        serve_page(port=port) as door,
     ):
         page = SetupPage(door.server, session)
         assert session.view.document == before

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from pydrake.geometry import Meshcat
 
-from burg_drake.visualization.scenes.scene import open_meshcat
+from burg_drake.visualization import open_meshcat
 
 
 class RecordingMeshcat:

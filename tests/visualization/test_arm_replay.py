@@ -7,15 +7,11 @@ from dataclasses import replace
 import numpy as np
 from eye import VIEWS, in_view, messages
 
-from burg_drake.core.frames import grasp_from_axes, transform_points
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.motion.planner import plan
-from burg_drake.motion.plans.grasp_plan import Plan
-from burg_drake.simulation.trials.arm_trial import ArmTrial
-from burg_drake.station.document.engine import ENGINES
-from burg_drake.station.document.station_document import load_station
-from burg_drake.visualization.scenes.arm_replay import record_arm_trial
-from burg_drake.visualization.scenes.scene import open_meshcat
+from burg_drake.core import Outcome, grasp_from_axes, transform_points
+from burg_drake.motion import Plan, plan
+from burg_drake.simulation import ArmTrial
+from burg_drake.station import ENGINES, load_station
+from burg_drake.visualization import open_meshcat, record_arm_trial
 from tests.evaluation.composed import tabletop
 
 X_OG = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))

@@ -12,15 +12,21 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.objects.library.document import ObjectLibrary, load_library
-from burg_drake.objects.library.entry import ContactGeometry, Fit, Primitive, StablePose
+from burg_drake.core import Pose
+from burg_drake.objects import (
+    ContactGeometry,
+    Fit,
+    ObjectLibrary,
+    Primitive,
+    StablePose,
+    load_library,
+)
 from burg_drake.system_libraries import missing_render_libraries
-from burg_drake.visualization.pictures.contact_sheet import (
+from burg_drake.visualization import (
     contact_name,
-    grams,
+    mass_text,
+    percent_text,
     pose_note,
-    share,
     surface_notes,
     write_contact_sheet,
 )
@@ -99,14 +105,14 @@ def test_figures_of_a_fit_and_a_simulated_pose(tmp_path: Path) -> None:
     ("probability", "text"), [(1.0, "100 %"), (0.0996, "10 %"), (0.0433, "4.3 %"), (0.001, "0.1 %")]
 )
 def test_shares(probability: float, text: str) -> None:
-    assert share(probability) == text
+    assert percent_text(probability) == text
 
 
 @pytest.mark.parametrize(
     ("mass", "text"), [(0.118, "118 g"), (0.0052, "5.20 g"), (1.5, "1.50 kg"), (12.34, "12.3 kg")]
 )
 def test_masses(mass: float, text: str) -> None:
-    assert grams(mass) == text
+    assert mass_text(mass) == text
 
 
 def test_words() -> None:

@@ -9,17 +9,20 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.frames import make_pose, rot_z
-from burg_drake.visualization.grasps.mesh import FINGER_LENGTH, STEM_LENGTH
-from burg_drake.visualization.grasps.strokes import grasp_corners, grasp_strokes
-from burg_drake.visualization.meshcat.portrait import camera_rotation
-from burg_drake.visualization.pictures.flat_view import FlatView, fit_view, path_data
-from burg_drake.visualization.pictures.shaded_drawing import (
-    DETAIL,
+from burg_drake.core import Array, make_pose, rot_z
+from burg_drake.visualization import (
+    FINGER_LENGTH,
+    PIXELS_PER_UNIT,
+    STEM_LENGTH,
     TONES,
+    FlatView,
     SolidMesh,
+    camera_rotation,
+    fit_view,
     footprint,
+    grasp_corners,
+    grasp_strokes,
+    path_data,
     shaded_outline,
 )
 
@@ -58,7 +61,7 @@ def test_an_outline_covers_what_the_solid_covers(mesh: trimesh.Trimesh, area: fl
     assert len(paths) == TONES
     # contours run through the middles of the pixels at the border, half a pixel inside
     length = sum(cv2.arcLength(p.astype(np.float32), True) for p in polygons(outline))
-    found = even_odd_area(outline) + length * 0.5 / DETAIL
+    found = even_odd_area(outline) + length * 0.5 / PIXELS_PER_UNIT
     assert found == pytest.approx(area * view.scale**2, rel=0.01)
 
 

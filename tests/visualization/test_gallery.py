@@ -9,12 +9,9 @@ import numpy as np
 import pytest
 from pydrake.geometry import Meshcat
 
-from burg_drake.core.errors import InvalidInputError, UnknownNameError
-from burg_drake.core.frames import transform_points
-from burg_drake.objects.library.document import ObjectLibrary, load_library
-from burg_drake.visualization.gallery.library import show_library
-from burg_drake.visualization.page import save_html
-from burg_drake.visualization.scenes.scene import open_meshcat
+from burg_drake.core import InvalidInputError, UnknownNameError, transform_points
+from burg_drake.objects import ObjectLibrary, load_library
+from burg_drake.visualization import open_meshcat, save_html, show_library
 
 ROOT = "/drake/library"
 NAMES = ["mug", "can", "marble"]

@@ -13,8 +13,8 @@ import trimesh
 from PIL import Image
 from pydrake.geometry import Mesh
 
-from burg_drake.objects.library.document import load_library
-from burg_drake.visualization.meshcat.gltf import gltf_mesh, label_mesh
+from burg_drake.objects import load_library
+from burg_drake.visualization import gltf_mesh, label_mesh
 
 
 def document(mesh: Mesh) -> dict:

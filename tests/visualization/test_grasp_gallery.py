@@ -8,12 +8,9 @@ import numpy as np
 import pytest
 from recording import RecordingMeshcat
 
-from burg_drake.core.errors import UnknownNameError
-from burg_drake.core.frames import grasp_from_axes, inverse, transform_points
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.objects.library.document import load_library
-from burg_drake.visualization.gallery.with_grasps import show_with_grasps
-from burg_drake.visualization.grasps.mesh import grasp_triangles
+from burg_drake.core import GraspSet, UnknownNameError, grasp_from_axes, inverse, transform_points
+from burg_drake.objects import load_library
+from burg_drake.visualization import grasp_triangles, show_objects_for_grasps
 
 NAMES = ["mug", "bowl", "screwdriver", "marble", "can"]
 PER_OBJECT = 6
@@ -32,7 +29,7 @@ def grasps() -> GraspSet:
 def test_everything_has_its_own_place(recorder: RecordingMeshcat, grasps: GraspSet) -> None:
     """Bounds on the floor of each object with its drawn grasps are apart, and above the floor."""
     library = load_library("household")
-    X_WG = show_with_grasps(library, grasps, grasps.width, recorder)  # type: ignore[arg-type]
+    X_WG = show_objects_for_grasps(library, grasps, grasps.width, recorder)  # type: ignore[arg-type]
     bounds = {}
     for name in NAMES:
         own = grasps.object == name
@@ -51,7 +48,7 @@ def test_grasps_stay_where_they_were_on_the_object(
     recorder: RecordingMeshcat, grasps: GraspSet
 ) -> None:
     library = load_library("household")
-    X_WG = show_with_grasps(library, grasps, grasps.width, recorder)  # type: ignore[arg-type]
+    X_WG = show_objects_for_grasps(library, grasps, grasps.width, recorder)  # type: ignore[arg-type]
     for X, name, X_OG in zip(X_WG, grasps.object.tolist(), grasps.X_OG, strict=True):
         X_WO = recorder.X_WP(f"/drake/library/visual/{name}")
         assert inverse(X_WO) @ X == pytest.approx(X_OG, abs=1e-12)
@@ -59,14 +56,14 @@ def test_grasps_stay_where_they_were_on_the_object(
 
 def test_only_the_objects_of_the_grasps(recorder: RecordingMeshcat, grasps: GraspSet) -> None:
     library = load_library("household")
-    show_with_grasps(library, grasps, grasps.width, recorder)  # type: ignore[arg-type]
+    show_objects_for_grasps(library, grasps, grasps.width, recorder)  # type: ignore[arg-type]
     assert not recorder.HasPath("/drake/library/visual/banana")
     one = grasps.select(grasps.object == "mug")
-    show_with_grasps(library, one, one.width, recorder)  # type: ignore[arg-type]
+    show_objects_for_grasps(library, one, one.width, recorder)  # type: ignore[arg-type]
     assert not recorder.HasPath("/drake/library/visual/bowl")
 
 
 def test_an_object_that_the_library_lacks(recorder: RecordingMeshcat) -> None:
     other = GraspSet.create(np.eye(4), object="mugg", width=0.05)
     with pytest.raises(UnknownNameError, match="did you mean 'mug'"):
-        show_with_grasps(load_library("household"), other, other.width, recorder)  # type: ignore[arg-type]
+        show_objects_for_grasps(load_library("household"), other, other.width, recorder)  # type: ignore[arg-type]

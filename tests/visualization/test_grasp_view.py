@@ -9,19 +9,19 @@ import pytest
 import trimesh
 from recording import RecordingMeshcat
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import grasp_from_axes, make_pose, transform_points
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.visualization.grasps.groups import all_alike, by_number, by_outcome
-from burg_drake.visualization.grasps.mesh import (
+from burg_drake.core import InvalidInputError, Outcome, grasp_from_axes, make_pose, transform_points
+from burg_drake.visualization import (
     BAR_RADIUS,
     FINGER_LENGTH,
     STEM_LENGTH,
     draw_grasps,
     grasp_path,
     grasp_triangles,
+    group_by_number,
+    group_by_outcome,
+    open_meshcat,
+    single_group,
 )
-from burg_drake.visualization.scenes.scene import open_meshcat
 
 WIDTH = 0.05
 
@@ -65,7 +65,7 @@ def test_triangles_have_the_place_and_colour_of_their_group(recorder: RecordingM
     n = 5
     X_WG = make_pose(p_AB=np.arange(3 * n).reshape(n, 3))
     values = np.array([0.1, 0.9, 0.1, math.nan, 0.5])
-    found = by_number(values, (0.0, 1.0))
+    found = group_by_number(values, (0.0, 1.0))
     draw_grasps(recorder, X_WG, np.full(n, WIDTH), found.groups)  # type: ignore[arg-type]
     assert len(found.groups) == 4
     for group in found.groups:
@@ -86,10 +86,10 @@ def test_drawing_again_replaces() -> None:
     meshcat = open_meshcat()
     poses, widths = np.tile(np.eye(4), (4, 1, 1)), np.full(4, WIDTH)
     verdicts = [Outcome.LIFTED, Outcome.SLIPPED, Outcome.LIFTED, None]
-    draw_grasps(meshcat, poses, widths, by_outcome(verdicts))
+    draw_grasps(meshcat, poses, widths, group_by_outcome(verdicts))
     for name in ("lifted", "slipped", "not_judged"):
         assert meshcat.HasPath(f"/drake/grasps/{name}")
-    draw_grasps(meshcat, poses[:1], widths[:1], all_alike(1))
+    draw_grasps(meshcat, poses[:1], widths[:1], single_group(1))
     assert not meshcat.HasPath("/drake/grasps/lifted")
     assert meshcat.HasPath("/drake/grasps/all")
 
@@ -97,4 +97,4 @@ def test_drawing_again_replaces() -> None:
 @pytest.mark.parametrize("widths", [[0.01], [0.01, math.nan]])
 def test_widths_that_cannot_be_drawn(widths: list[float]) -> None:
     with pytest.raises(InvalidInputError, match="for 2 grasps; give"):
-        draw_grasps(open_meshcat(), np.tile(np.eye(4), (2, 1, 1)), widths, all_alike(2))
+        draw_grasps(open_meshcat(), np.tile(np.eye(4), (2, 1, 1)), widths, single_group(2))

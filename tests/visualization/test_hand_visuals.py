@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from recording import RecordingMeshcat
 
-from burg_drake.core.frames import inverse, make_pose, rotation_from_rpy, transform_points
-from burg_drake.station.document.gripper_document import locate_hand
-from burg_drake.visualization.meshcat.gripper_view import GRIPPER_PATH, GripperView
-from burg_drake.visualization.meshcat.hand_visual import hand_visuals
+from burg_drake.core import inverse, make_pose, rotation_from_rpy, transform_points
+from burg_drake.station import locate_hand
+from burg_drake.visualization import GRIPPER_PATH, GripperView, hand_visuals
 
 
 @pytest.mark.parametrize("name", ["panda_hand", "wsg_50"])

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.objects.library.document import LibraryDocument, ObjectLibrary, load_library
-from burg_drake.visualization.meshcat.hydroelastic_mesh import (
+from burg_drake.core import InvalidInputError
+from burg_drake.objects import LibraryDocument, ObjectLibrary, load_library
+from burg_drake.visualization import (
     HydroelasticMesh,
     boundary_faces,
     convex_depth,

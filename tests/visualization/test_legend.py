@@ -7,10 +7,10 @@ import re
 
 import pytest
 
-from burg_drake.visualization.style.legend import (
+from burg_drake.visualization import (
+    BAR_MARGIN,
     BAR_WIDTH,
     HISTOGRAM_HEIGHT,
-    MARGIN,
     ColorBar,
     LegendEntry,
     legend_html,
@@ -43,16 +43,16 @@ def test_bar_has_every_color_side_by_side() -> None:
     assert [r["fill"] for r in drawn] == list(BAR.colors)
     edges = [float(r["x"]) for r in drawn]
     widths = [float(r["width"]) for r in drawn]
-    assert edges[0] == MARGIN and sum(widths) == BAR_WIDTH
+    assert edges[0] == BAR_MARGIN and sum(widths) == BAR_WIDTH
     assert [x + w for x, w in zip(edges, widths, strict=True)][:-1] == edges[1:]
 
 
 def test_ticks_are_below_their_places() -> None:
     found = re.findall(r'<text x="([\d.]+)"[^>]*>([^<]*)</text>', BAR.html())
     assert found == [
-        (f"{MARGIN:.1f}", "≤ 0"),
-        (f"{MARGIN + BAR_WIDTH / 2:.1f}", "1"),
-        (f"{MARGIN + BAR_WIDTH:.1f}", "2"),
+        (f"{BAR_MARGIN:.1f}", "≤ 0"),
+        (f"{BAR_MARGIN + BAR_WIDTH / 2:.1f}", "1"),
+        (f"{BAR_MARGIN + BAR_WIDTH:.1f}", "2"),
     ]
 
 

@@ -9,10 +9,8 @@ from pathlib import Path
 import pytest
 from pydrake.geometry import Box, Rgba
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.visualization.page import panel, save_html
-from burg_drake.visualization.scenes.scene import open_meshcat
-from burg_drake.visualization.style.legend import LegendEntry
+from burg_drake.core import InvalidInputError
+from burg_drake.visualization import LegendEntry, open_meshcat, page_panel, save_html
 
 
 class Resources(HTMLParser):
@@ -84,7 +82,7 @@ def test_narrow_views_show_as_much_as_the_narrowest_that_cameras_are_aimed_for(p
 
 
 def test_legend_is_escaped() -> None:
-    html = panel("t", [], [LegendEntry('<b>"', 'red"', ('/a"',))])
+    html = page_panel("t", [], [LegendEntry('<b>"', 'red"', ('/a"',))])
     assert "<b>" not in html
     assert 'red"' not in html
 

@@ -7,8 +7,8 @@ import itertools
 import numpy as np
 import pytest
 
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.visualization.style.palette import GROUPS, UNJUDGED, group_of
+from burg_drake.core import Outcome
+from burg_drake.visualization import OUTCOME_GROUPS, UNJUDGED_GROUP, outcome_group
 
 # Linear RGB to what protanopes and deuteranopes see: Machado, Oliveira, Fernandes, "A
 # Physiologically-based Model for Simulation of Color Vision Deficiency" (2009), severity 1.0.
@@ -42,24 +42,24 @@ def lab(rgb: np.ndarray) -> np.ndarray:
 
 
 def test_every_outcome_is_in_exactly_one_group() -> None:
-    members = [outcome for group in GROUPS for outcome in group.outcomes]
+    members = [outcome for group in OUTCOME_GROUPS for outcome in group.outcomes]
     assert sorted(members) == sorted(Outcome)
 
 
 def test_group_of() -> None:
-    assert group_of(Outcome.LIFTED).name == "lifted"
-    assert group_of(Outcome.NO_IK) is group_of(Outcome.ARM_COLLISION)
-    assert group_of(None) is UNJUDGED
+    assert outcome_group(Outcome.LIFTED).name == "lifted"
+    assert outcome_group(Outcome.NO_IK) is outcome_group(Outcome.ARM_COLLISION)
+    assert outcome_group(None) is UNJUDGED_GROUP
 
 
 def test_hex() -> None:
-    assert GROUPS[0].hex == "#009e73"
+    assert OUTCOME_GROUPS[0].hex == "#009e73"
 
 
 @pytest.mark.parametrize("vision", VISION)
 def test_groups_can_be_told_apart(vision: str) -> None:
     seen = {}
-    for group in (*GROUPS, UNJUDGED):
+    for group in (*OUTCOME_GROUPS, UNJUDGED_GROUP):
         linear = np.power(group.rgba[:3], 2.2)
         seen[group.name] = lab(np.clip(VISION[vision] @ linear, 0.0, 1.0))
     for a, b in itertools.combinations(seen, 2):

@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from burg_drake.core.frames import rot_z
-from burg_drake.objects.library.document import load_library
-from burg_drake.visualization.meshcat.portrait import best_yaw, camera_rotation, fit_camera, upright
+from burg_drake.core import rot_z
+from burg_drake.objects import load_library
+from burg_drake.visualization import best_yaw, camera_rotation, fit_camera, upright_rotation
 
 HALF = np.array([0.4, 0.3])
 
@@ -57,8 +57,8 @@ def test_what_shows_the_same_from_all_sides_is_not_turned() -> None:
 
 def test_objects_stand_in_their_own_frame_if_they_can() -> None:
     library = load_library("household")
-    assert upright(library.entry("bottle")) == pytest.approx(np.eye(3))
+    assert upright_rotation(library.entry("bottle")) == pytest.approx(np.eye(3))
     entry = library.entry("bottle")
     lying = dataclasses.replace(entry, stable_poses=entry.stable_poses[:1])
-    assert upright(lying) == pytest.approx(entry.X_SO(0)[:3, :3])
-    assert upright(dataclasses.replace(entry, stable_poses=())) == pytest.approx(np.eye(3))
+    assert upright_rotation(lying) == pytest.approx(entry.X_SO(0)[:3, :3])
+    assert upright_rotation(dataclasses.replace(entry, stable_poses=())) == pytest.approx(np.eye(3))

@@ -7,16 +7,16 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from burg_drake.motion.workspace.reachability import ReachabilityMap
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.visualization.pictures.reachability_svg import (
-    TITLE,
-    WIDTH,
-    outlines,
+from burg_drake.motion import ReachabilityMap
+from burg_drake.scene import load_scene
+from burg_drake.visualization import (
+    CHART_TITLE_HEIGHT,
+    CHART_WIDTH,
+    VIRIDIS,
+    object_outlines,
     reachability_chart,
     reachability_key,
 )
-from burg_drake.visualization.style.color_map import CONTROL_POINTS
 
 
 def one_corner() -> ReachabilityMap:
@@ -39,14 +39,19 @@ def test_cells_lie_as_the_sheet_is_read() -> None:
     svg = ElementTree.fromstring(reachability_chart(one_corner(), 0, {"a<b": triangle}))
     cells = [rect.attrib for rect in svg.iter("rect")]
     assert len(cells) == 8
-    (bright,) = (c for c in cells if c["fill"] == CONTROL_POINTS[-1])
-    assert (float(bright["x"]), float(bright["y"])) == pytest.approx((0.75 * WIDTH, TITLE))
-    assert {c["fill"] for c in cells} == {CONTROL_POINTS[0], CONTROL_POINTS[-1]}
+    (bright,) = (c for c in cells if c["fill"] == VIRIDIS[-1])
+    assert (float(bright["x"]), float(bright["y"])) == pytest.approx(
+        (0.75 * CHART_WIDTH, CHART_TITLE_HEIGHT)
+    )
+    assert {c["fill"] for c in cells} == {VIRIDIS[0], VIRIDIS[-1]}
     (path,) = svg.iter("path")
-    foot = TITLE + WIDTH / 2
-    assert path.attrib["d"] == f"M0.0 {foot:.1f}L{WIDTH:.1f} {foot:.1f}L0.0 {TITLE:.1f}Z"
+    foot = CHART_TITLE_HEIGHT + CHART_WIDTH / 2
+    assert (
+        path.attrib["d"]
+        == f"M0.0 {foot:.1f}L{CHART_WIDTH:.1f} {foot:.1f}L0.0 {CHART_TITLE_HEIGHT:.1f}Z"
+    )
     assert [text.text for text in svg.iter("text")] == ["5 cm above the board", "a<b"]
-    assert svg.attrib["viewBox"] == f"0 0 {WIDTH} {foot:.1f}"
+    assert svg.attrib["viewBox"] == f"0 0 {CHART_WIDTH} {foot:.1f}"
 
 
 def test_the_key_goes_from_none_to_all() -> None:
@@ -58,7 +63,7 @@ def test_the_key_goes_from_none_to_all() -> None:
 
 def test_outlines_are_those_of_the_objects() -> None:
     scene = load_scene("tabletop_six")
-    found = outlines(scene)
+    found = object_outlines(scene)
     assert list(found) == list(scene.instances)
     middle = found["bowl"].mean(axis=0)
     np.testing.assert_allclose(middle, [0.305, 0.31], atol=2e-3)

@@ -8,31 +8,27 @@ import numpy as np
 import pytest
 from eye import VIEWS, in_view, messages, placed
 
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import (
+from burg_drake.core import (
+    InvalidInputError,
+    Margins,
+    Outcome,
+    Pose,
     grasp_from_axes,
     make_pose,
     rotation_from_rpy,
     transform_points,
 )
-from burg_drake.core.grasps import Margins
-from burg_drake.core.grasps.outcome import Outcome
-from burg_drake.scene.document.scene import Scene
-from burg_drake.simulation.trials.hand_trial import HandTrial
-from burg_drake.simulation.trials.result import TrialResult
-from burg_drake.simulation.trials.trial_settings import TrialSettings
-from burg_drake.station.document.engine import ENGINES
-from burg_drake.station.document.grasp_motion import GraspMotion
-from burg_drake.station.document.station_document import Obstacle, Station, load_station
-from burg_drake.visualization.scenes.replay import (
-    CLEAR_VIEW,
-    VIEW,
+from burg_drake.scene import Scene
+from burg_drake.simulation import HandTrial, TrialResult, TrialSettings
+from burg_drake.station import ENGINES, GraspMotion, Obstacle, Station, load_station
+from burg_drake.visualization import (
+    PREFERRED_HEADING,
+    SIGHT_CLEARANCE,
     camera_offset,
-    describe,
+    describe_trial,
+    open_meshcat,
     record_trial,
 )
-from burg_drake.visualization.scenes.scene import open_meshcat
 from tests.evaluation.composed import tabletop
 
 X_OG = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
@@ -119,7 +115,7 @@ def test_the_camera_looks_across_the_fingers(yaw: float) -> None:
     offset = camera_offset(X_WG, np.empty((0, 3)))
     heading = offset[:2] / np.linalg.norm(offset[:2])
     assert abs(heading @ X_WG[:2, 0]) < 0.5  # at least 60 degrees from the closing direction
-    assert heading @ VIEW > 0.0
+    assert heading @ PREFERRED_HEADING > 0.0
     assert offset[2] > 0.0
 
 
@@ -132,7 +128,7 @@ def test_the_camera_avoids_what_is_in_the_way() -> None:
     around = camera_offset(X_WG, obstacle[None])
     flat = (1.0, 1.0, 0.0)
     beside = np.linalg.norm(np.cross(around * flat, 0.3 * free * flat)) / np.linalg.norm(around[:2])
-    assert beside > CLEAR_VIEW or around[:2] @ free[:2] < 0.0
+    assert beside > SIGHT_CLEARANCE or around[:2] @ free[:2] < 0.0
 
 
 @pytest.mark.parametrize("yaw", np.deg2rad([0, 80, 160, 250, 330]))
@@ -165,7 +161,7 @@ def test_describe() -> None:
         displacements={"bowl": 0.0004, "can": 0.0123, "box": 0.0},
         toppled="can",
     )
-    assert describe(lifted) == [
+    assert describe_trial(lifted) == [
         "lifted disturbed",
         "lift 300 mm, slip 1.2 mm, tilt 2.0 deg, pad force 40.0 N, patch 123 mm²,"
         " others moved 12.3 mm, others turned 50.0 deg",
@@ -175,6 +171,6 @@ def test_describe() -> None:
     blocked = TrialResult(
         outcome=Outcome.COLLISION_CLUTTER, margins=Margins(overlap=0.0034), blocker="mug"
     )
-    assert describe(blocked) == ["collision clutter (mug, 3.4 mm deep)"]
+    assert describe_trial(blocked) == ["collision clutter (mug, 3.4 mm deep)"]
     arm = TrialResult(outcome=Outcome.ARM_COLLISION, margins=Margins(overlap=0.0), blocker="shelf")
-    assert describe(arm) == ["arm collision (shelf)"]
+    assert describe_trial(arm) == ["arm collision (shelf)"]

@@ -8,16 +8,10 @@ import numpy as np
 import pytest
 from eye import VIEWS, in_view
 
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import transform_points
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.station.document.station_document import Station, load_station
-from burg_drake.station.world.robot import Robot
-from burg_drake.visualization.scenes.scene import (
-    draw_board,
-    open_meshcat,
-    show_scene,
-)
+from burg_drake.core import InvalidInputError, transform_points
+from burg_drake.scene import Scene, load_scene
+from burg_drake.station import Robot, Station, load_station
+from burg_drake.visualization import draw_board, open_meshcat, show_scene
 
 
 @pytest.fixture(scope="module")

@@ -7,15 +7,19 @@ import pytest
 from eye import VIEWS, in_view
 from pydrake.geometry import Meshcat
 
-from burg_drake.core.frames import transform_points
-from burg_drake.motion.workspace.arm_span import ArmSpan
-from burg_drake.motion.workspace.reachability import ReachabilityMap
-from burg_drake.motion.workspace.station_check import empty_scene
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.document.station_document import load_station
-from burg_drake.visualization.scenes.scene import open_meshcat
-from burg_drake.visualization.scenes.station import BINS, MAP_PATH, show_station, tiles
-from burg_drake.visualization.style.legend import ColorBar, LegendEntry
+from burg_drake.core import transform_points
+from burg_drake.motion import ArmSpan, ReachabilityMap, empty_scene
+from burg_drake.scene import load_scene
+from burg_drake.station import load_station
+from burg_drake.visualization import (
+    MAP_PATH,
+    REACHABILITY_BINS,
+    ColorBar,
+    LegendEntry,
+    open_meshcat,
+    show_station,
+    tile_triangles,
+)
 from tests.thorough import thorough
 
 
@@ -58,8 +62,13 @@ def test_everything_in_the_legend_is_there(meshcat: Meshcat) -> None:
     ]
     for entry in entries:
         assert any(meshcat.HasPath(path) for path in entry.paths), entry.label
-    shown = {(b, k) for b in range(BINS) for k in (0, 1) if meshcat.HasPath(f"{MAP_PATH}/{b}/{k}")}
-    assert shown == {(0, 0), (2, 0), (0, 1), (BINS - 1, 1)}
+    shown = {
+        (b, k)
+        for b in range(REACHABILITY_BINS)
+        for k in (0, 1)
+        if meshcat.HasPath(f"{MAP_PATH}/{b}/{k}")
+    }
+    assert shown == {(0, 0), (2, 0), (0, 1), (REACHABILITY_BINS - 1, 1)}
     for name in ("overview", "board"):
         assert meshcat.HasPath(f"/drake/cameras/{name}/image")
 
@@ -96,7 +105,7 @@ def test_the_share_says_what_stood_on_the_board(meshcat: Meshcat) -> None:
 
 def test_tiles_cover_their_cells_and_face_up() -> None:
     middle = np.array([[0.1, 0.2], [-0.3, 0.5]])
-    vertices, faces = tiles(middle, np.array([0.2, 0.1]), 0.03)
+    vertices, faces = tile_triangles(middle, np.array([0.2, 0.1]), 0.03)
     assert vertices.shape == (3, 8) and faces.shape == (3, 4)
     a, b, c = (vertices[:, faces[k]].T for k in range(3))
     normal = np.cross(b - a, c - a) / 2.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from burg_drake.visualization.meshcat.text import text_triangles
+from burg_drake.visualization import text_triangles
 
 
 def areas(text: str, height: float) -> tuple[np.ndarray, np.ndarray]:

@@ -8,17 +8,16 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from burg_drake.core.errors import MissingDependencyError, UnknownNameError
-from burg_drake.core.terminal.colors import distinct_colors
-from burg_drake.objects.library.document import ObjectLibrary, load_library
+from burg_drake.core import MissingDependencyError, UnknownNameError, distinct_colors
+from burg_drake.objects import ObjectLibrary, load_library
 from burg_drake.system_libraries import missing_render_libraries
-from burg_drake.visualization.pictures import thumbnails
-from burg_drake.visualization.pictures.thumbnails import (
-    BACKGROUND,
-    FILL,
+from burg_drake.visualization import (
+    MAX_FILLED_SHARE,
+    THUMBNAIL_BACKGROUND,
     ObjectRenderer,
     Thumbnail,
-    exploded,
+    explosion_offsets,
+    thumbnails,
 )
 
 needs_renderer = pytest.mark.skipif(
@@ -43,16 +42,16 @@ def check_framing(picture: Thumbnail) -> None:
     rows, columns = np.nonzero(picture.cover > 0.02)
     left, right = columns.min(), width - 1 - columns.max()
     top, bottom = rows.min(), height - 1 - rows.max()
-    assert min(left, right) >= (1 - FILL) / 2 * width - 2
-    assert min(top, bottom) >= (1 - FILL) / 2 * height - 2
+    assert min(left, right) >= (1 - MAX_FILLED_SHARE) / 2 * width - 2
+    assert min(top, bottom) >= (1 - MAX_FILLED_SHARE) / 2 * height - 2
     assert abs(left - right) <= 0.02 * width + 2 and abs(top - bottom) <= 0.02 * height + 2
     fill = max(np.ptp(columns) / width, np.ptp(rows) / height)
-    assert FILL - 0.06 < fill < FILL + 0.02
+    assert MAX_FILLED_SHARE - 0.06 < fill < MAX_FILLED_SHARE + 0.02
 
 
 def check_ink(picture: Thumbnail) -> None:
     """Where the object is, pixels are not background; in the corners they are."""
-    background = 255 * np.array(BACKGROUND)
+    background = 255 * np.array(THUMBNAIL_BACKGROUND)
     inside = picture.pixels[picture.cover == 1.0].astype(float)
     assert len(inside) > 500 or picture.cover.size < 30_000
     assert (np.abs(inside - background).max(axis=1) > 12).mean() > 0.97
@@ -137,6 +136,6 @@ def test_piece_colours_are_distinct(count: int) -> None:
 def test_pieces_move_outward_in_proportion() -> None:
     square = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype=float)
     aside = np.array([3.0, 0.0, 0.0])
-    left, right = exploded([square - aside, square + aside], 0.1)
+    left, right = explosion_offsets([square - aside, square + aside], 0.1)
     assert left == pytest.approx([-0.3, 0, 0]) and right == pytest.approx([0.3, 0, 0])
-    assert exploded([square], 0.1)[0] == pytest.approx([0, 0, 0])
+    assert explosion_offsets([square], 0.1)[0] == pytest.approx([0, 0, 0])

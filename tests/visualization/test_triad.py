@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from recording import RecordingMeshcat
 
-from burg_drake.core.frames import make_pose, rotation_from_rpy
-from burg_drake.visualization.meshcat.triad import AXIS_COLORS, TriadStyle, draw_triad
+from burg_drake.core import make_pose, rotation_from_rpy
+from burg_drake.visualization import AXIS_COLORS, TriadStyle, draw_triad
 
 
 def test_tips_are_on_the_axes_and_shafts_behind_them(recorder: RecordingMeshcat) -> None:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from burg_drake.objects.library.obj_file import face_palette
-from burg_drake.pipeline.build import build_library
-from burg_drake.pipeline.source import ObjectSource
+from burg_drake.objects import face_palette
+from burg_drake.pipeline import ObjectSource, build_library
 
 from . import household_shapes
 from .shape import Shape

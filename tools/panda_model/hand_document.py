@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from burg_drake.core.documents.kinds import SCHEMA_FOLDER
+from burg_drake.core import SCHEMA_URL
 from tools.panda_model.figures import (
     FINGER_EFFORT,
     FINGER_SPEED,
@@ -20,7 +20,7 @@ def hand_yaml() -> str:
         f"closed: 0.0, open: {FINGER_TRAVEL}}}\n"
         for index, side in ((1, "left"), (2, "right"))
     )
-    return f"""# yaml-language-server: $schema={SCHEMA_FOLDER}/hand.json
+    return f"""# yaml-language-server: $schema={SCHEMA_URL}/hand.json
 # Written by tools/panda_model (python -m tools.panda_model).
 version: 1
 name: panda_hand

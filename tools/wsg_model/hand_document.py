@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from burg_drake.core.documents.kinds import SCHEMA_FOLDER
+from burg_drake.core import SCHEMA_URL
 from tools.robot_model.shapes import PAD
 from tools.wsg_model.figures import (
     CLOSING_SPEED,
@@ -23,7 +23,7 @@ def hand_yaml() -> str:
             FINGER_LINKS, FINGER_JOINTS, (FINGER_TRAVEL, -FINGER_TRAVEL), strict=True
         )
     )
-    return f"""# yaml-language-server: $schema={SCHEMA_FOLDER}/hand.json
+    return f"""# yaml-language-server: $schema={SCHEMA_URL}/hand.json
 # Written by tools/wsg_model (python -m tools.wsg_model).
 version: 1
 name: wsg_50

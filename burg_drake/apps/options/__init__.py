@@ -1,8 +1,3 @@
 """Options that several verbs have, so that the same ones mean the same everywhere.
 
-`arguments` comes first; each other module has the options of one matter.
-"""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+`arguments` comes first; each other module has the options of one matter."""

@@ -1,23 +1,32 @@
-"""Parsers of verbs, and the arguments that many of them share."""
+"""The command line parser, and arguments that many commands share."""
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import shutil
 import textwrap
-from collections.abc import Callable
-from typing import Any, NoReturn
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any, NoReturn
 
-from burg_drake.apps.options.values import measured_mm, names, renaming, workers
-from burg_drake.core import did_you_mean, nearest, quoted
+from burg_drake.apps.options.values import (
+    input_file,
+    measured_mm,
+    names,
+    port,
+    positive,
+    renaming,
+    workers,
+)
+from burg_drake.core import InvalidInputError, did_you_mean, quote_value, suggest_names
+
+if TYPE_CHECKING:
+    from burg_drake.cameras import Intrinsics
+    from burg_drake.evaluation import Executor
 
 DEFAULT_STATION = "panda_tabletop"
-RULER_MM = 100.0
-"""Length of the printed rulers."""
-MAX_HELP_WIDTH = 100
-"""Of a help text [characters]; longer lines are hard to read."""
-VERB_WIDTH = 11
-"""Room for the name of a verb in a list of verbs [characters]."""
+RULER_LENGTH_MM = 100.0
+"""Length of the printed rulers, in millimetres."""
 
 
 class HelpFormatter(argparse.RawDescriptionHelpFormatter):
@@ -25,7 +34,8 @@ class HelpFormatter(argparse.RawDescriptionHelpFormatter):
     of verbs and examples, as they are."""
 
     def __init__(self, prog: str, **options: Any) -> None:
-        self.line_width = min(shutil.get_terminal_size().columns, MAX_HELP_WIDTH) - 2
+        max_width = 100  # Characters. Longer lines are hard to read.
+        self.line_width = min(shutil.get_terminal_size().columns, max_width) - 2
         super().__init__(prog, **{"max_help_position": 26, "width": self.line_width} | options)
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
@@ -54,31 +64,34 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, **options: Any) -> None:
         options.setdefault("formatter_class", HelpFormatter)
         options.setdefault("allow_abbrev", False)
-        self._waiting: Callable[[Parser], None] | None = None
+        self._add_options: Callable[[Parser], None] | None = None
         super().__init__(**options, add_help=False)
         self._positionals.title = "arguments"
         self.add_argument("-h", "--help", action="help", help=argparse.SUPPRESS)
 
-    def wait_with(self, options: Callable[[Parser], None] | None) -> None:
-        """Adds options when somebody asks for them."""
-        self._waiting = options
+    def defer_options(self, add_options: Callable[[Parser], None]) -> None:
+        """Adds options when the parser is first used.
 
-    def complete(self) -> None:
-        """Adds the options that were left for when somebody asks: they are made of settings, whose
-        modules need not be imported for the sake of other verbs."""
-        waiting, self._waiting = self._waiting, None
-        if waiting is not None:
-            waiting(self)
+        Args:
+            add_options: adds options, examples and defaults to this parser.
+        """
+        self._add_options = add_options
+
+    def add_deferred_options(self) -> None:
+        """Adds the deferred options, unless they were added before."""
+        add_options, self._add_options = self._add_options, None
+        if add_options is not None:
+            add_options(self)
 
     def format_usage(self) -> str:
         """The usage with all that is required."""
-        self.complete()
+        self.add_deferred_options()
         self.usage = self._required_usage()
         return super().format_usage()
 
     def format_help(self) -> str:
         """The help with all options."""
-        self.complete()
+        self.add_deferred_options()
         self.usage = self._required_usage()
         return super().format_help()
 
@@ -114,7 +127,7 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(self, *arguments: Any, **named: Any) -> Any:
         """Refuses what it does not know, for its verbs, too, which else leave that to the parser
         of the whole command, whose help knows nothing of them."""
-        self.complete()
+        self.add_deferred_options()
         found, unknown = super().parse_known_args(*arguments, **named)
         if not hasattr(found, "flags"):  # of the verb, whose parser comes first
             found.flags = {
@@ -132,18 +145,18 @@ class Parser(argparse.ArgumentParser):
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         """Names the nearest of the choices, of verbs among them."""
         if action.choices is not None and value not in action.choices:
-            known = nearest(str(value), map(str, action.choices))
+            known = suggest_names(str(value), map(str, action.choices))
             if isinstance(action, argparse._SubParsersAction):
-                self.error(f"there is no verb {quoted(value)}; {known}")
-            raise argparse.ArgumentError(action, f"invalid choice: {quoted(value)}; {known}")
+                self.error(f"there is no verb {quote_value(value)}; {known}")
+            raise argparse.ArgumentError(action, f"invalid choice: {quote_value(value)}; {known}")
 
     def error(self, message: str) -> NoReturn:
         """Ends the program with exit code 2."""
         self.exit(2, f"burg-drake: error: {message} (see {self.prog} --help)\n")
 
 
-def examples(*lines: str) -> str:
-    """Epilog of a verb's help.
+def examples_text(*lines: str) -> str:
+    """Text below the options in the help of a command.
 
     Args:
         lines: examples, and after an empty one paragraphs of text.
@@ -153,46 +166,11 @@ def examples(*lines: str) -> str:
     return "\n\n".join(["examples:\n" + textwrap.indent("\n".join(commands), "  "), *paragraphs])
 
 
-def add_verb(
-    verbs: Any,
-    name: str,
-    run: Any,
-    summary: str,
-    *lines: str,
-    options: Callable[[Parser], None] | None = None,
-) -> Parser:
-    """Adds a verb.
-
-    Args:
-        verbs: what `add_subparsers` returned.
-        name: of the verb.
-        run: called with the parsed arguments; returns the exit code.
-        summary: one sentence.
-        lines: examples.
-        options: adds what the verb takes, when somebody asks for it.
-    """
-    parser: Parser = verbs.add_parser(
-        name,
-        help=summary,
-        description=_sentence(summary),
-        epilog=examples(*lines),
-    )
-    parser.set_defaults(run=run)
-    parser.wait_with(options)
-    return parser
-
-
-def add_group(verbs: Any, name: str, summary: str) -> VerbGroup:
-    """Adds a verb that has verbs of its own; returns what those are added to."""
-    parser = verbs.add_parser(name, help=summary, description=_sentence(summary))
-    return VerbGroup(parser)
-
-
-class VerbGroup:
-    """The verbs of a parser, listed under one or more headings in the order in which they came."""
+class CommandGroup:
+    """The commands of a parser, listed under headings in the order in which they are added."""
 
     def __init__(self, parser: Parser) -> None:
-        """A parser that has no verbs so far."""
+        """A parser without commands."""
         self._parser = parser
         self._action: Any = parser.add_subparsers(
             metavar="VERB", required=True, help=argparse.SUPPRESS
@@ -200,21 +178,24 @@ class VerbGroup:
         self._list: Any = None
 
     def heading(self, title: str) -> None:
-        """Lists the verbs that come from now on under this title."""
+        """Lists the commands that are added from now on under this title."""
         self._list = self._parser.add_argument_group(title)
 
-    def add_parser(self, name: str, *, help: str, **options: Any) -> Parser:
-        """Adds a verb, as `argparse` does, with a line for the list."""
+    def add_parser(self, name: str, summary: str) -> Parser:
+        """Adds a command.
+
+        Args:
+            name: last word of the command.
+            summary: one sentence, without capital and period.
+        """
+        name_width = 11  # Characters of the column of command names.
         if self._list is None:
             self.heading("verbs")
-        line = f"{name:<{VERB_WIDTH}}  {help}"
+        line = f"{name:<{name_width}}  {summary}"
         self._list.description = "\n".join(filter(None, [self._list.description, line]))
-        parser: Parser = self._action.add_parser(name, help=help, **options)
+        sentence = f"{summary[0].upper()}{summary[1:]}."
+        parser: Parser = self._action.add_parser(name, help=summary, description=sentence)
         return parser
-
-
-def _sentence(summary: str) -> str:
-    return f"{summary[0].upper()}{summary[1:]}."
 
 
 def add_scene(parser: Parser) -> None:
@@ -228,7 +209,7 @@ def add_scene(parser: Parser) -> None:
 
 def scene_names() -> str:
     """The built-in scenes, for a help text."""
-    from burg_drake.core.paths import builtin_names
+    from burg_drake.core import builtin_names
 
     return ", ".join(builtin_names("scenes"))
 
@@ -247,15 +228,15 @@ def add_measured_board(
         "--measured-mm",
         metavar="X[,Y]",
         type=measured_mm,
-        default=(RULER_MM, RULER_MM),
+        default=(RULER_LENGTH_MM, RULER_LENGTH_MM),
         help=help,
     )
 
 
-def print_scale(arguments: argparse.Namespace) -> tuple[float, float]:
+def print_scale_from_options(arguments: argparse.Namespace) -> tuple[float, float]:
     """Size of the print against the document along x and y, by --measured-mm."""
     x, y = arguments.measured_mm
-    return x / RULER_MM, y / RULER_MM
+    return x / RULER_LENGTH_MM, y / RULER_LENGTH_MM
 
 
 def add_station(
@@ -324,3 +305,148 @@ def add_workers(
         default: None lets the library choose.
     """
     parser.add_argument("--workers", metavar="N", type=workers, default=default, help=help)
+
+
+MAX_PAGE_CONNECTIONS = 32
+"""Connections at a time, each with its own thread. A browser opens two to six."""
+
+
+def add_view_options(parser: Parser) -> None:
+    """The options of verbs that show something."""
+    parser.add_argument("--html", metavar="FILE", help="write one web page instead of a live view")
+    parser.add_argument(
+        "--port", type=port, metavar="N", help="port of the live view (default: first free)"
+    )
+    parser.add_argument(
+        "--no-wait", action="store_true", help="end at once instead of waiting for Ctrl-C"
+    )
+
+
+def add_page_options(parser: Any, network: str) -> None:
+    """The options of verbs that serve a page of their own.
+
+    Args:
+        parser: gets them.
+        network: who can do what with it if it is not for this computer alone, after "with 0.0.0.0".
+    """
+    parser.add_argument(
+        "--port", type=port, metavar="N", help="port of the page (default: first free)"
+    )
+    parser.add_argument(
+        "--host",
+        metavar="ADDRESS",
+        default="127.0.0.1",
+        help="address to serve on (default: 127.0.0.1, this computer alone); with 0.0.0.0"
+        f" {network}",
+    )
+    parser.add_argument("--open", action="store_true", help="open the page in the browser")
+
+
+def add_intrinsics(
+    parser: Any, help: str = "intrinsics of the camera", *, required: bool = False
+) -> None:
+    """The option --intrinsics.
+
+    Args:
+        parser: gets it.
+        help: what it means to the verb.
+        required: the verb can do nothing without.
+    """
+    parser.add_argument(
+        "--intrinsics", metavar="FILE", type=input_file, required=required, help=help
+    )
+
+
+def add_live_camera(parser: Any) -> None:
+    """The options --intrinsics and --fps, of verbs that follow what a camera sees."""
+    add_intrinsics(
+        parser,
+        "intrinsics of the camera, by burg-drake camera calibrate; simulated cameras need none",
+    )
+    parser.add_argument(
+        "--fps", type=positive, metavar="N", help="images per second to request from the camera"
+    )
+
+
+def add_depth_unit(parser: Any) -> None:
+    """The option --depth-unit, of verbs that take a depth image."""
+    parser.add_argument(
+        "--depth-unit",
+        metavar="M",
+        type=positive,
+        help="unit of the depth image in metres (default: 0.001 for whole numbers, else 1)",
+    )
+
+
+def intrinsics_from_options(arguments: argparse.Namespace) -> Intrinsics:
+    """Those that --intrinsics names, or that the simulated camera of --camera has.
+
+    Raises:
+        InvalidInputError: neither.
+    """
+    from burg_drake.cameras import SIMULATED_PREFIX, load_intrinsics
+
+    if arguments.intrinsics is not None:
+        return load_intrinsics(arguments.intrinsics)
+    if not arguments.camera.startswith(SIMULATED_PREFIX):
+        raise InvalidInputError(
+            f"camera {arguments.camera} needs --intrinsics FILE; burg-drake camera calibrate makes"
+            " one"
+        )
+    return load_intrinsics(arguments.camera)
+
+
+def add_cluster(group: Any) -> None:
+    """Adds the option.
+
+    Args:
+        group: of options that exclude each other, as the cluster has its own workers.
+    """
+    group.add_argument(
+        "--cluster",
+        metavar="WHERE",
+        help="use a Dask cluster: tls://HOST:PORT, a cluster.yaml, or local:N (needs"
+        " burg-drake[dask])",
+    )
+
+
+@contextlib.contextmanager
+def cluster_from_options(arguments: argparse.Namespace) -> Iterator[Executor | None]:
+    """The cluster that is asked for, until the block is left; None for this machine's processes."""
+    if arguments.cluster is None:
+        yield None
+        return
+    from burg_drake.evaluation import connect_cluster
+
+    with connect_cluster(arguments.cluster) as executor:
+        yield executor
+
+
+def add_retry_failed(parser: argparse.ArgumentParser, what: str) -> None:
+    """Adds --retry-failed.
+
+    Args:
+        parser: of the verb.
+        what: is tried again, in the plural.
+    """
+    parser.add_argument(
+        "--retry-failed",
+        action="store_true",
+        help=f"also retry {what} that could not be simulated",
+    )
+
+
+def retry_advice(interrupted: int, failed: int) -> str:
+    """What to do about failures, in one clause.
+
+    Args:
+        interrupted: of how many the worker process was ended from outside.
+        failed: how many there are in all.
+    """
+    if not interrupted:
+        return "--retry-failed tries them again"
+    again = (
+        f"{interrupted} of them because a worker process was ended from outside, as happens"
+        " when memory runs out: the same command tries these again (fewer --workers need less)"
+    )
+    return again if interrupted == failed else f"{again}, --retry-failed all"

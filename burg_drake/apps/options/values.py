@@ -1,4 +1,4 @@
-"""What values options accept: each function reads the text of one, or says what is wrong with it.
+"""Types of option values: each function parses the text of one value or says what is wrong with it.
 
 All raise `argparse.ArgumentTypeError`, which the parser reports with the option's name.
 """
@@ -13,59 +13,63 @@ import tempfile
 from functools import cache
 from pathlib import Path
 
-from burg_drake.core import LARGEST_SEED, InvalidInputError, quoted, shown
-from burg_drake.core.files import read_pipe
+from burg_drake.core import (
+    MAX_DOCUMENT_SEED,
+    InvalidInputError,
+    quote_value,
+    read_pipe,
+    shorten_text,
+)
 
-MOST = 10_000_000
-"""What is counted: grasps, trials, rows."""
-MOST_WORKERS = 1024
-STANDARD_INPUT = ("-", "/dev/stdin")
-_NAMES_OF_COPIES: dict[str, str] = {}
-"""What messages call copies of what came through pipes, by the paths of the copies."""
+MAX_COUNT = 10_000_000
+"""Maximum number of grasps, trials or rows."""
+_PIPE_NAMES: dict[str, str] = {}
+"""Names of pipes for messages, by the paths of the copies of their contents."""
 
 
 def input_file(text: str) -> str:
     """A file to read, `-` for the standard input. Files are read more than once, to recognise their
     format: what comes through a pipe, as with `<(...)`, is copied to a file first."""
+    standard_input = ("-", "/dev/stdin")
     try:
-        if text not in STANDARD_INPUT and not stat.S_ISFIFO(Path(text).stat().st_mode):
+        if text not in standard_input and not stat.S_ISFIFO(Path(text).stat().st_mode):
             return text
     except (OSError, ValueError):  # whoever opens it says what is wrong
         return text
-    name = "stdin" if text in STANDARD_INPUT else Path(text).name
-    copy = Path(tempfile.mkdtemp(dir=_copies().name)).resolve() / name
-    _NAMES_OF_COPIES[str(copy)] = "standard input" if text in STANDARD_INPUT else text
+    name = "stdin" if text in standard_input else Path(text).name
+    copy = Path(tempfile.mkdtemp(dir=_pipe_folder().name)).resolve() / name
+    _PIPE_NAMES[str(copy)] = "standard input" if text in standard_input else text
     try:
-        copy.write_bytes(read_pipe(0 if text in STANDARD_INPUT else text))
+        copy.write_bytes(read_pipe(0 if text in standard_input else text))
     except InvalidInputError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
     return str(copy)
 
 
-def with_given_names(message: str) -> str:
+def restore_pipe_names(message: str) -> str:
     """A message in which copies of what came through pipes go by the names that the user gave."""
-    for copy, name in _NAMES_OF_COPIES.items():
+    for copy, name in _PIPE_NAMES.items():
         message = message.replace(copy, name)
     return message
 
 
 @cache
-def _copies() -> tempfile.TemporaryDirectory[str]:
+def _pipe_folder() -> tempfile.TemporaryDirectory[str]:
     """The folder of what came through pipes; it goes when the process ends."""
     return tempfile.TemporaryDirectory(prefix="burg-drake-pipe-")
 
 
 def positive_int(text: str) -> int:
     """A whole number from 1 that can be counted to."""
-    return whole(text, 1, MOST)
+    return whole_number(text, 1, MAX_COUNT)
 
 
 def workers(text: str) -> int:
     """A number of processes."""
-    return whole(text, 1, MOST_WORKERS)
+    return whole_number(text, 1, 1024)
 
 
-def whole(text: str, low: int, high: int) -> int:
+def whole_number(text: str, low: int, high: int) -> int:
     """A whole number within bounds."""
     try:
         value = int(text)
@@ -73,7 +77,7 @@ def whole(text: str, low: int, high: int) -> int:
         value = low - 1
     if not low <= value <= high:
         raise argparse.ArgumentTypeError(
-            f"{quoted(text)} is not a whole number from {low} to {high}"
+            f"{quote_value(text)} is not a whole number from {low} to {high}"
         )
     return value
 
@@ -82,25 +86,27 @@ def two_numbers(text: str) -> tuple[int, int]:
     """`AxB` of whole numbers from 1."""
     found = re.fullmatch(r"([1-9]\d*)[x×]([1-9]\d*)", text.strip().lower())
     if found is None:
-        raise argparse.ArgumentTypeError(f"{quoted(text)} is not two whole numbers, such as 8x11")
+        raise argparse.ArgumentTypeError(
+            f"{quote_value(text)} is not two whole numbers, such as 8x11"
+        )
     return int(found[1]), int(found[2])
 
 
 def seed(text: str) -> int:
     """A whole number from 0 with at most 64 bits, as documents have it."""
-    return whole(text, 0, LARGEST_SEED)
+    return whole_number(text, 0, MAX_DOCUMENT_SEED)
 
 
 def port(text: str) -> int:
     """A port that needs no privileges; Drake's Meshcat takes those from 1024."""
-    return whole(text, 1024, 65535)
+    return whole_number(text, 1024, 65535)
 
 
 def positive(text: str) -> float:
     """A finite number above 0."""
     value = number(text)
     if value <= 0.0:
-        raise argparse.ArgumentTypeError(f"{shown(text)} is not above 0")
+        raise argparse.ArgumentTypeError(f"{shorten_text(text)} is not above 0")
     return value
 
 
@@ -108,7 +114,7 @@ def not_negative(text: str) -> float:
     """A finite number from 0."""
     value = number(text)
     if value < 0.0:
-        raise argparse.ArgumentTypeError(f"{shown(text)} is below 0")
+        raise argparse.ArgumentTypeError(f"{shorten_text(text)} is below 0")
     return value
 
 
@@ -119,7 +125,7 @@ def number(text: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"{quoted(text)} is not a finite number")
+        raise argparse.ArgumentTypeError(f"{quote_value(text)} is not a finite number")
     return value
 
 
@@ -127,7 +133,9 @@ def named_positive(text: str) -> tuple[str, float]:
     """`NAME=VALUE` with a value above 0."""
     name, equals, value = text.rpartition("=")
     if not equals or not name:
-        raise argparse.ArgumentTypeError(f"{quoted(text)} is not NAME=VALUE, such as mug=0.118")
+        raise argparse.ArgumentTypeError(
+            f"{quote_value(text)} is not NAME=VALUE, such as mug=0.118"
+        )
     try:
         return name, positive(value)
     except argparse.ArgumentTypeError as error:
@@ -136,12 +144,12 @@ def named_positive(text: str) -> tuple[str, float]:
 
 def unit(text: str) -> tuple[str, str]:
     """`NAME=UNIT`, or `UNIT` for all (then the name is empty)."""
-    from burg_drake.objects.meshes import UNITS
+    from burg_drake.objects import UNITS
 
     name, _, value = text.rpartition("=")
     if value not in UNITS:
         raise argparse.ArgumentTypeError(
-            f"{quoted(text)} is not [NAME=]UNIT with one of the units {', '.join(UNITS)}"
+            f"{quote_value(text)} is not [NAME=]UNIT with one of the units {', '.join(UNITS)}"
         )
     return name, value
 
@@ -156,7 +164,9 @@ def coefficient(text: str) -> float:
     """A friction coefficient from 0."""
     mu = number(text)
     if mu < 0.0:
-        raise argparse.ArgumentTypeError(f"{shown(text)} is not a friction coefficient from 0")
+        raise argparse.ArgumentTypeError(
+            f"{shorten_text(text)} is not a friction coefficient from 0"
+        )
     return mu
 
 
@@ -164,7 +174,9 @@ def renaming(text: str) -> tuple[str, str]:
     """`THEIRS=OURS`, or `OURS` for all (then the first name is empty)."""
     theirs, _, ours = text.rpartition("=")
     if not ours:
-        raise argparse.ArgumentTypeError(f"{quoted(text)} is not THEIRS=OURS, such as Mug_3f2a=mug")
+        raise argparse.ArgumentTypeError(
+            f"{quote_value(text)} is not THEIRS=OURS, such as Mug_3f2a=mug"
+        )
     return theirs, ours
 
 
@@ -172,7 +184,9 @@ def names(text: str) -> list[str]:
     """`A` or `A,B`: names of objects or instances, which have no commas."""
     found = [name for part in text.split(",") if (name := part.strip())]
     if not found:
-        raise argparse.ArgumentTypeError(f"{quoted(text)} has no name; give A, or A,B for several")
+        raise argparse.ArgumentTypeError(
+            f"{quote_value(text)} has no name; give A, or A,B for several"
+        )
     return found
 
 
@@ -181,6 +195,6 @@ def measured_mm(text: str) -> tuple[float, float]:
     values = [positive(part) for part in text.split(",")]
     if len(values) > 2:
         raise argparse.ArgumentTypeError(
-            f"{quoted(text)} is not X or X,Y, such as 98.5 or 98.5,99.2"
+            f"{quote_value(text)} is not X or X,Y, such as 98.5 or 98.5,99.2"
         )
     return values[0], values[-1]

@@ -1,8 +1,4 @@
-"""Intrinsics of a camera from images of a ChArUco target.
-
-Here is which images and corners count. `lens_choice` fits models of the lens to them, `promise` and
-`quality` tell how far the result can be trusted.
-"""
+"""Calibrate a camera: choose the lens model, reject outliers and fit."""
 
 from __future__ import annotations
 
@@ -13,32 +9,134 @@ from functools import cached_property
 
 import numpy as np
 
-from burg_drake.cameras.calibration.lens_choice import AUTO, MODELS, choose_lens
-from burg_drake.cameras.calibration.lens_fit import LensFit, names_of
-from burg_drake.cameras.calibration.lens_uncertainty import LensHypothesis, covariance_of
-from burg_drake.cameras.calibration.promise import Promise, promise_of
-from burg_drake.cameras.calibration.target import (
-    LEAST_CORNERS,
+from burg_drake.cameras.calibration.charuco_target import (
+    MIN_CORNERS,
     CharucoTarget,
     CharucoView,
     find_target,
 )
-from burg_drake.cameras.optics import Intrinsics
-from burg_drake.cameras.sources import Image
-from burg_drake.core import Array, InvalidInputError, UnknownNameError, nearest
+from burg_drake.cameras.calibration.lens_fit import (
+    COEFFICIENT_COUNTS,
+    HUBER_RATIO,
+    LensEvidence,
+    LensFit,
+    fit_lens,
+    guess_camera,
+    parameter_names,
+)
+from burg_drake.cameras.calibration.lens_uncertainty import (
+    LensHypothesis,
+    Promise,
+    calibration_promise,
+    camera_covariance,
+    camera_error,
+    image_grid,
+    lens_hypotheses,
+    view_disagreement,
+)
+from burg_drake.cameras.frame_source import Image
+from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.core import Array, InvalidInputError, UnknownNameError, suggest_names
 
-LEAST_VIEWS = 3
-"""Fewer do not determine a camera."""
-BLURRED = 0.08
-"""Blur of a view, as a share of a square's side, from which markers smear into the corners."""
-SAME = 0.005
-"""Views whose corners lie so near to each other, as a share of the image's diagonal, are one."""
-OUTLIER, TOLERATED = 3.0, 0.3
-"""A view is left out when its residual is beyond that many times the median view's, and beyond
-that many pixels."""
-WRONG_CORNER, TOLERATED_CORNER = 5.0, 0.15
-"""Likewise a corner, against the median corner."""
-ROUNDS = 6
+AUTO_LENS_MODEL = "auto"  # Choose the lens model by evidence.
+LENS_MODELS = tuple(COEFFICIENT_COUNTS)  # Names of all lens models.
+
+
+@dataclass(frozen=True, eq=False)
+class LensChoice:
+    """A fit, and what else the lens may be.
+
+    Attributes:
+        fit: of the model that was asked for, or that is supported best.
+        supported: the fit that is supported best, to tell which corners do not belong.
+        hypotheses: what the lens may be.
+        dispersion: of the corners' errors, see `LensEvidence`.
+    """
+
+    fit: LensFit
+    supported: LensFit
+    hypotheses: tuple[LensHypothesis, ...]
+    dispersion: float
+
+
+def choose_lens(views: Sequence[CharucoView], target: CharucoTarget, model: str) -> LensChoice:
+    """Fits all models and chooses.
+
+    Args:
+        views: of one camera.
+        target: that they show.
+        model: a key of `COEFFICIENT_COUNTS`, or `auto`.
+
+    Raises:
+        InvalidInputError: the views do not determine a camera.
+    """
+    perspective, fisheye = _fit_perspective_models(views, target), _fit_fisheye_model(views, target)
+    fits = [*perspective, fisheye] if _is_wide_angle(fisheye) else perspective
+    # All lenses distort a little, so that a pinhole is not chosen.
+    evidence = _lens_evidence(fits[1:])
+    best = min(fits[1:], key=lambda fit: fit.information(evidence, True))
+    # Beside the camera a perspective model means nothing, so it tells nothing about a fisheye.
+    hypotheses = lens_hypotheses([best] if best is fisheye else fits, evidence)
+    supported = best
+    if model != AUTO_LENS_MODEL:
+        best = next(fit for fit in (*perspective, fisheye) if fit.model == model)
+    elif best is not fisheye:
+        corners = np.concatenate([view.corners for view in views])
+        best = _rational_if_better(best, perspective[-1], evidence, hypotheses, corners)
+    return LensChoice(best, supported, hypotheses, evidence.dispersion)
+
+
+def _lens_evidence(fits: Sequence[LensFit]) -> LensEvidence:
+    """Views disagree by a model that is wrong, and by one that they do not determine, so that the
+    one by which they agree most tells how alike errors are."""
+    limit = HUBER_RATIO * min(fit.typical for fit in fits)
+    return LensEvidence(limit, min(view_disagreement(fit) for fit in fits) ** 2)
+
+
+def _rational_if_better(
+    best: LensFit,
+    rational: LensFit,
+    evidence: LensEvidence,
+    hypotheses: tuple[LensHypothesis, ...],
+    corners: Array,
+) -> LensFit:
+    """The rational fit, if Akaike's criterion, which is more generous, prefers it, and it is nearer
+    to all that the lens may be: it can fit better and yet be wild where no corners were seen."""
+    if not rational.information(evidence, False) < best.information(evidence, False):
+        return best
+    pixels = image_grid(best.intrinsics)
+    worst = [
+        camera_error(fit.intrinsics, hypotheses, corners, pixels).max() for fit in (best, rational)
+    ]
+    return rational if worst[1] < worst[0] else best
+
+
+def _fit_perspective_models(views: Sequence[CharucoView], target: CharucoTarget) -> list[LensFit]:
+    """Fits of the perspective models, each from the one before."""
+    # From the simplest on; each model contains the one before.
+    perspective_models = ("pinhole", "radial4", "radial", "rational")
+    start = guess_camera(views, target, "perspective")
+    fits = []
+    for model in perspective_models:
+        fits.append(fit_lens(views, target, model, start))
+        start = fits[-1].intrinsics, fits[-1].X_CT
+    return fits
+
+
+def _fit_fisheye_model(views: Sequence[CharucoView], target: CharucoTarget) -> LensFit:
+    return fit_lens(views, target, "fisheye", guess_camera(views, target, "fisheye"))
+
+
+def _is_wide_angle(fisheye: LensFit) -> bool:
+    # Radians. A fisheye is tried only if the image's corners are farther off the axis.
+    min_wide_angle = np.radians(55.0)
+    camera = fisheye.intrinsics
+    corners = camera.rays(image_grid(camera, 2, 2))
+    return bool(np.arccos(corners[:, 2]).max() > min_wide_angle)
+
+
+MAX_VIEW_BLUR = 0.08
+"""Largest blur of a usable view, as a fraction of a square's side."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +156,7 @@ class CalibratedView:
     @property
     def rms(self) -> float:
         """Root mean square distance of the corners from where the model puts them [pixels]."""
-        return rms_of(self.residuals)
+        return rms_length(self.residuals)
 
     @property
     def tilt(self) -> float:
@@ -99,12 +197,12 @@ class Calibration:
     @cached_property
     def promise(self) -> Promise:
         """To how many pixels the camera is known, and where it is not."""
-        return promise_of(self)
+        return calibration_promise(self)
 
     @property
     def rms(self) -> float:
         """As of a view, over all views [pixels]."""
-        return rms_of(np.concatenate([view.residuals for view in self.views]))
+        return rms_length(np.concatenate([view.residuals for view in self.views]))
 
     @property
     def parameters(self) -> dict[str, tuple[float, float]]:
@@ -112,10 +210,10 @@ class Calibration:
         k = self.intrinsics
         values = (*k.focal, *k.center, *k.distortion)
         deviations = np.sqrt(np.diag(self.covariance)).tolist()
-        return dict(zip(names_of(k), zip(values, deviations, strict=True), strict=True))
+        return dict(zip(parameter_names(k), zip(values, deviations, strict=True), strict=True))
 
 
-def rms_of(residuals: Array) -> float:
+def rms_length(residuals: Array) -> float:
     """Root mean square length of (N, 2) residuals."""
     return float(np.sqrt(np.mean(np.sum(np.square(residuals), axis=1))))
 
@@ -124,7 +222,7 @@ def calibrate(
     images: Sequence[Image],
     target: CharucoTarget,
     *,
-    model: str = AUTO,
+    model: str = AUTO_LENS_MODEL,
     names: Sequence[str] | None = None,
 ) -> Calibration:
     """Calibrates a camera.
@@ -154,7 +252,7 @@ def calibrate_views(
     views: Sequence[CharucoView],
     target: CharucoTarget,
     *,
-    model: str = AUTO,
+    model: str = AUTO_LENS_MODEL,
     rejected: Sequence[tuple[str, str]] = (),
 ) -> Calibration:
     """Calibrates a camera from corners that were found.
@@ -171,16 +269,17 @@ def calibrate_views(
         InvalidInputError: fewer than `LEAST_VIEWS` can be used, or they do not determine a camera.
         UnknownNameError: no such model.
     """
-    if model not in (AUTO, *MODELS):
+    max_rounds = 6  # Rounds of outlier rejection, at most.
+    if model not in (AUTO_LENS_MODEL, *LENS_MODELS):
         raise UnknownNameError(
-            f"lens model {model!r} does not exist; {nearest(model, (AUTO, *MODELS))}"
+            f"lens model {model!r} does not exist; {suggest_names(model, (AUTO_LENS_MODEL, *LENS_MODELS))}"
         )
-    kept, refused = _usable(views)
+    kept, refused = _select_usable_views(views)
     refused = [*rejected, *refused]
     _require_views(kept, refused)
     chosen = choose_lens(kept, target, model)
-    for _ in range(ROUNDS):
-        cleaned, outliers = _without_outliers(kept, chosen.supported)
+    for _ in range(max_rounds):
+        cleaned, outliers = _reject_outliers(kept, chosen.supported)
         if cleaned == kept:
             break
         kept, refused = cleaned, refused + outliers
@@ -189,14 +288,14 @@ def calibrate_views(
     fit = chosen.fit
     found = zip(kept, fit.X_CT, fit.residuals, strict=True)
     used = tuple(CalibratedView(*of_view) for of_view in found)
-    residual = rms_of(np.concatenate(fit.residuals))
+    residual = rms_length(np.concatenate(fit.residuals))
     calibration = Calibration(
         replace(fit.intrinsics, residual=residual),
         target,
         fit.model,
         used,
         tuple(refused),
-        chosen.dispersion * covariance_of(fit),
+        chosen.dispersion * camera_covariance(fit),
         chosen.hypotheses,
         fit.bulge,
     )
@@ -207,19 +306,22 @@ def calibrate_views(
     return replace(calibration, intrinsics=promised)
 
 
-def _usable(
+def _select_usable_views(
     views: Sequence[CharucoView],
 ) -> tuple[list[CharucoView], list[tuple[str, str]]]:
     """Views of the size that most have, sharp and different; and the others."""
+    duplicate_distance = 0.005  # Fraction of the diagonal; nearer views are duplicates.
     sizes = Counter(view.size for view in views)
     kept: list[CharucoView] = []
     refused = []
     for view in views:
         (size, _), *_ = sizes.most_common(1)
-        twin = next((other for other in kept if displacement(view, other) < SAME), None)
+        twin = next(
+            (other for other in kept if corner_displacement(view, other) < duplicate_distance), None
+        )
         if view.size != size:
             reason = "has {} x {} pixels, the others have {} x {}".format(*view.size, *size)
-        elif view.blur > BLURRED * view.side:
+        elif view.blur > MAX_VIEW_BLUR * view.side:
             reason = f"is blurred: its edges are {view.blur:.1f} pixels wide"
         elif twin is not None:
             reason = f"shows the target in the same place as {twin.name}"
@@ -230,7 +332,7 @@ def _usable(
     return kept, refused
 
 
-def displacement(view: CharucoView, other: CharucoView) -> float:
+def corner_displacement(view: CharucoView, other: CharucoView) -> float:
     """Mean distance of corners between two views, as a share of the image's diagonal.
 
     Infinite where they have less than half of their corners in common.
@@ -243,42 +345,47 @@ def displacement(view: CharucoView, other: CharucoView) -> float:
 
 
 def _require_views(views: Sequence[CharucoView], refused: Sequence[tuple[str, str]]) -> None:
-    if len(views) < LEAST_VIEWS:
+    min_views = 3  # Fewer views do not determine a camera.
+    if len(views) < min_views:
         count = len(views) + len(refused)
         first = f"; {refused[0][0]} {refused[0][1]}" if refused else ""
         raise InvalidInputError(
             f"{len(views)} of {count} images can be used; a calibration needs at least"
-            f" {LEAST_VIEWS}, better 15{first}"
+            f" {min_views}, better 15{first}"
         )
 
 
-def _without_outliers(
+def _reject_outliers(
     views: list[CharucoView], fit: LensFit
 ) -> tuple[list[CharucoView], list[tuple[str, str]]]:
     """Views without those, and without corners, that do not fit to the others."""
+    max_view_ratio = 3.0  # Outlier views exceed this multiple of the median view's residual ...
+    min_view_residual = 0.3  # ... and this residual in pixels.
+    max_corner_ratio = 5.0  # Outlier corners exceed this multiple of the median residual ...
+    min_corner_residual = 0.15  # ... and this residual in pixels.
     lengths = [np.linalg.norm(r, axis=1) for r in fit.residuals]
     typical = float(np.median(np.concatenate(lengths)))
-    rms = np.array([rms_of(r) for r in fit.residuals])
-    limit = max(OUTLIER * float(np.median(rms)), TOLERATED)
-    corner_limit = max(WRONG_CORNER * typical, TOLERATED_CORNER)
+    rms = np.array([rms_length(r) for r in fit.residuals])
+    limit = max(max_view_ratio * float(np.median(rms)), min_view_residual)
+    corner_limit = max(max_corner_ratio * typical, min_corner_residual)
     kept, refused = [], []
     for view, length, of_view in zip(views, lengths, rms, strict=True):
         # The worst first: they pull the view's pose, and with it other corners, off their place.
         good = length <= max(corner_limit, 0.5 * length.max())
         # A few wrong corners are left out by themselves, without their view.
-        if of_view > limit and (good.mean() < 0.8 or rms_of(length[good, None]) > limit):
+        if of_view > limit and (good.mean() < 0.8 or rms_length(length[good, None]) > limit):
             refused.append(
                 (
                     view.name,
                     f"is {of_view:.2f} pixels off, the median is {np.median(rms):.2f}",
                 )
             )
-        elif good.sum() < LEAST_CORNERS:
+        elif good.sum() < MIN_CORNERS:
             refused.append(
                 (
                     view.name,
                     f"has {good.sum()} corners that agree with the other images;"
-                    f" {LEAST_CORNERS} are needed",
+                    f" {MIN_CORNERS} are needed",
                 )
             )
         else:

@@ -1,8 +1,4 @@
-"""One least-squares fit of a camera model to views of a target.
-
-Levenberg and Marquardt's steps on the camera, the bend of the target and the poses of all views. Of
-each view's pose there is only what the others need: the equations are reduced to these (Schur).
-"""
+"""Least-squares fit of a lens model to views of a target: initial guess, derivatives, prior."""
 
 from __future__ import annotations
 
@@ -13,31 +9,162 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from burg_drake.cameras.calibration.lens_derivatives import lens_derivatives
-from burg_drake.cameras.calibration.lens_prior import BENDS, prior
-from burg_drake.cameras.calibration.target import CharucoTarget, CharucoView
-from burg_drake.cameras.optics import Intrinsics, LensModel
+from burg_drake.cameras.calibration.charuco_target import CharucoTarget, CharucoView
+from burg_drake.cameras.intrinsics import Intrinsics, LensModel, fisheye_lens
 from burg_drake.core import Array, InvalidInputError
 
-COEFFICIENTS = {"pinhole": 0, "radial4": 4, "radial": 5, "rational": 8, "fisheye": 4}
+FOCAL_LENGTH_GUESSES = np.geomspace(0.25, 3.0, 11)
+"""Initial focal lengths, as fractions of the image's diagonal."""
+
+
+def guess_camera(
+    views: Sequence[CharucoView], target: CharucoTarget, model: LensModel
+) -> tuple[Intrinsics, Array]:
+    """A camera without coefficients, and (V, 4, 4) the target in its frame, of the focal length
+    that explains the median view best."""
+    width, height = views[0].size
+    found = []
+    for share in FOCAL_LENGTH_GUESSES:
+        focal = float(share * np.hypot(width, height))
+        camera = Intrinsics(
+            width=width,
+            height=height,
+            focal=(focal, focal),
+            center=(0.5 * (width - 1), 0.5 * (height - 1)),
+            model=model,
+            distortion=(0.0,) * 4,
+        )
+        posed = [_fit_view_pose(view, target, camera) for view in views]
+        found.append(
+            (np.median([error for error, _ in posed]), camera, np.array([X for _, X in posed]))
+        )
+    _, camera, X_CT = min(found, key=lambda one: one[0])
+    return camera, X_CT
+
+
+def _fit_view_pose(
+    view: CharucoView, target: CharucoTarget, camera: Intrinsics
+) -> tuple[float, Array]:
+    """Mean distance of a view's corners from where its best pose puts them [pixels], and (4, 4)."""
+    p_TQ = target.p_TQ[view.ids]
+    straight = np.ascontiguousarray((camera.undistort(view.corners) - camera.center) / camera.focal)
+    _, rotations, translations, _ = cv2.solvePnPGeneric(
+        p_TQ, straight, np.eye(3), None, flags=cv2.SOLVEPNP_IPPE
+    )
+    best = (np.inf, _frontal_pose(p_TQ, straight))
+    for rotation, translation in zip(rotations, translations, strict=True):
+        X = np.eye(4)
+        X[:3, :3], X[:3, 3] = cv2.Rodrigues(rotation)[0], np.ravel(translation)
+        p_CQ = p_TQ @ X[:3, :3].T + X[:3, 3]
+        if not (p_CQ[:, 2] > 0.0).all():
+            continue
+        off = camera.project(p_CQ) - view.corners
+        error = float(np.linalg.norm(off, axis=1).mean())
+        if error < best[0]:
+            best = error, X
+    return best
+
+
+def _frontal_pose(p_TQ: Array, straight: Array) -> Array:
+    """(4, 4) the target upright before the camera, as large as it is seen: for views that no pose
+    explains, which turn out not to fit to the others."""
+    size = float(np.std(p_TQ[:, :2]) / max(float(np.std(straight)), 1e-9))
+    X = np.eye(4)
+    X[:3, 3] = size * np.r_[straight.mean(axis=0), 1.0] - p_TQ.mean(axis=0)
+    return X
+
+
+def lens_derivatives(intrinsics: Intrinsics, p_CQ: Array) -> tuple[Array, Array, Array]:
+    """Image points and their derivatives.
+
+    Args:
+        intrinsics: of the camera.
+        p_CQ: (N, 3) points in its frame [m].
+
+    Returns:
+        `(pixels, by_pose, by_camera)`: (N, 2); (N, 2, 6) by a small rotation [rad] of the points
+        about the camera's axes and a translation [m]; (N, 2, P) by fx, fy, cx, cy and the
+        coefficients, of which a perspective model has 5 at least.
+    """
+    if intrinsics.is_fisheye:
+        return _fisheye_derivatives(intrinsics, p_CQ)
+    k = np.zeros(max(len(intrinsics.distortion), 5))
+    k[: len(intrinsics.distortion)] = intrinsics.distortion
+    flat = np.ascontiguousarray(p_CQ, dtype=float)
+    pixels, J = cv2.projectPoints(flat, np.zeros(3), np.zeros(3), intrinsics.K, k)
+    J = np.asarray(J).reshape(len(flat), 2, -1)
+    return np.asarray(pixels).reshape(-1, 2), J[..., :6], J[..., 6:]
+
+
+def _fisheye_derivatives(intrinsics: Intrinsics, p_CQ: Array) -> tuple[Array, Array, Array]:
+    lens, focal = fisheye_lens(intrinsics.distortion), np.array(intrinsics.focal)
+    aside = np.maximum(np.linalg.norm(p_CQ[:, :2], axis=1), 1e-12)
+    angle = np.arctan2(aside, p_CQ[:, 2])
+    toward = p_CQ[:, :2] / aside[:, None]
+    square = aside**2 + p_CQ[:, 2] ** 2
+    radius, slope = lens.radius(angle), lens.slope(angle)
+    by_angle = np.column_stack([toward * (p_CQ[:, 2] / square)[:, None], -aside / square])
+    across = np.eye(2) - toward[:, :, None] * toward[:, None]
+    by_point = toward[:, :, None] * (slope[:, None] * by_angle)[:, None]
+    by_point[:, :, :2] += across * (radius / aside)[:, None, None]
+    by_point *= focal[:, None]
+    bent = toward * radius[:, None]
+    by_camera = np.zeros((len(p_CQ), 2, 8))
+    by_camera[:, [0, 1], [0, 1]] = bent
+    by_camera[:, [0, 1], [2, 3]] = 1.0
+    within = np.minimum(angle, lens.turn)
+    powers = within[:, None] ** (3 + 2 * np.arange(4))
+    by_camera[:, :, 4:] = focal[:, None] * toward[:, :, None] * powers[:, None]
+    # A rotation w moves a point p by w x p.
+    by_turn = np.cross(p_CQ[:, None], by_point)
+    return (
+        bent * focal + intrinsics.center,
+        np.concatenate([by_turn, by_point], axis=2),
+        by_camera,
+    )
+
+
+BEND_TERMS = 3
+"""Number of terms of a target's bend: x^2, x y and y^2."""
+PERSPECTIVE_POWERS = np.array([2, 4, 2, 2, 6, 2, 4, 6])
+"""Power of the distance from the centre in each coefficient's term."""
+FISHEYE_POWERS = np.array([2, 4, 6, 8])
+"""Power of the distance from the centre in each coefficient's term."""
+
+
+def lens_prior(camera: Intrinsics, bends: Array) -> tuple[Array, Array]:
+    """What is known of a camera and a target before any corner is seen.
+
+    Returns:
+        `(errors, slopes)`: (P + 3,) how many standard deviations their parameters are from what is
+        expected, and the derivatives of that.
+    """
+    max_term = 1.0  # Standard deviation of a term of the lens formula in the image's corners.
+    focal_log_sd = 0.5  # Standard deviation of the logarithm of the focal length over the diagonal.
+    center_sd = 0.1  # Standard deviation of the principal point, as a fraction of the diagonal.
+    size = np.array([camera.width, camera.height])
+    diagonal = float(np.hypot(*size))
+    reach = min(1.0, 0.5 * diagonal / camera.focal[0])
+    powers = FISHEYE_POWERS if camera.is_fisheye else PERSPECTIVE_POWERS[: len(camera.distortion)]
+    weights = reach**powers / max_term
+    aside = (np.array(camera.center) - 0.5 * (size - 1)) / (center_sd * diagonal)
+    errors = np.r_[
+        np.log(np.array(camera.focal) / diagonal) / focal_log_sd, aside, weights * camera.distortion
+    ]
+    slopes = np.r_[
+        1.0 / (focal_log_sd * np.array(camera.focal)), [1.0 / (center_sd * diagonal)] * 2, weights
+    ]
+    return np.r_[errors, bends], np.r_[slopes, np.ones(BEND_TERMS)]
+
+
+COEFFICIENT_COUNTS = {"pinhole": 0, "radial4": 4, "radial": 5, "rational": 8, "fisheye": 4}
 """Number of distortion coefficients of each lens model."""
-PERSPECTIVE_NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
-FISHEYE_NAMES = ("k1", "k2", "k3", "k4")
-NOISE = 0.05
-"""Of corners, against which all that is weighed in a fit [pixels]."""
-BEND = 0.3e-3
-"""How far targets bulge, about, from their middle to the ends of their longer side [m]. Glued paper
-is not flat; taken as flat, one that rises by 0.5 mm puts cameras off by 0.8 to 2.3 pixels."""
-TAIL, SMALLEST_TAIL = 3.0, 0.02
-"""Residuals beyond so many times the median one, and so many pixels, count linearly (Huber), so
-that a flexible model does not bend to corners that do not belong."""
-ROUNDS = 200
-SMALL_GAIN = 1e-9
-"""The fit has ended when a round lowers the sum of squares by no larger a share."""
-MOST_DAMPING = 1e8
+CORNER_SD_PX = 0.05
+"""Standard deviation of corners against which the prior is weighted, in pixels."""
+HUBER_RATIO = 3.0  # Residuals above this multiple of the median count linearly (Huber).
 
 
-class _State(NamedTuple):
+class _LensFitState(NamedTuple):
     """A camera, the target's bends (3,) and poses on the way: cost, and of N corners residuals
     (N, 2), weights (N,) and derivatives (N, 2, 6) and (N, 2, P + 3)."""
 
@@ -71,7 +198,7 @@ class LensFit:
     """A fitted camera model.
 
     Attributes:
-        model: of the lens, a key of `COEFFICIENTS`.
+        model: of the lens, a key of `COEFFICIENT_COUNTS`.
         intrinsics: fitted.
         X_CT: (V, 4, 4) target in the camera's frame, of each view.
         residuals: of each view (N, 2): where corners were seen less where the model puts them
@@ -95,7 +222,7 @@ class LensFit:
     def variance(self) -> float:
         """Of a coordinate of a corner, as the residuals tell it [pixels^2]."""
         count = sum(r.size for r in self.residuals)
-        return self.squares / max(count - self.size - BENDS - 6 * len(self.residuals), 1)
+        return self.squares / max(count - self.size - BEND_TERMS - 6 * len(self.residuals), 1)
 
     @property
     def squares(self) -> float:
@@ -105,7 +232,7 @@ class LensFit:
     @property
     def size(self) -> int:
         """Number of the camera's parameters."""
-        return 4 + COEFFICIENTS[self.model]
+        return 4 + COEFFICIENT_COUNTS[self.model]
 
     @property
     def typical(self) -> float:
@@ -127,14 +254,14 @@ def fit_lens(
     target: CharucoTarget,
     model: str,
     start: tuple[Intrinsics, Array],
-    bend: float = BEND,
+    bend: float = 0.3e-3,
 ) -> LensFit:
     """Fits a camera model.
 
     Args:
         views: images of one camera, all of one size.
         target: what they show.
-        model: of the lens, a key of `COEFFICIENTS`.
+        model: of the lens, a key of `COEFFICIENT_COUNTS`.
         start: a camera near by, of a simpler model or the same, and (V, 4, 4) the target in its
             frame.
         bend: how far the target bulges, about [m].
@@ -142,11 +269,12 @@ def fit_lens(
     Raises:
         InvalidInputError: the views do not determine a camera.
     """
-    camera = _padded(start[0], model)
-    problem = _Problem(views, target, camera, bend)
-    state = problem.fitted(camera, np.zeros(BENDS), start[1])
+    min_huber_limit = 0.02  # Pixels.
+    camera = _pad_coefficients(start[0], model)
+    problem = _LensFitProblem(views, target, camera, bend)
+    state = problem.fitted(camera, np.zeros(BEND_TERMS), start[1])
     typical = float(np.median(np.linalg.norm(state.residuals, axis=1)))
-    problem.limit = max(TAIL * typical, SMALLEST_TAIL)
+    problem.limit = max(HUBER_RATIO * typical, min_huber_limit)
     state = problem.fitted(state.intrinsics, state.bends, state.X_CT)
     ends = np.cumsum(problem.counts)[:-1]
     reduced = []
@@ -167,22 +295,24 @@ def fit_lens(
     )
 
 
-def names_of(camera: Intrinsics) -> tuple[str, ...]:
+def parameter_names(camera: Intrinsics) -> tuple[str, ...]:
     """Of a camera's parameters."""
-    names = FISHEYE_NAMES if camera.is_fisheye else PERSPECTIVE_NAMES[: len(camera.distortion)]
+    perspective_names = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")  # OpenCV's order.
+    fisheye_names = ("k1", "k2", "k3", "k4")  # OpenCV's order.
+    names = fisheye_names if camera.is_fisheye else perspective_names[: len(camera.distortion)]
     return ("fx", "fy", "cx", "cy", *names)
 
 
-def _padded(camera: Intrinsics, model: str) -> Intrinsics:
+def _pad_coefficients(camera: Intrinsics, model: str) -> Intrinsics:
     """A camera with as many coefficients as a model has."""
-    k = np.zeros(COEFFICIENTS[model])
+    k = np.zeros(COEFFICIENT_COUNTS[model])
     known = camera.distortion[: len(k)]
     k[: len(known)] = known
     lens: LensModel = "fisheye" if model == "fisheye" else "perspective"
     return replace(camera, model=lens, distortion=tuple(k.tolist()), residual=None)
 
 
-class _Problem:
+class _LensFitProblem:
     """The sum of squares of a fit, and steps that lower it."""
 
     def __init__(
@@ -203,7 +333,7 @@ class _Problem:
         x, y = ((self.p_TQ[:, :2] - half) / half.max()).T
         self.rise = bend * np.stack([x * x, x * y, y * y], axis=1)
 
-    def at(self, intrinsics: Intrinsics, bends: Array, X_CT: Array) -> _State:
+    def at(self, intrinsics: Intrinsics, bends: Array, X_CT: Array) -> _LensFitState:
         """Cost and derivatives."""
         X = X_CT[self.view]
         p_TQ = self.p_TQ + (self.rise @ bends)[:, None] * [0.0, 0.0, 1.0]
@@ -214,27 +344,29 @@ class _Problem:
         weights = np.minimum(1.0, self.limit / length)
         # Huber's: r^2 up to the limit c, then 2 c r - c^2.
         loss = np.sum(weights * length**2 * (2.0 - weights))
-        cost = float(loss + NOISE**2 * np.sum(prior(intrinsics, bends)[0] ** 2))
+        cost = float(loss + CORNER_SD_PX**2 * np.sum(lens_prior(intrinsics, bends)[0] ** 2))
         if not (np.isfinite(cost) and (intrinsics.is_fisheye or (p_CQ[:, 2] > 0.0).all())):
             cost = np.inf
         by_rise = np.einsum("nki,ni->nk", by_pose[..., 3:], X[:, :3, 2])
         by_bends = by_rise[:, :, None] * self.rise[:, None]
         by_others = np.concatenate([by_camera[..., : self.size], by_bends], axis=2)
-        return _State(intrinsics, bends, X_CT, cost, residuals, weights, by_pose, by_others)
+        return _LensFitState(intrinsics, bends, X_CT, cost, residuals, weights, by_pose, by_others)
 
-    def fitted(self, camera: Intrinsics, bends: Array, X_CT: Array) -> _State:
+    def fitted(self, camera: Intrinsics, bends: Array, X_CT: Array) -> _LensFitState:
         """The state of lowest cost that steps from a camera lead to.
 
         Raises:
             InvalidInputError: the views do not determine a camera.
         """
+        max_rounds = 200  # Iterations, at most.
+        min_gain = 1e-9  # The fit ends when the sum of squares decreases by a smaller fraction.
         state, damping = self.at(camera, bends, X_CT), 1e-3
-        for _ in range(ROUNDS):
+        for _ in range(max_rounds):
             better, damping = self.step(state, damping)
             if better is None:
                 break
             gain, state = 1.0 - better.cost / state.cost, better
-            if gain < SMALL_GAIN:
+            if gain < min_gain:
                 break
         if not np.isfinite(state.cost):
             raise InvalidInputError(
@@ -243,8 +375,9 @@ class _Problem:
             )
         return state
 
-    def step(self, state: _State, damping: float) -> tuple[_State | None, float]:
+    def step(self, state: _LensFitState, damping: float) -> tuple[_LensFitState | None, float]:
         """A state of lower cost and the next damping; None if there is no such."""
+        max_damping = 1e8  # Levenberg-Marquardt damping at which no step lowers the cost.
         root = np.sqrt(state.weights)[:, None]
         Jp, Jc, r = (
             state.by_pose * root[..., None],
@@ -253,13 +386,13 @@ class _Problem:
         )
         pose = np.add.reduceat(np.einsum("nki,nkj->nij", Jp, Jp), self.starts)
         mixed = np.add.reduceat(np.einsum("nki,nkj->nij", Jp, Jc), self.starts)
-        errors, slopes = prior(state.intrinsics, state.bends)
-        camera = np.einsum("nki,nkj->ij", Jc, Jc) + NOISE**2 * np.diag(slopes**2)
+        errors, slopes = lens_prior(state.intrinsics, state.bends)
+        camera = np.einsum("nki,nkj->ij", Jc, Jc) + CORNER_SD_PX**2 * np.diag(slopes**2)
         of_pose = np.add.reduceat(np.einsum("nki,nk->ni", Jp, r), self.starts)
         of_camera = np.einsum("nki,nk->i", Jc, r)
-        of_camera -= NOISE**2 * errors * slopes
+        of_camera -= CORNER_SD_PX**2 * errors * slopes
         diagonal = np.einsum("vii->vi", pose)
-        while damping < MOST_DAMPING:
+        while damping < max_damping:
             damped = pose + damping * diagonal[:, :, None] * np.eye(6)
             solved = np.linalg.solve(damped, np.concatenate([mixed, of_pose[..., None]], axis=2))
             left = camera + damping * np.diag(np.diag(camera))
@@ -275,7 +408,7 @@ class _Problem:
             damping *= 10.0
         return None, damping
 
-    def _moved(self, state: _State, change: Array, poses: Array) -> _State | None:
+    def _moved(self, state: _LensFitState, change: Array, poses: Array) -> _LensFitState | None:
         k = state.intrinsics
         values = np.r_[k.focal, k.center, k.distortion] + change[: self.size]
         if not np.isfinite(values).all() or values[:2].min() <= 0.0:

@@ -1,10 +1,4 @@
-"""How far a fitted camera model may be off, over the image.
-
-The corners that were seen often support several models about as well, which differ where none was
-seen. So the error of one is taken over all of them, each weighed by how well it fits (Burnham and
-Anderson, Model Selection and Multimodel Inference, 2002, section 4.3): how far it is from the one,
-and how far its own parameters may be off.
-"""
+"""Uncertainty of a fitted lens over the image, and the accuracy reported for each image part."""
 
 from __future__ import annotations
 
@@ -13,19 +7,69 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from burg_drake.cameras.calibration.lens_derivatives import lens_derivatives
-from burg_drake.cameras.calibration.lens_fit import LensEvidence, LensFit
-from burg_drake.cameras.calibration.lens_prior import prior
-from burg_drake.cameras.optics import Intrinsics
-from burg_drake.core import Array
+from burg_drake.cameras.calibration.charuco_target import CharucoView
+from burg_drake.cameras.calibration.lens_fit import (
+    LensEvidence,
+    LensFit,
+    lens_derivatives,
+    lens_prior,
+)
+from burg_drake.cameras.intrinsics import (
+    IMAGE_PARTS,
+    MAX_REPORTED_ERROR_PX,
+    Intrinsics,
+    describe_accuracy,
+)
+from burg_drake.core import Array, Indices
 
-BOUND = 2.0
+COVERAGE_GRID = (6, 8)
+"""Rows and columns of the grid on which corners are counted."""
+
+
+def corner_coverage(views: Sequence[CharucoView], size: tuple[int, int]) -> NDArray[np.int_]:
+    """How many corners were seen in each part of the image.
+
+    Args:
+        views: of the target.
+        size: width and height of the image [pixels].
+
+    Returns:
+        `COVERAGE_GRID` counts, rows from the top.
+    """
+    corners = np.concatenate([view.corners for view in views] or [np.empty((0, 2))])
+    edges = [
+        np.linspace(-0.5, n - 0.5, k + 1) for n, k in zip(size[::-1], COVERAGE_GRID, strict=True)
+    ]
+    counts, *_ = np.histogram2d(corners[:, 1], corners[:, 0], bins=edges)
+    whole: NDArray[np.int_] = counts.astype(int)
+    return whole
+
+
+def unseen_parts(counts: NDArray[np.int_]) -> tuple[str, ...]:
+    """Which of `IMAGE_PARTS` show no corners, or along less than half of an edge; from `corner_coverage`."""
+    min_seen_share = 0.5  # Fraction of an edge's cells in which corners must be seen.
+    bands = (slice(0, 1), slice(1, -1), slice(-1, None))
+    cells = (counts[rows, columns] for rows in bands for columns in bands)
+    return tuple(
+        name
+        for name, part in zip(IMAGE_PARTS, cells, strict=True)
+        if (part > 0).mean() < min_seen_share
+    )
+
+
+def image_part_indices(pixels: Array, size: tuple[int, int]) -> Indices:
+    """(N,) which of `IMAGE_PARTS` each place (N, 2) is in."""
+    bands = []
+    for values, length, count in zip(pixels.T, size, COVERAGE_GRID[::-1], strict=True):
+        cell = np.floor((values + 0.5) / length * count)
+        bands.append((cell >= 1).astype(int) + (cell >= count - 1))
+    return np.asarray(3 * bands[1] + bands[0])
+
+
+BOUND_SIGMAS = 2.0
 """Standard deviations that errors exceed in one of 20 cases."""
-LEAST_WEIGHT = 1e-4
-"""Models that are supported less do not count."""
-ALIGNED = 400
-"""Corners at which models are turned onto each other, at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,22 +110,23 @@ def image_grid(intrinsics: Intrinsics, columns: int = 13, rows: int = 9) -> Arra
     return np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
 
 
-def covariance_of(fit: LensFit) -> Array:
+def camera_covariance(fit: LensFit) -> Array:
     """(P, P) of the camera's parameters, as if the corners' errors were independent."""
-    return _covariance(fit)[: fit.size, : fit.size]
+    return _fit_covariance(fit)[: fit.size, : fit.size]
 
 
-def hypotheses_of(fits: Sequence[LensFit], evidence: LensEvidence) -> tuple[LensHypothesis, ...]:
+def lens_hypotheses(fits: Sequence[LensFit], evidence: LensEvidence) -> tuple[LensHypothesis, ...]:
     """Fits of several models to the same corners, weighed by Akaike's criterion."""
+    min_weight_share = 1e-4  # Models with less support are dropped.
     information = np.array([fit.information(evidence, False) for fit in fits])
     weights = np.exp(-0.5 * (information - information.min()))
-    kept = [k for k in range(len(fits)) if weights[k] > LEAST_WEIGHT * weights.sum()]
+    kept = [k for k in range(len(fits)) if weights[k] > min_weight_share * weights.sum()]
     total = float(weights[kept].sum())
     return tuple(
         LensHypothesis(
             float(weights[k]) / total,
             fits[k].intrinsics,
-            evidence.dispersion * covariance_of(fits[k]),
+            evidence.dispersion * camera_covariance(fits[k]),
         )
         for k in kept
     )
@@ -94,18 +139,18 @@ def view_disagreement(fit: LensFit) -> float:
     line. What the camera changes by when one view is left out knows that (the jackknife), over
     where corners were seen. At least 1.
     """
-    H, squares = _information(fit), np.zeros_like(_information(fit))
+    H, squares = _fit_information(fit), np.zeros_like(_fit_information(fit))
     count = len(fit.residuals)
     for J, r in zip(fit.reduced, fit.residuals, strict=True):
-        change = _inverse(H - J.T @ J, fit) @ (J.T @ r.ravel())
+        change = _scaled_inverse(H - J.T @ J, fit) @ (J.T @ r.ravel())
         squares += (count - 1) / count * np.outer(change, change)
     J = np.concatenate(fit.reduced)
-    independent = float(np.einsum("ni,ij,nj->", J, _covariance(fit), J))
+    independent = float(np.einsum("ni,ij,nj->", J, _fit_covariance(fit), J))
     seen = float(np.einsum("ni,ij,nj->", J, squares, J))
     return float(np.sqrt(max(1.0, seen / max(independent, 1e-300))))
 
 
-def uncertainty(calibrated: CalibratedCamera, pixels: Array) -> Array:
+def pixel_uncertainty(calibrated: CalibratedCamera, pixels: Array) -> Array:
     """How far the camera model may be off at places of the image.
 
     A turn of the camera that explains the difference where corners were seen does not count: the
@@ -118,10 +163,10 @@ def uncertainty(calibrated: CalibratedCamera, pixels: Array) -> Array:
     Returns:
         (N,) root mean square distance [pixels].
     """
-    return error_of(calibrated.intrinsics, calibrated.hypotheses, calibrated.corners, pixels)
+    return camera_error(calibrated.intrinsics, calibrated.hypotheses, calibrated.corners, pixels)
 
 
-def error_of(
+def camera_error(
     camera: Intrinsics, hypotheses: Sequence[LensHypothesis], corners: Array, pixels: Array
 ) -> Array:
     """The same of any camera.
@@ -132,11 +177,12 @@ def error_of(
         corners: (N, 2) that were seen [pixels].
         pixels: (N, 2) places [pixels].
     """
-    seen = corners[:: max(1, len(corners) // ALIGNED)]
+    max_aligned_corners = 400  # Corners at which two models are rotated onto each other.
+    seen = corners[:: max(1, len(corners) // max_aligned_corners)]
     total = np.zeros(len(pixels))
     for hypothesis in hypotheses:
-        here = _Differences(camera, hypothesis.intrinsics, pixels)
-        there = _Differences(camera, hypothesis.intrinsics, seen)
+        here = _CameraDifferences(camera, hypothesis.intrinsics, pixels)
+        there = _CameraDifferences(camera, hypothesis.intrinsics, seen)
         turn = np.linalg.lstsq(there.by_turn, there.columns, rcond=None)[0]
         columns = (here.columns - here.by_turn @ turn).reshape(len(pixels), 2, -1)
         off, J = columns[..., 0], columns[..., 1:]
@@ -145,7 +191,7 @@ def error_of(
     return np.asarray(np.sqrt(total))
 
 
-class _Differences:
+class _CameraDifferences:
     """How far another camera shows what one shows at some pixels: (2 N, 1 + P), its distance from
     there and how that changes with its parameters; and (2 N, 3), with a turn of it."""
 
@@ -158,19 +204,92 @@ class _Differences:
         )
 
 
-def _covariance(fit: LensFit) -> Array:
+def _fit_covariance(fit: LensFit) -> Array:
     """(P + 3, P + 3) of the parameters of camera and target."""
-    return np.asarray(fit.variance * _inverse(_information(fit), fit))
+    return np.asarray(fit.variance * _scaled_inverse(_fit_information(fit), fit))
 
 
-def _information(fit: LensFit) -> Array:
+def _fit_information(fit: LensFit) -> Array:
     """(P + 3, P + 3) inverse covariance for corners of variance 1, the prior's included."""
     J = np.concatenate(fit.reduced)
-    return np.asarray(J.T @ J + fit.variance * np.diag(prior(fit.intrinsics, fit.bends)[1] ** 2))
+    return np.asarray(
+        J.T @ J + fit.variance * np.diag(lens_prior(fit.intrinsics, fit.bends)[1] ** 2)
+    )
 
 
-def _inverse(information: Array, fit: LensFit) -> Array:
+def _scaled_inverse(information: Array, fit: LensFit) -> Array:
     """Of a matrix whose parameters have the scales of a fit's."""
-    scale = 1.0 / np.sqrt(np.diag(_information(fit)))
+    scale = 1.0 / np.sqrt(np.diag(_fit_information(fit)))
     outer = np.outer(scale, scale)
     return np.asarray(np.linalg.pinv(information * outer, rcond=1e-14, hermitian=True) * outer)
+
+
+NOTABLE_ERROR_PX = 0.5  # Error bound that is worth reporting, in pixels.
+MAX_KNOWN_ERROR_PX = 3.0  # Error bound above which the camera counts as unknown, in pixels.
+MAX_FISHEYE_ANGLE = np.radians(85.0)
+"""Radians from a fisheye's axis; beyond, no accuracy is given."""
+
+
+@dataclass(frozen=True, eq=False)
+class Promise:
+    """How far apart the true and the calibrated camera show the same, in 19 of 20 cases at most.
+
+    Attributes:
+        parts: that bound by part of the image [pixels]; without parts that look farther than 85
+            degrees off the axis all over.
+        unknown: share of the image where it is more than 3 pixels.
+    """
+
+    parts: dict[str, float]
+    unknown: float
+
+    @property
+    def except_at(self) -> tuple[str, ...]:
+        """Parts that nothing is promised of or that are known much worse than the middle, or than
+        the best part if the middle is one of those; the worst first."""
+        max_error_ratio = 2.0  # Parts with a larger error relative to the best part are named.
+        bounds = {name: self.parts.get(name, np.inf) for name in IMAGE_PARTS}
+        best = self.parts.get("middle", min(self.parts.values()))
+        limit = max(NOTABLE_ERROR_PX, max_error_ratio * best)
+        worse = [name for name, bound in bounds.items() if not bound <= limit]
+        return tuple(sorted(worse, key=lambda name: -bounds[name]))
+
+    @property
+    def known_to(self) -> float:
+        """The bound in all other parts [pixels]; infinite if there are none."""
+        excepted = self.except_at
+        held = [bound for name, bound in self.parts.items() if name not in excepted]
+        return max(held, default=np.inf)
+
+    def bound(self, name: str) -> str:
+        """That of a part, as text."""
+        if name not in self.parts:
+            return f"beyond {np.degrees(MAX_FISHEYE_ANGLE):.0f} degrees"
+        bound = self.parts[name]
+        return (
+            f"{bound:.2g}"
+            if bound < MAX_REPORTED_ERROR_PX
+            else f"more than {MAX_REPORTED_ERROR_PX:g}"
+        )
+
+    def __str__(self) -> str:
+        bounds = {name: self.bound(name) for name in self.except_at}
+        return f"known {describe_accuracy(self.known_to, self.except_at, bounds)}"
+
+
+def calibration_promise(calibrated: CalibratedCamera) -> Promise:
+    """What a calibration promises."""
+    grid_size = (17, 13)  # Columns and rows of the places where the error is computed.
+    camera = calibrated.intrinsics
+    pixels = image_grid(camera, *grid_size)
+    pixels = pixels[camera.rays(pixels)[:, 2] > np.cos(MAX_FISHEYE_ANGLE)]
+    if not len(pixels):  # of views that tell nothing
+        return Promise(dict.fromkeys(IMAGE_PARTS, np.inf), 1.0)
+    bound = np.nan_to_num(BOUND_SIGMAS * pixel_uncertainty(calibrated, pixels), nan=np.inf)
+    part = image_part_indices(pixels, (camera.width, camera.height))
+    parts = {
+        name: float(bound[part == k].max())
+        for k, name in enumerate(IMAGE_PARTS)
+        if (part == k).any()
+    }
+    return Promise(parts, float((~(bound <= MAX_KNOWN_ERROR_PX)).mean()))

@@ -1,4 +1,4 @@
-"""A calibration target as a PDF, at true scale."""
+"""Write a calibration target as a PDF page, true to scale."""
 
 from __future__ import annotations
 
@@ -8,26 +8,22 @@ from pathlib import Path
 import numpy as np
 from reportlab.pdfgen.canvas import Canvas
 
-from burg_drake.cameras.calibration.target import CharucoTarget
-from burg_drake.core import Array, InvalidInputError, option_of
-from burg_drake.core.files import atomic_write
+from burg_drake.cameras.calibration.charuco_target import CharucoTarget
+from burg_drake.core import Array, InvalidInputError, atomic_write, option_name
 from burg_drake.printout import (
     BLACK,
-    BOLD,
+    BOLD_FONT,
     INK,
     POINT,
     Paper,
     Pen,
     PrintSettings,
     cell_outlines,
-    orientations,
-    page_frame,
+    draw_rulers,
+    page_orientations,
     rectangle,
 )
-from burg_drake.scene.document import marker_dictionary
-
-QUIET = 0.3
-"""White around the squares, as a share of a square: edges need some to be seen as edges."""
+from burg_drake.scene import marker_dictionary
 
 
 def write_target(
@@ -48,8 +44,8 @@ def write_target(
         InvalidInputError: the target does not fit on the page, or the file cannot be written.
     """
     settings = settings or PrintSettings()
-    papers = orientations(settings.page, settings.margin, settings.measured)
-    paper = next((p for p in papers if _fits(target, p)), None)
+    papers = page_orientations(settings.page, settings.margin, settings.measured)
+    paper = next((p for p in papers if _fits_on_paper(target, p)), None)
     if paper is None:
         raise InvalidInputError(
             "a target of {} x {} squares of {:g} mm measures {:.0f} x {:.0f} mm, but page {} has"
@@ -70,23 +66,24 @@ def write_target(
     canvas.setViewerPreference("PrintScaling", "None")
     canvas.scale(*print_scale.tolist())
     pen = Pen(canvas)
-    page_frame.draw_rulers(pen, paper)
-    _draw_words(pen, target, paper)
-    _draw_squares(pen, target, upper_left(target, paper))
+    draw_rulers(pen, paper)
+    _draw_caption(pen, target, paper)
+    _draw_squares(pen, target, target_origin(target, paper))
     canvas.showPage()
     canvas.save()
     atomic_write(path, stream.getvalue())
     return paper
 
 
-def upper_left(target: CharucoTarget, paper: Paper) -> Array:
+def target_origin(target: CharucoTarget, paper: Paper) -> Array:
     """(2,) where the target's origin is on the page, from its lower left corner [m]."""
     spare = (np.array(paper.room) - target.size) / 2.0
     return np.array(paper.lower) + spare + [0.0, target.size[1]]
 
 
-def _fits(target: CharucoTarget, paper: Paper) -> bool:
-    needed = np.array(target.size) + 2.0 * QUIET * target.square
+def _fits_on_paper(target: CharucoTarget, paper: Paper) -> bool:
+    quiet_zone = 0.3  # White margin around the squares, as a fraction of a square.
+    needed = np.array(target.size) + 2.0 * quiet_zone * target.square
     # Beyond the room there is the margin, which is white, too.
     return bool((needed <= np.array(paper.room) + 1e-9).all())
 
@@ -113,7 +110,7 @@ def _draw_squares(pen: Pen, target: CharucoTarget, origin: Array) -> None:
         pen.area([origin + flip * (corner + loop) for loop in loops], BLACK)
 
 
-def _draw_words(pen: Pen, target: CharucoTarget, paper: Paper) -> None:
+def _draw_caption(pen: Pen, target: CharucoTarget, paper: Paper) -> None:
     left, base = paper.lower[0] + 0.108, paper.margin
     columns, rows = target.squares
     values = {
@@ -122,9 +119,9 @@ def _draw_words(pen: Pen, target: CharucoTarget, paper: Paper) -> None:
         "marker": f"{1e3 * target.marker:g}",
         "dictionary": target.dictionary,
     }
-    words = [f"{option_of(CharucoTarget, name)} {value}" for name, value in values.items()]
-    words += [option_of(CharucoTarget, "legacy")] if target.legacy else []
-    pen.text(left, base + 9.0e-3, "Calibration target", 9.0, font=BOLD, color=INK)
+    words = [f"{option_name(CharucoTarget, name)} {value}" for name, value in values.items()]
+    words += [option_name(CharucoTarget, "legacy")] if target.legacy else []
+    pen.text(left, base + 9.0e-3, "Calibration target", 9.0, font=BOLD_FONT, color=INK)
     for k, line in enumerate(
         (
             "Print at 100 %, glue onto something flat and stiff, then",

@@ -1,29 +1,25 @@
-"""The placement check: from an image of the finished scene, how far each object stands from its
-target. The board is seen, so that the camera's place is known; objects stand as the scene lets
-them, and are displaced in the plane of the board and turned about the vertical.
+"""Placement check: measure how far each object of a real scene stands from its target.
+
+The pose of the camera comes from the board. An object is assumed to rest as in the scene,
+displaced in the plane of the board and rotated about the vertical.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from datetime import datetime
 from functools import lru_cache
 from pathlib import Path
+from typing import cast
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras.optics import Intrinsics, Undistortion
-from burg_drake.cameras.placement.alignment import (
-    Aligner,
-    DepthAligner,
-    PinholeView,
-    SilhouetteAligner,
-    check_depth,
-    empty_board,
-    target_shapes,
-)
-from burg_drake.cameras.placement.assessment import placement_of, typical_likeness, unseen
+from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.cameras.placement.alignment import Aligner
+from burg_drake.cameras.placement.board_background import empty_board
+from burg_drake.cameras.placement.depth_aligner import DepthAligner, check_depth
 from burg_drake.cameras.placement.document import (
     CameraPlace,
     CheckedImage,
@@ -31,20 +27,196 @@ from burg_drake.cameras.placement.document import (
     ExtraObject,
     Placement,
     PlacementCheck,
+    PlacementStatus,
     camera_versions,
 )
-from burg_drake.cameras.placement.exchanged import exchanged_objects
-from burg_drake.cameras.placement.extras import extra_objects
-from burg_drake.cameras.placement.localization import locate_objects
-from burg_drake.cameras.pose import BoardEstimate, BoardPose
-from burg_drake.core import InvalidInputError, content_hash
-from burg_drake.core.documents import Pose
+from burg_drake.cameras.placement.localization import MIN_OBJECT_SUPPORT, Located, locate_objects
+from burg_drake.cameras.placement.misplaced_objects import (
+    find_exchanged_objects,
+    find_extra_objects,
+)
+from burg_drake.cameras.placement.object_search import SEARCH_RANGE
+from burg_drake.cameras.placement.object_shape import TargetShape, target_shapes
+from burg_drake.cameras.placement.pinhole_view import PinholeView
+from burg_drake.cameras.placement.silhouette_aligner import SilhouetteAligner
+from burg_drake.cameras.pose.board_estimate import BoardEstimate
+from burg_drake.cameras.pose.board_pose import BoardPose
+from burg_drake.core import Array, InvalidInputError, Pose, Vector3, content_hash
 from burg_drake.printout import height_map
-from burg_drake.scene.document import Scene, SceneLike, as_scene
+from burg_drake.scene import Scene, SceneLike, as_scene
 
-TINTS = 1e-3
-"""Side of a pixel of the height map that may be printed on the sheet [m]."""
-NO_CONTRAST = "the board's paper and ink look alike in the photo; give it more light"
+
+class Undistortion:
+    """Straightens the images of one camera; of a pinhole camera they stay as they are.
+
+    Args:
+        intrinsics: of the camera; those of the straightened images have the same `K`. They show
+            less than the camera sees where its edges look far aside: the width over the focal
+            length decides, and of any fisheye it is less than 180 degrees. One of 1280 pixels, 430
+            a radian, sees 170 degrees across and keeps the middle 112.
+    """
+
+    def __init__(self, intrinsics: Intrinsics) -> None:
+        self._map = None
+        if not intrinsics.is_pinhole:
+            u, v = np.arange(intrinsics.width), np.arange(intrinsics.height)
+            grid = np.stack(np.meshgrid(u, v), axis=-1)
+            flat = (grid - intrinsics.center) / intrinsics.focal
+            rays = np.concatenate([flat, np.ones((*flat.shape[:2], 1))], axis=-1)
+            at = intrinsics.project(rays).astype(np.float32)
+            self._map = at[..., 0].copy(), at[..., 1].copy()
+
+    def color(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """(H, W, 3); black beyond the given image."""
+        if self._map is None:
+            return image
+        return np.asarray(cv2.remap(image, *self._map, cv2.INTER_CUBIC))
+
+    def depth(self, depth: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(H, W); of the nearest pixel, as distances across an edge have no mean; 0 beyond."""
+        if self._map is None:
+            return depth
+        return np.asarray(cv2.remap(depth, *self._map, cv2.INTER_NEAREST))
+
+
+class PlacementThresholds:
+    """Placement thresholds."""
+
+    # Visible fraction of the silhouette needed to call an object absent.
+    min_absence_visibility = 0.2
+    min_visibility = 0.4  # Visible fraction needed for a certain measurement.
+    min_agreement = 0.6  # Fraction of the outline, or of the depth points, that must fit.
+    min_camouflaged_agreement = 0.85  # The same for objects as dark as ink or as bright as paper.
+    min_support = 0.45  # Mean evidence in the silhouette.
+    max_spill = 0.35  # Fraction around the silhouette with evidence of something else.
+    min_median_likeness = 0.6  # Median colour likeness at which mesh colours are reliable.
+    min_likeness_ratio = 0.4  # Colour likeness over its median.
+    max_angle_sd = np.deg2rad(3.0)  # Radians.
+    max_displacement_sd = 0.003  # Metres.
+
+
+def assess_placement(
+    scene: Scene,
+    name: str,
+    shape: TargetShape,
+    found: Located,
+    camera: Array,
+    rough: float,
+    typical: float,
+) -> Placement:
+    """The entry of an object.
+
+    Args:
+        scene: the targets.
+        name: of the instance.
+        shape: of the object.
+        found: what was found.
+        camera: (6, 6) covariance of the camera's pose, NaN if unknown.
+        rough: residual of the alignment from which on it is another object's.
+        typical: likeness of the scene's objects in the photo, see `typical_likeness`.
+    """
+    missing = _missing_reason(found)
+    if missing or found.alignment is None:
+        return unseen_placement(scene, name, missing, found.seen)
+    alignment = found.alignment
+    q, spread = alignment.q, alignment.spread(camera)
+    deviation = np.sqrt(np.maximum(np.diag(spread), 0.0))
+    reason = _doubt_reason(shape, found, deviation, rough, typical)
+    status: PlacementStatus = "uncertain" if reason else "measured"
+    residual = alignment.residual
+    angle = float((q[2] + np.pi) % (2.0 * np.pi) - np.pi)
+    return Placement(
+        object=scene.instance(name).object,
+        status=status,
+        reason=reason,
+        target=scene.instance(name).X_SO,
+        measured=Pose.from_matrix(shape.placed(q), quaternion=True),
+        reference=cast(Vector3, tuple(np.round(shape.p_OR, 9).tolist())),
+        displacement=(float(q[0]), float(q[1])),
+        displacement_sd=(float(deviation[0]), float(deviation[1])),
+        angle=None if shape.symmetric else angle,
+        angle_sd=None if shape.symmetric else float(deviation[2]),
+        seen=round(found.seen, 4),
+        residual=float(residual) if np.isfinite(residual) else None,
+    )
+
+
+def typical_likeness(located: Iterable[Located]) -> float:
+    """Median likeness of the objects that were found; 0 of fewer than three."""
+    likeness = [
+        f.likeness
+        for f in located
+        if f.alignment is not None and f.seen > PlacementThresholds.min_visibility
+    ]
+    return float(np.median(likeness)) if len(likeness) > 2 else 0.0
+
+
+def unseen_placement(scene: Scene, name: str, reason: str, seen: float = 0.0) -> Placement:
+    """The entry of an object of which nothing can be said."""
+    instance = scene.instance(name)
+    return Placement(
+        object=instance.object,
+        status="not_seen",
+        reason=reason,
+        target=instance.X_SO,
+        seen=round(seen, 4),
+    )
+
+
+def _missing_reason(found: Located) -> str:
+    """Why an object is not seen; empty if it is."""
+    if found.in_image < PlacementThresholds.min_absence_visibility:
+        return "it is out of view"
+    if found.seen < PlacementThresholds.min_absence_visibility:
+        return "other objects hide it"
+    if found.alignment is None or found.support < MIN_OBJECT_SUPPORT:
+        return f"nothing like it was found within {1e3 * SEARCH_RANGE:.0f} mm of its target"
+    return ""
+
+
+def _doubt_reason(
+    shape: TargetShape, found: Located, deviation: Array, rough: float, typical: float
+) -> str:
+    """What is doubtful about a measurement; empty if nothing is."""
+    alignment = found.alignment
+    assert alignment is not None
+    if alignment.agreement < PlacementThresholds.min_agreement:
+        return (
+            f"only {100 * alignment.agreement:.0f} % of its outline match the image: is it another"
+            " object, or in another pose?"
+        )
+    if (
+        found.support < PlacementThresholds.min_support
+        and alignment.agreement < PlacementThresholds.min_camouflaged_agreement
+    ):
+        return (
+            "the board is visible where the object should cover it: is it another object, or in"
+            " another pose?"
+        )
+    if alignment.residual > rough:
+        return (
+            "its outline does not quite match the image: is it another object, or in another pose?"
+        )
+    if (
+        shape.colors is not None
+        and found.likeness < PlacementThresholds.min_likeness_ratio * typical
+        and typical > PlacementThresholds.min_median_likeness
+    ):
+        return "it does not have the colors of its mesh: is it another object?"
+    if found.spill > PlacementThresholds.max_spill:
+        return "something sticks out next to it: is it another object, or in another pose?"
+    if alignment.ambiguous:
+        return "another pose fits almost as well"
+    if alignment.turnable:
+        turn = np.rad2deg(max(alignment.turnable, key=abs))
+        return f"it fits as well when rotated by another {turn:+.0f} deg"
+    if found.seen < PlacementThresholds.min_visibility:
+        return f"only {100 * found.seen:.0f} % of it can be seen"
+    if deviation[:2].max() > PlacementThresholds.max_displacement_sd:
+        return f"its position is only known to {1e3 * deviation[:2].max():.1f} mm"
+    if not shape.symmetric and deviation[2] > PlacementThresholds.max_angle_sd:
+        return f"its rotation is only known to {np.rad2deg(deviation[2]):.0f} deg"
+    return ""
 
 
 def check_placement(
@@ -90,15 +262,15 @@ def check_placement(
         depth = check_depth(depth, intrinsics)
     if estimate is None:
         estimate = BoardPose(scene.board, intrinsics, scale).estimate(color)
-    instances, extra, reason = _measured(scene, color, depth, intrinsics, estimate, scale)
+    instances, extra, reason = _measure_objects(scene, color, depth, intrinsics, estimate, scale)
     return PlacementCheck(
-        scene=_scene(scene),
+        scene=_checked_scene(scene),
         taken=datetime.now().astimezone().isoformat(timespec="seconds"),
         method="silhouette" if depth is None else "depth",
         image=image_source or CheckedImage(content=content_hash(color)),
         depth=None if depth is None else depth_source or CheckedImage(content=content_hash(depth)),
         intrinsics=intrinsics,
-        camera=_camera(estimate),
+        camera=_camera_place(estimate),
         reason=reason,
         instances=instances,
         extra=extra,
@@ -106,12 +278,12 @@ def check_placement(
     )
 
 
-def _scene(scene: Scene) -> CheckedScene:
+def _checked_scene(scene: Scene) -> CheckedScene:
     path = Path(scene.path).absolute()
     return CheckedScene(name=scene.name, path=str(path), content=scene.content)
 
 
-def _measured(
+def _measure_objects(
     scene: Scene,
     color: NDArray[np.uint8],
     depth: NDArray[np.float32] | None,
@@ -120,21 +292,21 @@ def _measured(
     scale: tuple[float, float],
 ) -> tuple[dict[str, Placement], tuple[ExtraObject, ...], str]:
     """Placements by name; what else stands there; and why nothing was measured, if so."""
-    aligner = _aligner(scene, color, depth, intrinsics, estimate, scale)
+    aligner = _build_aligner(scene, color, depth, intrinsics, estimate, scale)
     if isinstance(aligner, str):
         names = (*scene.instances, *scene.background)
-        return {name: unseen(scene, name, aligner) for name in names}, (), aligner
+        return {name: unseen_placement(scene, name, aligner) for name in names}, (), aligner
     shapes = target_shapes(scene)
     located = locate_objects(aligner, shapes)
     typical = typical_likeness(located.values())
     placements = {
-        name: placement_of(
+        name: assess_placement(
             scene, name, shapes[name], found, estimate.covariance, aligner.rough, typical
         )
         for name, found in located.items()
     }
     doubtful = [name for name, placed in placements.items() if placed.status != "measured"]
-    stands, empty = exchanged_objects(aligner, shapes, located, doubtful)
+    stands, empty = find_exchanged_objects(aligner, shapes, located, doubtful)
     elsewhere = {name: place for place, (name, _) in stands.items()}
     placed = [
         (shapes[name], found.alignment.q)
@@ -142,14 +314,16 @@ def _measured(
         if found.alignment is not None and name not in stands and name not in elsewhere
     ]
     placed += [where for _, where in stands.values()]
-    extra = extra_objects(aligner, placed, [shapes[name].p_SR for name in empty])
+    extra = find_extra_objects(aligner, placed, [shapes[name].p_SR for name in empty])
     for name in {*stands, *elsewhere}:
-        reason = _exchange(name, stands[name][0] if name in stands else "", elsewhere.get(name, ""))
-        placements[name] = unseen(scene, name, reason, located[name].seen)
+        reason = _exchange_reason(
+            name, stands[name][0] if name in stands else "", elsewhere.get(name, "")
+        )
+        placements[name] = unseen_placement(scene, name, reason, located[name].seen)
     return placements, extra, ""
 
 
-def _exchange(name: str, instead: str, place: str) -> str:
+def _exchange_reason(name: str, instead: str, place: str) -> str:
     """Why an object is not where it belongs, when others' places are mixed up with it.
 
     Args:
@@ -162,7 +336,7 @@ def _exchange(name: str, instead: str, place: str) -> str:
     return f"{instead} stands in its place" if instead else f"it stands where {place} belongs"
 
 
-def _aligner(
+def _build_aligner(
     scene: Scene,
     color: NDArray[np.uint8],
     depth: NDArray[np.float32] | None,
@@ -171,25 +345,30 @@ def _aligner(
     scale: tuple[float, float],
 ) -> Aligner | str:
     """What objects are aligned by; or why nothing can be measured."""
+    # Reason if the photo cannot be measured.
+    no_contrast = "the board's paper and ink look alike in the photo; give it more light"
     if not estimate.valid:
         return f"the board was not found: {estimate.reason}" if estimate.reason else "no board"
     size = intrinsics.width, intrinsics.height
     straight = Undistortion(intrinsics)
-    view = PinholeView(intrinsics.K, size, estimate.X_SC, _blind(straight, size))
+    view = PinholeView(intrinsics.K, size, estimate.X_SC, _blind_pixels(straight, size))
     if depth is not None:
         return DepthAligner(view, straight.depth(depth))
     image = straight.color(color)
-    picture = empty_board(scene.board, image, intrinsics.K, estimate.X_SC, scale, _tints(scene))
-    return NO_CONTRAST if picture is None else SilhouetteAligner(view, image, picture)
+    picture = empty_board(
+        scene.board, image, intrinsics.K, estimate.X_SC, scale, _height_map_tints(scene)
+    )
+    return no_contrast if picture is None else SilhouetteAligner(view, image, picture)
 
 
 @lru_cache(maxsize=4)
-def _tints(scene: Scene) -> NDArray[np.uint8]:
+def _height_map_tints(scene: Scene) -> NDArray[np.uint8]:
     """(R, C, 3) the height map that may be printed on the sheet."""
-    return height_map(scene, TINTS).image
+    pixel_size = 1e-3  # Metres. Resolution of the printed height map.
+    return height_map(scene, pixel_size).image
 
 
-def _blind(straight: Undistortion, size: tuple[int, int]) -> NDArray[np.bool_]:
+def _blind_pixels(straight: Undistortion, size: tuple[int, int]) -> NDArray[np.bool_]:
     """(H, W) pixels of a straight image that are beyond the given one, or next to these."""
     beyond = straight.depth(np.ones(size[::-1], np.float32)) == 0.0
     return np.asarray(cv2.dilate(beyond.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0)
@@ -207,7 +386,7 @@ def _checked_image(image: NDArray[np.uint8], intrinsics: Intrinsics) -> NDArray[
     return np.ascontiguousarray(image[..., :3])
 
 
-def _camera(estimate: BoardEstimate) -> CameraPlace | None:
+def _camera_place(estimate: BoardEstimate) -> CameraPlace | None:
     if not estimate.valid:
         return None
     error, covariance = estimate.reprojection_error, np.asarray(estimate.covariance)

@@ -1,28 +1,37 @@
-"""The document of a placement check: how far each object of a real scene stands from its target.
-
-Saved beside a real trial, so that it can be compared with one that was simulated later. Numbers
-that are not known are None, and left out of the file.
-"""
+"""The document of a placement check, and checks of several photos combined into one."""
 
 from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
-from burg_drake.cameras.optics import Intrinsics
-from burg_drake.core import BurgError, software_versions
-from burg_drake.core.documents import Pose, load_document, save_document
-from burg_drake.core.files import IMAGE_SIZE, read_bytes
-from burg_drake.core.paths import resolve
+import numpy as np
+
+from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.core import (
+    Array,
+    BurgError,
+    FileLimits,
+    InvalidInputError,
+    Pose,
+    load_document,
+    make_pose,
+    read_bytes,
+    resolve_reference,
+    rot_z,
+    save_document,
+    software_versions,
+)
 
 PlacementStatus = Literal["measured", "uncertain", "not_seen"]
 Method = Literal["silhouette", "depth"]
 
-PACKAGES = {"opencv": "opencv-python-headless", "numpy": "numpy", "scipy": "scipy"}
-"""As they are called in files, and installed."""
+PLACEMENT_PACKAGES = {"opencv": "opencv-python-headless", "numpy": "numpy", "scipy": "scipy"}
+"""Packages that affect a placement check: name in the document and on PyPI."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,26 +168,28 @@ class PlacementCheck:
 
 
 def load_placement(path: str | Path) -> PlacementCheck:
-    """Reads a placement file; see `core.documents.schema.load_document`."""
+    """Reads a placement file; see `core.documents.load_document`."""
     return load_document(path, PlacementCheck)
 
 
 def save_placement(check: PlacementCheck, path: str | Path) -> None:
-    """Writes a placement file; see `core.documents.schema.save_document`.
+    """Writes a placement file; see `core.documents.save_document`.
 
     The scene's path in it starts at the file's folder, so that both can move together.
     """
     scene = check.scene
     if scene.path and Path(scene.path).is_absolute():
-        scene = replace(scene, path=_reference(Path(scene.path), Path(path).absolute().parent))
+        scene = replace(
+            scene, path=_scene_reference(Path(scene.path), Path(path).absolute().parent)
+        )
     check = replace(check, scene=scene)
     save_document(check, path, "Placement check: lengths in m, angles in rad, frame S of the board")
 
 
-def _reference(path: Path, folder: Path) -> str:
+def _scene_reference(path: Path, folder: Path) -> str:
     """What a file in a folder calls a scene: a bare name for those that come along, else a path."""
     try:
-        if resolve(path.stem, "scenes").samefile(path):
+        if resolve_reference(path.stem, "scenes").samefile(path):
             return path.stem
     except (BurgError, OSError):
         pass
@@ -188,17 +199,148 @@ def _reference(path: Path, folder: Path) -> str:
         return path.as_posix()
 
 
-def image_of_file(path: str | Path) -> CheckedImage:
+def describe_image_file(path: str | Path) -> CheckedImage:
     """The entry of an image file.
 
     Raises:
         InvalidInputError: it cannot be read.
     """
     path = Path(path)
-    data = read_bytes(path, IMAGE_SIZE)
+    data = read_bytes(path, FileLimits.image_bytes)
     return CheckedImage(file=path.name, content=hashlib.sha256(data).hexdigest())
 
 
 def camera_versions() -> dict[str, str]:
     """Versions of what decides about a placement check."""
-    return software_versions(PACKAGES, with_platform=False)
+    return software_versions(PLACEMENT_PACKAGES, with_platform=False)
+
+
+def combine_checks(checks: Sequence[PlacementCheck]) -> PlacementCheck:
+    """One check of several, of photos that show the same objects on the same places.
+
+    An object is where the photos that measured it say, weighted by their variances per coordinate;
+    if these contradict each other, or one shows that it is not there, it is `uncertain`. One that
+    no photo measured is as the photo says that knows most. Extra objects are those that half of the
+    photos show. The camera, and the first image, are those of the first check.
+
+    Args:
+        checks: at least one.
+
+    Raises:
+        InvalidInputError: none, or of different scenes or methods.
+    """
+    if not checks:
+        raise InvalidInputError("no placement checks are given to combine; give at least one")
+    first, *others = checks
+    if any((c.scene.content, c.method) != (first.scene.content, first.method) for c in others):
+        raise InvalidInputError(
+            "placement checks of different scenes or methods cannot be combined"
+        )
+    return replace(
+        first,
+        more_images=tuple(c.image for c in others),
+        reason="" if any(not c.reason for c in checks) else first.reason,
+        instances={
+            name: _combine_placements([c.instances[name] for c in checks])
+            for name in first.instances
+        },
+        extra=_merge_extra_objects([extra for c in checks for extra in c.extra], len(checks)),
+    )
+
+
+def _combine_placements(placements: list[Placement]) -> Placement:
+    min_visibility = 0.5  # Visible fraction for which an object's absence counts.
+    found = _mean_placement(placements)
+    gone = [p for p in placements if p.status == "not_seen" and p.seen >= min_visibility]
+    if found.status != "measured" or not gone:
+        return found
+    shown = f"{len(gone)} of {len(placements)} photos show"
+    return replace(
+        found, status="uncertain", reason=f"{shown} that it is not there: {gone[0].reason}"
+    )
+
+
+def _mean_placement(placements: list[Placement]) -> Placement:
+    max_sigmas = 4.0  # A photo farther from the mean of all contradicts it.
+    measured = [p for p in placements if p.status == "measured"]
+    if len(measured) < 2:
+        return max(placements, key=_information_rank)
+    values = np.array([_displacement_and_sd(p)[0] for p in measured])
+    values[:, 2] = values[0, 2] + (values[:, 2] - values[0, 2] + np.pi) % (2.0 * np.pi) - np.pi
+    sd = np.array([_displacement_and_sd(p)[1] for p in measured])
+    weight = sd**-2.0
+    mean = (weight * values).sum(axis=0) / weight.sum(axis=0)
+    mean_sd = weight.sum(axis=0) ** -0.5
+    off = np.abs(values - mean)
+    contradicts = bool((off > max_sigmas * np.sqrt(np.maximum(sd**2 - mean_sd**2, 1e-18))).any())
+    if contradicts:
+        mean_sd = np.maximum(mean_sd, off.max(axis=0))
+    best = max(measured, key=_information_rank)
+    turned = best.angle is not None
+    reason = f"the photos disagree by {1e3 * off[:, :2].max():.1f} mm" if contradicts else ""
+    if contradicts and turned:
+        reason += f" and {np.rad2deg(off[:, 2].max()):.1f} deg"
+    angle = float((mean[2] + np.pi) % (2.0 * np.pi) - np.pi)
+    return replace(
+        best,
+        status="uncertain" if contradicts else "measured",
+        reason=reason,
+        measured=_displaced_pose(best, mean),
+        displacement=(float(mean[0]), float(mean[1])),
+        displacement_sd=(float(mean_sd[0]), float(mean_sd[1])),
+        angle=angle if turned else None,
+        angle_sd=float(mean_sd[2]) if turned else None,
+        seen=max(p.seen for p in measured),
+    )
+
+
+def _information_rank(placement: Placement) -> tuple[int, float]:
+    """How much a placement tells: its status, then how exact it is, or how much was seen."""
+    rank = {"measured": 2, "uncertain": 1, "not_seen": 0}[placement.status]
+    if placement.displacement_sd is None:
+        return rank, placement.seen
+    return rank, -max(placement.displacement_sd)
+
+
+def _displacement_and_sd(placement: Placement) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """x, y [m] and angle [rad], and their standard deviations; angle 0 ± 1 where there is none."""
+    assert placement.displacement is not None
+    assert placement.displacement_sd is not None
+    angle, sd = placement.angle, placement.angle_sd
+    return (
+        (*placement.displacement, angle or 0.0),
+        (*placement.displacement_sd, 1.0 if sd is None else sd),
+    )
+
+
+def _displaced_pose(placement: Placement, q: Array) -> Pose:
+    """X_SO with the reference point displaced, and the object turned about the vertical."""
+    target = placement.target.matrix()
+    R = rot_z(float(q[2]) if placement.angle is not None else 0.0) @ target[:3, :3]
+    p_OR = np.array(placement.reference)
+    p_SR = target[:3, :3] @ p_OR + target[:3, 3] + (q[0], q[1], 0.0)
+    return Pose.from_matrix(make_pose(R, p_SR - R @ p_OR), quaternion=True)
+
+
+def _merge_extra_objects(extra: list[ExtraObject], photos: int) -> tuple[ExtraObject, ...]:
+    """Extra objects that half of the photos show, each once."""
+    merge_distance = 0.05  # Metres within which extra objects are one.
+    groups: list[list[ExtraObject]] = []
+    for one in extra:
+        near = (
+            g
+            for g in groups
+            if np.hypot(*np.subtract(one.position, g[0].position)) < merge_distance
+        )
+        group = next(near, None)
+        if group is None:
+            groups.append([one])
+        else:
+            group.append(one)
+    return tuple(_merge_group(group) for group in groups if 2 * len(group) >= photos)
+
+
+def _merge_group(group: list[ExtraObject]) -> ExtraObject:
+    x, y = np.mean([e.position for e in group], axis=0)
+    position = round(float(x), 4), round(float(y), 4)
+    return ExtraObject(position=position, width=max(e.width for e in group))

@@ -1,9 +1,4 @@
-"""Finds all objects of a scene in one image, though they hide each other.
-
-The clearest object first: what it covers is explained, and no other object is looked for there.
-Then each is aligned with the others where they have been found, twice, as a better neighbour makes
-a better outline.
-"""
+"""Locate all objects of a scene in one image, including occluded and rotation-ambiguous ones."""
 
 from __future__ import annotations
 
@@ -12,34 +7,21 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from burg_drake.cameras.placement.alignment import (
-    Aligner,
-    Alignment,
-    PinholeView,
-    TargetShape,
-    differ,
-    window_slices,
+from burg_drake.cameras.placement.alignment import Aligner, Alignment, are_different_places
+from burg_drake.cameras.placement.object_search import (
+    Placed,
+    SilhouetteSearch,
+    assign_candidates,
+    silhouette_support,
 )
-from burg_drake.cameras.placement.candidates import Placed, assigned_places, support_of
-from burg_drake.cameras.placement.rotation_ambiguity import with_rotation_ambiguity
+from burg_drake.cameras.placement.object_shape import TargetShape
+from burg_drake.cameras.placement.pinhole_view import PinholeView, Window, window_slices
 from burg_drake.core import Array
 
-TURNED = np.deg2rad(40.0)
-"""Farther from the target's angle an object must not only look as good, but better [rad]."""
-RIM = 0.04
-"""How far beside the silhouette it is looked at for that, as a share of the image's width."""
-WEAK = 0.7
-"""Agreement below which an object is looked for once more, when the others have their places."""
-SUPPORTED = 0.35
-"""Mean evidence in the silhouette below which an object is not there."""
-BEYOND = 0.06
-"""Farther from its target nothing is an object's place [m]."""
-FITS_WELL, NUDGE = 0.93, np.deg2rad(4.0)
-"""Agreement below which an alignment may have caught on a wrong edge, and by how much the object is
-turned to get it off [rad]."""
-RING = 5.0
-"""How wide, beside the silhouette and what the evidence smears of it, nothing should stand
-[pixels]."""
+LARGE_TURN = np.deg2rad(40.0)
+"""Radians from the target's angle; beyond, an object must fit better, not just as well."""
+MIN_OBJECT_SUPPORT = 0.35
+"""Mean evidence in the silhouette below which an object is absent."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,30 +54,33 @@ def locate_objects(aligner: Aligner, shapes: dict[str, TargetShape]) -> dict[str
         aligner: of the image.
         shapes: the objects by name.
     """
-    q = assigned_places(aligner, shapes, {})
+    min_agreement = 0.7  # Objects with less are searched again once the others are placed.
+    q = assign_candidates(aligner, shapes, {})
     aligned: dict[str, Alignment] = {}
-    _align(aligner, shapes, q, aligned, list(q), far=True)
+    _align_objects(aligner, shapes, q, aligned, list(q), far=True)
     # one that took another's place left that one without, and itself fits badly
-    weak = [n for n in shapes if n not in aligned or aligned[n].agreement < WEAK]
+    weak = [n for n in shapes if n not in aligned or aligned[n].agreement < min_agreement]
     if weak:
         before = {name: (aligned.pop(name), q.pop(name)) for name in weak if name in aligned}
-        found = assigned_places(
-            aligner, {name: shapes[name] for name in weak}, _placed(shapes, aligned)
+        found = assign_candidates(
+            aligner, {name: shapes[name] for name in weak}, _placed_shapes(shapes, aligned)
         )
         q |= found
-        _align(aligner, shapes, q, aligned, list(found), far=True)
+        _align_objects(aligner, shapes, q, aligned, list(found), far=True)
         for name, (alignment, start) in before.items():
             if name not in aligned:
                 aligned[name], q[name] = alignment, start
-    _align(aligner, shapes, q, aligned, list(q), far=False)
-    return {name: _located(aligner, shapes, q, name, aligned.get(name)) for name in shapes}
+    _align_objects(aligner, shapes, q, aligned, list(q), far=False)
+    return {name: _build_located(aligner, shapes, q, name, aligned.get(name)) for name in shapes}
 
 
-def _placed(shapes: dict[str, TargetShape], aligned: dict[str, Alignment]) -> dict[str, Placed]:
+def _placed_shapes(
+    shapes: dict[str, TargetShape], aligned: dict[str, Alignment]
+) -> dict[str, Placed]:
     return {name: (shapes[name], alignment.q) for name, alignment in aligned.items()}
 
 
-def _align(
+def _align_objects(
     aligner: Aligner,
     shapes: dict[str, TargetShape],
     q: dict[str, list[Array]],
@@ -106,8 +91,8 @@ def _align(
 ) -> None:
     """Aligns objects, from their candidates or where they are; leaves out what fails."""
     for name in names:
-        others = _others(aligner.view, shapes, q, name)
-        starts = q[name] if far else _nudged(shapes[name], aligned[name])
+        others = _depth_of_others(aligner.view, shapes, q, name)
+        starts = q[name] if far else _nudged_starts(shapes[name], aligned[name])
         best = best_alignment(aligner, shapes[name], starts, others, far)
         if best is not None and not far:
             best = replace(best, ambiguous=aligned[name].ambiguous)
@@ -118,15 +103,17 @@ def _align(
             aligned[name], q[name] = best, [best.q]
 
 
-def _nudged(shape: TargetShape, found: Alignment) -> list[Array]:
+def _nudged_starts(shape: TargetShape, found: Alignment) -> list[Array]:
     """Where to begin the last alignment: where an object was found, and turned a little from there
     if not all fits, as outlines catch on wrong edges."""
-    if shape.symmetric or found.agreement > FITS_WELL:
+    good_agreement = 0.93  # With less, the alignment may have caught on a wrong edge.
+    nudge_angle = np.deg2rad(4.0)  # Radians by which the object is turned off a wrong edge.
+    if shape.symmetric or found.agreement > good_agreement:
         return [found.q]
-    return [found.q + np.array([0.0, 0.0, turn]) for turn in (0.0, NUDGE, -NUDGE)]
+    return [found.q + np.array([0.0, 0.0, turn]) for turn in (0.0, nudge_angle, -nudge_angle)]
 
 
-def _others(
+def _depth_of_others(
     view: PinholeView, shapes: dict[str, TargetShape], q: dict[str, list[Array]], name: str
 ) -> Array:
     """(H, W) depth of all objects that were found but one."""
@@ -137,16 +124,17 @@ def best_alignment(
     aligner: Aligner, shape: TargetShape, starts: list[Array], others: Array, far: bool
 ) -> Alignment | None:
     """The alignment that agrees best with the image; if several do, near the target's angle."""
+    max_displacement = 0.06  # Metres from the target.
     rated: list[tuple[float, Alignment]] = []
     for start in starts:
         found = aligner.align(shape, start, others, far=far)
-        if found is None or np.hypot(*found.q[:2]) > BEYOND:
+        if found is None or np.hypot(*found.q[:2]) > max_displacement:
             continue
-        support, _ = support_of(aligner.view, shape, found.q, aligner.evidence, others)
+        support, _ = silhouette_support(aligner.view, shape, found.q, aligner.evidence, others)
         rating = found.agreement + found.coverage + support
         rating += aligner.likeness(shape, found.q, others)
-        rating -= _disagreement(aligner, shape, found.q, others)
-        if abs(_wrapped(found.q[2])) > TURNED:
+        rating -= _depth_disagreement(aligner, shape, found.q, others)
+        if abs(_wrap_to_pi(found.q[2])) > LARGE_TURN:
             rating -= aligner.required_gain
         rated.append((rating, found))
         if rating > aligner.convincing_rating:
@@ -157,7 +145,7 @@ def best_alignment(
     rivals = (
         rating
         for rating, found in rated
-        if differ(found, best) and not shape.looks_alike(found.q, best.q)
+        if are_different_places(found, best) and not shape.looks_alike(found.q, best.q)
     )
     ambiguous = max(rivals, default=-np.inf) > score - aligner.clearly
     return replace(best, q=_least_turned(shape, best.q), ambiguous=ambiguous)
@@ -167,49 +155,126 @@ def _least_turned(shape: TargetShape, q: Array) -> Array:
     """Of the displacements that look like this one, as a box's does after half a turn, the one
     nearest to the target's angle."""
     alike = [q]
-    for quarter in (1, 2, 3) if abs(_wrapped(q[2])) > TURNED else ():
+    for quarter in (1, 2, 3) if abs(_wrap_to_pi(q[2])) > LARGE_TURN else ():
         other = q + np.array([0.0, 0.0, quarter * np.pi / 2])
-        other[2] = _wrapped(other[2])
+        other[2] = _wrap_to_pi(other[2])
         if shape.looks_alike(q, other):
             alike.append(other)
-    return min(alike, key=lambda p: abs(_wrapped(p[2])))
+    return min(alike, key=lambda p: abs(_wrap_to_pi(p[2])))
 
 
-def _wrapped(angle: float) -> float:
+def _wrap_to_pi(angle: float) -> float:
     return float((angle + np.pi) % (2.0 * np.pi) - np.pi)
 
 
-def _disagreement(aligner: Aligner, shape: TargetShape, q: Array, others: Array) -> float:
+def _depth_disagreement(aligner: Aligner, shape: TargetShape, q: Array, others: Array) -> float:
     """How much of an image of distances disagrees, as a share of the silhouette; 0 for a photo,
     where shadows and other things stand out as well."""
+    rim_share = 0.04  # Width of the compared rim, as a fraction of the image's width.
     if not aligner.strict:
         return 0.0
-    window = aligner.view.window(shape, q, RIM * aligner.view.size[0])
+    window = aligner.view.window(shape, q, rim_share * aligner.view.size[0])
     wrong, area = aligner.misfit(shape, q, others, window)
     return min(wrong / max(area, 1.0), 1.0)
 
 
-def _located(
+def _build_located(
     aligner: Aligner,
     shapes: dict[str, TargetShape],
     q: dict[str, list[Array]],
     name: str,
     alignment: Alignment | None,
 ) -> Located:
+    ring_width = 5.0  # Pixels beside the silhouette that should be free.
     view, shape = aligner.view, shapes[name]
     at = np.zeros(3) if alignment is None else alignment.q
-    others = _others(view, shapes, q, name)
+    others = _depth_of_others(view, shapes, q, name)
     if alignment is not None:
-        alignment = with_rotation_ambiguity(aligner, shape, alignment, others)
+        alignment = add_rotation_ambiguity(aligner, shape, alignment, others)
     in_image, seen = view.seen(shape, at, others)
-    support, _ = support_of(view, shape, at, aligner.evidence, others)
+    support, _ = silhouette_support(view, shape, at, aligner.evidence, others)
     near = 2.0 + aligner.smear
-    window = view.window(shape, at, near + RING + 1.0)
+    window = view.window(shape, at, near + ring_width + 1.0)
     part = window_slices(window)
     mask = np.isfinite(view.buffer(shape, at, window)).astype(np.uint8)
     away = cv2.distanceTransform(1 - mask, cv2.DIST_L2, 3) if mask.any() else np.zeros(mask.shape)
-    ring = (away > near) & (away < near + RING) & ~np.isfinite(others[part])
+    ring = (away > near) & (away < near + ring_width) & ~np.isfinite(others[part])
     around = aligner.evidence[part][ring]
     spill = float(np.maximum(around, 0.0).sum() / max(np.abs(around).sum(), 1.0))
     alike = aligner.likeness(shape, at, others) if aligner.sees_colors else 0.5
     return Located(alignment, in_image, seen, support, spill, alike)
+
+
+_POSITIVE_TURNS = np.deg2rad((8.0, 15.0, 25.0, 40.0, 60.0, 85.0, 110.0, 135.0, 160.0))  # Radians.
+AMBIGUITY_TEST_ANGLES = np.concatenate(
+    [np.stack([_POSITIVE_TURNS, -_POSITIVE_TURNS], axis=1).ravel(), [np.pi]]
+)
+"""Radians by which an object is turned to see whether it fits as well."""
+TURNING_SHIFT = 0.025
+"""Metres by which an object may shift while it is turned."""
+
+
+def add_rotation_ambiguity(
+    aligner: Aligner, shape: TargetShape, found: Alignment, others: Array
+) -> Alignment:
+    """The alignment, told in how many other angles the object fits as well.
+
+    Args:
+        aligner: of the image.
+        shape: the object.
+        found: its alignment.
+        others: (H, W) depth of other objects, infinity where there is none.
+    """
+    slack_share = 0.01  # Extra disagreement that still fits as well, fraction of the silhouette ...
+    slack_pixels = 12.0  # ... and pixels of an image 640 wide.
+    rough_factor = 2.0  # Multiple of the slack before the exact place is known.
+    if shape.symmetric:
+        return found
+    window = _turning_window(aligner.view, shape, found.q)
+    least, area = aligner.misfit(shape, found.q, others, window)
+    slack = slack_share * area + slack_pixels * (aligner.view.size[0] / 640) ** 2 * window.scale**2
+    search = SilhouetteSearch(
+        aligner.view, shape, np.where(np.isfinite(others), 0.0, aligner.evidence)
+    )
+    fitting = []
+    for turn in AMBIGUITY_TEST_ANGLES:
+        q = search.shifted(found.q + np.array([0.0, 0.0, turn]), TURNING_SHIFT)
+        more = aligner.misfit(shape, q, others, window)[0] - least
+        if more > rough_factor * slack:
+            continue
+        exact = aligner.align(shape, q, others, far=False, turn=False)
+        if exact is None:
+            continue
+        more = aligner.misfit(shape, exact.q, others, window)[0] - least
+        worse = max(more, 0.0) / slack + _fit_loss(found, exact, aligner.residual_floor)
+        if worse < 1.0 and not shape.looks_alike(found.q, exact.q):
+            fitting.append(exact.q - found.q)
+    if not fitting:
+        return found
+    off = np.array(fitting)
+    spread = off.T @ off / (len(off) + 1)
+    return replace(found, covariance=found.covariance + spread, turnable=tuple(off[:, 2]))
+
+
+def _fit_loss(found: Alignment, other: Alignment, fine: float) -> float:
+    """By how much another alignment fits the image worse; 1 where that is no chance any more."""
+    agreement_step = 0.1  # Loss of agreement that tells two angles apart.
+    residual_step = 0.5  # Relative increase of the residual that tells two angles apart.
+    missing = max(found.coverage - other.coverage, found.agreement - other.agreement, 0.0)
+    rougher = other.residual / max(found.residual, fine) - 1.0
+    return missing / agreement_step + max(rougher, 0.0) / residual_step
+
+
+def _turning_window(view: PinholeView, shape: TargetShape, q: Array) -> Window:
+    """A raster of all that the object may cover while it is turned."""
+    pixel_count = 2500  # Pixels around the object that are compared, about.
+    reach = (
+        float(np.linalg.norm(shape.p_SV[:, :2] - shape.p_SR[:2], axis=1).max()) + TURNING_SHIFT / 2
+    )
+    top = float(shape.p_SV[:, 2].max())
+    corner = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (0, 1)])
+    box = shape.p_SR + (q[0], q[1], 0.0) + corner * (reach, reach, top)
+    _, pixels = view.project(box)
+    window = view.window_of(pixels, 1.0)
+    pitch = max(1.0, float(np.sqrt(window.width * window.height / pixel_count)))
+    return replace(window, scale=1.0 / pitch)

@@ -1,9 +1,4 @@
-"""Whether a sheet is another one than the document says, though its markers fit at a place.
-
-A sheet with another first id or another number of rows has markers that stand to each other as the
-document's do, so that a pose fits them exactly, whole gaps aside of the truth. What tells is what
-lies around: markers beyond those that the document has, or paper where it has some.
-"""
+"""Detect that a sheet differs from the board's document although its markers fit."""
 
 from __future__ import annotations
 
@@ -12,34 +7,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.cameras.optics import Intrinsics
-from burg_drake.cameras.pose.detection import BORDER_ERRORS, CORRECTED
-from burg_drake.cameras.pose.edge_projection import NEAREST
-from burg_drake.cameras.pose.quadrilaterals import read_cells
+from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.cameras.pose.edge_measurement import MIN_VISIBLE_DEPTH
+from burg_drake.cameras.pose.marker_detection import (
+    MAX_BIT_CORRECTION,
+    MAX_BORDER_ERRORS,
+    read_cells,
+)
 from burg_drake.core import Array
-from burg_drake.scene.document import Board, marker_dictionary
+from burg_drake.scene import Board, marker_dictionary
 
-FRAME = 0.4
-"""Least difference of a marker's border and the white around it, as a share of the latter's light;
-blur takes a part of it."""
-FRAME_SIDES = 3
-"""Sides of four on which a place must look like a marker's border to be read."""
-FEWEST = 2
-"""Markers beyond the document's that make another board: with other ids each, on its own grid,
-upright, they are no chance."""
-FEWEST_BLANK = 3
-"""Places of a row or column that must be in the image, or all, if it has fewer."""
-POINTS_PER_AXIS = 4
-"""Points along both axes at which a place must be blank, the first and last on the border."""
-BLANK = 0.35
-"""Most that light from the place of a marker may differ from paper's nearby, as a share of it."""
-FIELD_OF_VIEW = 1.02
-"""Slopes of rays that are looked at, by those of the image's corners; the model of a lens may fold
-farther ones back into the image."""
-SIDES = np.array([[0.0, 1.0], [1.0, 0.0], [0.0, -1.0], [-1.0, 0.0]])
-"""Directions from a marker's middle to its sides."""
-SQUARE = np.array([[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]])
-"""A marker's corners from its middle [half sides], in the order of the layout's."""
+SIDE_DIRECTIONS = np.array([[0.0, 1.0], [1.0, 0.0], [0.0, -1.0], [-1.0, 0.0]])
+"""From a marker's middle to its sides."""
+CORNER_DIRECTIONS = np.array([[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]])
+"""From a marker's middle to its corners, in the layout's order."""
 
 
 class WrongBoardCheck:
@@ -52,6 +33,9 @@ class WrongBoardCheck:
     """
 
     def __init__(self, board: Board, intrinsics: Intrinsics, scale: tuple[float, float]) -> None:
+        # Points of a place that must be blank; the outer ones are on its border.
+        points_per_axis = 4
+        field_margin = 1.02  # Slopes of used rays over those of the image's corners.
         layout = board.layout
         self._layout, self._intrinsics = layout, intrinsics
         self._columns = len(np.unique(np.round(layout.p_SQ[:, 0, 0], 9)))
@@ -68,11 +52,13 @@ class WrongBoardCheck:
             intrinsics.height - 1,
         ]
         slopes = (intrinsics.undistort(corners) - intrinsics.center) / intrinsics.focal
-        self._steepest = FIELD_OF_VIEW * float(np.linalg.norm(slopes, axis=1).max())
+        self._steepest = field_margin * float(np.linalg.norm(slopes, axis=1).max())
         cell, gap = 1.0 / layout.cells, board.markers.spacing / layout.side
         # Middles of the border's cells, and the white beside them, in half sides.
-        self._frame = np.concatenate([(1.0 - cell) * SIDES, (1.0 + min(cell, gap)) * SIDES])
-        middles = np.linspace(cell - 1.0, 1.0 - cell, POINTS_PER_AXIS)
+        self._frame = np.concatenate(
+            [(1.0 - cell) * SIDE_DIRECTIONS, (1.0 + min(cell, gap)) * SIDE_DIRECTIONS]
+        )
+        middles = np.linspace(cell - 1.0, 1.0 - cell, points_per_axis)
         self._looks = np.stack(np.meshgrid(middles, middles), axis=-1).reshape(-1, 2)
 
     def beyond(self, grey: NDArray[np.uint8], light: NDArray[np.float32], X_SC: Array) -> str:
@@ -86,14 +72,17 @@ class WrongBoardCheck:
         Returns:
             What is wrong; empty if nothing is.
         """
+        min_frame_contrast = 0.4  # Fraction of the light of the white frame.
+        min_frame_sides = 3  # Sides of four that must look like a marker's border.
+        min_foreign = 2  # Markers beyond the document's that show another board.
         at, seen = self._places(X_SC, self._around, self._frame)
         if not seen.any():
             return ""
-        values = _brightness(light, at[seen])
-        darker = (values[:, :4] < (1.0 - FRAME) * values[:, 4:]).sum(axis=1)
-        suspects = self._around[seen][darker >= FRAME_SIDES]
-        ids = self._read(grey, X_SC, suspects) if len(suspects) >= FEWEST else []
-        if len(ids) < FEWEST:
+        values = _sample_light(light, at[seen])
+        darker = (values[:, :4] < (1.0 - min_frame_contrast) * values[:, 4:]).sum(axis=1)
+        suspects = self._around[seen][darker >= min_frame_sides]
+        ids = self._read(grey, X_SC, suspects) if len(suspects) >= min_foreign else []
+        if len(ids) < min_foreign:
             return ""
         listed = ", ".join(map(str, ids[:3])) + (" ..." if len(ids) > 3 else "")
         return (
@@ -128,22 +117,24 @@ class WrongBoardCheck:
         line: int,
     ) -> bool:
         """All places of a row or column that are in the image are as light as paper all over."""
+        min_blank_places = 3  # Visible places of a row or column, or all of them.
+        max_difference = 0.35  # Fraction of the light of paper nearby.
         every = np.arange(len(self._inside)).reshape(self._rows, self._columns)
         which = every[line] if across else every[:, line]
         at, seen = self._places(X_SC, self._inside[which], self._looks)
-        if seen.sum() < min(FEWEST_BLANK, len(which)):
+        if seen.sum() < min(min_blank_places, len(which)):
             return False
-        values = _brightness(light, at[seen])
-        if (np.ptp(values, axis=1) > 2.0 * BLANK * values.max(axis=1)).any():
+        values = _sample_light(light, at[seen])
+        if (np.ptp(values, axis=1) > 2.0 * max_difference * values.max(axis=1)).any():
             return False
         white, in_image = self._places(X_SC, self._inside[used], self._frame[4:])
         if not in_image.any():
             return False
-        paper = np.median(_brightness(light, white[in_image]), axis=1)
+        paper = np.median(_sample_light(light, white[in_image]), axis=1)
         # Light falls unevenly: the paper beside the nearest markers that are in sight counts.
         away = self._inside[which][seen][:, None] - self._inside[used][in_image]
         nearest = paper[(away**2).sum(axis=2).argmin(axis=1)]
-        return bool((np.abs(values - nearest[:, None]) < BLANK * nearest[:, None]).all())
+        return bool((np.abs(values - nearest[:, None]) < max_difference * nearest[:, None]).all())
 
     def _doubt(self, across: bool, line: int, first: int, last: int) -> str:
         names = ("row", "from the top") if across else ("column", "from the left")
@@ -170,8 +161,10 @@ class WrongBoardCheck:
         p_S = np.zeros((len(middles), len(offsets), 3))
         p_S[..., :2] = middles[:, None] + offsets * self._half
         p_C = (p_S - X_SC[:3, 3]) @ X_SC[:3, :3]
-        z = np.maximum(p_C[..., 2], NEAREST)
-        seen = (p_C[..., 2] > NEAREST) & (np.hypot(p_C[..., 0], p_C[..., 1]) < self._steepest * z)
+        z = np.maximum(p_C[..., 2], MIN_VISIBLE_DEPTH)
+        seen = (p_C[..., 2] > MIN_VISIBLE_DEPTH) & (
+            np.hypot(p_C[..., 0], p_C[..., 1]) < self._steepest * z
+        )
         at = self._intrinsics.project(np.where(seen[..., None], p_C, [0.0, 0.0, 1.0]))
         limit = [self._intrinsics.width - 1, self._intrinsics.height - 1]
         seen &= ((at >= 0.0) & (at <= limit)).all(axis=2)
@@ -179,20 +172,20 @@ class WrongBoardCheck:
 
     def _read(self, grey: NDArray[np.uint8], X_SC: Array, middles: Array) -> list[int]:
         """Numbers of markers that stand upright at places (N, 2), each once."""
-        at, _ = self._places(X_SC, middles, SQUARE)
+        at, _ = self._places(X_SC, middles, CORNER_DIRECTIONS)
         black, _ = read_cells(grey, at, self._layout.cells)
         border = np.pad(np.zeros((self._layout.cells - 2,) * 2, bool), 1, constant_values=True)
         dictionary = marker_dictionary(self._layout.dictionary)
         ids = set()
-        for cells in black[(~black[:, border]).mean(axis=1) <= BORDER_ERRORS]:
+        for cells in black[(~black[:, border]).mean(axis=1) <= MAX_BORDER_ERRORS]:
             bits = np.ascontiguousarray(~cells[1:-1, 1:-1], dtype=np.uint8)
-            found, number, turns = dictionary.identify(bits, CORRECTED)
+            found, number, turns = dictionary.identify(bits, MAX_BIT_CORRECTION)
             if found and turns == 0:
                 ids.add(int(number))
         return sorted(ids)
 
 
-def _brightness(light: NDArray[np.float32], at: Array) -> Array:
+def _sample_light(light: NDArray[np.float32], at: Array) -> Array:
     """(N, M) light at pixels (N, M, 2), bilinear."""
     import cv2
 

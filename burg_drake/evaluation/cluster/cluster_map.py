@@ -1,8 +1,4 @@
-"""Calls of a function on the workers of a cluster, one for each piece of work, in any order.
-
-As in `dispatch` the driver decides who does what. A thread of a worker has one call at a time, as
-each takes seconds. When a worker is lost, its call is made elsewhere.
-"""
+"""Calls of a function on the workers of a cluster, one for each piece of work, in any order."""
 
 from __future__ import annotations
 
@@ -20,18 +16,24 @@ from typing import Any
 from distributed import KilledWorker
 
 from burg_drake.core import BurgError, ClusterError, SimulationError, one_line
-from burg_drake.evaluation.cluster.bundles import Bundle
-from burg_drake.evaluation.cluster.calls import CallAnswer, CallChildren, ClusterCall, make_call
-from burg_drake.evaluation.cluster.delivery import end_run, register_plugin, send_bundle
-from burg_drake.evaluation.cluster.members import ClusterWorkers, lost_scheduler, scheduler_errors
-from burg_drake.evaluation.cluster.sent_job import LOSSES
-from burg_drake.evaluation.cluster.waiting import Waiting
+from burg_drake.evaluation.cluster.bundle import Bundle
+from burg_drake.evaluation.cluster.dispatch import end_run, register_plugin, send_bundle
+from burg_drake.evaluation.cluster.members import (
+    ChunkSettings,
+    ClusterWorkers,
+    WorkerWait,
+    lost_scheduler_error,
+    scheduler_errors,
+)
+from burg_drake.evaluation.cluster.worker_tasks import (
+    CallAnswer,
+    CallChildren,
+    ClusterCall,
+    make_call,
+)
 
-WORKER_POLL_INTERVAL = 1.0
+CALL_POLL_INTERVAL = 1.0
 """Seconds between checks for new and lost workers."""
-RESULT_TIMEOUT = 60.0
-"""Seconds that a result may take to arrive: it may have many megabytes, or its worker may be lost
-by now."""
 
 
 @dataclass(eq=False)
@@ -72,8 +74,8 @@ class ClusterMap:
         self._outcomes: deque[tuple[Any, Any]] = deque()
         self._deliveries: Counter[str] = Counter()
         self._ready: set[str] = set()
-        self._waiting = Waiting(client)
-        self._seen = -WORKER_POLL_INTERVAL
+        self._waiting = WorkerWait(client)
+        self._seen = -CALL_POLL_INTERVAL
 
     def run(
         self, work: Sequence[Any], maintain: Callable[[], None]
@@ -88,7 +90,7 @@ class ClusterMap:
         register_plugin(self._client, self._cluster, CallChildren(self._name))
         try:
             while self._open or self._sent or self._outcomes:
-                if time.monotonic() > self._seen + WORKER_POLL_INTERVAL:
+                if time.monotonic() > self._seen + CALL_POLL_INTERVAL:
                     maintain()
                     self._look()
                 self._hand_out(self._cluster.workers)
@@ -154,7 +156,7 @@ class ClusterMap:
         if self._outcomes:
             return
         try:
-            futures = [self._done.get(timeout=WORKER_POLL_INTERVAL)]
+            futures = [self._done.get(timeout=CALL_POLL_INTERVAL)]
         except queue.Empty:
             return
         while not self._done.empty():
@@ -168,8 +170,10 @@ class ClusterMap:
 
     def _take(self, sent: SentCall) -> bool:
         """Deals with what became of a call; whether the worker has to be sent the bundle first."""
+        # Seconds; a result may have many megabytes, or its worker may be lost.
+        result_timeout = 60.0
         try:
-            answer: CallAnswer = sent.future.result(timeout=RESULT_TIMEOUT)
+            answer: CallAnswer = sent.future.result(timeout=result_timeout)
         except KilledWorker:
             self._take_back(sent, blamed=True)
             return False
@@ -182,7 +186,7 @@ class ClusterMap:
             raise ClusterError(f"worker {sent.address}: {one_line(error)}") from error
         if answer.missing or answer.ended:
             self._take_back(sent)
-            self._seen = -WORKER_POLL_INTERVAL
+            self._seen = -CALL_POLL_INTERVAL
             return answer.missing
         self._ready.add(sent.address)
         found = pickle.loads(answer.result) if answer.error is None else answer.error
@@ -192,7 +196,7 @@ class ClusterMap:
     def _refetch(self, sent: SentCall) -> None:
         """A result did not come: the worker is lost, or the network is slow."""
         if self._client.status != "running":
-            raise lost_scheduler(self._client)
+            raise lost_scheduler_error(self._client)
         self._look()
         if sent.address in self._cluster.workers:
             self._sent[sent.future.key] = sent
@@ -203,7 +207,7 @@ class ClusterMap:
     def _take_back(self, sent: SentCall, *, blamed: bool = False) -> None:
         """Has work done by another worker, unless too many were lost at it."""
         losses = sent.losses + blamed
-        if losses < LOSSES:
+        if losses < ChunkSettings.max_losses:
             self._open.appendleft((sent.work, losses))
             return
         reason = (

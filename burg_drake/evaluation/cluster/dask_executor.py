@@ -1,27 +1,71 @@
-"""Judges jobs, and calls functions, on a cluster of Dask."""
+"""Judges jobs, and calls functions, on a Dask cluster."""
 
 from __future__ import annotations
 
 import contextlib
 import logging
 import queue
+import socket
 import threading
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
+from urllib.parse import urlsplit
 
-from burg_drake.core import ClusterError, MissingDependencyError
-from burg_drake.core.grasps import Verdict
+from burg_drake.core import ClusterError, MissingDependencyError, Verdict
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.cluster.bundles import Bundle
-from burg_drake.evaluation.cluster.connection_failure import unreached_reason
-from burg_drake.evaluation.cluster.document import Cluster, TlsFiles, read_cluster, require_safe
-from burg_drake.evaluation.workers import Job, OnFailure, WorkerLimits
+from burg_drake.evaluation.cluster.bundle import Bundle
+from burg_drake.evaluation.cluster.document import (
+    Cluster,
+    TlsFiles,
+    read_cluster,
+    require_safe_address,
+)
+from burg_drake.evaluation.executor import Job, OnFailure, WorkerLimits
 
-REACH = 5.0
-"""Time in which a scheduler has to be reached [s]."""
-HANDSHAKES = 3
-"""So many times longer a connection may take whose steps all keep to that time."""
+
+def connection_failure_reason(where: object, error: BaseException) -> str:
+    """A reason in one line.
+
+    Args:
+        where: the address that was tried; of anything else no more is known than the error says.
+        error: of Dask.
+    """
+    connect_timeout = 2.0  # Seconds.
+    words = _innermost_error(error)
+    if not isinstance(where, str):
+        return words
+    parts = urlsplit(where)
+    try:
+        socket.create_connection(
+            (parts.hostname or "", parts.port or 0), timeout=connect_timeout
+        ).close()
+    except ConnectionRefusedError:
+        return "nobody listens there (connection refused)"
+    except socket.gaierror:
+        return f"there is no machine with the name {parts.hostname}"
+    except TimeoutError:
+        return "the machine does not answer; is it off, or does a firewall block the connection?"
+    except OSError as refused:
+        return refused.strerror or words
+    return (
+        "something listens there, but does not answer like a scheduler with "
+        f"{parts.scheme}:// ({words})"
+    )
+
+
+def _innermost_error(error: BaseException) -> str:
+    """Of an error and its causes the innermost one that has words."""
+    words = type(error).__name__
+    cause: BaseException | None = error
+    while cause is not None:
+        words = " ".join(str(cause).split()) or words
+        cause = cause.__cause__
+    return words
+
+
+SCHEDULER_TIMEOUT = 5.0
+"""Seconds in which a scheduler has to answer."""
 Work = TypeVar("Work")
 Result = TypeVar("Result")
 
@@ -45,7 +89,7 @@ class DaskExecutor:
 
         Args:
             client: a `distributed.Client`; what it is connected to has to be safe, see
-                `require_safe`.
+                `require_safe_address`.
             limits: the usual ones if None.
             maintain: called from time to time while grasps are judged, such as to restart workers.
 
@@ -55,9 +99,9 @@ class DaskExecutor:
         from burg_drake.evaluation.cluster.members import scheduler_errors
 
         address = client.scheduler.address if client.scheduler is not None else ""
-        require_safe(address, "the scheduler at ")
+        require_safe_address(address, "the scheduler at ")
         with scheduler_errors(client):  # it may listen elsewhere, too, than where it was reached
-            require_safe(client.scheduler_info()["address"], "the scheduler listens at ")
+            require_safe_address(client.scheduler_info()["address"], "the scheduler listens at ")
         self.client = client
         self.limits = limits or WorkerLimits()
         self.maintain = maintain
@@ -89,7 +133,7 @@ def map_on_cluster(
     bundle: Bundle,
     pack: Callable[[Work], Any],
 ) -> Generator[tuple[Work, Result | BaseException], None, None]:
-    """Results of a function as they come, as `core.workers.map_unordered` gives them.
+    """Results of a function as they come, as `core.map_unordered` gives them.
 
     Args:
         executor: the cluster.
@@ -133,37 +177,38 @@ def connect_cluster(cluster: str, limits: WorkerLimits | None = None) -> Iterato
         raise MissingDependencyError(
             "a cluster needs Dask: pip install burg-drake[dask]"
         ) from error
-    quiet = dask.config.set({"distributed.comm.timeouts.connect": f"{REACH:g}s"})
-    with quiet, _without_its_log(), contextlib.ExitStack() as stack:
+    quiet = dask.config.set({"distributed.comm.timeouts.connect": f"{SCHEDULER_TIMEOUT:g}s"})
+    with quiet, _silence_dask_log(), contextlib.ExitStack() as stack:
         maintain: Callable[[], None] = lambda: None  # noqa: E731
         where: Any
-        security = _security(distributed, asked)
+        security = _tls_security(distributed, asked)
         if asked.local:
-            from burg_drake.evaluation.cluster.local_nodes import LocalNodes
+            from burg_drake.evaluation.cluster.node import LocalNodes
 
             nodes = LocalNodes(asked.local)
             stack.callback(nodes.close)
             where, maintain = nodes.address, nodes.restart_workers
         elif asked.document is not None and asked.document.jobqueue is not None:
-            from burg_drake.evaluation.cluster.jobqueue import start_jobqueue
+            from burg_drake.evaluation.cluster.document import start_jobqueue
 
             where = stack.enter_context(start_jobqueue(asked, security))
             security = where.security
         else:
             assert asked.document is not None
             where = asked.document.address
-        client = _client(distributed, where, security)
-        stack.callback(_leave, client)
+        client = _make_client(distributed, where, security)
+        stack.callback(_close_client, client)
         yield DaskExecutor(client, limits, maintain)
 
 
-def _client(distributed: Any, where: Any, security: Any) -> Any:
+def _make_client(distributed: Any, where: Any, security: Any) -> Any:
     """A client of the scheduler. Dask's own time-out does not cover what a listener that stays
     silent never answers, hence a thread that is left behind then."""
+    timeout_factor = 3  # A connection takes several steps, each of which keeps to the timeout.
     made: queue.SimpleQueue[Any] = queue.SimpleQueue()
 
     def make() -> None:
-        options = {"timeout": REACH, "security": security, "set_as_default": False}
+        options = {"timeout": SCHEDULER_TIMEOUT, "security": security, "set_as_default": False}
         try:
             made.put(distributed.Client(where, **options))
         except BaseException as error:
@@ -171,31 +216,31 @@ def _client(distributed: Any, where: Any, security: Any) -> Any:
 
     threading.Thread(target=make, name="client", daemon=True).start()
     try:
-        found = made.get(timeout=HANDSHAKES * REACH)
+        found = made.get(timeout=timeout_factor * SCHEDULER_TIMEOUT)
     except queue.Empty:
         found = TimeoutError("no answer")
     if isinstance(found, (OSError, TimeoutError, ValueError, RuntimeError, TypeError)):
         raise ClusterError(
-            f"no Dask scheduler answered at {where} within {REACH:.0f} s: "
-            f"{unreached_reason(where, found)}"
+            f"no Dask scheduler answered at {where} within {SCHEDULER_TIMEOUT:.0f} s: "
+            f"{connection_failure_reason(where, found)}"
         ) from found
     if isinstance(found, BaseException):
         raise found
     return found
 
 
-def _leave(client: Any) -> None:
+def _close_client(client: Any) -> None:
     with contextlib.suppress(Exception):  # of a scheduler that is gone
-        client.close(timeout=REACH)
+        client.close(timeout=SCHEDULER_TIMEOUT)
 
 
-def _security(distributed: Any, cluster: Cluster) -> Any:
+def _tls_security(distributed: Any, cluster: Cluster) -> Any:
     """TLS of the files that the cluster file names, or else of Dask's configuration."""
     document, files = cluster.document, cluster.tls
     if document is None or (document.jobqueue is not None and files is None):
         return None
     if files is not None:
-        return _of_files(distributed, files)
+        return _security_from_files(distributed, files)
     if document.address.startswith("tls://"):
         security = distributed.Security(require_encryption=True)
         if security.tls_ca_file is None:
@@ -208,7 +253,7 @@ def _security(distributed: Any, cluster: Cluster) -> Any:
     return None
 
 
-def _of_files(distributed: Any, files: TlsFiles) -> Any:
+def _security_from_files(distributed: Any, files: TlsFiles) -> Any:
     return distributed.Security(
         tls_ca_file=files.ca,
         tls_client_cert=files.cert,
@@ -222,7 +267,7 @@ def _of_files(distributed: Any, files: TlsFiles) -> Any:
 
 
 @contextlib.contextmanager
-def _without_its_log() -> Iterator[None]:
+def _silence_dask_log() -> Iterator[None]:
     """What Dask would say of lost connections is said by our errors, in one line."""
     # Dask's configuration gives the second one a level of its own
     logs = [logging.getLogger(name) for name in ("distributed", "distributed.client")]

@@ -1,40 +1,148 @@
-"""Hands the grasps of jobs out to the workers of a cluster and collects what becomes of them.
-
-The driver decides who does what: each chunk is for one worker, and Dask only carries it there. So
-a worker that is lost takes nothing along but the chunk that it was at. As long as it may be the
-machine that failed, no grasp is blamed: the grasps of that chunk travel again, one by one.
-"""
+"""Sends bundles and chunks of grasps to the workers of a cluster, and collects their verdicts."""
 
 from __future__ import annotations
 
 import queue
 import time
 import uuid
+from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from typing import Any
 
 from distributed import KilledWorker
 
-from burg_drake.core import BurgError, ClusterError, SimulationError, one_line
-from burg_drake.core.grasps import Outcome, Stage, Verdict
+from burg_drake.core import (
+    BurgError,
+    ClusterError,
+    Outcome,
+    SimulationError,
+    Stage,
+    Verdict,
+    one_line,
+)
 from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.cluster.delivery import deliver_bundle, end_run, register_plugin
+from burg_drake.evaluation.cluster.bundle import Bundle
 from burg_drake.evaluation.cluster.members import (
+    CONNECTION_ERRORS,
+    ChunkSettings,
     ClusterWorker,
     ClusterWorkers,
-    lost_scheduler,
+    SentChunk,
+    SentJob,
+    WorkerWait,
+    lost_scheduler_error,
     scheduler_errors,
 )
-from burg_drake.evaluation.cluster.remote import Answers, Chunk, Supervisor, judge_chunk
-from burg_drake.evaluation.cluster.sent_job import LOSSES, SentChunk, SentJob
-from burg_drake.evaluation.cluster.waiting import Waiting
-from burg_drake.evaluation.workers import Answer, Job, JobFailed, OnFailure, WorkerLimits
+from burg_drake.evaluation.cluster.worker_tasks import (
+    Chunk,
+    ChunkAnswers,
+    Supervisor,
+    judge_chunk,
+    unpack_on_worker,
+)
+from burg_drake.evaluation.executor import Answer, Job, JobFailed, OnFailure, WorkerLimits
+
+DELIVERY_ATTEMPTS = 3
+"""Number of times that a worker is sent what it needs to begin."""
+
+
+def register_plugin(client: Any, cluster: ClusterWorkers, plugin: Any) -> None:
+    """Has the workers, and those that join later, begin a run. A worker that dies meanwhile is no
+    reason to stop.
+
+    Args:
+        client: of Dask.
+        cluster: the workers; looked at before anything is registered where others would not know
+            it.
+        plugin: of Dask's workers, with the `name` of the run.
+
+    Raises:
+        ClusterError: as `ClusterWorkers.update`.
+    """
+    retry_interval = 1.0  # Seconds between attempts.
+    for attempt in range(1, DELIVERY_ATTEMPTS + 1):
+        cluster.update()
+        try:
+            client.register_plugin(plugin, name=plugin.name)
+            return
+        except CONNECTION_ERRORS as error:
+            if client.status != "running" or attempt == DELIVERY_ATTEMPTS:
+                raise lost_scheduler_error(client) from error
+            time.sleep(retry_interval)
+
+
+def end_run(client: Any, name: str, futures: Sequence[Any]) -> None:
+    """Gives up what is under way, and ends the children of a run.
+
+    Args:
+        client: of Dask.
+        name: of the run's plugin.
+        futures: of Dask.
+    """
+    if client.status != "running":
+        return
+    try:
+        client.cancel(list(futures), force=True)
+        client.unregister_worker_plugin(name)
+    except CONNECTION_ERRORS:
+        pass  # the scheduler is lost, and its workers end with it
+
+
+def deliver_bundle(client: Any, job: SentJob, addresses: Sequence[str]) -> None:
+    """Sends it; a worker that lacks it nonetheless, after some attempts, is told of.
+
+    Args:
+        client: of Dask.
+        job: has a bundle.
+        addresses: of the workers.
+
+    Raises:
+        ClusterError: a worker cannot unpack it, or does not keep it; or the scheduler is lost.
+    """
+    assert job.bundle is not None
+    send_bundle(client, job.bundle, f"the scene {job.job.key!r}", job.deliveries, addresses)
+
+
+def send_bundle(
+    client: Any, bundle: Bundle, what: str, deliveries: Counter[str], addresses: Sequence[str]
+) -> None:
+    """Sends a bundle; a worker that lacks it nonetheless, after some attempts, is told of.
+
+    Args:
+        client: of Dask.
+        bundle: with its data.
+        what: it is, for people.
+        deliveries: how often it was sent, by the worker's address; counted on.
+        addresses: of the workers.
+
+    Raises:
+        ClusterError: as `deliver_bundle`.
+    """
+    if not addresses:
+        return
+
+    def refusal(address: str, why: str) -> ClusterError:
+        return ClusterError(f"worker {address} did not receive {what}: {why}")
+
+    for address in addresses:
+        deliveries[address] += 1
+        if deliveries[address] > DELIVERY_ATTEMPTS:
+            raise refusal(address, "its files are not there afterwards")
+    with scheduler_errors(client):
+        errors = client.run(
+            unpack_on_worker, bundle.data, bundle.name, workers=list(addresses), on_error="return"
+        )
+    for address, error in errors.items():
+        if isinstance(error, CONNECTION_ERRORS) and deliveries[address] < DELIVERY_ATTEMPTS:
+            continue  # a look will tell whether the worker is lost
+        if isinstance(error, BaseException):
+            why = str(error) if isinstance(error, BurgError) else one_line(error)
+            raise refusal(address, why)
+
 
 WORKER_POLL_INTERVAL = 1.0
 """Seconds between checks for new and lost workers."""
-RESULT_TIMEOUT = 3.0
-"""Seconds that a result may take to arrive; its worker may be lost by now."""
 
 
 class Dispatch:
@@ -60,7 +168,7 @@ class Dispatch:
         self._on_failure: OnFailure | None = None
         self._exhausted = False
         self._seen = -WORKER_POLL_INTERVAL
-        self._waiting = Waiting(client)
+        self._waiting = WorkerWait(client)
 
     def run(
         self, jobs: Iterable[Job | None], on_failure: OnFailure | None
@@ -159,6 +267,7 @@ class Dispatch:
 
     def collect(self) -> Iterator[Answer]:
         """Waits a while for what comes, and takes all that has come."""
+        result_timeout = 3.0  # Seconds; the worker may be lost by now.
         try:
             futures = [self._done.get(timeout=WORKER_POLL_INTERVAL)]
         except queue.Empty:
@@ -171,7 +280,7 @@ class Dispatch:
                 continue  # was taken back
             chunk, worker = self._sent[future.key]
             try:
-                answers: Answers = future.result(timeout=RESULT_TIMEOUT)
+                answers: ChunkAnswers = future.result(timeout=result_timeout)
             except KilledWorker:
                 self.forget(chunk, worker)
                 yield from self.doubt(chunk)
@@ -180,7 +289,7 @@ class Dispatch:
                 self._refetch(future, worker)
                 continue
             except CancelledError:  # by the loss of the scheduler, or by somebody else
-                answers = Answers(ended=True)
+                answers = ChunkAnswers(ended=True)
             except Exception as error:
                 raise ClusterError(f"worker {worker.address}: {one_line(error)}") from error
             self.forget(chunk, worker)
@@ -198,7 +307,7 @@ class Dispatch:
             there = [a for a in dict.fromkeys(addresses) if a in self.cluster.workers]
             deliver_bundle(self.client, job, there)
 
-    def take(self, chunk: SentChunk, answers: Answers) -> Iterator[Answer]:
+    def take(self, chunk: SentChunk, answers: ChunkAnswers) -> Iterator[Answer]:
         """Passes the verdicts of a chunk on."""
         job = chunk.job
         judged = set()
@@ -244,7 +353,9 @@ class Dispatch:
             what: the last worker did, for people.
         """
         for grasp in chunk.suspect(chunk.grasps if grasps is None else grasps):
-            reason = f"{LOSSES} workers of the cluster {what}, one after the other"
+            reason = (
+                f"{ChunkSettings.max_losses} workers of the cluster {what}, one after the other"
+            )
             failed = Outcome.SIMULATION_FAILED
             yield (
                 chunk.job.job,
@@ -272,7 +383,7 @@ class Dispatch:
     def _refetch(self, future: Any, worker: ClusterWorker) -> None:
         """A result did not come: the worker is lost, which a look will tell, or is busy."""
         if self.client.status != "running":
-            raise lost_scheduler(self.client)
+            raise lost_scheduler_error(self.client)
         if worker.address in self.cluster.workers:
             self._done.put(future)
         self._seen = -WORKER_POLL_INTERVAL

@@ -1,24 +1,27 @@
-"""The cluster document: where a cluster of Dask is, or how a batch system is to start one."""
+"""The cluster document: address of a running Dask scheduler, or how a batch system starts one."""
 
 from __future__ import annotations
 
 import ipaddress
 import re
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
-from burg_drake.core import ClusterError, FieldError, InvalidInputError, quoted
-from burg_drake.core.documents import load_document
-from burg_drake.core.paths import resolve
-
-LOCAL = re.compile(r"local:(\d{1,4})")
-ADDRESS = re.compile(r"(tls|tcp)://(\[[^\]]+\]|[^:/\s]+):(\d{1,5})")
-MAX_PORT = 65_535
-HOW_TLS = (
-    "start scheduler and workers with --protocol tls --tls-ca-file CA --tls-cert CERT --tls-key"
-    " KEY, and give a cluster.yaml with address: tls://HOST:PORT and tls: {ca, cert, key}"
+from burg_drake.core import (
+    ClusterError,
+    FieldError,
+    InvalidInputError,
+    MissingDependencyError,
+    load_document,
+    quote_value,
+    resolve_reference,
 )
+from burg_drake.evaluation.cluster.node import LOOPBACK
+
+LOCAL_CLUSTER_PATTERN = re.compile(r"local:(\d{1,4})")
+SCHEDULER_ADDRESS_PATTERN = re.compile(r"(tls|tcp)://(\[[^\]]+\]|[^:/\s]+):(\d{1,5})")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,7 +125,7 @@ class ClusterDocument:
         if self.jobqueue is None:
             if self.scale is not None or self.adapt is not None:
                 raise InvalidInputError("scale and adapt belong to a jobqueue, which is missing")
-            require_safe(self.address)
+            require_safe_address(self.address)
             if self.tls is not None and not self.address.startswith("tls://"):
                 raise FieldError(
                     f"address is {self.address}, but tls files are given; write tls://", "address"
@@ -161,30 +164,30 @@ def read_cluster(text: str) -> Cluster:
         DocumentError: the file does not fit the schema.
         UnknownNameError: there is no such file.
     """
-    if found := LOCAL.fullmatch(text):
+    if found := LOCAL_CLUSTER_PATTERN.fullmatch(text):
         if int(found[1]) < 1:
             raise InvalidInputError(f"{text} has no workers; give local:1 or more")
         return Cluster(local=int(found[1]))
     if "://" in text:
-        require_safe(text)
+        require_safe_address(text)
         return Cluster(document=ClusterDocument(address=text))
     if Path(text).suffix not in (".yaml", ".yml"):
         raise InvalidInputError(
-            f"{quoted(text)} is not a cluster; give local:N, tls://HOST:PORT or a cluster.yaml"
+            f"{quote_value(text)} is not a cluster; give local:N, tls://HOST:PORT or a cluster.yaml"
         )
-    path = resolve(text)
+    path = resolve_reference(text)
     document = load_document(path, ClusterDocument)
     tls = document.tls
     if tls is not None:
         found_files = {}
         for name in ("ca", "cert", "key"):
-            file = resolve(getattr(tls, name), base=path.parent)
+            file = resolve_reference(getattr(tls, name), base=path.parent)
             found_files[name] = str(file)
         tls = TlsFiles(**found_files)
     return Cluster(document=document, tls=tls)
 
 
-def require_safe(address: str, prefix: str = "") -> None:
+def require_safe_address(address: str, prefix: str = "") -> None:
     """Refuses an address at which anybody could listen, or run code.
 
     Args:
@@ -196,22 +199,27 @@ def require_safe(address: str, prefix: str = "") -> None:
         InvalidInputError: it is not an address.
         ClusterError: plain TCP beyond this machine.
     """
+    max_port = 65_535
+    tls_instructions = (
+        "start scheduler and workers with --protocol tls --tls-ca-file CA --tls-cert CERT --tls-key"
+        " KEY, and give a cluster.yaml with address: tls://HOST:PORT and tls: {ca, cert, key}"
+    )
     if prefix and address.startswith("inproc://"):
         return
-    found = ADDRESS.fullmatch(address)
+    found = SCHEDULER_ADDRESS_PATTERN.fullmatch(address)
     if found is None:
         what = "worker" if "worker" in prefix else "scheduler"
         raise InvalidInputError(
-            f"{prefix}{quoted(address)} is not an address of a {what}; write tls://HOST:PORT"
+            f"{prefix}{quote_value(address)} is not an address of a {what}; write tls://HOST:PORT"
         )
-    if not 1 <= int(found[3]) <= MAX_PORT:
+    if not 1 <= int(found[3]) <= max_port:
         raise InvalidInputError(
-            f"{prefix}{address}: there is no port {found[3]}; ports go from 1 to {MAX_PORT}"
+            f"{prefix}{address}: there is no port {found[3]}; ports go from 1 to {max_port}"
         )
     if found[1] == "tcp" and not _is_loopback(found[2].strip("[]")):
         raise ClusterError(
             f"{prefix}{address} is not encrypted: whoever reaches this port can run"
-            f" programs as you. {HOW_TLS}"
+            f" programs as you. {tls_instructions}"
         )
 
 
@@ -222,3 +230,86 @@ def _is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return False
+
+
+def start_jobqueue(cluster: Cluster, security: Any) -> Any:
+    """Starts a scheduler here and asks the batch system for workers.
+
+    Args:
+        cluster: with a `jobqueue`.
+        security: of the document's TLS files; None for certificates of passing use.
+
+    Returns:
+        The cluster of dask-jobqueue.
+
+    Raises:
+        MissingDependencyError: dask-jobqueue is not installed, or what makes certificates.
+        ClusterError: it refuses the parameters, or the batch system is not there.
+    """
+    # Class of dask-jobqueue for each batch system.
+    classes = {
+        "slurm": "SLURMCluster",
+        "pbs": "PBSCluster",
+        "sge": "SGECluster",
+        "lsf": "LSFCluster",
+        "htcondor": "HTCondorCluster",
+        "oar": "OARCluster",
+        "moab": "MoabCluster",
+    }
+    document = cluster.document
+    assert document is not None and document.jobqueue is not None
+    try:
+        import dask_jobqueue
+    except ImportError as error:
+        raise MissingDependencyError(
+            "jobqueue in a cluster file needs dask-jobqueue: pip install burg-drake[dask,jobqueue]"
+        ) from error
+    if security is None:
+        try:
+            import cryptography  # noqa: F401
+        except ImportError as error:
+            raise MissingDependencyError(
+                "a jobqueue without tls files makes certificates of its own, which needs"
+                " cryptography: pip install burg-drake[jobqueue], or give tls: {ca, cert, key}"
+            ) from error
+    make = getattr(dask_jobqueue, classes[document.jobqueue.kind])
+    submit = str(make.job_cls.submit_command).split()[0]
+    if shutil.which(submit) is None:
+        raise ClusterError(
+            f"this machine has no {submit}, so jobs cannot be submitted to "
+            f"{document.jobqueue.kind}; run this where jobs are submitted"
+        )
+    try:
+        started = make(security=security or True, **jobqueue_parameters(document.jobqueue))
+        if document.adapt is not None:
+            started.adapt(minimum_jobs=document.adapt.minimum, maximum_jobs=document.adapt.maximum)
+        else:
+            started.scale(jobs=document.scale)
+    except (OSError, ValueError, TypeError, RuntimeError) as error:
+        raise ClusterError(f"{document.jobqueue.kind} does not start a cluster: {error}") from error
+    return started
+
+
+def jobqueue_parameters(queue: JobQueue) -> dict[str, Any]:
+    """Keywords of dask-jobqueue's classes."""
+    named = {
+        "walltime": queue.walltime,
+        "queue": queue.queue,
+        "account": queue.account,
+        "interface": queue.interface,
+        "local_directory": queue.local_directory,
+        "python": queue.python,
+        "log_directory": queue.log_directory,
+        "shared_temp_directory": queue.shared_directory,
+        "job_extra_directives": list(queue.directives),
+        "job_script_prologue": list(queue.prologue),
+    }
+    return {
+        "cores": queue.workers,
+        "processes": queue.workers,
+        "memory": queue.memory,
+        "protocol": "tls://",
+        "worker_extra_args": ["--dashboard-address", f"{LOOPBACK}:0"],
+        "scheduler_options": {"dashboard_address": f"{LOOPBACK}:0"},
+        **{name: value for name, value in named.items() if value},
+    }

@@ -1,29 +1,203 @@
-"""The workers of a cluster that may be used, and what each of them has."""
+"""Workers of a cluster that may be used, and the grasps of jobs that each of them has."""
 
 from __future__ import annotations
 
 import asyncio
 import concurrent.futures
 import contextlib
-from collections.abc import Iterable, Iterator
+import functools
+import time
+import uuid
+from collections import Counter, deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
-from burg_drake.core import BurgError, ClusterError
-from burg_drake.evaluation.cluster.document import require_safe
-from burg_drake.evaluation.cluster.sent_job import DEPTH, SentChunk, SentJob
-from burg_drake.evaluation.cluster.versions import require_same, software
+import burg_drake
+from burg_drake.core import (
+    JUDGING_PACKAGES,
+    BurgError,
+    ClusterError,
+    content_hash,
+    software_versions,
+)
+from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.cluster.bundle import Bundle, make_recipe
+from burg_drake.evaluation.cluster.document import require_safe_address
+from burg_drake.evaluation.executor import Job
+from burg_drake.station import ENGINES
 
-ANSWER = 20.0
-"""A scheduler that does not answer for so long is lost [s]."""
-LOST = (
+
+class ChunkSettings:
+    """Chunk settings."""
+
+    max_grasps = 32  # Dask takes milliseconds per chunk; a lost worker's chunk is judged again.
+    per_thread = 2  # Chunks that a worker's thread has: one under way and one that waits.
+    max_losses = 3  # Workers lost at a grasp, the last ones alone, until it is given up.
+
+
+@dataclass(eq=False)
+class SentJob:
+    """A job under way.
+
+    Attributes:
+        job: the job.
+        waiting: grasps that no worker has.
+        suspects: those among them at which a worker was lost, with the number of workers; each of
+            them travels alone.
+        sent: number of chunks that workers have.
+        false_starts: of children in a row that died while they built the judge.
+        crashes_in_a_row: grasps that ended their children since one was judged.
+        failed: whether it is given up.
+        deliveries: how often its bundle was sent, by the worker's address.
+    """
+
+    job: Job
+    waiting: deque[Candidate] = field(default_factory=deque)
+    suspects: deque[tuple[Candidate, int]] = field(default_factory=deque)
+    sent: int = 0
+    false_starts: int = 0
+    crashes_in_a_row: int = 0
+    failed: bool = False
+    deliveries: Counter[str] = field(default_factory=Counter)
+
+    def __post_init__(self) -> None:
+        self.recipe, self.bundle = make_recipe(self.job.make_judge)
+        self.waiting.extend(self.job.candidates)
+
+    bundle: Bundle | None = field(init=False, default=None)
+
+    @property
+    def left(self) -> int:
+        """Number of grasps that no worker has."""
+        return len(self.waiting) + len(self.suspects)
+
+    def cut(self, threads: int) -> SentChunk:
+        """Takes grasps off for a chunk, fewer as the end comes near.
+
+        Args:
+            threads: number of those that share what is left.
+        """
+        if self.suspects:
+            grasp, losses = self.suspects.popleft()
+            return SentChunk(self, (grasp,), losses)
+        size = min(
+            ChunkSettings.max_grasps, -(-len(self.waiting) // (ChunkSettings.per_thread * threads))
+        )
+        return SentChunk(self, tuple(self.waiting.popleft() for _ in range(size)))
+
+    def give_up(self) -> None:
+        """Forgets what is left."""
+        self.failed = True
+        self.waiting.clear()
+        self.suspects.clear()
+
+
+@dataclass(eq=False)
+class SentChunk:
+    """Grasps that a worker has.
+
+    Attributes:
+        job: of which they are.
+        grasps: the grasps.
+        losses: workers that were lost at the one grasp.
+        future: of Dask.
+        done: whether the worker has judged them; the answers may be lost with it nonetheless.
+    """
+
+    job: SentJob
+    grasps: tuple[Candidate, ...]
+    losses: int = 0
+    future: Any = None
+    done: bool = False
+
+    def take_back(self) -> None:
+        """Returns the grasps to their job, as nothing is known of them."""
+        if self.job.failed:
+            return
+        if self.losses:
+            self.job.suspects.appendleft((self.grasps[0], self.losses))
+        else:
+            self.job.waiting.extendleft(reversed(self.grasps))
+
+    def suspect(self, grasps: Sequence[Candidate]) -> Sequence[Candidate]:
+        """Returns grasps to their job, as each of them may be why a worker was lost.
+
+        Returns:
+            Those with which that has happened too often.
+        """
+        if self.job.failed:
+            return ()
+        if self.losses + 1 >= ChunkSettings.max_losses:
+            return grasps
+        self.job.suspects.extend((grasp, self.losses + 1) for grasp in grasps)
+        return ()
+
+
+@functools.cache
+def deciding_versions() -> dict[str, str]:
+    """Versions by name; of burg_drake also a hash of its code, as releases under way differ."""
+    # Packages that decide about verdicts or images, of all engines.
+    packages = {
+        **JUDGING_PACKAGES,
+        **{name: package for e in ENGINES.values() for name, package in e.packages.items()},
+        "opencv": "opencv-python-headless",
+    }
+    code = code_hash(Path(burg_drake.__file__).parent)
+    return {**software_versions(packages, with_platform=False), "code of burg_drake": code}
+
+
+def code_hash(package: Path) -> str:
+    """Hash of all files of an installed package that decide about results."""
+    code_suffixes = (".py", ".json")  # Modules, and curves of confidences.
+    files = sorted(file for file in package.rglob("*") if file.suffix in code_suffixes)
+    names = [file.relative_to(package).as_posix() for file in files]
+    return content_hash(names, files)[:12]
+
+
+def require_same_versions(workers: Mapping[str, Mapping[str, str] | BaseException]) -> None:
+    """Refuses workers with other versions than ours.
+
+    Args:
+        workers: what `deciding_versions` returned, by the worker's address; an error if it could not.
+
+    Raises:
+        ClusterError: names the first such worker, and how many there are.
+    """
+    ours = deciding_versions()
+    refused = []
+    for address, theirs in workers.items():
+        if isinstance(theirs, BaseException):
+            refused.append(f"worker {address} cannot run burg_drake ({_error_words(theirs)})")
+            continue
+        other = [
+            f"{name} {theirs.get(name, 'none')} (here {version})"
+            for name, version in ours.items()
+            if theirs.get(name) != version
+        ]
+        if other:
+            refused.append(f"worker {address} has {', '.join(other)}")
+    if refused:
+        more = f", and {len(refused) - 1} more differ" if len(refused) > 1 else ""
+        raise ClusterError(
+            f"{refused[0]}{more}; results agree only if all machines have the same"
+            " versions: install the same environment on all of them"
+        )
+
+
+def _error_words(error: BaseException) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split())
+
+
+CONNECTION_ERRORS = (
     OSError,  # with Dask's CommClosedError
     TimeoutError,
     asyncio.TimeoutError,
     concurrent.futures.CancelledError,
     asyncio.CancelledError,
 )
-"""What is raised when the other side is gone."""
+"""Errors that are raised when the other side is gone."""
 
 
 @dataclass(eq=False)
@@ -45,7 +219,7 @@ class ClusterWorker:
     @property
     def room(self) -> int:
         """Number of chunks that it may get."""
-        return DEPTH * self.threads - len(self.chunks)
+        return ChunkSettings.per_thread * self.threads - len(self.chunks)
 
     @property
     def load(self) -> float:
@@ -84,8 +258,8 @@ class ClusterWorkers:
             del self.workers[worker.address]
         new = [address for address in there if address not in self.workers]
         for address in new:
-            require_safe(address, "worker ")
-        for address in admitted(self._client, new):
+            require_safe_address(address, "worker ")
+        for address in check_versions(self._client, new):
             self.workers[address] = ClusterWorker(address, there[address])
         return lost
 
@@ -96,10 +270,13 @@ def threads_by_address(client: Any) -> dict[str, int]:
     Raises:
         ClusterError: it does not answer.
     """
+    answer_timeout = 20.0  # Seconds after which a scheduler that does not answer counts as lost.
     if client.status != "running":  # a scheduler that is started again knows nothing of us
-        raise lost_scheduler(client)
+        raise lost_scheduler_error(client)
     with scheduler_errors(client):
-        found: dict[str, int] = client.sync(client.scheduler.ncores, callback_timeout=ANSWER)
+        found: dict[str, int] = client.sync(
+            client.scheduler.ncores, callback_timeout=answer_timeout
+        )
         return found
 
 
@@ -112,17 +289,17 @@ def scheduler_errors(client: Any) -> Iterator[None]:
     """
     try:
         yield
-    except LOST as error:
-        raise lost_scheduler(client) from error
+    except CONNECTION_ERRORS as error:
+        raise lost_scheduler_error(client) from error
     except BurgError:
         raise
     except Exception as error:  # Dask has no class of its own for a client that was closed
         if client.status == "running":
             raise
-        raise lost_scheduler(client) from error
+        raise lost_scheduler_error(client) from error
 
 
-def lost_scheduler(client: Any) -> ClusterError:
+def lost_scheduler_error(client: Any) -> ClusterError:
     """What is said when it does not answer."""
     address = client.scheduler.address if client.scheduler is not None else "the given address"
     return ClusterError(
@@ -131,7 +308,7 @@ def lost_scheduler(client: Any) -> ClusterError:
     )
 
 
-def admitted(client: Any, addresses: Iterable[str]) -> list[str]:
+def check_versions(client: Any, addresses: Iterable[str]) -> list[str]:
     """Those of some workers that are still there, after a look at their versions.
 
     Raises:
@@ -141,7 +318,43 @@ def admitted(client: Any, addresses: Iterable[str]) -> list[str]:
     if not addresses:
         return []
     with scheduler_errors(client):
-        found = client.run(software, workers=addresses, on_error="return")
+        found = client.run(deciding_versions, workers=addresses, on_error="return")
     gone = {a for a, answer in found.items() if isinstance(answer, OSError)}  # died meanwhile
-    require_same({a: answer for a, answer in found.items() if a not in gone})
+    require_same_versions({a: answer for a, answer in found.items() if a not in gone})
     return [a for a in addresses if a in found and a not in gone]
+
+
+WORKER_TIMEOUT = 600.0
+"""Seconds that a run waits without any worker."""
+
+
+class WorkerWait:
+    """The time without workers; while it lasts a task waits at the scheduler, from which Dask sees
+    that workers are wanted."""
+
+    def __init__(self, client: Any) -> None:
+        self._client = client
+        self._since: float | None = None
+        self._call: Any = None
+
+    def end(self) -> None:
+        """There are workers, or none is needed any more."""
+        self._since = self._call = None
+
+    def go_on(self) -> None:
+        """There is no worker.
+
+        Raises:
+            ClusterError: for too long, or the scheduler is lost.
+        """
+        if self._since is None:
+            self._since = time.monotonic()
+            with scheduler_errors(self._client):
+                key = f"call-{uuid.uuid4().hex}"
+                self._call = self._client.submit(int, key=key, pure=False)
+        if time.monotonic() > self._since + WORKER_TIMEOUT:
+            raise ClusterError(
+                f"the scheduler at {self._client.scheduler.address} has had no worker for"
+                f" {WORKER_TIMEOUT / 60:.0f} minutes; the results so far are kept: start"
+                " workers and run the same command to continue"
+            )

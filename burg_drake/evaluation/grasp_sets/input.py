@@ -1,23 +1,178 @@
-"""Grasps to work on: a file of any project, or the folder of a run; and the hand they are for."""
+"""Grasps to work on: a file of any project or the folder of a run, and the hand that they are for."""
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from burg_drake.core import InvalidInputError
-from burg_drake.core.grasps import GraspSet, parts_of
-from burg_drake.core.paths import is_resolved
-from burg_drake.evaluation.grasp_sets.pose_mistakes import check_corrections, corrected
-from burg_drake.evaluation.grasp_sets.run_set import run_documents, run_grasps
-from burg_drake.evaluation.records import is_table
-from burg_drake.evaluation.store import load_run
-from burg_drake.formats import FORMATS, format_of, read_grasp_file
-from burg_drake.formats.common import PANDA, Gripper, ImportedGrasps
+import numpy as np
+from numpy.typing import NDArray
 
-OURS = "burg_drake"
+from burg_drake.core import (
+    INPUT_PREFIX,
+    BurgError,
+    GraspSet,
+    InvalidInputError,
+    Outcome,
+    UnknownNameError,
+    is_resolved,
+    load_document,
+    provenance_parts,
+    software_versions,
+    suggest_names,
+)
+from burg_drake.evaluation.candidates import INSTANCE_COLUMN
+from burg_drake.evaluation.grasp_sets.pose_mistakes import check_corrections, correct_grasps
+from burg_drake.evaluation.results_table import TEXT_COLUMNS
+from burg_drake.evaluation.run_folder import SCENE_FILE, STATION_FILE, Run, load_run
+from burg_drake.evaluation.table_file import is_table
+from burg_drake.formats import (
+    GRASP_FORMATS,
+    PANDA_GRIPPER,
+    Gripper,
+    ImportedGrasps,
+    format_of,
+    read_grasp_file,
+)
+from burg_drake.objects import ObjectLibrary
+from burg_drake.scene import Scene
+from burg_drake.station import Hand, Station, StationDocument, locate_hand
+from burg_drake.visualization import OUTCOME_GROUPS, outcome_group
+
+
+def set_documents(
+    library: ObjectLibrary, scene: Scene | None, station: Station, objects: Iterable[str]
+) -> dict[str, Any]:
+    """Documents, the content that they had, and versions of the software, as JSON values.
+
+    Args:
+        library: has the objects.
+        scene: where they stand; then it is named, else the library.
+        station: whose hand it is.
+        objects: names of those that there are grasps of.
+    """
+    kind, document = ("library", library.root) if scene is None else ("scene", scene.path)
+    return {
+        kind: str(document.resolve()),
+        "station": str(station.path.resolve()),
+        "hand": hand_entry(station.hand, station.hand_path),
+        "content": {
+            **({} if scene is None else {"scene": scene.content}),
+            "station": station.content,
+            "objects": {name: library.entry(name).build for name in objects},
+        },
+        "versions": software_versions(),
+    }
+
+
+def hand_entry(hand: Hand, document: Path | None) -> dict[str, str]:
+    """How a provenance names the hand that grasps are for."""
+    return {"name": hand.name, **({"document": str(document.resolve())} if document else {})}
+
+
+def object_files(library: ObjectLibrary, objects: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Mesh and physics of objects, under the names that `formats.grasp_conversion` knows."""
+    return {name: _object_entry(library, name) for name in objects}
+
+
+def _object_entry(library: ObjectLibrary, object: str) -> dict[str, Any]:
+    entry = library.entry(object)
+    return {
+        "file": str(library.path(entry.surface or entry.mesh).resolve()),
+        "scale": 1.0,
+        "mass": entry.mass,
+        "com": list(entry.mass_properties.center_of_mass),
+        "friction": entry.friction,
+    }
+
+
+def run_grasps(run: Run) -> GraspSet:
+    """All grasps of a run, in order, judged or not.
+
+    Args:
+        run: complete or not.
+
+    Returns:
+        The grasps with the column `instance` and those of the results table, see
+        `evaluation.results_table`; NaN or empty for grasps that are not judged yet. What came with
+        the grasps has its own name, and begins with `INPUT_PREFIX` only where the run has a column
+        of that name. The identifier of a grasp is the run's without the instance. The provenance
+        names the run, its copies of scene and station, and the hand, and describes the objects.
+    """
+    # Columns of the results that a grasp set has as attributes.
+    own_columns = ("id", "object", "width", "score", "X_OG", *"xyz", "qw", "qx", "qy", "qz")
+    candidates, results = run.candidates, run.results
+    row = {id: i for i, id in enumerate(candidates.id)}
+    judged = np.array([row[id] for id in results["id"].tolist()], dtype=int)
+    columns = {}
+    for name, values in results.items():
+        given = name.startswith(INPUT_PREFIX) and name.removeprefix(INPUT_PREFIX) not in results
+        if name in own_columns or given:
+            continue
+        text = name in TEXT_COLUMNS or values.dtype.kind == "U"
+        filled = np.full(len(candidates), "" if text else np.nan, values.dtype if text else float)
+        filled[judged] = values
+        columns[name] = filled
+    columns["instance"] = candidates.instance
+    grasps = candidates.grasps
+    return dataclasses.replace(
+        grasps,
+        columns={**grasps.columns, **columns},
+        provenance={**grasps.provenance, **run_documents(run)},
+    )
+
+
+def result_column(grasps: GraspSet, name: str) -> str:
+    """The column of `run_grasps` that goes by a name of the results table."""
+    plain = name.removeprefix(INPUT_PREFIX)
+    return plain if name not in grasps.column_names and plain in grasps.column_names else name
+
+
+def run_documents(run: Run) -> dict[str, Any]:
+    """What the provenance of a run's grasps names; without the hand and the objects where those
+    are gone or have changed since."""
+    folder = run.path.resolve()
+    named: dict[str, Any] = {
+        "run": str(folder),
+        "scene": str(folder / SCENE_FILE),
+        "station": str(folder / STATION_FILE),
+    }
+    with contextlib.suppress(BurgError):
+        document = load_document(folder / STATION_FILE, StationDocument)
+        hand, _, path = locate_hand(document.hand, folder)
+        named["hand"] = hand_entry(hand, path)
+    with contextlib.suppress(BurgError):
+        scene = run.scene()
+        objects = sorted({instance.object for instance in scene.instances.values()})
+        named["object_files"] = object_files(scene.library, objects)
+    return named
+
+
+def split_by_instance(grasps: GraspSet) -> dict[str, GraspSet]:
+    """Grasps of a file that names instances, each set with its own provenance."""
+    owner = grasps.columns[INSTANCE_COLUMN]
+    given = grasps.provenance.get("parts")
+    parts = given if isinstance(given, Mapping) else {}
+    rest = without_instance(grasps)
+    found = {}
+    for name in dict.fromkeys(owner.tolist()):
+        part = parts.get(name)
+        provenance = part if isinstance(part, Mapping) else {}
+        found[name] = dataclasses.replace(rest.select(owner == name), provenance=provenance)
+    return found
+
+
+def without_instance(grasps: GraspSet) -> GraspSet:
+    """The same grasps without the column that candidates have in their own way."""
+    columns = {name: values for name, values in grasps.columns.items() if name != INSTANCE_COLUMN}
+    return dataclasses.replace(grasps, columns=columns)
+
+
+OWN_FORMAT = "burg_drake"
 """The format in which sets name their hand."""
 
 
@@ -54,13 +209,16 @@ def read_input(
             " their outcomes"
         )
     else:
-        imported = read_grasp_file(path, format, gripper or PANDA)
-    imported = corrected(imported, gripper or PANDA, correction)
+        imported = read_grasp_file(path, format, gripper or PANDA_GRIPPER)
+    imported = correct_grasps(imported, gripper or PANDA_GRIPPER, correction)
     hand = hand_of(imported.grasps)
     if hand is None:
-        if path.is_dir() or (format or format_name(path)) == OURS:
+        if path.is_dir() or (format or format_name(path)) == OWN_FORMAT:
             return imported
-        provenance = {**imported.grasps.provenance, "hand": {"name": (gripper or PANDA).name}}
+        provenance = {
+            **imported.grasps.provenance,
+            "hand": {"name": (gripper or PANDA_GRIPPER).name},
+        }
         grasps = dataclasses.replace(imported.grasps, provenance=provenance)
         return dataclasses.replace(imported, grasps=grasps)
     if gripper is None or hand["name"] == gripper.name:
@@ -74,21 +232,21 @@ def read_input(
 
 def format_name(path: str | Path) -> str:
     """Name of the format that a file's content is of; a run's grasps are in ours."""
-    return OURS if Path(path).is_dir() else format_of(path).name
+    return OWN_FORMAT if Path(path).is_dir() else format_of(path).name
 
 
 def hand_of(grasps: GraspSet) -> dict[str, str] | None:
     """The hand that a set is for: its name and, where it is known, the path of its document."""
-    hands = _hands(grasps.provenance)
+    hands = _hands_of(grasps.provenance)
     return hands[0] if len({hand["name"] for hand in hands}) == 1 else None
 
 
-def _hands(provenance: Mapping[str, Any]) -> list[dict[str, str]]:
+def _hands_of(provenance: Mapping[str, Any]) -> list[dict[str, str]]:
     """The hand that a provenance names, or else those of its parts."""
     hand = provenance.get("hand")
     if isinstance(hand, Mapping) and isinstance(hand.get("name"), str):
         return [{key: value for key, value in hand.items() if isinstance(value, str)}]
-    return [hand for part in parts_of(provenance) for hand in _hands(part)]
+    return [hand for part in provenance_parts(provenance) for hand in _hands_of(part)]
 
 
 def hand_reference(path: str | Path) -> str | None:
@@ -99,7 +257,7 @@ def hand_reference(path: str | Path) -> str | None:
     if path.is_dir():
         hand = run_documents(load_run(path)).get("hand")
     else:
-        grasps = _ours(path)
+        grasps = _read_own_format(path)
         hand = None if grasps is None else hand_of(grasps)
     if hand is None:
         return None
@@ -114,12 +272,103 @@ def station_reference(path: str | Path) -> str | None:
     path = Path(path)
     if path.is_dir():
         return str(run_documents(load_run(path))["station"])
-    grasps = _ours(path)
+    grasps = _read_own_format(path)
     station = None if grasps is None else grasps.provenance.get("station")
     return station if isinstance(station, str) else None
 
 
-def _ours(path: Path) -> GraspSet | None:
+def _read_own_format(path: Path) -> GraspSet | None:
     """The grasps of a file of ours."""
-    is_ours = path.is_file() and FORMATS[OURS].recognises(path)
+    is_ours = path.is_file() and GRASP_FORMATS[OWN_FORMAT].recognises(path)
     return GraspSet.load(path) if is_ours else None
+
+
+@dataclass(frozen=True, eq=False)
+class RankedGrasps:
+    """Grasps, best first.
+
+    Attributes:
+        order: (N,) their indices.
+        by: what they are ranked by, for people; empty if nothing tells them apart.
+    """
+
+    order: NDArray[np.int64]
+    by: str
+
+
+def rank_run_grasps(run: Run, grasps: GraspSet) -> RankedGrasps:
+    """Those of a run: lifted ones as `Run.best` has them, then by the groups of their outcomes, as
+    legends list them: held ones before lost ones, and those before what was not executed.
+
+    Args:
+        run: the run.
+        grasps: of the run, as a set.
+    """
+    row = {id: i for i, id in enumerate(run.candidates.id)}
+    best = [row[id] for id in run.best(len(row))]
+    outcomes = grasps.column("outcome").tolist()
+    groups = [outcome_group(Outcome(text) if text else None) for text in outcomes]
+    places = [
+        OUTCOME_GROUPS.index(group) if group in OUTCOME_GROUPS else len(OUTCOME_GROUPS)
+        for group in groups
+    ]
+    rest = np.argsort(places, kind="stable")
+    order = np.concatenate([np.array(best, dtype=np.int64), rest[~np.isin(rest, best)]])
+    return RankedGrasps(order, "outcome, lifted ones by the room around the hand")
+
+
+def rank_by_score(grasps: GraspSet) -> RankedGrasps:
+    """Those of a set, by score; unknown scores last."""
+    if not np.isfinite(grasps.score).any():
+        return RankedGrasps(np.arange(len(grasps)), "")
+    order = np.argsort(-np.where(np.isfinite(grasps.score), grasps.score, -np.inf), kind="stable")
+    quality = grasps.provenance.get("quality")
+    by = quality.get("by") if isinstance(quality, dict) else None
+    return RankedGrasps(order, f"score ({by})" if by else "score")
+
+
+def best_of_each(
+    holder: NDArray[np.str_], among: NDArray[np.bool_], ranking: RankedGrasps, most: int | None
+) -> list[int]:
+    """The best grasps of each object, best first; taken evenly where nothing tells them apart.
+
+    Args:
+        holder: (N,) object or instance of each grasp.
+        among: (N,) which grasps there are to choose from.
+        ranking: of all N.
+        most: of each object; all if None.
+
+    Returns:
+        Their indices, object by object in the order of the set.
+    """
+    chosen: list[int] = []
+    for name in dict.fromkeys(holder[among].tolist()):
+        members = ranking.order[(among & (holder == name))[ranking.order]]
+        count = len(members) if most is None else min(len(members), most)
+        places = range(count) if ranking.by else (k * len(members) // count for k in range(count))
+        chosen += [int(members[k]) for k in places]
+    return chosen
+
+
+def grasp_index(grasps: GraspSet, id: str, where: str) -> int:
+    """The grasp of an identifier, with or without its instance in front.
+
+    Raises:
+        UnknownNameError: there is none, or one for each of several instances.
+    """
+    names = shown_ids(grasps)
+    if id in names:
+        return names.index(id)
+    same = [k for k, own in enumerate(grasps.id.tolist()) if own == id]
+    if len(same) == 1:
+        return same[0]
+    known = [names[k] for k in same] or names
+    raise UnknownNameError(f"{where} has no grasp {id!r}; {suggest_names(id, known)}")
+
+
+def shown_ids(grasps: GraspSet) -> list[str]:
+    """Identifiers as tables of results have them, with the instance in front where there is one."""
+    if "instance" not in grasps.columns:
+        return [str(id) for id in grasps.id]
+    instances = grasps.column("instance").tolist()
+    return [f"{name}-{id}" for name, id in zip(instances, grasps.id.tolist(), strict=True)]

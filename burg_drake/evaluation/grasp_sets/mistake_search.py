@@ -1,5 +1,4 @@
-"""Finds which of the usual mistakes of `pose_mistakes` a set of grasps shows, by the screen of the
-open hand and where its pads meet the object."""
+"""Finds the usual mistake that a set of grasps shows, by the open hand's clearance and pad contacts."""
 
 from __future__ import annotations
 
@@ -15,85 +14,61 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array, BurgError, inverse, make_pose, rot_z
-from burg_drake.core.grasps import GraspSet, Outcome
-from burg_drake.evaluation.candidates import Owners, held_instances
+from burg_drake.core import Array, BurgError, GraspSet, Outcome, inverse, make_pose, rot_z
+from burg_drake.evaluation.campaign_folder import Campaign
+from burg_drake.evaluation.grasp_sets.given_grasps import Owners, held_instances
+from burg_drake.evaluation.grasp_sets.input import split_by_instance
 from burg_drake.evaluation.grasp_sets.pose_mistakes import (
     HALF_WIDTHS,
-    LIKELY_GRASPS,
+    MIN_LIKELY_GRASPS,
     Mistake,
     MistakeFound,
-    corrected_poses,
+    correct_poses,
     correction_of,
     format_of_set,
     frames_of,
     usual_mistakes,
 )
-from burg_drake.evaluation.grasp_sets.run_set import of_instances
-from burg_drake.evaluation.store import Campaign, Run, load_run
-from burg_drake.formats import FORMATS
-from burg_drake.formats.common import GraspFormat, Gripper, PoseFrame
-from burg_drake.objects.library import ObjectLibrary
-from burg_drake.scene.document import Scene, SceneLike, as_scene
-from burg_drake.station.document import Station, StationLike, as_station
+from burg_drake.evaluation.run_folder import Run, load_run
+from burg_drake.formats import GRASP_FORMATS, GraspFormat, Gripper, PoseFrame
+from burg_drake.objects import ObjectLibrary
+from burg_drake.scene import Scene, SceneLike, as_scene
+from burg_drake.station import Station, StationLike, as_station
 
 if TYPE_CHECKING:
     from burg_drake.geometry import Surface
-    from burg_drake.grasping.clearance import HandClearance
-    from burg_drake.station.diagram import StationDiagram
+    from burg_drake.grasping import HandClearance
+    from burg_drake.station import StationDiagram
 
-MAX_GRASPS = 100
-"""Maximum number of grasps of a set that are examined."""
-MIN_FITTING = 3
-"""Minimum number of grasps that have to fit after the correction for a mistake to be reported."""
-MIN_SHARE, MIN_SHARE_COMBINED = 0.6, 0.8
-"""Minimum share of the grasps that has to fit after the correction; the second one applies to two
-mistakes at once, and to distances that no known frame has. Of grasps sampled by
-points alone, which are often in a collision, up to 0.67 fit if a quarter turn and a distance are
-combined."""
-MIN_SHARE_ABOUT = 0.9
-"""The same of turns about the closing direction, which the pads do not notice, and of all mistakes
-where `MAX_CLOSING` is exceeded."""
-MIN_GAIN = 2.5
-"""Minimum ratio of the grasps that fit after the correction to those that fit before."""
-MIN_GAINED, MAX_LOST_SHARE = 10, 0.1
-"""Where more grasps fit before, the least number of those that fit only after the correction, and
-the largest ratio to that of those that fit only before. Transposed rotations need this: a grasp
-from straight above is turned by 180 degrees, and transposing that changes nothing."""
-MAX_CLOSING = 0.4
-"""Where the pads close on the object at a larger share of the grasps, whatever the rest of the hand
-hits, the grasps may be right and only poor. On the built-in objects the share is 0.5 to 1 for right
-sets, and at most 0.38 for most grasps that are turned or moved; but about the closing direction and
-on thin objects the share is up to 1 for these, too. Of right sets at most a share of 0.33 fits once
-turned or read otherwise, if that is `MIN_GAIN` times as many as before."""
-MIN_FITTING_CLOSING = 8
-"""Minimum number of grasps that have to fit after the correction there."""
-TIE_RATIO = 0.9
-"""Mistakes count as equally good if the ratio of their counts is above this."""
-MIN_FRICTION = 0.5
-"""Minimum friction coefficient assumed for the pads, as sets from elsewhere assume other
-coefficients than ours."""
-HALF_WIDTH_RATIOS = (0.35, 0.6)
-"""Range of the ratio of width to distance of the contact patches that is taken for half widths.
-For correct widths nearly all ratios are 0.75 to 1.07, the smallest at the curved wall of a mug."""
-MAX_TOUCHED_SHARE = 0.9
-"""Where both fingers touched the object at a larger share of a run's grasps, poses are taken as
-they are."""
-MAX_SCENES = 3
-"""Maximum number of scenes of a run over many that are examined."""
-MILLIMETRE_DISTANCE = 1.0
-"""Lengths are also tried as millimetres if the median distance of the grasps from the origin is
-larger [m]."""
+
+class MistakeSearchSettings:
+    """Mistake search settings."""
+
+    max_grasps = 100  # Maximum number of grasps of a set that are examined.
+    min_fitting = 3  # Minimum number of grasps that fit after the correction.
+    min_share = 0.6  # Minimum share of grasps that fit after the correction.
+    min_share_combined = 0.8  # The same of two mistakes at once; up to 0.67 of random grasps fit.
+    min_share_about = 0.9  # The same of turns about the closing direction, and above max_closing.
+    min_gain = 2.5  # Minimum ratio of fitting grasps after to before the correction.
+    min_gained = 10  # Minimum number that fit only after, where more fit before.
+    max_lost_share = 0.1  # Maximum ratio to that of grasps that fit only before.
+    max_closing = 0.4  # Above this share of closing pads, grasps may be right and only poor.
+    min_fitting_closing = 8  # Minimum number that fit after the correction above max_closing.
+    tie_ratio = 0.9  # Mistakes are equally good if the ratio of their counts is above this.
+    min_friction = 0.5  # Friction coefficient of the pads at least; other sets assume other ones.
+    # Width over contact distance of half widths; correct ones have 0.75 to 1.07.
+    half_width_ratios = (0.35, 0.6)
+    max_touched_share = 0.9  # Above this share of grasps that touched the object, poses are right.
+    max_scenes = 3  # Maximum number of scenes of a run over many that are examined.
+    millimetre_distance = 1.0  # Metres; beyond this median distance millimetres are tried.
+
+
 CONTACT_OUTCOMES = [
     outcome.value
     for outcome in Outcome
     if outcome.held or outcome in (Outcome.SLIPPED, Outcome.DROPPED, Outcome.BLOCKED)
 ]
 """Outcomes of grasps at which both fingers have touched the object."""
-SAME_READER = ("isaac_grasp", "graspgen_yaml")
-"""Formats that can be read as one another."""
-R_BODY_OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
-"""Orientation of a camera's optical frame (OpenCV) in its body frame (ROS, x forward)."""
 
 Fits = NDArray[np.bool_]
 
@@ -117,26 +92,30 @@ def find_mistake(
     held = {name: part for name, part in grasps.items() if len(part)}
     if not held:
         return None
-    from burg_drake.station.world import station_gripper
+    from burg_drake.station import station_gripper
 
     station = as_station(station)
     source = source if isinstance(source, ObjectLibrary) else as_scene(source)
     gripper = station_gripper(station)
-    if found := _mistake_of_all(_Search(held, station, source, gripper)):
+    if found := _find_common_mistake(_MistakeSearch(held, station, source, gripper)):
         return found
-    many = {name: part for name, part in held.items() if len(part) >= LIKELY_GRASPS}
+    many = {name: part for name, part in held.items() if len(part) >= MIN_LIKELY_GRASPS}
     for name, part in many.items() if len(held) > 1 else ():
-        found = _mistake_of_all(_Search({name: part}, station, source, gripper))
+        found = _find_common_mistake(_MistakeSearch({name: part}, station, source, gripper))
         if found and found.is_likely:  # with many objects, one of them would show one by chance
             return replace(found, only=name)
     return None
 
 
-def _mistake_of_all(search: _Search) -> MistakeFound | None:
+def _find_common_mistake(search: _MistakeSearch) -> MistakeFound | None:
     mistakes = search.mistakes()
     alone, in_scene = search.fits(mistakes)
-    found = _decide(search, mistakes, alone)
-    return found if found is not None or in_scene is None else _decide(search, mistakes, in_scene)
+    found = _choose_mistake(search, mistakes, alone)
+    return (
+        found
+        if found is not None or in_scene is None
+        else _choose_mistake(search, mistakes, in_scene)
+    )
 
 
 def mistake_notes(
@@ -176,14 +155,16 @@ def given_hints(run: Run, asked: Run | Campaign | None = None) -> tuple[str, ...
     hints = []
     with contextlib.suppress(BurgError):
         scene, station = run.scene(), run.station()
-        grasps = of_instances(run.candidates.grasps.with_columns(instance=run.candidates.instance))
-        if touched.sum() < MAX_TOUCHED_SHARE * len(touched):
+        grasps = split_by_instance(
+            run.candidates.grasps.with_columns(instance=run.candidates.instance)
+        )
+        if touched.sum() < MistakeSearchSettings.max_touched_share * len(touched):
             found = find_mistake(grasps, station, scene)
             if found is not None:
-                hints.append(found.text() + _again(asked or run, found.options()))
+                hints.append(found.text() + _repeat_command(asked or run, found.options()))
         if halved := half_width_note(grasps, station, scene):
             options = ["--correction", ",".join((*run.document.grasps.correction, HALF_WIDTHS))]
-            hints.append(halved + _again(asked or run, options))
+            hints.append(halved + _repeat_command(asked or run, options))
     return tuple(hints)
 
 
@@ -196,7 +177,7 @@ def campaign_hints(campaign: Campaign) -> tuple[str, ...]:
     codes, texts = rows.codes("outcome")
     missed = ~np.isin(texts, CONTACT_OUTCOMES)[codes]
     by_scene = np.bincount(rows.run[missed], minlength=len(campaign.names))
-    for place in np.argsort(-by_scene, kind="stable")[:MAX_SCENES].tolist():
+    for place in np.argsort(-by_scene, kind="stable")[: MistakeSearchSettings.max_scenes].tolist():
         name = campaign.names[place]
         with contextlib.suppress(BurgError):
             hints = given_hints(load_run(campaign.folder(name)), campaign)
@@ -205,14 +186,14 @@ def campaign_hints(campaign: Campaign) -> tuple[str, ...]:
     return ()
 
 
-def _again(run: Run | Campaign, options: Sequence[str]) -> str:
+def _repeat_command(run: Run | Campaign, options: Sequence[str]) -> str:
     """How to evaluate again with further options. Verdicts on grasps as they were read stay where
     they are, so that it takes another folder."""
     words = shlex.split(run.document.command)
     if not options or words[:2] != ["burg-drake", "evaluate"] or not _has_grasp_file(words):
         return " Evaluate them again in another folder."
     only = ["--only"] if "--only" in options else []
-    kept = _without(words, "-o", "--output", "--shard", *only)
+    kept = _drop_options(words, "-o", "--output", "--shard", *only)
     command = shlex.join([*kept, *options, "-o", f"{run.path}_corrected"])
     return f" This command evaluates them again:\n{command}"
 
@@ -224,7 +205,7 @@ def _has_grasp_file(words: Sequence[str]) -> bool:
     return any(Path(file).is_file() and not file.startswith("/dev/") for file in files)
 
 
-def _without(words: Sequence[str], *options: str) -> list[str]:
+def _drop_options(words: Sequence[str], *options: str) -> list[str]:
     """The words of a command but for some of its options that have one value each."""
     before = ["", *words]
     return [
@@ -238,16 +219,23 @@ def half_width_note(
     grasps: Mapping[str, GraspSet], station: Station, source: Scene | ObjectLibrary
 ) -> str:
     """A note if most widths are half of the distance of the contacts; "" if they are not."""
-    from burg_drake.grasping.quality import grasp_contacts
+    from burg_drake.grasping import grasp_contacts
 
     test, ratios = _FitTest(station, source), []
     for name, part in grasps.items():
-        known = np.flatnonzero(part.width > 0.0)[:MAX_GRASPS]
+        known = np.flatnonzero(part.width > 0.0)[: MistakeSearchSettings.max_grasps]
         contacts = grasp_contacts(test.surface(name), part.X_OG[known], test.jaws)
         apart = np.linalg.norm(contacts.p_OC[:, 1] - contacts.p_OC[:, 0], axis=-1)
         ratios += (part.width[known] / apart)[contacts.touching].tolist()
-    half = sum(HALF_WIDTH_RATIOS[0] < ratio < HALF_WIDTH_RATIOS[1] for ratio in ratios)
-    if half < max(MIN_FITTING, MIN_SHARE_COMBINED * len(ratios)):
+    half = sum(
+        MistakeSearchSettings.half_width_ratios[0]
+        < ratio
+        < MistakeSearchSettings.half_width_ratios[1]
+        for ratio in ratios
+    )
+    if half < max(
+        MistakeSearchSettings.min_fitting, MistakeSearchSettings.min_share_combined * len(ratios)
+    ):
         return ""
     return (
         f"The widths of {half} of the {len(ratios)} grasps that were checked are half of"
@@ -256,7 +244,7 @@ def half_width_note(
     )
 
 
-class _Search:
+class _MistakeSearch:
     """Grasps of a set, as they were read and as each mistake would have them."""
 
     def __init__(
@@ -278,8 +266,12 @@ class _Search:
         self.format = format_of_set(first)
         self.correction = correction_of(first)
         self.total = sum(len(part) for part in grasps.values())
-        rows = [(name, part, k) for name, part in grasps.items() for k in _promising(part)]
-        chosen = np.unique(np.linspace(0, len(rows) - 1, min(MAX_GRASPS, len(rows))).astype(int))
+        rows = [(name, part, k) for name, part in grasps.items() for k in _promising_rows(part)]
+        chosen = np.unique(
+            np.linspace(0, len(rows) - 1, min(MistakeSearchSettings.max_grasps, len(rows))).astype(
+                int
+            )
+        )
         frames = {name: frames_of(part, gripper) for name, part in grasps.items()}
         picked = [rows[i] for i in chosen]
         self._name = np.array([name for name, _, _ in picked])
@@ -296,8 +288,13 @@ class _Search:
 
     def mistakes(self) -> list[Mistake]:
         """Those that can have been made."""
+        # A camera's optical frame (OpenCV) in its body frame (ROS, x forward).
+        optical_rotation = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
         found = usual_mistakes(self.format, self._gripper)
-        if np.median(np.linalg.norm(self._X_MG[:, :3, 3], axis=-1)) < MILLIMETRE_DISTANCE:
+        if (
+            np.median(np.linalg.norm(self._X_MG[:, :3, 3], axis=-1))
+            < MistakeSearchSettings.millimetre_distance
+        ):
             found = [mistake for mistake in found if mistake.correction != ("millimetres",)]
         if self._scene is None:
             return found
@@ -309,7 +306,7 @@ class _Search:
                 Mistake("with the pose of the camera inverted", camera=inverse(self._X_SM)),
                 Mistake(
                     "with a camera whose pose is that of a body whose x points forward",
-                    camera=self._X_SM @ make_pose(R_BODY_OPTICAL),
+                    camera=self._X_SM @ make_pose(optical_rotation),
                 ),
             ]
         return found
@@ -339,14 +336,14 @@ class _Search:
         """Whether the fingers close along the same line once a mistake is corrected."""
         if not mistake.moves_frame:
             return False
-        X_GN = corrected_poses(np.eye(4), self.format.X_GF(self._gripper), mistake.correction)
+        X_GN = correct_poses(np.eye(4), self.format.X_GF(self._gripper), mistake.correction)
         return bool(np.abs([X_GN[1:3, 0], X_GN[1:3, 3]]).max() < 1e-3)
 
     def _as_meant(self, mistake: Mistake) -> Array:
         """(N, 4, 4) the grasps in M once a mistake about grasps or the camera is corrected."""
         if mistake.camera is not None and self._X_SM is not None:
             return np.asarray(inverse(self._X_SM) @ mistake.camera @ self._X_MG)
-        return corrected_poses(self._X_MG, self._X_GF, mistake.correction)
+        return correct_poses(self._X_MG, self._X_GF, mistake.correction)
 
     def _placed(self, X_MG: Array) -> list[tuple[Owners, Array]]:
         """Instances, or objects, and grasps in their frames, of K times N grasps (K, N, 4, 4)."""
@@ -385,30 +382,47 @@ class _Search:
             before, after: (N,) which grasps fit as they were read, and once it is corrected.
         """
         about, n = self.keeps_closing_line(mistake), int(after.sum())
-        if self.closing_share <= MAX_CLOSING or about:
+        if self.closing_share <= MistakeSearchSettings.max_closing or about:
             combined = mistake.step or bool(mistake.turn and mistake.forward)
-            share = MIN_SHARE_COMBINED if combined else MIN_SHARE
-            least = max(MIN_FITTING, (MIN_SHARE_ABOUT if about else share) * self.count)
+            share = (
+                MistakeSearchSettings.min_share_combined
+                if combined
+                else MistakeSearchSettings.min_share
+            )
+            least = max(
+                MistakeSearchSettings.min_fitting,
+                (MistakeSearchSettings.min_share_about if about else share) * self.count,
+            )
         elif mistake.reads_otherwise:
-            least = max(MIN_FITTING_CLOSING, MIN_SHARE_ABOUT * self.count)
+            least = max(
+                MistakeSearchSettings.min_fitting_closing,
+                MistakeSearchSettings.min_share_about * self.count,
+            )
         else:
             return False
-        if n < least or n >= MIN_GAIN * before.sum():
+        if n < least or n >= MistakeSearchSettings.min_gain * before.sum():
             return bool(n >= least)
         gained, lost = int((after & ~before).sum()), int((before & ~after).sum())
-        enough = gained >= MIN_GAINED and lost <= MAX_LOST_SHARE * gained
-        return enough and mistake.reads_otherwise and n >= MIN_SHARE_ABOUT * self.count
+        enough = (
+            gained >= MistakeSearchSettings.min_gained
+            and lost <= MistakeSearchSettings.max_lost_share * gained
+        )
+        return (
+            enough
+            and mistake.reads_otherwise
+            and n >= MistakeSearchSettings.min_share_about * self.count
+        )
 
     def likeness(self, mistake: Mistake) -> tuple[GraspFormat, ...]:
         """Other formats that measure grasps as those are once a mistake is corrected."""
         if not mistake.moves_frame:
             return ()
         X_GF = self.format.X_GF(self._gripper)
-        X_GF = inverse(corrected_poses(np.eye(4), X_GF, mistake.correction)) @ X_GF
+        X_GF = inverse(correct_poses(np.eye(4), X_GF, mistake.correction)) @ X_GF
         same = (X_GF, make_pose(rot_z(np.pi)) @ X_GF)  # fingers are exchangeable
         return tuple(
             format
-            for format in FORMATS.values()
+            for format in GRASP_FORMATS.values()
             if format.name != self.format.name
             and any(np.allclose(X, format.X_GF(self._gripper), atol=1e-4) for X in same)
         )
@@ -418,7 +432,7 @@ class _FitTest:
     """Tells which grasps fit: the open hand is clear of the object, and its pads close on it."""
 
     def __init__(self, station: Station, source: Scene | ObjectLibrary) -> None:
-        from burg_drake.grasping.quality import jaws_of
+        from burg_drake.grasping import jaws_of
 
         self._station, self._source = station, source
         self.jaws = jaws_of(station.hand, station.hand_model, station.packages)
@@ -441,20 +455,22 @@ class _FitTest:
 
     def closes(self, names: Owners, X_OG: Array) -> Fits:
         """(N,) at which grasps the pads close on their object, whatever else the hand hits."""
-        from burg_drake.grasping.quality import are_antipodal, grasp_contacts
+        from burg_drake.grasping import are_antipodal, grasp_contacts
 
         closing = np.zeros(len(names), dtype=bool)
         for name in dict.fromkeys(names.tolist()):
             mine = names == name
             contacts = grasp_contacts(self.surface(name), X_OG[mine], self.jaws)
-            friction = max(MIN_FRICTION, self._library.entry(self._object(name)).friction)
+            friction = max(
+                MistakeSearchSettings.min_friction, self._library.entry(self._object(name)).friction
+            )
             closing[mine] = are_antipodal(contacts, X_OG[mine], friction)
         return closing
 
     @cached_property
     def _diagram(self) -> StationDiagram | None:
         """Of the scene, if there is one."""
-        from burg_drake.station.diagram import build_station_diagram
+        from burg_drake.station import build_station_diagram
 
         if not isinstance(self._source, Scene):
             return None
@@ -462,7 +478,7 @@ class _FitTest:
 
     @cached_property
     def _everything(self) -> HandClearance | None:
-        from burg_drake.grasping.clearance import HandClearance
+        from burg_drake.grasping import HandClearance
 
         return None if self._diagram is None else HandClearance(self._diagram)
 
@@ -477,7 +493,7 @@ class _FitTest:
         return np.eye(4) if self._diagram is None else self._diagram.X_WO(name)
 
     def _screen(self, name: str) -> HandClearance:
-        from burg_drake.grasping.clearance import HandClearance, hand_clearance_alone
+        from burg_drake.grasping import HandClearance, hand_clearance_alone
 
         if name not in self._screens:
             self._screens[name] = (
@@ -496,7 +512,9 @@ class _FitTest:
         return self._surfaces[object]
 
 
-def _decide(search: _Search, mistakes: Sequence[Mistake], fits: Fits) -> MistakeFound | None:
+def _choose_mistake(
+    search: _MistakeSearch, mistakes: Sequence[Mistake], fits: Fits
+) -> MistakeFound | None:
     """The mistake that makes most grasps fit; None if it does not make enough of them fit.
 
     Args:
@@ -515,11 +533,15 @@ def _decide(search: _Search, mistakes: Sequence[Mistake], fits: Fits) -> Mistake
     best = max(count.values())
     named = [m for m in count if not m.step]
     top = max((count[m] for m in named), default=0)
-    good = [m for m in named if count[m] == top] if top >= TIE_RATIO * best else []
+    good = (
+        [m for m in named if count[m] == top]
+        if top >= MistakeSearchSettings.tie_ratio * best
+        else []
+    )
     chosen = good[0] if good else next(m for m in count if count[m] == best)
     reach = None
     if chosen.forward and chosen.moves_frame:
-        run = _run_of(chosen, count, TIE_RATIO * best)
+        run = _adjacent_mistakes(chosen, count, MistakeSearchSettings.tie_ratio * best)
         known = [m for m in count if m in run and not m.step and m.forward]
         middle = 0.5 * (run[0].forward + run[-1].forward)
         chosen = known[0] if known else min(run, key=lambda m: abs(m.forward - middle))
@@ -543,9 +565,13 @@ def _decide(search: _Search, mistakes: Sequence[Mistake], fits: Fits) -> Mistake
     )
 
 
-def _run_of(chosen: Mistake, count: Mapping[Mistake, int], least: float) -> list[Mistake]:
+def _adjacent_mistakes(
+    chosen: Mistake, count: Mapping[Mistake, int], least: float
+) -> list[Mistake]:
     """Mistakes with the same turn and neighbouring distances that do about as well."""
-    line = sorted((m for m in count if m.moves_frame and m.turn == chosen.turn), key=_forward)
+    line = sorted(
+        (m for m in count if m.moves_frame and m.turn == chosen.turn), key=_forward_distance
+    )
     low = high = line.index(chosen)
     while low > 0 and count[line[low - 1]] >= least:
         low -= 1
@@ -554,15 +580,16 @@ def _run_of(chosen: Mistake, count: Mapping[Mistake, int], least: float) -> list
     return line[low : high + 1]
 
 
-def _forward(mistake: Mistake) -> float:
+def _forward_distance(mistake: Mistake) -> float:
     return mistake.forward
 
 
 def _other_reader(name: str, others: Sequence[str]) -> str:
     """A format by which a file of the one called `name` can be read, too; "" if there is none."""
-    if name not in SAME_READER:
+    interchangeable = ("isaac_grasp", "graspgen_yaml")  # Formats that can be read as one another.
+    if name not in interchangeable:
         return ""
-    return next((other for other in others if other in SAME_READER), "")
+    return next((other for other in others if other in interchangeable), "")
 
 
 def _one_instance_each(grasps: Mapping[str, GraspSet], scene: Scene) -> dict[str, GraspSet]:
@@ -573,11 +600,16 @@ def _one_instance_each(grasps: Mapping[str, GraspSet], scene: Scene) -> dict[str
     return {name: grasps[name] for name in chosen.values()}
 
 
-def _promising(grasps: GraspSet) -> list[int]:
+def _promising_rows(grasps: GraspSet) -> list[int]:
     """Grasps to look at: the successes, where scores are 0 and 1, or else the half with the highest
     scores, where there are so many; data sets have failures, and networks poor grasps."""
     score = np.where(np.isfinite(grasps.score), grasps.score, -np.inf)
-    if set(score.tolist()) == {0.0, 1.0} and (score == 1.0).sum() >= MIN_FITTING:
+    if (
+        set(score.tolist()) == {0.0, 1.0}
+        and (score == 1.0).sum() >= MistakeSearchSettings.min_fitting
+    ):
         return [int(k) for k in np.flatnonzero(score == 1.0)]
-    best = np.argsort(-score, kind="stable")[: max(MAX_GRASPS, len(grasps) // 2)]
+    best = np.argsort(-score, kind="stable")[
+        : max(MistakeSearchSettings.max_grasps, len(grasps) // 2)
+    ]
     return sorted(int(k) for k in best)

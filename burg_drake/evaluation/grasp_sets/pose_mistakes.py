@@ -1,10 +1,4 @@
-"""The usual mistakes in grasps from elsewhere: which there are, how each is corrected, and which of
-them a set of grasps shows.
-
-A set shows a mistake if its grasps do not fit their objects as they are, but do once the mistake is
-corrected. A grasp fits if the open hand is clear of the object and its pads close on it; nothing is
-simulated.
-"""
+"""Usual mistakes in grasp poses from elsewhere, and how each is corrected."""
 
 from __future__ import annotations
 
@@ -18,30 +12,21 @@ import numpy as np
 
 from burg_drake.core import (
     Array,
+    GraspSet,
     UnknownNameError,
     inverse,
-    listing,
+    list_names,
     make_pose,
-    nearest,
+    provenance_parts,
     quaternion_from_rotation,
     rotation_from_quaternion,
     rotation_from_rpy,
+    suggest_names,
 )
-from burg_drake.core.grasps import GraspSet, parts_of
-from burg_drake.formats import FORMATS
-from burg_drake.formats.common import GraspFormat, Gripper, ImportedGrasps, PoseFrame
-
-OFFSETS_MM = np.arange(-120.0, 121.0, 5.0)
-"""Distances along the approach that are tried besides those of known frames [mm]."""
-AXIS_WORDS = {
-    "z": "the approach",
-    "x": "the closing direction",
-    "y": "the axis across approach and closing direction",
-}
-"""Axes of G in words."""
+from burg_drake.formats import GRASP_FORMATS, GraspFormat, Gripper, ImportedGrasps, PoseFrame
 
 
-def _turned(X_MG: Array, X_GF: Array, axis: str, degrees: float) -> Array:
+def _turn_grasps(X_MG: Array, X_GF: Array, axis: str, degrees: float) -> Array:
     """Grasps (..., 4, 4) turned about the origin of the file's frame F."""
     rpy = np.deg2rad(degrees) * np.array([axis == name for name in "xyz"])
     X_GO = make_pose(p_AB=X_GF[..., :3, 3])
@@ -49,25 +34,31 @@ def _turned(X_MG: Array, X_GF: Array, axis: str, degrees: float) -> Array:
     return turned
 
 
-def _with_rotations(X: Array, R: Array) -> Array:
+def _replace_rotations(X: Array, R: Array) -> Array:
     return make_pose(R, X[..., :3, 3])
 
 
-def _reordered(X: Array, shift: int) -> Array:
+def _shift_quaternions(X: Array, shift: int) -> Array:
     """The poses with the four numbers wxyz of their quaternions shifted."""
     flat = quaternion_from_rotation(X[..., :3, :3].reshape(-1, 3, 3))
     R = rotation_from_quaternion(np.roll(flat, shift, axis=-1))
-    return _with_rotations(X, R.reshape(*X.shape[:-2], 3, 3))
+    return _replace_rotations(X, R.reshape(*X.shape[:-2], 3, 3))
 
 
-FILE_POSES: Mapping[str, tuple[Callable[[Array], Array], str]] = {
+POSE_CORRECTIONS: Mapping[str, tuple[Callable[[Array], Array], str]] = {
     "inverse": (inverse, "with each pose inverted"),
     "transposed": (
-        lambda X: _with_rotations(X, np.swapaxes(X[..., :3, :3], -1, -2)),
+        lambda X: _replace_rotations(X, np.swapaxes(X[..., :3, :3], -1, -2)),
         "with each rotation transposed",
     ),
-    "wxyz": (lambda X: _reordered(X, -1), "with quaternions that are in the order w, x, y, z"),
-    "xyzw": (lambda X: _reordered(X, 1), "with quaternions that are in the order x, y, z, w"),
+    "wxyz": (
+        lambda X: _shift_quaternions(X, -1),
+        "with quaternions that are in the order w, x, y, z",
+    ),
+    "xyzw": (
+        lambda X: _shift_quaternions(X, 1),
+        "with quaternions that are in the order x, y, z, w",
+    ),
     "y_up": (lambda X: _quarter_turn(90.0) @ X, "with y up in the frame that they are measured in"),
     "z_up": (
         lambda X: _quarter_turn(-90.0) @ X,
@@ -78,18 +69,13 @@ FILE_POSES: Mapping[str, tuple[Callable[[Array], Array], str]] = {
         "with lengths in millimetres",
     ),
 }
-"""Corrections of the poses that a file has, by name: of poses (..., 4, 4) in the file's convention,
-and in words."""
+"""Corrections of poses (..., 4, 4) in the file's convention, with words."""
 HALF_WIDTHS = "half_widths"
-CORRECTION_KEY = "correction"
-"""Key of a provenance."""
-CORRECTION_FORMS = (*FILE_POSES, HALF_WIDTHS, "turn:AXISDEGREES", "forward:MM")
+CORRECTION_FORMS = (*POSE_CORRECTIONS, HALF_WIDTHS, "turn:AXISDEGREES", "forward:MM")
 """What `correction` may have."""
-LIKELY_GRASPS, LIKELY_SHARE = 8, 0.9
-"""A mistake is called likely if so many grasps were looked at, and so large a share of them fits
-once it is corrected."""
-_TURN = re.compile(r"turn:([xyz])([+-]?\d+(?:\.\d+)?)")
-_FORWARD = re.compile(r"forward:([+-]?\d+(?:\.\d+)?)")
+MIN_LIKELY_GRASPS = 8  # Number of examined grasps from which a mistake can be called likely.
+_TURN_PATTERN = re.compile(r"turn:([xyz])([+-]?\d+(?:\.\d+)?)")
+_FORWARD_PATTERN = re.compile(r"forward:([+-]?\d+(?:\.\d+)?)")
 
 
 def _quarter_turn(degrees: float) -> Array:
@@ -103,7 +89,7 @@ class FileReading:
     Attributes:
         format: of the file; None to tell by the content.
         correction: mistakes of the file that are made up for, such as `("turn:z90",)`; see
-            `corrected_poses`.
+            `correct_poses`.
     """
 
     format: str | None = None
@@ -118,17 +104,17 @@ def check_corrections(correction: Iterable[str]) -> tuple[str, ...]:
     """
     names = tuple(correction)
     for name in names:
-        plain = name in FILE_POSES or name == HALF_WIDTHS
-        if not (plain or _TURN.fullmatch(name) or _FORWARD.fullmatch(name)):
-            known = [*FILE_POSES, HALF_WIDTHS]
+        plain = name in POSE_CORRECTIONS or name == HALF_WIDTHS
+        if not (plain or _TURN_PATTERN.fullmatch(name) or _FORWARD_PATTERN.fullmatch(name)):
+            known = [*POSE_CORRECTIONS, HALF_WIDTHS]
             raise UnknownNameError(
-                f"there is no correction {name!r}; {nearest(name, known)}, a turn such as"
+                f"there is no correction {name!r}; {suggest_names(name, known)}, a turn such as"
                 " turn:z90, or a distance along the approach in millimetres such as forward:103.4"
             ).about("correction")
     return names
 
 
-def corrected_poses(X_MG: Array, X_GF: Array, correction: Sequence[str]) -> Array:
+def correct_poses(X_MG: Array, X_GF: Array, correction: Sequence[str]) -> Array:
     """Grasps as they are once mistakes are corrected, one after the other.
 
     Args:
@@ -142,19 +128,19 @@ def corrected_poses(X_MG: Array, X_GF: Array, correction: Sequence[str]) -> Arra
     """
     X = X_MG
     for name in correction:
-        if turn := _TURN.fullmatch(name):
-            X = _turned(X, X_GF, turn[1], float(turn[2]))
-        elif forward := _FORWARD.fullmatch(name):
+        if turn := _TURN_PATTERN.fullmatch(name):
+            X = _turn_grasps(X, X_GF, turn[1], float(turn[2]))
+        elif forward := _FORWARD_PATTERN.fullmatch(name):
             X = X @ make_pose(p_AB=(0.0, 0.0, float(forward[1]) / 1000.0))
-        elif name in FILE_POSES:
-            X = FILE_POSES[name][0](X @ X_GF) @ inverse(X_GF)
+        elif name in POSE_CORRECTIONS:
+            X = POSE_CORRECTIONS[name][0](X @ X_GF) @ inverse(X_GF)
     return X
 
 
-def corrected(
+def correct_grasps(
     imported: ImportedGrasps, gripper: Gripper, correction: Iterable[str]
 ) -> ImportedGrasps:
-    """What was read of a file, once mistakes are corrected; see `corrected_poses`.
+    """What was read of a file, once mistakes are corrected; see `correct_poses`.
 
     Args:
         imported: what was read.
@@ -169,14 +155,14 @@ def corrected(
     provenance = _without_correction(grasps.provenance)
     if not names:
         return replace(imported, grasps=replace(grasps, provenance=provenance))
-    X_MG = corrected_poses(grasps.X_OG, frames_of(grasps, gripper), names)
+    X_MG = correct_poses(grasps.X_OG, frames_of(grasps, gripper), names)
     factor = 2.0 if HALF_WIDTHS in names else 1.0
     found = GraspSet.create(
         X_MG,
         object=grasps.object,
         width=grasps.width * factor,
         score=grasps.score,
-        provenance={**provenance, CORRECTION_KEY: list(names)},
+        provenance={**provenance, "correction": list(names)},
         columns=grasps.columns,
     )
     return replace(imported, grasps=found)
@@ -185,19 +171,19 @@ def corrected(
 def _without_correction(provenance: Mapping[str, Any]) -> dict[str, Any]:
     """A provenance without the correction with which the grasps of a file were once read from
     another file, which the poses of this one have already."""
-    found = {key: value for key, value in provenance.items() if key != CORRECTION_KEY}
+    found = {key: value for key, value in provenance.items() if key != "correction"}
     parts = found.get("parts")
     if isinstance(parts, Mapping):
         found["parts"] = {k: _without_correction(p) if p else p for k, p in parts.items()}
     elif isinstance(parts, (list, tuple)):
-        found["parts"] = [_without_correction(part) for part in parts_of(found)]
+        found["parts"] = [_without_correction(part) for part in provenance_parts(found)]
     return found
 
 
 def correction_of(grasps: GraspSet) -> tuple[str, ...]:
     """The correction with which a set was read, as its provenance says."""
-    provenances = (grasps.provenance, *parts_of(grasps.provenance))
-    return next((tuple(p[CORRECTION_KEY]) for p in provenances if p.get(CORRECTION_KEY)), ())
+    provenances = (grasps.provenance, *provenance_parts(grasps.provenance))
+    return next((tuple(p["correction"]) for p in provenances if p.get("correction")), ())
 
 
 def frames_of(grasps: GraspSet, gripper: Gripper) -> Array:
@@ -209,9 +195,11 @@ def format_of_set(grasps: GraspSet) -> GraspFormat:
     """The format that a set was read from, as its provenance says; else ours."""
     names = [
         grasps.provenance.get("format"),
-        *(p.get("format") for p in parts_of(grasps.provenance)),
+        *(p.get("format") for p in provenance_parts(grasps.provenance)),
     ]
-    return FORMATS[next((n for n in names if isinstance(n, str) and n in FORMATS), "burg_drake")]
+    return GRASP_FORMATS[
+        next((n for n in names if isinstance(n, str) and n in GRASP_FORMATS), "burg_drake")
+    ]
 
 
 @dataclass(frozen=True)
@@ -220,7 +208,7 @@ class Mistake:
 
     Attributes:
         words: what makes up for it, as in "turned by 90 degrees about the approach".
-        correction: the same as `corrected_poses` takes it.
+        correction: the same as `correct_poses` takes it.
         frame: what poses are measured in, if that is the mistake; then nothing else is.
         camera: whether the camera's pose is the mistake.
         step: whether it is one of many distances, none of which is that of a known frame.
@@ -240,7 +228,9 @@ class Mistake:
     @property
     def forward(self) -> float:
         """Distance along the approach [mm]."""
-        return sum(float(m[1]) for name in self.correction if (m := _FORWARD.fullmatch(name)))
+        return sum(
+            float(m[1]) for name in self.correction if (m := _FORWARD_PATTERN.fullmatch(name))
+        )
 
     @property
     def moves_frame(self) -> bool:
@@ -265,9 +255,11 @@ def usual_mistakes(format: GraspFormat, gripper: Gripper) -> list[Mistake]:
         format: that the grasps were read as.
         gripper: the hand.
     """
-    origin = _origin(format, gripper)
+    # Distances along the approach, beside those of known frames.
+    offsets_mm = np.arange(-120.0, 121.0, 5.0)
+    origin = _frame_offset_mm(format, gripper)
     base = round(1e3 * gripper.X_HG[2, 3], 2)
-    known = {round(o - origin, 2) for o in _origins(gripper)} | {base, -base}
+    known = {round(o - origin, 2) for o in _frame_offsets_mm(gripper)} | {base, -base}
     first = sorted((base, -base), key=lambda d: (abs(d + origin - base), -d))
     distances = [d for d in dict.fromkeys([*first, *sorted(known, key=abs)]) if d]
     quarter, flange = ("turn:z90",), (("turn:z45",), ("turn:z-45",))
@@ -279,33 +271,42 @@ def usual_mistakes(format: GraspFormat, gripper: Gripper) -> list[Mistake]:
     found = [_frame_mistake(quarter, 0.0)]
     found += [_frame_mistake((), d) for d in distances]
     found += [_frame_mistake(turn, 0.0) for turn in others]
-    found += [Mistake(words, (name,)) for name, (_, words) in FILE_POSES.items()]
+    found += [Mistake(words, (name,)) for name, (_, words) in POSE_CORRECTIONS.items()]
     found += [_frame_mistake(turn, d) for turn, d in product((quarter, *others), distances)]
     found += [_frame_mistake(turn, d) for turn, d in product(flange, (0.0, base)) if turn or d]
     found += [
         replace(_frame_mistake(turn, d), step=True)
-        for turn, d in product(((), quarter), OFFSETS_MM.tolist())
+        for turn, d in product(((), quarter), offsets_mm.tolist())
         if d and d not in distances
     ]
     return list(dict.fromkeys(found))
 
 
-def _origin(format: GraspFormat, gripper: Gripper) -> float:
+def _frame_offset_mm(format: GraspFormat, gripper: Gripper) -> float:
     """How far the origin of a format's frame is behind G [mm]."""
     return -1e3 * float(format.X_GF(gripper)[2, 3])
 
 
-def _origins(gripper: Gripper) -> list[float]:
+def _frame_offsets_mm(gripper: Gripper) -> list[float]:
     """How far origins of known frames are behind G [mm]: of all formats, and the finger tips."""
-    return [*(_origin(format, gripper) for format in FORMATS.values()), -1e3 * gripper.tip]
+    return [
+        *(_frame_offset_mm(format, gripper) for format in GRASP_FORMATS.values()),
+        -1e3 * gripper.tip,
+    ]
 
 
 def _frame_mistake(turn: tuple[str, ...], forward: float) -> Mistake:
     """A mistake about the grasp frame of a file."""
+    # Axes of G.
+    axis_words = {
+        "z": "the approach",
+        "x": "the closing direction",
+        "y": "the axis across approach and closing direction",
+    }
     words = [
-        f"turned by {float(m[2]):g} degrees about {AXIS_WORDS[m[1]]}"
+        f"turned by {float(m[2]):g} degrees about {axis_words[m[1]]}"
         for name in turn
-        if (m := _TURN.fullmatch(name))
+        if (m := _TURN_PATTERN.fullmatch(name))
     ]
     if forward:
         way = "forward" if forward > 0.0 else "back"
@@ -346,7 +347,8 @@ class MistakeFound:
     @property
     def is_likely(self) -> bool:
         """Whether nearly all grasps fit once it is corrected, and nothing else does as well."""
-        enough = self.count >= LIKELY_GRASPS and self.after >= LIKELY_SHARE * self.count
+        min_share = 0.9  # Share of grasps that fit after the correction.
+        enough = self.count >= MIN_LIKELY_GRASPS and self.after >= min_share * self.count
         return enough and not self.alternatives
 
     def text(self, format_option: str = "--grasps-format") -> str:
@@ -360,7 +362,7 @@ class MistakeFound:
             low, high = sorted(map(abs, self.reach_mm))
             sentences.append(f"Any distance from {low:g} to {high:g} mm fits equally well.")
         if self.likeness:
-            sentences.append(f"Files of {listing(self.likeness)} have their grasps that way.")
+            sentences.append(f"Files of {list_names(self.likeness)} have their grasps that way.")
         if self.alternatives:
             sentences.append(f"Equally many fit {' or '.join(self.alternatives)}.")
         return " ".join([*sentences, self._remedy(format_option)])

@@ -1,16 +1,26 @@
-"""What comes of a comparison: simulated outcomes against real ones, or another simulation's."""
+"""The result of a comparison, as JSON and in sentences."""
 
 from __future__ import annotations
 
+import dataclasses
+import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
+from burg_drake.core import MISSING_NUMBER, format_number, outcome_label
+from burg_drake.experiment.comparison.agreement_between_runs import RunAgreement
+from burg_drake.experiment.comparison.compared_runs import Side
+from burg_drake.experiment.comparison.confusion_matrix import Agreement, Paired
+from burg_drake.experiment.comparison.estimates import AGREEMENT_MEASURES, Estimate
+from burg_drake.experiment.comparison.group_agreement import OutlierGroup
 from burg_drake.experiment.comparison.judge_assessment import Judgement
-from burg_drake.experiment.comparison.run_agreement import RunAgreement
-from burg_drake.experiment.pairing import Side
-from burg_drake.experiment.statistics import Estimate, Paired
-from burg_drake.experiment.trials import Success
+from burg_drake.experiment.comparison.margin_calibration import (
+    MIN_TRIALS_PER_OUTCOME,
+    PROBABILITY_MARGIN,
+)
+from burg_drake.experiment.trials.trial_sheet import Success
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,3 +79,327 @@ class Comparison:
     settings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     seed: int = 0
+
+
+def comparison_json(comparison: Comparison, more: Mapping[str, Any] | None = None) -> str:
+    """A comparison as JSON; keys are the names of the dataclasses' fields.
+
+    Args:
+        comparison: what is told.
+        more: further keys.
+    """
+    return json.dumps(json_values(comparison) | dict(more or {}), indent=2, allow_nan=False) + "\n"
+
+
+def json_values(value: Any) -> Any:
+    """Dataclasses as mappings of all their fields, sequences as lists; numbers that are not finite
+    are None."""
+    if dataclasses.is_dataclass(value):
+        return {f.name: json_values(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): json_values(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [json_values(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+PERCENT_MEASURES = frozenset(
+    name for name, measure in AGREEMENT_MEASURES.items() if measure.is_share
+) | {"excess"}
+"""Measures that are shown in per cent."""
+
+
+def selection_suffix(comparison: Comparison) -> str:
+    """What titles add to say of which trials their figures are; nothing where all count alike."""
+    return "" if comparison.kind == "runs" else ", selected trials"
+
+
+def cell_name(comparison: Comparison, cell: str) -> str:
+    """What the grasps of a cell of the matrix have in common."""
+    # Names of the cells of the confusion matrix.
+    names_of_trials = {
+        "tp": "success predicted and seen",
+        "fp": "success predicted, failure seen",
+        "fn": "failure predicted, success seen",
+        "tn": "failure predicted and seen",
+    }
+    # Names of the cells for two runs.
+    names_of_runs = {
+        "tp": "success in both runs",
+        "fp": "success in the first run, failure in the second",
+        "fn": "failure in the first run, success in the second",
+        "tn": "failure in both runs",
+    }
+    return (names_of_runs if comparison.kind == "runs" else names_of_trials)[cell]
+
+
+def measure_name(comparison: Comparison, key: str) -> str:
+    """What a figure is called."""
+    # Names of figures of two runs, neither of which is the truth.
+    names_of_runs = {
+        "predicted": "success in the first run",
+        "actual": "success in the second run",
+        "excess": "success in the first less the second",
+    }
+    if comparison.kind == "runs" and key in names_of_runs:
+        return names_of_runs[key]
+    return AGREEMENT_MEASURES[key].name
+
+
+def success_description(comparison: Comparison) -> str:
+    """What margins are to tell of."""
+    return "success in the second run" if comparison.kind == "runs" else "actual success"
+
+
+def estimate_text(found: Estimate, *, percent: bool) -> str:
+    """The value of a figure."""
+    if found.value is None:
+        return MISSING_NUMBER
+    return f"{100 * found.value:.2f} %" if percent else f"{found.value + 0.0:.3f}"
+
+
+def bracketed_interval(found: Estimate, *, percent: bool) -> str:
+    """The interval of a figure in brackets; empty if there is none."""
+    if found.low is None or found.high is None:
+        return ""
+    bounds, decimals = [found.low, found.high], 2
+    if percent:
+        bounds = [100 * bound for bound in bounds]
+        decimals = 0 if bounds[1] - bounds[0] >= 2.0 else 1
+    low, high = (f"{round(bound, decimals) + 0.0:.{decimals}f}" for bound in bounds)
+    return f"[{low}, {high}]"
+
+
+def brief_share_text(found: Estimate) -> str:
+    """A share in whole per cents with its interval."""
+    if found.value is None:
+        return f"undefined ({found.reason})"
+    return f"{100 * found.value:.0f} % {bracketed_interval(found, percent=True)}"
+
+
+def headline_sentence(comparison: Comparison) -> str:
+    """What was found, in one sentence."""
+    c, found = comparison, headline_agreement(comparison.judgement)
+    if have_identical_rows(c):
+        return _identical_rows_sentence(c)
+    if c.kind == "runs":
+        return (
+            f"On {found.trials:,} grasps the two runs agree in {brief_share_text(found.accuracy)}: success in"
+            f" {brief_share_text(found.predicted)} by the first ({c.first.label}) and in"
+            f" {brief_share_text(found.actual)} by the second ({c.reference.label})."
+        )
+    plural = "" if found.trials == 1 else "s"
+    trials = f"{found.trials:,} trial{plural} on the robot"
+    where = f"In {trials}"
+    if population_agreement(c.judgement) is not None:
+        stand = "stand" if plural else "stands"
+        where = f"Estimated for the {round(sum(found.cells)):,} grasps that {trials} {stand} for,"
+    if c.other is not None and c.second is not None and c.difference is not None:
+        first, second = f"the first simulator ({c.first.label})", f"the second ({c.second.label})"
+        p = (
+            ""
+            if c.difference.p_value is None
+            else f" (McNemar p = {format_number(c.difference.p_value)})"
+        )
+        return (
+            f"{where} {first} was right in {brief_share_text(found.accuracy)}, {second} in"
+            f" {brief_share_text(headline_agreement(c.other).accuracy)}; {difference_sentence(c)}{p}."
+        )
+    true = (
+        f"Of the grasps that it expected to succeed, {brief_share_text(found.precision)} succeeded"
+    )
+    foreseen = f"of the grasps that succeeded, it had expected {brief_share_text(found.recall)}"
+    if found.precision.value is None:
+        true = "It expected no grasp to succeed"
+    if found.recall.value is None:
+        foreseen = "no grasp succeeded"
+    right = f"{where} the simulator's verdict was right for {brief_share_text(found.accuracy)} of the grasps"
+    return f"{right}. {true}; {foreseen}. In brackets: 95 % intervals."
+
+
+def headline_agreement(judged: Judgement) -> Agreement:
+    """The figures that sentences are made of: of all grasps that the trials stand for, if known;
+    figures of the trials themselves depend on how many of which were chosen."""
+    return population_agreement(judged) or judged.selected
+
+
+def population_agreement(judged: Judgement) -> Agreement | None:
+    """Figures of all grasps that the trials stand for; None if that is not known, or if they stand
+    for themselves alone."""
+    found = judged.all_grasps
+    return None if found is None or round(sum(found.cells)) <= found.trials else found
+
+
+def have_identical_rows(comparison: Comparison) -> bool:
+    """Whether two runs have the same rows, of which no figure of agreement says anything."""
+    found = comparison.agreement
+    return found is not None and found.same_rows == comparison.coverage.compared
+
+
+def _identical_rows_sentence(c: Comparison) -> str:
+    why = "their settings differ, which changed nothing"
+    if c.first.hashes == c.reference.hashes:
+        why = f"both are run {', '.join(c.first.hashes[:3])}, one a copy of the other"
+    elif not c.settings:
+        why = "they were made with the same settings"
+    return (
+        f"The {c.coverage.compared:,} rows of both runs are the same, in outcome, stage and every"
+        f" margin: {why}. They are one opinion, not two."
+    )
+
+
+def agreement_sentence(comparison: Comparison) -> str:
+    """How often two runs hold the same grasps, and which engine each is; nothing of others."""
+    c, found = comparison, comparison.agreement
+    if found is None:
+        return ""
+    kappa = "undefined" if found.kappa.value is None else estimate_text(found.kappa, percent=False)
+    bounds = bracketed_interval(found.kappa, percent=False)
+    return (
+        f"Held in both or in neither: {brief_share_text(found.alike)}; Cohen's kappa"
+        f" {f'{kappa} {bounds}'.rstrip()}. First: {c.first.engines}; second:"
+        f" {c.reference.engines}."
+    )
+
+
+def difference_sentence(comparison: Comparison) -> str:
+    """Which of two simulators was right where the other was wrong."""
+    d = comparison.difference
+    if d is None:
+        return ""
+    return f"in {d.only_first} trials only the first was right, in {d.only_second} only the second"
+
+
+def population_difference_sentence(comparison: Comparison) -> str:
+    """Which of two simulators is right about more of the grasps that the trials stand for; empty
+    where nothing says what they were chosen from."""
+    found = comparison.difference_of_all
+    if found is None or found.value is None:
+        return ""
+    return (
+        f"Of all grasps that the trials stand for, the first is right about"
+        f" {100 * found.value:+.1f} percentage points more {bracketed_interval(found, percent=True)}."
+    )
+
+
+def bias_sentence(comparison: Comparison, judged: Judgement | None = None) -> str:
+    """Whether a simulator promises too much: of all grasps that the trials stand for, if that is
+    known, and then of the trials themselves as well, whose mix may turn it round."""
+    judged = judged or comparison.judgement
+    b = judged.bias
+    if b.difference.value is None:
+        return "no trials"
+    parted = (
+        f"{b.only_first:,} failed that it expected to succeed, {b.only_second:,} succeeded that it"
+        " expected to fail"
+    )
+    who, other = "simulator promises", "the robot achieved"
+    if comparison.kind == "runs":
+        who, other = "first run sees", "the second"
+        parted = (
+            f"{b.only_first:,} succeeded in the first alone, {b.only_second:,} in the second alone"
+        )
+    elif comparison.other is not None:
+        which = "second" if judged is comparison.other else "first"
+        who = f"{which} simulator promises"
+    every = population_agreement(judged)
+    if every is not None and every.excess.value is not None:
+        return (
+            f"Over all these grasps the {who} {_percentage_points_text(every.excess.value, 'success than')} {other}"
+            f" {bracketed_interval(every.excess, percent=True)}. In the selected trials alone, each counted"
+            f" once, it promises {_percentage_points_text(b.difference.value, 'than')} {other}: of {b.trials:,}"
+            f" grasps, {parted}."
+        )
+    return (
+        f"The {who} {_percentage_points_text(b.difference.value, 'success than')} {other}"
+        f" {bracketed_interval(b.difference, percent=True)}: of {b.trials:,} grasps, {parted}"
+        f" (McNemar's exact test: p = {format_number(b.p_value)})."
+    )
+
+
+def _percentage_points_text(difference: float, of: str) -> str:
+    """A difference in percentage points, as words."""
+    if difference == 0:
+        return f"just as much {of.replace('than', 'as')}"
+    more = "more" if difference > 0 else "less"
+    return f"{100 * abs(difference):.1f} percentage points {more} {of}"
+
+
+def unpredictable_sentence(judged: Judgement) -> str:
+    """Failures that a run of the hand alone does not predict, and precision without them; empty if
+    there are none."""
+    found = judged.unpredictable
+    if found is None:
+        return ""
+    count = sum(found.outcomes.values())
+    without = (
+        found.selected
+        if population_agreement(judged) is None
+        else found.all_grasps or found.selected
+    )
+    return (
+        f"{count:,} trial{'' if count == 1 else 's'} failed for reasons that a run of the hand"
+        f" alone cannot predict ({outcome_counts_text(found.outcomes)}),"
+        f" {found.predicted_successes:,} of them after a predicted success. They count as"
+        f" failures; without them precision is {brief_share_text(without.precision)}"
+        f" instead of {brief_share_text(headline_agreement(judged).precision)}."
+    )
+
+
+def too_few_trials_sentence(comparison: Comparison, judged: Judgement) -> str:
+    """Why nothing is said of how margins rank trials; empty where something is, or where there are
+    no margins."""
+    found = judged.calibration
+    if not found or any(c.auroc.value is not None for c in found):
+        return ""
+    most = max(found, key=lambda c: min(c.successes, c.trials - c.successes))
+    return (
+        f"Too few trials to tell which margins predict {success_description(comparison)}: that takes"
+        f" {MIN_TRIALS_PER_OUTCOME} successes and {MIN_TRIALS_PER_OUTCOME} failures; there are"
+        f" {most.successes} and {most.trials - most.successes}."
+    )
+
+
+def outcome_counts_text(outcomes: Mapping[str, int]) -> str:
+    """Outcomes with how often they occur."""
+    return ", ".join(f"{n:,} {outcome_label(name)}" for name, n in outcomes.items())
+
+
+def outlier_name(one: OutlierGroup) -> str:
+    """Name of an outlier group for people."""
+    return outcome_label(one.name) if one.kind == "verdict" else one.name
+
+
+def outlier_sentence(judged: Judgement) -> str:
+    """A sentence on the outlier groups; empty if there are none."""
+    parts = [
+        f"{outlier_name(one)} ({one.kind}; {one.wrong} of {one.trials} predicted"
+        f" {'successes failed' if one.predicted else 'failures succeeded'}, of all others"
+        f" {one.other_wrong} of {one.other_trials})"
+        for one in judged.standing_out
+    ]
+    return f"What stands out: {', '.join(parts)}." if parts else ""
+
+
+def no_outliers_sentence(judged: Judgement) -> str:
+    """A sentence for judgements without outlier groups."""
+    if not judged.tested_groups:
+        return "Too few trials to tell whether verdicts of an object or a cause stand out."
+    groups = f"{judged.tested_groups} groups" if judged.tested_groups > 1 else "group"
+    return (
+        f"No object, verdict or body in the way stands out among the {groups} that were tested"
+        " (Fisher's exact test with Holm's correction)."
+    )
+
+
+def margin_title(name: str) -> tuple[str, str, float]:
+    """What a margin is called, its unit for people, and how many of them its column's unit is."""
+    from burg_drake.core import display_unit
+
+    if name == PROBABILITY_MARGIN:
+        return "predicted probability", "", 1.0
+    if name.endswith("_mm"):
+        return name.removesuffix("_mm").replace("_", " "), "mm", 1.0
+    return name.replace("_", " "), *display_unit(name)

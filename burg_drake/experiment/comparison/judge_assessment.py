@@ -1,38 +1,236 @@
-"""All that a comparison says of one judge: how often it was right, where, and by what numbers."""
+"""Assessment of one judge: its error rates, wrong verdicts, and the effect of object placement."""
 
 from __future__ import annotations
 
+import math
+import shlex
 from collections import Counter
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from burg_drake.core import Array
-from burg_drake.core.grasps import RealOutcome
-from burg_drake.experiment.comparison.disagreement import Disagreement
-from burg_drake.experiment.comparison.groups import (
-    FactorGroup,
-    Stopped,
-    by_factor,
-    outcome_table,
-    stopped,
-)
-from burg_drake.experiment.comparison.placement_error import PlacementAgreement
-from burg_drake.experiment.comparison.standing_out import OutlierGroup, standing_out
-from burg_drake.experiment.pairing import VerdictPairs
-from burg_drake.experiment.statistics import (
+from burg_drake.core import Array, RealOutcome
+from burg_drake.experiment.comparison.confusion_matrix import (
     Agreement,
-    Flags,
-    MarginCalibration,
     Paired,
-    agreement,
-    calibrations,
-    grouped,
-    matrix_of,
-    paired,
+    compare_paired,
+    count_cells,
+    count_cells_by_group,
+    estimate_agreement,
+    estimate_agreements,
 )
+from burg_drake.experiment.comparison.estimates import Flags
+from burg_drake.experiment.comparison.group_agreement import (
+    FactorGroup,
+    OutlierGroup,
+    Stopped,
+    agreement_by_factor,
+    count_outcomes,
+    find_outlier_groups,
+    outcomes_by_verdict,
+)
+from burg_drake.experiment.comparison.margin_calibration import (
+    MarginCalibration,
+    calibrate_margin,
+    calibrate_margins,
+)
+from burg_drake.experiment.comparison.verdict_pairs import VerdictPairs
+from burg_drake.experiment.trials.trial_sheet import RealTrial
+
+
+@dataclass(frozen=True, kw_only=True)
+class Disagreement:
+    """A grasp whose verdict was wrong.
+
+    Attributes:
+        kind: `fp` if success was predicted, `fn` if failure was.
+        scene, object, grasp: which grasp on what.
+        simulated, stage, blocker: the verdict.
+        ended: what happened.
+        replays: commands that show the trials in simulation.
+        trial: number of the real trial; None if there is none.
+        note, photo: of the real trial; the photo as the sheet names it.
+        offset_mm: largest offset of any object [mm]; None where unknown.
+    """
+
+    kind: Literal["fp", "fn"]
+    scene: str
+    object: str
+    grasp: str
+    simulated: str
+    stage: str
+    blocker: str
+    ended: str
+    replays: tuple[str, ...]
+    trial: int | None = None
+    note: str = ""
+    photo: str = ""
+    offset_mm: float | None = None
+
+
+def list_wrong_verdicts(
+    pairs: VerdictPairs,
+    scenes: Mapping[str, str],
+    folders: Sequence[Mapping[str, str]],
+    trials: Sequence[RealTrial] = (),
+    offset_mm: Array | None = None,
+) -> tuple[Disagreement, ...]:
+    """Lists what was predicted wrongly, false successes first.
+
+    Args:
+        pairs: N grasps.
+        scenes: names of the scenes by their content.
+        folders: of the runs by content of the scene; one mapping for each run to be replayed.
+        trials: (N,) the real trials, if that is what happened.
+        offset_mm: (N,) largest offset of any object in them; NaN where unknown.
+    """
+    max_cases = 200  # Of each kind; the confusion matrix counts all.
+    found = []
+    for kind, wrong in (
+        ("fp", pairs.predicted & ~pairs.actual),
+        ("fn", ~pairs.predicted & pairs.actual),
+    ):
+        for row in np.flatnonzero(wrong)[:max_cases].tolist():
+            scene, grasp = pairs.scene[row], pairs.id[row]
+            trial = trials[row] if trials else None
+            offset = np.nan if offset_mm is None else float(offset_mm[row])
+            found.append(
+                Disagreement(
+                    kind="fp" if kind == "fp" else "fn",
+                    scene=scenes.get(scene, scene),
+                    object=pairs.object[row],
+                    grasp=grasp,
+                    simulated=pairs.simulated[row],
+                    stage=pairs.stage[row],
+                    blocker=pairs.blocker[row],
+                    ended=pairs.ended[row],
+                    replays=replay_commands(folders, scene, grasp),
+                    trial=None if trial is None else trial.number,
+                    note="" if trial is None else trial.note,
+                    photo="" if trial is None else trial.photo,
+                    offset_mm=None if np.isnan(offset) else offset,
+                )
+            )
+    return tuple(found)
+
+
+def replay_commands(
+    folders: Sequence[Mapping[str, str]], scene: str, grasp: str
+) -> tuple[str, ...]:
+    """Commands that show a grasp in each run that has its scene.
+
+    Args:
+        folders: of the runs by content of the scene; one mapping for each run.
+        scene: its content.
+        grasp: its id.
+    """
+    return tuple(
+        shlex.join(["burg-drake", "replay", known[scene], "--grasp", grasp])
+        for known in folders
+        if scene in known
+    )
+
+
+PLACEMENT_LIMIT_MM = 2.0  # Placement error up to which an object stands where it should, in mm.
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlacementAgreement:
+    """Agreement by how far the objects were from their targets before a trial.
+
+    Attributes:
+        limit_mm: how far off every object may be to stand where it should [mm].
+        within: trials in which every object did.
+        beyond: trials in which one was measured farther off.
+        unmeasured: trials in which one of the scene was not measured, and none farther off.
+        largest: share of right verdicts over the largest offset of any object [mm].
+        target: the same over the offset of the target [mm].
+    """
+
+    limit_mm: float
+    within: Agreement
+    beyond: Agreement
+    unmeasured: Agreement
+    largest: MarginCalibration
+    target: MarginCalibration
+
+
+def placement_agreement(
+    pairs: VerdictPairs,
+    largest: Array,
+    target: Array,
+    *,
+    limit_mm: float = PLACEMENT_LIMIT_MM,
+    seed: int = 0,
+) -> PlacementAgreement:
+    """Compares trials by their placement.
+
+    Args:
+        pairs: N trials.
+        largest: (N,) largest offset of any object [mm]; NaN where one is not measured, and none is
+            known to be beyond the limit.
+        target: (N,) offset of the target [mm]; NaN where it is not measured.
+        limit_mm: how far off every object may be [mm].
+        seed: of the intervals' resampling.
+    """
+    group = np.where(np.isnan(largest), 2, (largest > limit_mm).astype(int))
+    counts = count_cells_by_group(pairs.predicted, pairs.actual, group, 3)
+    within, beyond, unmeasured = estimate_agreements(counts, seed=seed)
+    right = pairs.predicted == pairs.actual
+
+    def over(name: str, values: Array) -> MarginCalibration:
+        return calibrate_margin(name, values, right, smaller_is_better=True)
+
+    return PlacementAgreement(
+        limit_mm=limit_mm,
+        within=within,
+        beyond=beyond,
+        unmeasured=unmeasured,
+        largest=over("largest_offset_mm", largest),
+        target=over("target_offset_mm", target),
+    )
+
+
+def placement_errors_mm(
+    trials: Sequence[RealTrial],
+    instances: Sequence[Collection[str]],
+    limit_mm: float = PLACEMENT_LIMIT_MM,
+) -> tuple[Array, Array]:
+    """Offsets of the objects before trials [mm].
+
+    Args:
+        trials: N trials.
+        instances: the free instances of the scene of each.
+        limit_mm: see `placement_agreement`.
+
+    Returns:
+        (N,) the largest of any object, and (N,) that of the target; NaN where unknown.
+    """
+    pairs = zip(trials, instances, strict=True)
+    largest = np.array(
+        [_largest_error(trial, there, limit_mm) for trial, there in pairs], dtype=float
+    )
+    target = np.array([_measured_errors(trial).get(trial.instance, math.nan) for trial in trials])
+    return largest, target.astype(float)
+
+
+def _largest_error(trial: RealTrial, instances: Collection[str], limit_mm: float) -> float:
+    """Largest offset; NaN if an object was not measured, unless another one is beyond the limit."""
+    measured = _measured_errors(trial)
+    most = max(measured.values(), default=math.nan)
+    return most if set(instances) <= set(measured) or most > limit_mm else math.nan
+
+
+def _measured_errors(trial: RealTrial) -> dict[str, float]:
+    """Offsets of the objects that were measured."""
+    return {
+        name: math.hypot(*place.offset_mm)
+        for name, place in trial.placement.items()
+        if place.status == "measured" and place.offset_mm is not None
+    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +259,8 @@ class Strata:
 
     def agreement(self, first: Flags, second: Flags, *, seed: int = 0) -> Agreement:
         """Figures of all grasps, from two answers, (N,), about each trial."""
-        counts = grouped(first, second, self.index, len(self.population))
-        return agreement(counts, population=self.population, seed=seed)
+        counts = count_cells_by_group(first, second, self.index, len(self.population))
+        return estimate_agreement(counts, population=self.population, seed=seed)
 
     @property
     def missing(self) -> int:
@@ -129,7 +327,7 @@ class Judgement:
     disagreements: tuple[Disagreement, ...]
 
 
-def judgement(
+def assess_judge(
     pairs: VerdictPairs,
     *,
     scenes: Mapping[str, str],
@@ -152,44 +350,50 @@ def judgement(
         seed: of the intervals' resampling.
     """
     weight = None if strata is None else strata.weight
-    selected, represented = _agreements(pairs, strata, seed)
+    selected, represented = _estimate_agreements(pairs, strata, seed)
     names = {outcome.value for outcome in unpredictable}
     apart = pairs.ended.where([name in names for name in pairs.ended.names])
-    found, tested_groups = standing_out(pairs.take(~apart)) if real else ((), 0)
+    found, tested_groups = find_outlier_groups(pairs.take(~apart)) if real else ((), 0)
     return Judgement(
         selected=selected,
         all_grasps=represented,
         not_represented=0 if strata is None else strata.missing,
-        unpredictable=_without(pairs, strata, apart, seed) if apart.any() else None,
+        unpredictable=_without_unpredictable(pairs, strata, apart, seed) if apart.any() else None,
         standing_out=found,
         tested_groups=tested_groups,
-        bias=replace(paired(pairs.predicted, pairs.actual, seed=seed), difference=selected.excess),
-        objects=by_factor(pairs, pairs.object, seed=seed),
-        scenes=by_factor(pairs, pairs.scene, scenes, seed=seed),
-        stages=by_factor(pairs, pairs.stage, seed=seed),
-        stopped=stopped(pairs),
-        outcomes=outcome_table(pairs),
-        calibration=calibrations(pairs.margins, pairs.actual, weight),
+        bias=replace(
+            compare_paired(pairs.predicted, pairs.actual, seed=seed), difference=selected.excess
+        ),
+        objects=agreement_by_factor(pairs, pairs.object, seed=seed),
+        scenes=agreement_by_factor(pairs, pairs.scene, scenes, seed=seed),
+        stages=agreement_by_factor(pairs, pairs.stage, seed=seed),
+        stopped=outcomes_by_verdict(pairs),
+        outcomes=count_outcomes(pairs),
+        calibration=calibrate_margins(pairs.margins, pairs.actual, weight),
         placement=placement,
         disagreements=disagreements,
     )
 
 
-def _agreements(
+def _estimate_agreements(
     pairs: VerdictPairs, strata: Strata | None, seed: int
 ) -> tuple[Agreement, Agreement | None]:
     """Figures of the trials, and of all grasps that they stand for."""
     if strata is None:
-        return agreement(matrix_of(pairs.predicted, pairs.actual)[None], seed=seed), None
-    counts = grouped(pairs.predicted, pairs.actual, strata.index, len(strata.population))
+        return estimate_agreement(count_cells(pairs.predicted, pairs.actual)[None], seed=seed), None
+    counts = count_cells_by_group(
+        pairs.predicted, pairs.actual, strata.index, len(strata.population)
+    )
     represented = strata.agreement(pairs.predicted, pairs.actual, seed=seed)
-    return agreement(counts, seed=seed), represented
+    return estimate_agreement(counts, seed=seed), represented
 
 
-def _without(pairs: VerdictPairs, strata: Strata | None, apart: Flags, seed: int) -> Unpredictable:
+def _without_unpredictable(
+    pairs: VerdictPairs, strata: Strata | None, apart: Flags, seed: int
+) -> Unpredictable:
     """What some trials are, and the figures without them."""
     kept = None if strata is None else strata.keep(~apart)
-    selected, represented = _agreements(pairs.take(~apart), kept, seed)
+    selected, represented = _estimate_agreements(pairs.take(~apart), kept, seed)
     ended = Counter(pairs.ended.names[k] for k in pairs.ended.index[apart].tolist())
     return Unpredictable(
         outcomes=dict(ended.most_common()),

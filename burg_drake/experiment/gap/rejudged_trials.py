@@ -1,33 +1,55 @@
-"""Real trials that were judged again, and what that says of where disagreement comes from."""
+"""Real trials that were judged again, the causes of disagreement, and the files that record them.
+
+rejudged.csv      one row for each trial: planned, as measured, real; rows can be replayed
+rejudged.json     the figures
+scenes/NNN.yaml   the scene of trial NNN as it was measured
+"""
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
-from burg_drake.core import wilson_interval
-from burg_drake.core.grasps import Outcome, RealOutcome, Verdict
-from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.records import TrialOrigin
-from burg_drake.evaluation.store import Run
-from burg_drake.experiment.pairing import unpredictable_outcomes
-from burg_drake.experiment.statistics import Paired, paired_counts
-from burg_drake.experiment.trials import RealTrial, Success, TrialSheet, grasp_contents, succeeded
-from burg_drake.scene.document import Scene
+import numpy as np
+
+from burg_drake.core import (
+    Outcome,
+    RealOutcome,
+    Verdict,
+    atomic_write,
+    portable_reference,
+    wilson_interval,
+)
+from burg_drake.evaluation import (
+    HASH_DIGITS,
+    Candidate,
+    Columns,
+    RecordedTrial,
+    Run,
+    TrialOrigin,
+    trial_columns,
+    write_table,
+)
+from burg_drake.experiment.comparison.compared_runs import unpredictable_outcomes
+from burg_drake.experiment.comparison.confusion_matrix import Paired, compare_paired_counts
+from burg_drake.experiment.trials.source_runs import grasp_contents
+from burg_drake.experiment.trials.trial_sheet import RealTrial, Success, TrialSheet, is_success
+from burg_drake.scene import Scene, save_scene
 
 TrialCause = Literal["agreed", "placement", "worsened", "physics", "unpredictable"]
-CAUSES: dict[TrialCause, str] = {
+DISAGREEMENT_CAUSES: dict[TrialCause, str] = {
     "agreed": "agreed as planned, and as measured",
     "placement": "disagreed as planned, agree as measured: explained by the placement",
     "worsened": "agreed as planned, disagree as measured: worsened",
     "physics": "disagree either way: left to physics",
     "unpredictable": "failed for reasons that a run of the hand alone cannot predict",
 }
-"""What a pair of verdicts says of a real one."""
+"""Meaning of each combination of both verdicts and the real outcome."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -84,7 +106,9 @@ class Rejudged:
     def is_right(self, success: Success, *, measured: bool) -> bool:
         """Whether the verdict as planned, or as measured, agrees with the robot."""
         verdict = self.outcome if measured else self.planned
-        return verdict is not None and succeeded(verdict, success) is succeeded(self.real, success)
+        return verdict is not None and is_success(verdict, success) is is_success(
+            self.real, success
+        )
 
     def cause(self, success: Success) -> TrialCause | None:
         """What the two verdicts say of the real one; None if it could not be judged again, or not
@@ -123,7 +147,7 @@ class Rejudging:
     @cached_property
     def causes(self) -> Counter[TrialCause]:
         """Number of trials by what they say."""
-        found: Counter[TrialCause] = Counter(dict.fromkeys(CAUSES, 0))
+        found: Counter[TrialCause] = Counter(dict.fromkeys(DISAGREEMENT_CAUSES, 0))
         found.update(c for t in self.judged if (c := t.cause(self.success)) is not None)
         return found
 
@@ -132,9 +156,9 @@ class Rejudging:
         """Number of trials by success as planned, as measured, and in reality."""
         return Counter(
             (
-                succeeded(t.planned, self.success),
-                t.outcome is not None and succeeded(t.outcome, self.success),
-                succeeded(t.real, self.success),
+                is_success(t.planned, self.success),
+                t.outcome is not None and is_success(t.outcome, self.success),
+                is_success(t.real, self.success),
             )
             for t in self.judged
         )
@@ -163,9 +187,9 @@ class Rejudging:
             trial
             for trial in (self.judged if every else self.predictable)
             if (verdict := trial.outcome if measured else trial.planned) is not None
-            and succeeded(verdict, self.success)
+            and is_success(verdict, self.success)
         ]
-        return sum(succeeded(trial.real, self.success) for trial in promised), len(promised)
+        return sum(is_success(trial.real, self.success) for trial in promised), len(promised)
 
     @property
     def explained(self) -> tuple[int, int, float, float]:
@@ -180,7 +204,7 @@ class Rejudging:
         """McNemar's exact test of which verdicts agree with reality more often: those as measured,
         which come first, or those as planned."""
         of = self.causes
-        return paired_counts(of["agreed"], of["placement"], of["worsened"], of["physics"])
+        return compare_paired_counts(of["agreed"], of["placement"], of["worsened"], of["physics"])
 
 
 def skip_reason(trial: RealTrial, run: Run | None, content: str | None) -> str:
@@ -204,7 +228,7 @@ def skip_reason(trial: RealTrial, run: Run | None, content: str | None) -> str:
     return "" if content == trial.content else "another grasp of this id in the run"
 
 
-def runs_for(sheet: TrialSheet, runs: Sequence[Run]) -> dict[str, Run]:
+def match_runs_to_sources(sheet: TrialSheet, runs: Sequence[Run]) -> dict[str, Run]:
     """Which of some runs stands for each run of a sheet: itself, or else one of the same scene,
     that which has most of the grasps.
 
@@ -223,3 +247,122 @@ def runs_for(sheet: TrialSheet, runs: Sequence[Run]) -> dict[str, Run]:
 
 def _match_rank(run: Run, hash: str, tried: Mapping[str, str]) -> tuple[bool, int]:
     return run.document.hash == hash, len(grasp_contents(run, tried).items() & tried.items())
+
+
+REJUDGED_TABLE_FILE = "rejudged.csv"  # Table of the trials that were judged again.
+
+
+def rejudged_scene_file(trial: Rejudged, folder: Path) -> Path:
+    """Where the scene of a trial is written."""
+    return folder / "scenes" / f"{trial.number:03d}.yaml"
+
+
+def write_rejudging(found: Rejudging) -> None:
+    """Writes scenes, table and figures.
+
+    Raises:
+        InvalidInputError: a file cannot be written.
+    """
+    for trial in found.trials:
+        if trial.scene is not None:
+            path = rejudged_scene_file(trial, found.path)
+            library = portable_reference(trial.scene.library.root, path.parent)
+            path.parent.mkdir(exist_ok=True)
+            save_scene(replace(trial.scene.document, library=library), path)
+    rows = [row for trial in found.trials if (row := _trial_columns(trial, found)) is not None]
+    if rows:
+        write_table(found.path / REJUDGED_TABLE_FILE, concatenate_tables(rows))
+    atomic_write(found.path / "rejudged.json", json.dumps(rejudging_json(found), indent=1) + "\n")
+
+
+def _trial_columns(trial: Rejudged, found: Rejudging) -> Columns | None:
+    """The table of one trial; nothing of one that no judge has seen."""
+    if trial.scene is None or trial.candidate is None or trial.verdict is None:
+        return None
+    origin = replace(
+        trial.origin,
+        scene=str(rejudged_scene_file(trial, found.path)),
+        scene_content=trial.scene.content[:HASH_DIGITS],
+        run="",
+    )
+    one = RecordedTrial(
+        id=trial.grasp,
+        instance=trial.instance,
+        object=trial.object,
+        X_OG=trial.candidate.X_OG,
+        width=trial.candidate.width,
+        verdict=trial.verdict,
+    )
+    joints = len(trial.verdict.q_grasp)
+    columns = trial_columns([one], origin, instances=list(trial.scene.instances), joints=joints)
+    values = {
+        "trial": trial.number,
+        "real": trial.real.value,
+        "planned": trial.planned.value,
+        "cause": trial.cause(found.success) or "",
+        "notes": "; ".join(trial.notes),
+    }
+    return {name: np.array([value]) for name, value in values.items()} | columns
+
+
+def concatenate_tables(tables: list[Columns]) -> Columns:
+    """Tables one below the other; what one of them lacks is NaN or empty there."""
+    names = dict.fromkeys(name for table in tables for name in table)
+    kinds = {n: next(t[n].dtype.kind for t in tables if n in t) for n in names}
+
+    def part(table: Columns, name: str) -> Any:
+        if name in table:
+            return table[name]
+        return np.full(len(table["id"]), "" if kinds[name] == "U" else np.nan)
+
+    return {name: np.concatenate([part(table, name) for table in tables]) for name in names}
+
+
+def rejudging_json(found: Rejudging) -> dict[str, Any]:
+    """The figures as JSON values."""
+    count = len(found.predictable)
+    return {
+        "success": found.success,
+        "judged": len(found.judged),
+        "unpredictable": found.causes["unpredictable"],
+        "agree": {
+            name: _share_json(*found.agreement(measured=measured), count)
+            for name, measured in (("planned", False), ("measured", True))
+        },
+        "precision": {
+            name: {
+                which: dict(zip(("count", "of"), shares, strict=True))
+                for which, every in (("all", True), ("predictable", False))
+                for shares in [found.precision(measured=measured, every=every)]
+            }
+            for name, measured in (("planned", False), ("measured", True))
+        },
+        "causes": {cause: found.causes[cause] for cause in DISAGREEMENT_CAUSES},
+        "explained": dict(zip(("count", "of", "low", "high"), found.explained, strict=True)),
+        "mcnemar_p": found.paired.p_value,
+        "table": [
+            {"planned": p, "measured": m, "real": r, "count": n}
+            for (p, m, r), n in sorted(found.table.items())
+        ],
+        "trials": [_trial_json(trial, found) for trial in found.trials],
+        "skipped": {str(number): why for number, why in found.skipped.items()},
+    }
+
+
+def _share_json(count: int, low: float, high: float, whole: int) -> dict[str, float]:
+    return {"count": count, "of": whole, "low": low, "high": high}
+
+
+def _trial_json(trial: Rejudged, found: Rejudging) -> dict[str, Any]:
+    return {
+        "number": trial.number,
+        "run": trial.run,
+        "grasp": trial.grasp,
+        "object": trial.object,
+        "real": trial.real.value,
+        "planned": trial.planned.value,
+        "measured": None if trial.outcome is None else trial.outcome.value,
+        "cause": trial.cause(found.success),
+        "why_not": trial.why_not,
+        "notes": list(trial.notes),
+    }

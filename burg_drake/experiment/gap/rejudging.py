@@ -1,10 +1,9 @@
-"""Judges real trials again in scenes whose objects stand where they were measured before.
+"""Judges real trials again in scenes whose objects stand where they were measured.
 
-The robot goes where the grasp was planned, and the object is elsewhere: that is what a planned
-verdict leaves out. What disagrees with reality as planned, and agrees as measured, came from the
-placement; what is left is physics. Answers are appended to a journal as they come, under names that
-follow from all that decides about them, so that the same call goes on where one stopped, and asks
-again what was changed.
+The robot moves to the planned grasp, but the object may stand elsewhere. A verdict that is wrong
+as planned and right as measured was wrong because of the placement; the remaining disagreement is
+physics. Verdicts are appended to a journal under names that follow from all of their inputs. A
+repeated call continues where the first one stopped, and judges again only what has changed.
 """
 
 from __future__ import annotations
@@ -16,43 +15,50 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from burg_drake.core import (
-    JUDGING,
+    JUDGING_PACKAGES,
+    STARTING_PHASE,
+    Listener,
+    Progress,
+    ProgressMeter,
+    Reporter,
+    Verdict,
     content_hash,
+    ensure_writable_folder,
     one_line,
+    remove_unfinished,
     software_versions,
 )
-from burg_drake.core.files import remove_unfinished, writable_folder
-from burg_drake.core.grasps import Verdict
-from burg_drake.core.terminal import STARTING, Listener, Progress, ProgressMeter, Reporter
-from burg_drake.evaluation.candidates import Candidate
-from burg_drake.evaluation.records import (
+from burg_drake.evaluation import (
     JOURNAL_FILE,
+    Candidate,
+    Executor,
+    Job,
+    JobFailed,
     Journal,
+    LocalExecutor,
+    Run,
     origin_of,
     read_journal,
+    require_engine_for,
 )
-from burg_drake.evaluation.stages import require_engine_for
-from burg_drake.evaluation.store import Run
-from burg_drake.evaluation.workers import Executor, Job, JobFailed, LocalExecutor
-from burg_drake.experiment.gap.displacement import commanded
-from burg_drake.experiment.gap.measured_places import measured_scene
-from burg_drake.experiment.gap.rejudged_files import write_rejudging
-from burg_drake.experiment.gap.rejudged_trials import Rejudged, Rejudging, skip_reason
-from burg_drake.experiment.gap.scene_judge import SceneJudgeFactory
-from burg_drake.experiment.trials import (
-    RealTrial,
-    Success,
-    TrialSheet,
-    grasp_contents,
-    load_sources,
+from burg_drake.experiment.gap.displaced_scenes import (
+    SceneJudgeFactory,
+    grasps_as_commanded,
+    measured_scene,
 )
-from burg_drake.scene.document import Scene
-from burg_drake.station.document import Station
+from burg_drake.experiment.gap.rejudged_trials import (
+    Rejudged,
+    Rejudging,
+    skip_reason,
+    write_rejudging,
+)
+from burg_drake.experiment.trials.source_runs import grasp_contents, load_sources
+from burg_drake.experiment.trials.trial_sheet import RealTrial, Success, TrialSheet
+from burg_drake.scene import Scene
+from burg_drake.station import Station
 
 if TYPE_CHECKING:
-    from burg_drake.station.checks import SceneCheck
-
-ID_DIGITS = 12
+    from burg_drake.station import SceneCheck
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,9 +105,9 @@ def rejudge(
     """
     runs = load_sources(sheet, path) if runs is None else runs
     executor = LocalExecutor.of_this_machine() if executor is None else executor
-    skipped = _skipped(sheet, runs)
+    skipped = _skip_reasons(sheet, runs)
     tasks = _rejudge_tasks([t for t in sheet.trials if t.number not in skipped], runs)
-    folder = writable_folder(out)
+    folder = ensure_writable_folder(out)
     with Reporter(progress) as reporter, Journal(folder / JOURNAL_FILE) as journal:
         remove_unfinished(folder)
         known = {
@@ -110,10 +116,10 @@ def rejudge(
             if not verdict.is_open(retry_failed=retry_failed)
         }
         failed: dict[str, str] = {}
-        for id, verdict in _judge(tasks, known, executor, reporter, failed):
+        for id, verdict in _judge_tasks(tasks, known, executor, reporter, failed):
             journal.append(id, verdict)
             known[id] = verdict
-    trials = tuple(_answered(one.trial, known, failed) for one in tasks)
+    trials = tuple(_with_verdict(one.trial, known, failed) for one in tasks)
     found = Rejudging(
         path=folder, success=success or sheet.selection.success, trials=trials, skipped=skipped
     )
@@ -121,7 +127,7 @@ def rejudge(
     return found
 
 
-def _skipped(sheet: TrialSheet, runs: Mapping[str, Run]) -> dict[int, str]:
+def _skip_reasons(sheet: TrialSheet, runs: Mapping[str, Run]) -> dict[int, str]:
     """Why trials cannot be judged again, by number."""
     tried = [trial.grasp for trial in sheet.trials]
     contents = {key: grasp_contents(run, tried) for key, run in runs.items()}
@@ -134,7 +140,7 @@ def _skipped(sheet: TrialSheet, runs: Mapping[str, Run]) -> dict[int, str]:
 
 
 def _rejudge_tasks(trials: Sequence[RealTrial], runs: Mapping[str, Run]) -> list[_RejudgeTask]:
-    from burg_drake.station.checks import SceneCheck
+    from burg_drake.station import SceneCheck
 
     places: dict[str, tuple[Scene, Station, SceneCheck]] = {}
     tasks = []
@@ -172,26 +178,28 @@ def _rejudge_task(
         return _RejudgeTask(trial, None)
     settings = origin.settings(f"{run.path}: trial")
     factory = SceneJudgeFactory(measured.scene, station, origin.engine, origin.mode, settings)
-    X_OG = commanded(planned, measured.scene, grasp.instance, grasp.X_OG)
+    X_OG = grasps_as_commanded(planned, measured.scene, grasp.instance, grasp.X_OG)
     packages = origin.engine.packages
-    versions = software_versions({**JUDGING, **packages})
+    versions = software_versions({**JUDGING_PACKAGES, **packages})
     key = content_hash(
         *(real.number, factory.content, grasp.instance, X_OG, grasp.width),
         *(versions[name] for name in ("burg_drake", "drake", *packages)),
     )
-    id = f"{real.number}:{key[:ID_DIGITS]}"
+    id = f"{real.number}:{key[:12]}"
     candidate = Candidate(id, grasp.instance, X_OG, width=grasp.width)
     return _RejudgeTask(replace(trial, candidate=candidate), factory)
 
 
-def _answered(trial: Rejudged, known: Mapping[str, Verdict], failed: Mapping[str, str]) -> Rejudged:
+def _with_verdict(
+    trial: Rejudged, known: Mapping[str, Verdict], failed: Mapping[str, str]
+) -> Rejudged:
     if trial.candidate is None:
         return trial
     id = trial.candidate.id
     return replace(trial, verdict=known.get(id), reason=failed.get(id, ""))
 
 
-def _judge(
+def _judge_tasks(
     tasks: Sequence[_RejudgeTask],
     known: Mapping[str, Verdict],
     executor: Executor,
@@ -220,7 +228,7 @@ def _judge(
     if not jobs:
         return
     todo = sum(len(job.candidates) for job in jobs.values())
-    begin = Progress(STARTING, total - todo, total, unit="trials")
+    begin = Progress(STARTING_PHASE, total - todo, total, unit="trials")
     pace = ProgressMeter(reporter.show, begin, "judging again")
 
     def note(lost: JobFailed) -> None:

@@ -1,6 +1,6 @@
-"""The text of a trials file: one trial of it changes, and all else stays as people wrote it.
+"""Edits of a trials file as text: one trial changes, and everything else stays as people wrote it.
 
-Of the trial itself only those keys change whose value does, so that comments within it stay, too.
+Only the keys of the trial whose values change are edited, so that comments within it stay, too.
 """
 
 from __future__ import annotations
@@ -14,26 +14,27 @@ from typing import Any
 
 import yaml
 
-from burg_drake.core import DocumentError, InvalidInputError
-from burg_drake.core.documents import (
+from burg_drake.core import (
+    DocumentError,
+    InvalidInputError,
     Reader,
     dump_document,
-    empty_document,
-    parse_nodes,
+    empty_document_message,
+    parse_yaml_node,
     plain_data,
     read_document,
 )
-from burg_drake.experiment.trials.sheet import RealTrial, TrialSheet
+from burg_drake.experiment.trials.trial_sheet import RealTrial, TrialSheet
 
-_BREAK = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
-"""What YAML counts as the end of a line."""
-_SPACE = " \t\n\r\x85\u2028\u2029"
-"""What YAML counts as space around a value: a no-break space is part of it."""
-_HYPHEN = re.compile("( *)- +")
-"""Before a trial, on the line where it begins."""
-_DIRECTIVE = re.compile("^%", re.MULTILINE)
-_ANCHOR = re.compile(r"(^|[\s\[{,:-])[&!]", re.MULTILINE)
-"""What may be an anchor or a tag, whose meaning the lines of others can change."""
+_LINE_BREAK = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
+"""End of a line in YAML."""
+_YAML_SPACE = " \t\n\r\x85\u2028\u2029"
+"""Space around a value in YAML; a no-break space is part of the value."""
+_ITEM_START = re.compile("( *)- +")
+"""Start of a trial, on the line where it begins."""
+_YAML_DIRECTIVE = re.compile("^%", re.MULTILINE)  # A directive of YAML.
+_ANCHOR_OR_TAG = re.compile(r"(^|[\s\[{,:-])[&!]", re.MULTILINE)
+"""Possible anchor or tag; other lines can change its meaning."""
 
 Edit = tuple[int, int, str]
 """Text from one offset to another, and what it becomes."""
@@ -68,9 +69,9 @@ class SheetText:
         Raises:
             DocumentError: it does not fit the schema.
         """
-        root = parse_nodes(text, name, empty_document(TrialSheet))
+        root = parse_yaml_node(text, name, empty_document_message(TrialSheet))
         sheet = read_document(root, TrialSheet, name)
-        return cls(name, text, sheet, *_places(root, text))
+        return cls(name, text, sheet, *_locate_trials(root, text))
 
     def after(self, text: str) -> SheetText:
         """Reads another text, of which this one may be an earlier state.
@@ -96,15 +97,15 @@ class SheetText:
         trials[place] = new
         if self.starts:
             start, end = self.starts[place : place + 2]
-            (node,) = parse_nodes(self.text[start:end], self.name).value
+            (node,) = parse_yaml_node(self.text[start:end], self.name).value
             line = self.text.count("\n", 0, start) + node.start_mark.line
         else:
             start, end = 0, len(self.text)
-            node = _trials(parse_nodes(self.text, self.name)).value[place]
+            node = _find_trial_nodes(parse_yaml_node(self.text, self.name)).value[place]
             line = node.start_mark.line
         own = self.text[start:end]
         try:
-            changed = _edited(own, _edits(_Text(own), node, old, new))
+            changed = _apply_edits(own, _list_edits(_LineIndex(own), node, old, new))
             text = self.text[:start] + changed + self.text[end:]
             found = self._after_change_of(place, text) or SheetText.read(text, self.name)
             if found.sheet == dataclasses.replace(self.sheet, trials=tuple(trials)):
@@ -122,7 +123,7 @@ class SheetText:
             return None
         longer = len(text) - len(self.text)
         starts = *self.starts[: place + 1], *(at + longer for at in self.starts[place + 1 :])
-        trial = _trial_in(text[starts[place] : starts[place + 1]], self.name, self.column)
+        trial = _parse_trial(text[starts[place] : starts[place + 1]], self.name, self.column)
         if trial is None:
             return None
         trials = (*self.sheet.trials[:place], trial, *self.sheet.trials[place + 1 :])
@@ -138,8 +139,8 @@ class SheetText:
         if not self.starts:
             return None
         longest = min(len(text), len(self.text))
-        tail = _last_true(longest, lambda n: text[-n:] == self.text[-n:])
-        same = _last_true(longest - tail, lambda n: text[:n] == self.text[:n])
+        tail = _largest_that_holds(longest, lambda n: text[-n:] == self.text[-n:])
+        same = _largest_that_holds(longest - tail, lambda n: text[:n] == self.text[:n])
         place = bisect.bisect_right(self.starts, same) - 1
         if not 0 <= place < len(self.sheet.trials):
             return None
@@ -147,23 +148,23 @@ class SheetText:
         return place if last <= self.starts[place + 1] else None
 
 
-def _last_true(most: int, holds: Callable[[int], bool]) -> int:
+def _largest_that_holds(most: int, holds: Callable[[int], bool]) -> int:
     """The largest number from 0 to `most` that something holds of, if it does of all below."""
     return bisect.bisect_left(range(1, most + 1), True, key=lambda n: not holds(n))
 
 
-def _places(root: yaml.Node, text: str) -> tuple[tuple[int, ...], int]:
+def _locate_trials(root: yaml.Node, text: str) -> tuple[tuple[int, ...], int]:
     """Where trials are whose lines can be read by themselves, see `SheetText`, and their column."""
     nothing: tuple[tuple[int, ...], int] = ((), 0)
     at = next((k for k, (key, _) in enumerate(root.value) if key.value == "trials"), None)
-    if _DIRECTIVE.search(text) or at is None or _has_alias(root):
+    if _YAML_DIRECTIVE.search(text) or at is None or _has_alias(root):
         return nothing
     items = root.value[at][1].value
-    lines = _Text(text)
+    lines = _LineIndex(text)
     starts, columns = [], set()
     for item in items:
         start = lines.starts[item.start_mark.line]
-        hyphen = _HYPHEN.fullmatch(text, start, lines.offset(item.start_mark))
+        hyphen = _ITEM_START.fullmatch(text, start, lines.offset(item.start_mark))
         if hyphen is None or not isinstance(item, yaml.MappingNode) or item.flow_style:
             return nothing
         starts.append(start)
@@ -172,7 +173,7 @@ def _places(root: yaml.Node, text: str) -> tuple[tuple[int, ...], int]:
     if at + 1 < len(root.value):
         after = root.value[at + 1][0].start_mark
         end = lines.starts[after.line]
-        if text[end : lines.offset(after)].strip(_SPACE):
+        if text[end : lines.offset(after)].strip(_YAML_SPACE):
             return nothing
     return ((*starts, end), columns.pop()) if len(columns) == 1 else nothing
 
@@ -193,13 +194,13 @@ def _has_alias(node: yaml.Node) -> bool:
     return False
 
 
-def _trial_in(lines: str, name: str, column: int) -> RealTrial | None:
+def _parse_trial(lines: str, name: str, column: int) -> RealTrial | None:
     """The trial that these lines of a file hold, if they mean by themselves what they mean there:
     a single entry of a list with its hyphen in this column, whole lines, no anchor."""
-    if not lines.endswith("\n") or _ANCHOR.search(lines):
+    if not lines.endswith("\n") or _ANCHOR_OR_TAG.search(lines):
         return None
     try:
-        node = parse_nodes(lines, name)
+        node = parse_yaml_node(lines, name)
         if not isinstance(node, yaml.SequenceNode) or node.flow_style or len(node.value) != 1:
             return None
         if node.start_mark.column != column or node.value[0].flow_style:
@@ -210,12 +211,12 @@ def _trial_in(lines: str, name: str, column: int) -> RealTrial | None:
     return trial
 
 
-class _Text:
+class _LineIndex:
     """A text with the offsets of its lines."""
 
     def __init__(self, text: str) -> None:
         self.text = text
-        self.starts = [0, *(found.end() for found in _BREAK.finditer(text))]
+        self.starts = [0, *(found.end() for found in _LINE_BREAK.finditer(text))]
         self.newline = "\r\n" if "\r\n" in text else "\n"
 
     def offset(self, mark: Any) -> int:
@@ -229,7 +230,7 @@ class _Text:
             last = node.value[-1]
             return self.end(last[-1] if isinstance(last, tuple) else last)
         start, end = self.offset(node.start_mark), self.offset(node.end_mark)
-        return start + len(self.text[start:end].rstrip(_SPACE))
+        return start + len(self.text[start:end].rstrip(_YAML_SPACE))
 
     def line_start(self, offset: int) -> int:
         """Where the line of an offset begins."""
@@ -237,16 +238,16 @@ class _Text:
 
     def line_end(self, offset: int) -> int:
         """Where the line of an offset ends, before its break."""
-        found = _BREAK.search(self.text, offset)
+        found = _LINE_BREAK.search(self.text, offset)
         return found.start() if found else len(self.text)
 
 
-def _trials(root: yaml.Node) -> yaml.Node:
+def _find_trial_nodes(root: yaml.Node) -> yaml.Node:
     node: yaml.Node = next(value for key, value in root.value if key.value == "trials")
     return node
 
 
-def _edits(text: _Text, node: yaml.Node, old: RealTrial, new: RealTrial) -> list[Edit]:
+def _list_edits(text: _LineIndex, node: yaml.Node, old: RealTrial, new: RealTrial) -> list[Edit]:
     if not isinstance(node, yaml.MappingNode) or node.flow_style:
         whole = yaml.safe_dump(
             plain_data(new), default_flow_style=True, sort_keys=False, width=1 << 30
@@ -261,35 +262,35 @@ def _edits(text: _Text, node: yaml.Node, old: RealTrial, new: RealTrial) -> list
         value = plain_data(getattr(new, field.name))
         if value == plain_data(getattr(old, field.name)):
             continue
-        lines = _lines({field.name: value}, column, text.newline)
+        lines = _format_entry({field.name: value}, column, text.newline)
         if field.name in entries:
-            default = value == plain_data(_default(field))
-            edits.append(_replaced(text, node, *entries[field.name], lines, default))
+            default = value == plain_data(_field_default(field))
+            edits.append(_replace_value(text, node, *entries[field.name], lines, default))
         else:
             added += text.newline + " " * column + lines
     return [*edits, (bottom, bottom, added)]
 
 
-def _replaced(
-    text: _Text, trial: yaml.Node, key: yaml.Node, value: yaml.Node, lines: str, default: bool
+def _replace_value(
+    text: _LineIndex, trial: yaml.Node, key: yaml.Node, value: yaml.Node, lines: str, default: bool
 ) -> Edit:
     """A key with another value; what is at its default goes away with its lines, unless there is
     something else on them."""
     start, end = text.offset(key.start_mark), text.end(value)
     first, last = text.line_start(start), text.line_end(end)
-    alone = not (text.text[first:start] + text.text[end:last]).strip(_SPACE)
+    alone = not (text.text[first:start] + text.text[end:last]).strip(_YAML_SPACE)
     if default and alone and key.start_mark.line != trial.start_mark.line:
         return (first - len(text.newline), last, "")
     return (start, max(start, end), lines)
 
 
-def _lines(entry: Mapping[str, Any], column: int, newline: str) -> str:
+def _format_entry(entry: Mapping[str, Any], column: int, newline: str) -> str:
     """A key and its value as they stand in a mapping at a column."""
     lines = dump_document(entry).rstrip("\n").split("\n")
     return newline.join([lines[0], *(" " * column + line if line else "" for line in lines[1:])])
 
 
-def _require_in_order(text: _Text, node: yaml.Node) -> None:
+def _require_in_order(text: _LineIndex, node: yaml.Node) -> None:
     """Refuses values that are written elsewhere."""
     at = text.offset(node.start_mark)
     for key, value in node.value:
@@ -299,13 +300,13 @@ def _require_in_order(text: _Text, node: yaml.Node) -> None:
             at = text.offset(part.start_mark)
 
 
-def _default(field: dataclasses.Field[Any]) -> Any:
+def _field_default(field: dataclasses.Field[Any]) -> Any:
     if field.default_factory is not dataclasses.MISSING:
         return field.default_factory()
     return field.default
 
 
-def _edited(text: str, edits: list[Edit]) -> str:
+def _apply_edits(text: str, edits: list[Edit]) -> str:
     for start, end, new in sorted(edits, key=lambda edit: edit[:2], reverse=True):
         text = text[:start] + new + text[end:]
     return text

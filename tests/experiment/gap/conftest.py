@@ -8,15 +8,16 @@ from collections.abc import Generator, Iterable, Iterator
 import numpy as np
 import pytest
 
-from burg_drake.core.frames import grasp_from_axes, make_pose
-from burg_drake.core.grasps import Verdict
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.candidates.candidates import Candidate
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.stages.judge import judge_grasp
-from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.evaluation.workers import Job, OnFailure
+from burg_drake.core import GraspSet, Verdict, grasp_from_axes, make_pose
+from burg_drake.evaluation import (
+    Candidate,
+    EvaluationSettings,
+    Job,
+    OnFailure,
+    Run,
+    evaluate,
+    judge_grasp,
+)
 
 ABOVE = grasp_from_axes((1, 0, 0), (0, 0, -1), (0.0, 0.0, 0.18))
 """Across the narrow side of the household box, from above."""
@@ -46,7 +47,7 @@ class Here:
 def no_chart_of_reach() -> Iterator[None]:
     """How far the arm reaches is most of the work of a page, and `tests/evaluation` has it."""
     with pytest.MonkeyPatch.context() as patch:
-        place = "burg_drake.evaluation.report.page.reachability_section"
+        place = "burg_drake.evaluation.report.pages.reachability_section"
         patch.setattr(place, lambda run: None)
         yield
 

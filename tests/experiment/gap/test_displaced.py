@@ -8,23 +8,18 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from burg_drake.core.arrays import Array
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.candidates.candidates import Candidates, given_candidates
-from burg_drake.experiment.gap import placement_noise
-from burg_drake.experiment.gap.displacement import (
-    commanded,
-    commanded_candidates,
-    displaced_scene,
-)
-from burg_drake.experiment.gap.placement_noise import (
+from burg_drake.core import Array, GraspSet, InvalidInputError
+from burg_drake.evaluation import Candidates, given_candidates
+from burg_drake.experiment import (
     PlacementNoise,
-    moved,
+    candidates_as_commanded,
+    displaced_scene,
+    grasps_as_commanded,
+    move_on_board,
     noisy_scene,
 )
-from burg_drake.scene.document.scene import Scene, load_scene
-from burg_drake.scene.document.validation import SceneIssue
+from burg_drake.experiment.gap import displaced_scenes
+from burg_drake.scene import Scene, SceneIssue, load_scene
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +39,7 @@ def test_the_hand_stays_where_it_was_told_to_go(scene: Scene) -> None:
     """By numpy alone: world poses before and after are the same."""
     X_SO, X_OG = random_pose(1), np.stack([random_pose(2), random_pose(3)])
     now = displaced_scene(scene, {"mug": X_SO})
-    X_OG_now = commanded(scene, now, "mug", X_OG)
+    X_OG_now = grasps_as_commanded(scene, now, "mug", X_OG)
     X_SO_text = now.instance("mug").X_SO.matrix()
     np.testing.assert_allclose(X_SO_text, X_SO, atol=1e-12)
     for there, here in zip(X_OG, X_OG_now, strict=True):
@@ -57,7 +52,7 @@ def test_what_stands_as_planned_keeps_every_bit(scene: Scene) -> None:
     assert displaced_scene(scene, {name: scene.X_SO(name) for name in scene.instances}) is scene
     now = displaced_scene(scene, {"mug": random_pose(4)})
     X_OG = random_pose(5)
-    assert commanded(scene, now, "box", X_OG) is X_OG
+    assert grasps_as_commanded(scene, now, "box", X_OG) is X_OG
     assert now.content != scene.content and list(now.instances) == list(scene.instances)
 
 
@@ -77,7 +72,7 @@ def test_candidates_keep_ids_and_all_but_their_poses(scene: Scene) -> None:
     }
     candidates = given_candidates(scene, sets)
     now = displaced_scene(scene, {"mug": random_pose(10)})
-    found: Candidates = commanded_candidates(scene, now, candidates)
+    found: Candidates = candidates_as_commanded(scene, now, candidates)
     assert found.id == candidates.id
     of_box = found.instance == "box"
     assert (found.grasps.X_OG[of_box] == candidates.grasps.X_OG[of_box]).all()
@@ -111,7 +106,7 @@ def test_errors_of_placement_are_normal_and_follow_from_content(scene: Scene) ->
 def test_no_noise_is_the_scene_itself(scene: Scene) -> None:
     found = noisy_scene(scene, PlacementNoise(place=0.0, turn=0.0), 0, lambda _: ())
     assert found.scene is scene and found.redrawn == 0
-    np.testing.assert_array_equal(moved(scene, "mug", np.zeros(3), 0.0), scene.X_SO("mug"))
+    np.testing.assert_array_equal(move_on_board(scene, "mug", np.zeros(3), 0.0), scene.X_SO("mug"))
     with pytest.raises(InvalidInputError, match="noise of the turn is -1; give 0 or more"):
         PlacementNoise(turn=-1.0)
 
@@ -133,7 +128,7 @@ def test_what_collides_is_drawn_again_and_counted(
     assert all(one.draws["box"] == 0 for one in found)
     # the number of refused draws is geometric: mean 1, variance 2
     assert 18 <= sum(one.redrawn for one in found) <= 70
-    monkeypatch.setattr(placement_noise, "MOST_DRAWS", 5)
+    monkeypatch.setattr(displaced_scenes, "MAX_PLACEMENT_DRAWS", 5)
     never = noisy_scene(
         scene,
         noise,

@@ -12,39 +12,33 @@ from typing import Any
 import numpy as np
 import pytest
 
-from burg_drake.apps.cli import main
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.grasps import Mode, Verdict
-from burg_drake.core.grasps.outcome import Outcome, RealOutcome, Stage
-from burg_drake.evaluation.records.identity import run_hash
-from burg_drake.evaluation.replay import differences
-from burg_drake.evaluation.stages.judge import judge_grasp
-from burg_drake.evaluation.stages.station_judge import build_judge
-from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.evaluation.workers import Job
-from burg_drake.experiment.gap.changes import gap_changes
-from burg_drake.experiment.gap.measurement import measure_gap
-from burg_drake.experiment.gap.placement_noise import PlacementNoise
-from burg_drake.experiment.gap.report.sections import (
-    change_section,
-    push_section,
-    reality_section,
-)
-from burg_drake.experiment.gap.report.sentences import reality_words, step_sentences
-from burg_drake.experiment.gap.report.tables import gap_json
-from burg_drake.experiment.gap.settings import GapSettings
-from burg_drake.experiment.gap.step_agreement import agreement_by_step, tried_grasps
-from burg_drake.experiment.gap.steps import GapStep, GapSteps
-from burg_drake.experiment.trials.sheet import (
+from burg_drake.apps import main
+from burg_drake.core import InvalidInputError, Mode, Outcome, RealOutcome, Stage, Verdict
+from burg_drake.evaluation import Job, Run, build_judge, differences, judge_grasp, run_hash
+from burg_drake.experiment import (
+    GapSettings,
+    GapStep,
+    GapSteps,
+    PlacementNoise,
     RealTrial,
     Selection,
     SourceRun,
     Stratum,
     TrialSheet,
+    agreement_by_step,
+    change_section,
+    gap_changes,
+    gap_json,
+    grasp_contents,
+    measure_gap,
+    push_section,
+    reality_section,
+    reality_sentence,
+    step_sentences,
+    tried_grasps,
 )
-from burg_drake.experiment.trials.sources import grasp_contents
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.document.engine import ENGINES
+from burg_drake.scene import Scene
+from burg_drake.station import ENGINES
 from tests.experiment.gap.conftest import Here
 
 NONE = PlacementNoise(place=0.0, turn=0.0)
@@ -314,7 +308,7 @@ def test_each_step_is_held_against_the_robot(known: GapSteps) -> None:
     assert found[1].found.precision.value == 1.0
     assert found[2].found.recall.value == 0.5
     assert all(a.all_grasps is None and a.estimated is a.found for a in found)
-    assert "each counted once" in reality_words(found)
+    assert "each counted once" in reality_sentence(found)
     stopped = [replace(t, outcome=RealOutcome.NO_PATH) for t in trials]
     apart = agreement_by_step(known, sheet, stopped, "lifted")
     assert [(a.step, a.unpredictable) for a in apart] == [("hand", 3), ("reach", 0), ("placed", 2)]
@@ -345,7 +339,7 @@ def test_shares_beside_the_robot_hold_for_all_grasps_that_were_chosen_from(known
 
 
 def test_the_page_shows_all_sections(ladder: GapSteps) -> None:
-    from burg_drake.experiment.gap.report.page import gap_page
+    from burg_drake.experiment import gap_page
 
     page = gap_page(ladder, "lifted", (), "burg-drake gap tabletop_six -o gap")
     for head in ("From step to step", "By object", "With the arm", "How to repeat"):

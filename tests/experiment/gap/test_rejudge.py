@@ -15,35 +15,40 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from burg_drake.apps.cli import main
-from burg_drake.core.arrays import Array
-from burg_drake.core.documents.schema import Pose
-from burg_drake.core.errors import InvalidInputError, SimulationError
-from burg_drake.core.grasps.outcome import Outcome, RealOutcome
-from burg_drake.evaluation.candidates.candidates import Candidates
-from burg_drake.evaluation.records.journal import Journal, decode
-from burg_drake.evaluation.records.table_file import read_table
-from burg_drake.evaluation.replay import differences
-from burg_drake.evaluation.stages.station_judge import StationJudgeFactory
-from burg_drake.evaluation.store.run_folder import Run, load_run
-from burg_drake.evaluation.workers import Job, JobFailed, OnFailure
-from burg_drake.experiment.gap.measured_places import measured_scene, upright
-from burg_drake.experiment.gap.rejudged_trials import Rejudging, runs_for
-from burg_drake.experiment.gap.rejudging import rejudge
-from burg_drake.experiment.gap.report.rejudging import rejudged_section, rejudged_words
-from burg_drake.experiment.trials.sheet import (
+from burg_drake.apps import main
+from burg_drake.core import Array, InvalidInputError, Outcome, Pose, RealOutcome, SimulationError
+from burg_drake.evaluation import (
+    Candidates,
+    Job,
+    JobFailed,
+    Journal,
+    OnFailure,
+    Run,
+    StationJudgeFactory,
+    decode_verdict,
+    differences,
+    load_run,
+    read_table,
+)
+from burg_drake.experiment import (
     ObjectPlace,
     RealTrial,
+    Rejudging,
     Selection,
     SourceRun,
     Stratum,
     TrialSheet,
+    correct_height_and_tilt,
+    grasp_content,
+    match_runs_to_sources,
+    measured_scene,
+    rejudge,
+    rejudged_section,
+    rejudged_sentences,
     save_trials,
 )
-from burg_drake.experiment.trials.sources import grasp_content
-from burg_drake.scene.document.scene import Scene
-from burg_drake.station.checks.scene_check import SceneCheck
-from burg_drake.station.document.engine import ENGINES, Engine
+from burg_drake.scene import Scene
+from burg_drake.station import ENGINES, Engine, SceneCheck
 from tests.experiment.gap.conftest import Here
 
 MISSED = {"no_contact", "collision_target", "collision_table", "closed_empty", "one_finger"}
@@ -189,7 +194,7 @@ def test_what_the_hand_alone_cannot_predict_is_left_to_nothing(
     # all three were predicted to lift, one of which was predictable, and none did
     assert told.precision(measured=False, every=True) == (0, 3)
     assert told.precision(measured=False) == (0, 1) and told.precision(measured=True) == (0, 1)
-    words = " ".join(rejudged_words(told))
+    words = " ".join(rejudged_sentences(told))
     assert "2 trials failed for reasons that a run of the hand alone cannot predict (" in words
     assert "(1 no path, 1" in words
     assert re.search(r"as planned 0 of 3 \(0\S* %\) with them, 0 of 1 \(0\S* %\) without", words)
@@ -208,7 +213,7 @@ def test_an_answer_that_is_lost_is_asked_for_again(
     whole = (found.path / "journal.jsonl").read_bytes()
     *kept, last = whole.splitlines(keepends=True)
     (tmp_path / "journal.jsonl").write_bytes(b"".join(kept) + last[:20])
-    lost, verdict = decode(last)
+    lost, verdict = decode_verdict(last)
     asked: list[str] = []
 
     class Knowing:
@@ -267,7 +272,7 @@ def test_a_scene_that_cannot_be_built_is_a_trial_that_is_not_judged(
     found = rejudge(sheet, "trials.yaml", tmp_path, executor=Failing(), progress=False)  # type: ignore[arg-type]
     assert found.judged == () and found.paired.p_value is None
     assert found.trials[0].why_not == "SimulationError: no such world"
-    assert "None of the trials could be judged again." in rejudged_words(found)[0]
+    assert "None of the trials could be judged again." in rejudged_sentences(found)[0]
     assert "no such world" in rejudged_section(found)
 
 
@@ -343,20 +348,23 @@ def test_another_grasp_of_the_same_id_is_not_judged_again(
     of = run.candidates
     less.__dict__["candidates"] = Candidates(of.grasps.select(np.array([2])), of.instance[2:])
     meant = replace(other, trials=sheet.trials)
-    assert runs_for(meant, [less, run])["a"] is run and runs_for(meant, [run, less])["a"] is run
+    assert (
+        match_runs_to_sources(meant, [less, run])["a"] is run
+        and match_runs_to_sources(meant, [run, less])["a"] is run
+    )
 
 
 def test_small_errors_of_measuring_are_put_right(run: Run, check: SceneCheck) -> None:
     scene = run.scene()
     X = shifted(scene, "box", 0.003, 0.001, 0.002)
     X[:3, :3] = Rotation.from_euler("xz", [1.0, 4.0], degrees=True).as_matrix() @ X[:3, :3]
-    found, said = upright(scene.X_SO("box"), X)
+    found, said = correct_height_and_tilt(scene.X_SO("box"), X)
     assert found[2, 3] == scene.X_SO("box")[2, 3] and said.startswith("2.0 mm lower and upright")
     turn = Rotation.from_matrix(found[:3, :3] @ scene.X_SO("box")[:3, :3].T)
     np.testing.assert_allclose(turn.as_rotvec(degrees=True), (0.0, 0.0, 4.0), atol=1e-2)
     fallen = X.copy()
     fallen[:3, :3] = Rotation.from_euler("x", 90, degrees=True).as_matrix()
-    assert upright(scene.X_SO("box"), fallen)[0] is fallen
+    assert correct_height_and_tilt(scene.X_SO("box"), fallen)[0] is fallen
 
 
 def test_what_overlaps_a_little_is_moved_apart(run: Run, check: SceneCheck) -> None:

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from burg_drake.evaluation.store.loading import load_runs
-from burg_drake.experiment.pages.trial_pictures import TrialPictures
-from burg_drake.experiment.pages.tried_runs import TriedRuns
+from burg_drake.evaluation import load_runs
+from burg_drake.experiment import TrialPictures, TriedRuns
 from tests.experiment.pages.tried import make_runs, make_trials
 
 

@@ -11,26 +11,22 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.cameras.live.frame_processing import FrameProcessor, LocatedFrame
-from burg_drake.cameras.optics.intrinsics import Intrinsics
-from burg_drake.cameras.placement.document import PlacementCheck
-from burg_drake.cameras.sources.opening import open_source
-from burg_drake.core.errors import InvalidInputError
-from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps.outcome import RealOutcome
-from burg_drake.experiment.pages import lab_book
-from burg_drake.experiment.pages.lab_book import (
+from burg_drake.cameras import FrameProcessor, Intrinsics, LocatedFrame, PlacementCheck, open_source
+from burg_drake.core import InvalidInputError, RealOutcome, make_pose
+from burg_drake.experiment import (
     EntryConflict,
     LabBook,
+    LabCamera,
     LabEntry,
+    RealTrial,
+    TrialBook,
+    TriedRuns,
+    entry_states,
+    load_trials,
     plan_data,
-    state_of,
-    states,
+    trial_state_hash,
 )
-from burg_drake.experiment.pages.lab_camera import LabCamera
-from burg_drake.experiment.pages.tried_runs import TriedRuns
-from burg_drake.experiment.trials.book import TrialBook
-from burg_drake.experiment.trials.sheet import RealTrial, load_trials
+from burg_drake.experiment.lab import lab_book
 from tests.cameras.synthetic import board_image
 from tests.hang_guard import HANG_GUARD
 
@@ -44,7 +40,7 @@ def lab(trials: Path) -> LabBook:
 
 def entry(lab: LabBook, number: int, outcome: str | None, **more: object) -> LabEntry:
     """As a browser makes it that has seen the file as it is now."""
-    state = state_of(lab.sheet().trial(number))
+    state = trial_state_hash(lab.sheet().trial(number))
     chosen = None if outcome is None else RealOutcome(outcome)
     made = LabEntry(number=number, replaces=state, outcome=chosen, time=TIME, operator="AB")
     return replace(made, **more)  # type: ignore[arg-type]
@@ -78,7 +74,7 @@ def test_two_browsers_that_disagree(lab: LabBook, trials: Path) -> None:
     ):
         lab.enter(mine)
     assert load_trials(trials).trial(1).outcome is RealOutcome.SLIPPED
-    lab.enter(replace(mine, replaces=state_of(load_trials(trials).trial(1))))
+    lab.enter(replace(mine, replaces=trial_state_hash(load_trials(trials).trial(1))))
     assert load_trials(trials).trial(1).outcome is RealOutcome.LIFTED
 
 
@@ -89,14 +85,14 @@ def test_what_another_program_enters_in_between_is_not_replaced(
     others = iter([{"photo": "photos/001.png"}, {"outcome": "dropped"}])
 
     def seen(trial: RealTrial) -> str:
-        state = state_of(trial)
+        state = trial_state_hash(trial)
         for other in others:
             TrialBook(trials).record(trial.number, **other)
             break
         return state
 
     mine = entry(lab, 1, "lifted")
-    monkeypatch.setattr(lab_book, "state_of", seen)
+    monkeypatch.setattr(lab_book, "trial_state_hash", seen)
     with pytest.raises(EntryConflict, match="changed by someone else: it now has dropped"):
         lab.enter(mine)
     trial = load_trials(trials).trial(1)
@@ -133,17 +129,17 @@ def test_entries_from_everywhere_at_once(lab: LabBook, trials: Path) -> None:
         thread.join()
     found = {t.number: t.outcome for t in load_trials(trials).trials if t.outcome}
     assert found == {number: RealOutcome(outcome) for number, outcome in wanted.items()}
-    assert {e["number"] for e in states(lab)["entries"] if e["outcome"]} == set(wanted)
+    assert {e["number"] for e in entry_states(lab)["entries"] if e["outcome"]} == set(wanted)
 
 
 def test_a_file_that_is_being_edited(lab: LabBook, trials: Path) -> None:
     waiting, text = entry(lab, 2, "lifted"), trials.read_text()
     trials.write_text(text.replace("number: 2", "number: 2\n    outcom: lifted"))
-    assert "outcom" in states(lab)["problem"]
+    assert "outcom" in entry_states(lab)["problem"]
     with pytest.raises(InvalidInputError, match="outcom"):
         lab.enter(waiting)
     trials.write_text(text.replace("grasp: blue_mug", "grasp: other_mug"))
-    assert "holds other trials" in states(lab)["problem"]
+    assert "holds other trials" in entry_states(lab)["problem"]
     trials.write_text(text)
     assert lab.enter(waiting).outcome is RealOutcome.LIFTED
     with pytest.raises(InvalidInputError):
@@ -156,7 +152,7 @@ def test_the_page_is_not_told_what_was_simulated(lab: LabBook) -> None:
             return {*data, *(k for value in data.values() for k in keys(value))}
         return {k for one in data for k in keys(one)} if isinstance(data, list) else set()
 
-    assert not {"simulated", "stratum"} & (keys(plan_data(lab)) | keys(states(lab)))
+    assert not {"simulated", "stratum"} & (keys(plan_data(lab)) | keys(entry_states(lab)))
     told = LabBook(lab.runs, show_simulated=True)
     assert plan_data(told)["trials"][0]["simulated"] == lab.runs.sheet.trials[0].simulated
 

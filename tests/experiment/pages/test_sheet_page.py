@@ -11,13 +11,18 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps.outcome import Outcome, RealOutcome
-from burg_drake.experiment.pages.protocol import SheetOptions, sheet_page
-from burg_drake.experiment.pages.trial_pictures import TrialPictures
-from burg_drake.experiment.pages.tried_runs import TriedRuns
-from burg_drake.experiment.pages.words import SHORT_LIST, approach_text, closing_text
-from burg_drake.experiment.trials.sheet import RealTrial, RobotReport
+from burg_drake.core import Outcome, RealOutcome, make_pose
+from burg_drake.experiment import (
+    MAIN_OUTCOMES,
+    RealTrial,
+    RobotReport,
+    SheetOptions,
+    TrialPictures,
+    TriedRuns,
+    approach_text,
+    closing_text,
+    sheet_page,
+)
 
 VOID = {"meta", "br", "img"}
 SMALL = (260, 195)
@@ -92,7 +97,7 @@ def test_every_trial_is_there_once(runs: TriedRuns, once: TrialPictures) -> None
     for trial in runs.sheet.trials:
         card = pages.cards[f"trial-{trial.number}"]
         assert trial.instance in card and trial.grasp in card and "40 mm" in card
-        assert all(label in card for label, _ in SHORT_LIST.values()) and "✕" not in card
+        assert all(label in card for label, _ in MAIN_OUTCOMES.values()) and "✕" not in card
     assert len(page) < 60_000 * len(runs.sheet.trials) + 50_000
     assert page.count('class="block"') == 2 and "Block 2: two, trials 5 to 7" in page
 

@@ -6,11 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from burg_drake.experiment.pages.highlight import RIM
-from burg_drake.experiment.pages.painting import NOTHING
-from burg_drake.experiment.pages.scene_bodies import HAND
-from burg_drake.experiment.pages.trial_pictures import TrialPictures
-from burg_drake.experiment.pages.tried_runs import TriedRuns
+from burg_drake.experiment import HAND_BODY, NO_BODY, TARGET_RIM_COLOR, TrialPictures, TriedRuns
 
 SMALL = (260, 195)
 
@@ -28,10 +24,10 @@ def test_both_painters_see_the_same(
             painter.paint_grasp(trial, SMALL) for painter in (pictures, by_rays)
         )
         assert np.array_equal(view.X_SC, other.X_SC)
-        for name in (HAND, *runs.of(trial).scene.instances):
+        for name in (HAND_BODY, *runs.of(trial).scene.instances):
             a, b = one.shows(placed, name), two.shows(also, name)
             assert (a ^ b).sum() <= 0.02 * max(a.sum(), 1) + 40, name
-        assert one.shows(placed, HAND).sum() > 1500
+        assert one.shows(placed, HAND_BODY).sum() > 1500
 
 
 def test_hand_and_target_are_where_the_grasp_is(runs: TriedRuns, pictures: TrialPictures) -> None:
@@ -40,7 +36,7 @@ def test_hand_and_target_are_where_the_grasp_is(runs: TriedRuns, pictures: Trial
         # A projection of its own: pinhole, pixel centres at integers, S to C.
         R, p = view.X_SC[:3, :3], view.X_SC[:3, 3]
         X_SG, half = runs.X_SG(trial), runs.width(trial) / 2 + 0.006
-        hand = painting.shows(placed, HAND)
+        hand = painting.shows(placed, HAND_BODY)
         away = cv2.distanceTransform((~hand).astype(np.uint8), cv2.DIST_L2, 5)
         for side in (-half, half):
             x, y, z = R.T @ ((X_SG @ [side, 0.0, -0.02, 1.0])[:3] - p)
@@ -51,7 +47,7 @@ def test_hand_and_target_are_where_the_grasp_is(runs: TriedRuns, pictures: Trial
             assert away[round(v), round(u)] < 12, trial.grasp
         target = painting.shows(placed, trial.instance)
         assert target.sum() > 400, trial.grasp
-        assert (painting.owner == NOTHING).mean() < 0.6
+        assert (painting.owner == NO_BODY).mean() < 0.6
 
 
 def test_the_target_has_a_rim(runs: TriedRuns, pictures: TrialPictures) -> None:
@@ -59,7 +55,7 @@ def test_the_target_has_a_rim(runs: TriedRuns, pictures: TrialPictures) -> None:
     painting, placed, _ = pictures.paint_grasp(trial, SMALL)
     data = np.frombuffer(pictures.grasp(trial, SMALL), np.uint8)
     image = cv2.imdecode(data, cv2.IMREAD_COLOR)[..., ::-1].astype(int)
-    orange = np.abs(image - RIM).max(axis=2) < 70
+    orange = np.abs(image - TARGET_RIM_COLOR).max(axis=2) < 70
     mask = painting.shows(placed, trial.instance).astype(np.uint8)
     near = cv2.dilate(mask, np.ones((9, 9))) > 0
     assert orange[near].sum() > 60

@@ -8,21 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from burg_drake.core.frames import make_pose
-from burg_drake.core.grasps.grasp_set import GraspSet
-from burg_drake.evaluation.cascade import evaluate
-from burg_drake.evaluation.records.settings import EvaluationSettings
-from burg_drake.evaluation.store.run_folder import Run
-from burg_drake.experiment.trials.sheet import (
+from burg_drake.core import GraspSet, make_pose
+from burg_drake.evaluation import EvaluationSettings, Run, evaluate
+from burg_drake.experiment import (
     RealTrial,
     Selection,
     Stratum,
     TrialSheet,
+    grasp_content,
+    make_source_run,
     save_trials,
 )
-from burg_drake.experiment.trials.sources import grasp_content, source_of
-from burg_drake.scene.document.scene import load_scene
-from burg_drake.station.document.station_document import load_station
+from burg_drake.scene import load_scene
+from burg_drake.station import load_station
 from tests.evaluation.inline_executor import Inline
 from tests.evaluation.known_judge import install
 
@@ -104,7 +102,7 @@ def make_trials(folder: Path, runs: list[Run], **first: object) -> Path:
     }
     sheet = TrialSheet(
         created="2026-05-04T16:30:00+02:00",
-        runs={f"r{block}": source_of(run, folder) for block, run in enumerate(runs, 1)},
+        runs={f"r{block}": make_source_run(run, folder) for block, run in enumerate(runs, 1)},
         selection=Selection(per_object=2, balance="none", seed=3),
         strata=strata,
         trials=tuple(trials),

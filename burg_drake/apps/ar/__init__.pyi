@@ -1,1 +1,0 @@
-from .verb import add_to as add_to

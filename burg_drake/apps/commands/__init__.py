@@ -1,0 +1,1 @@
+"""The commands of `burg-drake`, by topic; `apps.cli` lists them."""

@@ -1,0 +1,356 @@
+"""`burg-drake camera list`, `show`, `convert` and `calibrate`: cameras and their intrinsics."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.commands.printout import add_target_board_options, target_from_options
+from burg_drake.apps.options.arguments import Parser, examples_text
+from burg_drake.apps.options.values import input_file, positive_int, two_numbers
+
+if TYPE_CHECKING:
+    from burg_drake.cameras import Calibration, CharucoTarget, CharucoView, FrameSource, Intrinsics
+
+
+def print_intrinsics(intrinsics: Intrinsics) -> None:
+    """Prints a camera's figures."""
+    import numpy as np
+
+    from burg_drake.cameras import describe_accuracy
+
+    k = intrinsics
+    title = f"{k.camera}: " if k.camera else ""
+    print(f"{title}{k.width} x {k.height} pixels")
+    print(f"focal length     fx {k.focal[0]:.2f}, fy {k.focal[1]:.2f} pixels")
+    print(
+        f"principal point  cx {k.center[0]:.2f}, cy {k.center[1]:.2f} (pixel centres at integers)"
+    )
+    across, down, diagonal = (math.degrees(angle) for angle in field_of_view(k))
+    print(f"field of view    {across:.1f} x {down:.1f} degrees, diagonal {diagonal:.1f}")
+    if k.is_fisheye:
+        print("lens model       fisheye")
+    if k.is_pinhole:
+        print("distortion       none")
+    else:
+        print("distortion       " + ", ".join(f"{value:.5g}" for value in k.distortion))
+        corners = np.array([(u, v) for v in (0, k.height - 1) for u in (0, k.width - 1)], float)
+        if k.is_fisheye:
+            figures = np.degrees(np.arccos(k.rays(corners)[:, 2]))
+            words = "corners look", "degrees off the axis"
+        else:
+            figures = np.linalg.norm(corners - k.undistort(corners), axis=1)
+            words = "moves corners by", "pixels"
+        names = ("upper left", "upper right", "lower left", "lower right")
+        of_corners = (f"{name} {figure:.1f}" for name, figure in zip(names, figures, strict=True))
+        print(f"{words[0]:17}{', '.join(of_corners)} {words[1]}")
+    if k.residual is not None:
+        print(f"residual         {k.residual:.3f} pixels")
+    if k.known_to is not None:
+        print(f"known            {describe_accuracy(k.known_to, k.except_at)}")
+
+
+def field_of_view(intrinsics: Intrinsics) -> tuple[float, float, float]:
+    """Angle between what opposite edges see, across and down, and opposite corners [rad]."""
+    import numpy as np
+
+    k = intrinsics
+    w, h = k.width - 0.5, k.height - 0.5
+    cx, cy = k.center
+    ends = [((-0.5, cy), (w, cy)), ((cx, -0.5), (cx, h)), ((-0.5, -0.5), (w, h))]
+    rays = k.rays(np.array(ends, dtype=float))
+    between = np.arccos(np.clip((rays[:, 0] * rays[:, 1]).sum(axis=-1), -1.0, 1.0))
+    # Of a fisheye it may be more than half a turn.
+    beyond = np.arccos(rays[..., 2]).sum(axis=1) > np.pi
+    angles = np.where(beyond, 2.0 * np.pi - between, between).tolist()
+    return angles[0], angles[1], angles[2]
+
+
+def add_camera_calibrate_options(calibrate: Parser) -> None:
+    """Adds the options of `burg-drake camera calibrate`."""
+    calibrate.epilog = examples_text(
+        "burg-drake camera calibrate photos/*.jpg -o K.yaml --report calibration.html",
+        "burg-drake camera calibrate --camera 0 --size 1280x720 -o K.yaml",
+        "burg-drake camera calibrate photos --squares 5x7 --square-mm 30 --marker-mm 22 -o K.yaml",
+        "",
+        "Exit code 1 if the photos do not determine the camera well; the file is then written"
+        " only with --keep.",
+    )
+    calibrate.add_argument(
+        "images",
+        metavar="IMAGE",
+        nargs="*",
+        help="photos of the calibration board, folders of them, or a video",
+    )
+    calibrate.add_argument(
+        "--camera",
+        metavar="CAMERA",
+        help="take the views live: 0, /dev/video0, rtsp://...",
+    )
+    calibrate.add_argument(
+        "--size", metavar="WxH", type=two_numbers, help="image size of the live camera"
+    )
+    calibrate.add_argument(
+        "--views",
+        metavar="N",
+        type=positive_int,
+        default=20,
+        help="number of live views (default: %(default)s); Ctrl-C ends earlier",
+    )
+    calibrate.add_argument("--save-views", metavar="FOLDER", help="save the live images here")
+    calibrate.add_argument(
+        "-o", "--output", metavar="FILE", required=True, help="intrinsics file to write (.yaml)"
+    )
+    calibrate.add_argument(
+        "--report", metavar="FILE", help="page with all residuals to write (.html)"
+    )
+    calibrate.add_argument(
+        "--model",
+        choices=("auto", "pinhole", "radial4", "radial", "rational", "fisheye"),
+        default="auto",
+        help="lens model: pinhole (no distortion), radial4 (k1 k2 p1 p2), radial (also k3),"
+        " rational (also k4 k5 k6), fisheye; auto chooses by the residuals (default:"
+        " %(default)s)",
+    )
+    calibrate.add_argument("--name", default="", help="name of the camera, for the file")
+    calibrate.add_argument(
+        "--keep", action="store_true", help="write the file even if the result is uncertain"
+    )
+    add_target_board_options(calibrate)
+
+
+def run_camera_calibrate(arguments: argparse.Namespace) -> int:
+    """Calibrates; 1 if the result is of little use."""
+    from burg_drake.cameras import calibrate_views, calibration_advice, is_useless, open_source
+    from burg_drake.core import InvalidInputError, require_writable
+
+    if bool(arguments.images) == bool(arguments.camera):
+        raise InvalidInputError("give images of the target, or --camera; not both")
+    for output in (arguments.output, arguments.report):
+        if output:
+            require_writable(output)
+    target = target_from_options(arguments)
+    with open_source(arguments.camera or arguments.images, size=arguments.size) as source:
+        views, rejected = (
+            _views_from_camera(source, target, arguments)
+            if arguments.camera
+            else _views_from_photos(source, target)
+        )
+    calibration = calibrate_views(views, target, model=arguments.model, rejected=rejected)
+    _print_calibration(calibration)
+    lines = calibration_advice(calibration)
+    for line in lines:
+        print(f"burg-drake: {line}", file=sys.stderr)
+    useless = is_useless(calibration)
+    if arguments.report:
+        from burg_drake.visualization import write_calibration_report
+
+        write_calibration_report(calibration, lines, arguments.report)
+        print(f"report  {arguments.report}")
+    if useless and not arguments.keep:
+        print(
+            "burg-drake: no file was written: the views do not determine the camera well enough;"
+            " take more, or give --keep",
+            file=sys.stderr,
+        )
+    else:
+        _save_calibration(calibration, arguments)
+    return 1 if useless else 0
+
+
+def _save_calibration(calibration: Calibration, arguments: argparse.Namespace) -> None:
+    import dataclasses
+
+    from burg_drake.cameras import save_intrinsics
+
+    intrinsics = dataclasses.replace(calibration.intrinsics, camera=arguments.name)
+    header = (
+        f"burg-drake camera calibrate: {len(calibration.views)} views, lens model"
+        f" {calibration.model}\nIn 19 of 20 cases the camera is {calibration.promise}."
+    )
+    save_intrinsics(intrinsics, arguments.output, header)
+    print(f"wrote {arguments.output}")
+
+
+def _views_from_photos(
+    source: FrameSource, target: CharucoTarget
+) -> tuple[list[CharucoView], list[tuple[str, str]]]:
+    """Looks for the target in photos."""
+    from burg_drake.cameras import find_target
+    from burg_drake.core import InvalidInputError, Progress, ProgressMeter, Reporter
+
+    views, rejected = [], []
+    with Reporter(True) as reporter:
+        pace = ProgressMeter(reporter.show, Progress("looking for the target", unit="images"))
+        while True:
+            try:
+                frame = source.read()
+            except InvalidInputError as error:
+                rejected.append(("", str(error)))
+                continue
+            if frame is None:
+                break
+            found = find_target(frame.image, target, frame.name)
+            if isinstance(found, str):
+                rejected.append((frame.name, found))
+            else:
+                views.append(found)
+            pace.step(note=f"{len(views)} with the target")
+    return views, rejected
+
+
+def _views_from_camera(
+    source: FrameSource, target: CharucoTarget, arguments: argparse.Namespace
+) -> tuple[list[CharucoView], list[tuple[str, str]]]:
+    """Takes views from a camera until there are enough, it ends, or Ctrl-C."""
+    from pathlib import Path
+
+    from burg_drake.cameras import CameraLost, ViewCollector, write_image
+    from burg_drake.core import ensure_writable_folder
+
+    folder = arguments.save_views and ensure_writable_folder(arguments.save_views)
+    collector = ViewCollector(target)
+    said, enough = "", False
+    try:
+        while len(collector.views) < arguments.views:
+            try:
+                frame = source.read()
+            except CameraLost as error:
+                word = str(error)
+            else:
+                if frame is None:
+                    break
+                taken, word = collector.offer(frame)
+                if taken and folder:
+                    number = len(collector.views)
+                    write_image(Path(folder) / f"view_{number:03d}.png", frame.image)
+            line = f"{len(collector.views)} of {arguments.views} views: {word}"
+            if line != said:
+                print(line, file=sys.stderr, flush=True)
+            said = line
+            if collector.enough and not enough:
+                print("more views make it better; Ctrl-C ends", file=sys.stderr, flush=True)
+            enough = collector.enough
+    except KeyboardInterrupt:
+        print(f"ended with {len(collector.views)} views", file=sys.stderr)
+    return collector.views, []
+
+
+def _print_calibration(calibration: Calibration) -> None:
+    """Prints views, what was left out, parameters and where the image was covered."""
+    from burg_drake.cameras import IMAGE_PARTS, corner_coverage
+    from burg_drake.core import TextTable, format_number
+
+    table = TextTable("views").names("image")
+    table.numbers("corners", "rms [px]", "worst [px]", "tilt [deg]", "blur [px]")
+    for used in calibration.views:
+        worst = float(max((used.residuals**2).sum(axis=1)) ** 0.5)
+        table.row(
+            used.view.name,
+            str(len(used.view.ids)),
+            format_number(used.rms, 3),
+            format_number(worst, 2),
+            format_number(math.degrees(used.tilt), 0),
+            format_number(used.view.blur, 2),
+        )
+    table.show()
+    for name, reason in calibration.rejected:
+        print(f"left out: {name} {reason}".replace(":  ", ": "))
+    table = TextTable(f"lens model {calibration.model}").texts("parameter")
+    table.numbers("value", "standard deviation")
+    for name, (value, deviation) in calibration.parameters.items():
+        table.row(name, f"{value:.6g}", f"{deviation:.2g}")
+    table.caption = "f and c in pixels, others without a unit"
+    table.show()
+    size = (calibration.intrinsics.width, calibration.intrinsics.height)
+    print("corners seen in each part of the image")
+    for row in corner_coverage([used.view for used in calibration.views], size):
+        print("  " + " ".join(f"{count:4d}" for count in row))
+    print()
+    print_intrinsics(calibration.intrinsics)
+    print(f"target           bulges by {1e3 * calibration.bulge:.2f} mm")
+    print("known, in 19 of 20 cases, to so many pixels")
+    parts = calibration.promise.parts
+    for row in (IMAGE_PARTS[:3], IMAGE_PARTS[3:6], IMAGE_PARTS[6:]):
+        words = (f"{name} {calibration.promise.bound(name)}" for name in row if name in parts)
+        print("  " + ", ".join(words))
+
+
+def add_camera_list_options(parser: Parser) -> None:
+    """Adds the options of `burg-drake camera list`."""
+    parser.epilog = examples_text(
+        "burg-drake camera list",
+    )
+
+
+def add_camera_show_options(show: Parser) -> None:
+    """Adds the options of `burg-drake camera show`."""
+    show.epilog = examples_text(
+        "burg-drake camera show K.yaml",
+        "burg-drake camera show sim:panda_tabletop/board",
+    )
+    _add_intrinsics_argument(show)
+
+
+def add_camera_convert_options(convert: Parser) -> None:
+    """Adds the options of `burg-drake camera convert`."""
+    convert.epilog = examples_text(
+        "burg-drake camera convert K.yaml --to ros -o camera_info.yaml",
+        "burg-drake camera convert camera_info.yaml -o K.yaml",
+        "burg-drake camera convert opencv_calibration.yml -o K.yaml",
+    )
+    _add_intrinsics_argument(convert)
+    convert.add_argument(
+        "--to",
+        choices=("burg", "ros"),
+        default="burg",
+        help="format to write (default: %(default)s)",
+    )
+    convert.add_argument("-o", "--output", metavar="FILE", required=True, help="file to write")
+
+
+def _add_intrinsics_argument(parser: Any) -> None:
+    parser.add_argument(
+        "intrinsics",
+        metavar="INTRINSICS",
+        type=input_file,
+        help="intrinsics file (ours, ROS's camera_info, OpenCV's), or sim:STATION/CAMERA",
+    )
+
+
+def run_camera_list(arguments: argparse.Namespace) -> int:
+    """Prints the cameras that open; 1 if there are none."""
+    from burg_drake.cameras import open_devices
+
+    found = 0
+    for name, (width, height) in open_devices():
+        print(f"camera {name}: {width} x {height} pixels")
+        found += 1
+    if not found:
+        print(
+            "burg-drake: no camera gives images; is one plugged in and not in use, and do you have"
+            " permission to read it?",
+            file=sys.stderr,
+        )
+    return 0 if found else 1
+
+
+def run_camera_show(arguments: argparse.Namespace) -> int:
+    """Prints intrinsics."""
+    from burg_drake.cameras import load_intrinsics
+
+    print_intrinsics(load_intrinsics(arguments.intrinsics))
+    return 0
+
+
+def run_camera_convert(arguments: argparse.Namespace) -> int:
+    """Writes intrinsics in another format."""
+    from burg_drake.cameras import load_intrinsics, save_camera_info, save_intrinsics
+
+    intrinsics = load_intrinsics(arguments.intrinsics)
+    save = save_camera_info if arguments.to == "ros" else save_intrinsics
+    save(intrinsics, arguments.output)
+    print(f"wrote {arguments.output}")
+    return 0

@@ -1,0 +1,548 @@
+"""`burg-drake doctor`: what is installed, what is missing for which feature, how to install it."""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import importlib.metadata
+import importlib.util
+import json
+import os
+import platform
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Literal
+
+from burg_drake import __version__
+from burg_drake.apps.options.arguments import Parser, examples_text
+from burg_drake.core import AllocatorSettings
+from burg_drake.system_libraries import (
+    SystemLibrary,
+    apt_command,
+    missing_import_libraries,
+    missing_render_libraries,
+    missing_useful_libraries,
+)
+
+PACKAGE_NAME = "burg-drake"  # Name of this package in package indexes.
+
+
+def installed_version(package: str) -> str | None:
+    """The installed version of a package; None if it is not installed."""
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return None
+
+
+@functools.cache
+def import_error(modules: str) -> str | None:
+    """Why modules cannot be imported, in one line; None if they can.
+
+    Args:
+        modules: as after `import`.
+    """
+    import_timeout = 60.0  # Seconds.
+    try:
+        tried = subprocess.run(
+            [sys.executable, "-c", f"import {modules}"],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=import_timeout,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return f"import {modules} takes more than {import_timeout:g} s"
+    if tried.returncode < 0:
+        return f"import {modules} ends the process (signal {-tried.returncode})"
+    lines = tried.stderr.strip().splitlines() or ["no reason given"]
+    return lines[-1] if tried.returncode else None
+
+
+def unmet_requirements(extra: str = "") -> list[str]:
+    """What burg_drake, or an extra of it, needs and this environment does not have.
+
+    Returns:
+        Such as `mujoco>=3.10` and `viser>=1.1,<1.2 (1.3.0 is installed)`.
+    """
+    unmet = []
+    for requirement in _requirements(extra):
+        name, bounds = re.fullmatch(r"([\w.-]+)(?:\[.*?\])?\s*(.*)", requirement).groups()  # type: ignore[union-attr]
+        found = installed_version(name)
+        if found is None:
+            unmet.append(requirement)
+        elif not _satisfies(found, bounds):
+            unmet.append(f"{requirement} ({found} is installed)")
+    return unmet
+
+
+def _requirements(extra: str) -> list[str]:
+    """What is declared for an extra, or for all if it is empty; none in a checkout on the path."""
+    try:
+        declared = importlib.metadata.requires(PACKAGE_NAME) or []
+    except importlib.metadata.PackageNotFoundError:
+        return []
+    found = []
+    for requirement in declared:
+        needed, _, marker = requirement.partition(";")
+        named = re.search(r"extra == ['\"](.*?)['\"]", marker)
+        if (named[1] if named else marker) == extra:
+            found.append(needed.strip())
+    return found
+
+
+def _satisfies(found: str, bounds: str) -> bool:
+    """Whether a version is within bounds such as `>=1.1,<1.2`."""
+    limits = re.findall(r"(>=|<)\s*([\d.]+)", bounds)
+    ours = _version_numbers(found)
+    return all((ours >= _version_numbers(v)) == (operator == ">=") for operator, v in limits)
+
+
+def _version_numbers(text: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in re.findall(r"\d+", text.partition("+")[0]))
+
+
+def install_command(extra: str, installed: list[str]) -> str:
+    """The command that brings an extra into the environment that this process runs in.
+
+    Args:
+        extra: such as `mujoco`.
+        installed: extras that are there, and that uv would remove.
+    """
+    if _is_pipx_environment():
+        return (
+            f"pipx inject {PACKAGE_NAME} {' '.join(map(_quote_requirement, _requirements(extra)))}"
+        )
+    if _is_uv_tool_environment():
+        return f"uv tool install '{PACKAGE_NAME}[{','.join([*installed, extra])}]'"
+    return f"{pip_install()} '{PACKAGE_NAME}[{extra}]'"
+
+
+def pip_install() -> str:
+    """The command that installs packages into the environment that this process runs in."""
+    if _is_pipx_environment():
+        return f"pipx runpip {PACKAGE_NAME} install"
+    if _is_uv_tool_environment():
+        return f"uv pip install --python {sys.prefix}"
+    return "pip install" if importlib.util.find_spec("pip") else "uv pip install"
+
+
+def _is_pipx_environment() -> bool:
+    return Path(sys.prefix, "pipx_metadata.json").exists()
+
+
+def _is_uv_tool_environment() -> bool:
+    return Path(sys.prefix, "uv-receipt.toml").exists()
+
+
+def _quote_requirement(requirement: str) -> str:
+    return f"'{requirement}'"
+
+
+Finding = Literal["ok", "missing", "broken", "low"]
+
+COMPILED_MODULES = "numpy, cv2, coacd, embreex, manifold3d, h5py"
+"""Required modules with compiled code. Modules in pure Python hardly ever fail to import."""
+BYTES_PER_GIB = 1 << 30
+LIMIT_FILES = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
+"""Of control groups, versions 2 and 1."""
+QUOTA_FILE = Path("/sys/fs/cgroup/cpu.max")  # Of control groups, version 2.
+
+
+@dataclass(frozen=True)
+class FeatureCheck:
+    """What was found about one feature.
+
+    Attributes:
+        feature: what a person wants.
+        state: ok, missing, broken (it is installed, and does not work), or low.
+        found: version, path or number; why it does not work.
+        remedy: what to do, if anything.
+        required: `burg-drake evaluate` needs it.
+    """
+
+    feature: str
+    state: Finding
+    found: str = ""
+    remedy: str = ""
+    required: bool = False
+
+    @property
+    def prevents_evaluation(self) -> bool:
+        """Whether `evaluate` cannot run."""
+        return self.required and self.state != "ok"
+
+
+@dataclass(frozen=True)
+class OptionalFeature:
+    """An optional part: packages that an extra of burg_drake brings.
+
+    Attributes:
+        name: of the extra.
+        feature: what it is for.
+        package: whose version is told.
+        modules: tried by an import: those that are compiled, which break most and load fast.
+    """
+
+    name: str
+    feature: str
+    package: str
+    modules: str
+
+
+EXTRAS = (
+    OptionalFeature("mujoco", "second opinion by MuJoCo", "mujoco", "mujoco"),
+    OptionalFeature("ui", "scene editor (burg-drake setup)", "viser", "msgspec"),
+    OptionalFeature("parquet", "tables in Parquet", "pyarrow", "pyarrow.lib"),
+    OptionalFeature("frame", "results in pandas", "pandas", "pandas"),
+    OptionalFeature("dask", "clusters over Dask", "distributed", "msgpack"),
+    OptionalFeature("jobqueue", "batch systems (SLURM, PBS)", "dask-jobqueue", "cryptography"),
+    OptionalFeature("usd", "export to USD", "usd-core", "pxr.Usd"),
+)
+"""Optional features, and the packages that they need."""
+BLENDER_EXTRA = OptionalFeature("blender", "photorealistic images (Blender)", "bpy", "bpy")
+"""Photorealistic rendering, by a Blender program or by the package bpy."""
+
+
+def all_checks() -> list[FeatureCheck]:
+    """Everything, in the order in which it is shown."""
+    installed = [extra for extra in EXTRAS if installed_version(extra.package)]
+    tried = ["pydrake.common", COMPILED_MODULES, *(extra.modules for extra in installed)]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:  # of processes; answers are kept
+        list(pool.map(import_error, tried))
+    names = [extra.name for extra in installed]
+    checks = [
+        _check_python(),
+        _check_drake(),
+        _check_packages(),
+        _check_cores_and_memory(),
+        _check_disk(),
+        _check_cache(),
+    ]
+    checks += [
+        _check_renderer(),
+        _check_allocator(),
+        *(_check_extra(extra, names) for extra in EXTRAS),
+    ]
+    return [
+        *checks,
+        _check_blender(names),
+        _check_ros(),
+        _check_cameras(),
+        _check_browser(),
+        _check_gpu(),
+    ]
+
+
+def _check_python() -> FeatureCheck:
+    min_python = (3, 11)
+    found = platform.python_version()
+    if sys.version_info[:2] >= min_python:
+        return FeatureCheck("Python", "ok", found, required=True)
+    oldest = ".".join(map(str, min_python))
+    return FeatureCheck("Python", "low", found, f"install Python {oldest} or later", required=True)
+
+
+def _check_drake() -> FeatureCheck:
+    feature = "simulation (Drake)"
+    found = installed_version("drake")
+    if missing := missing_import_libraries():
+        return FeatureCheck(
+            feature,
+            "broken",
+            f"lacks {', '.join(missing)}",
+            _libraries_remedy(missing),
+            required=True,
+        )
+    install = pip_install()
+    if error := import_error("pydrake.common"):
+        state: Finding = "broken" if found else "missing"
+        return FeatureCheck(
+            feature, state, error if found else "", f"{install} drake", required=True
+        )
+    return FeatureCheck(feature, "ok", f"drake {found or 'of unknown version'}", required=True)
+
+
+def _check_packages() -> FeatureCheck:
+    feature = "packages it always needs"
+    install = pip_install()
+    if unmet := unmet_requirements():
+        return FeatureCheck(
+            feature, "missing", ", ".join(unmet), f"{install} --upgrade burg-drake", True
+        )
+    if error := import_error(COMPILED_MODULES):
+        return FeatureCheck(
+            feature, "broken", error, f"{install} --force-reinstall burg-drake", True
+        )
+    return FeatureCheck(
+        feature,
+        "ok",
+        f"numpy {installed_version('numpy')}, scipy {installed_version('scipy')}, ...",
+        "",
+        True,
+    )
+
+
+def _check_cores_and_memory() -> FeatureCheck:
+    min_memory = 2.0  # GiB. A worker takes 0.3 to 0.5.
+    memory = usable_memory() / BYTES_PER_GIB
+    found = f"{usable_cores():g} cores, {memory:.1f} GiB of memory"
+    if memory < min_memory:
+        return FeatureCheck("processor", "low", found, "use --workers 1")
+    return FeatureCheck("processor", "ok", found)
+
+
+def _check_disk() -> FeatureCheck:
+    min_free = 1.0  # GiB.
+    here = Path.cwd()
+    free = free_bytes(here) / BYTES_PER_GIB
+    found = f"{free:.0f} GiB free here"
+    if not can_write_in(here):
+        return FeatureCheck(
+            "disk", "broken", f"{here} cannot be written to", "work in another folder"
+        )
+    if free < min_free:
+        return FeatureCheck("disk", "low", f"{free:.1f} GiB free here", "free some space")
+    return FeatureCheck("disk", "ok", found)
+
+
+def _check_cache() -> FeatureCheck:
+    try:
+        from burg_drake.core import BurgError, cache_folder
+    except ImportError as error:  # numpy is broken, which another check tells
+        return FeatureCheck("cache", "broken", str(error))
+    try:
+        folder = cache_folder()
+    except BurgError as error:
+        return FeatureCheck("cache", "broken", str(error), "set BURG_DRAKE_CACHE to a folder")
+    if folder is None:
+        return FeatureCheck("cache", "ok", "off, by BURG_DRAKE_CACHE")
+    if not can_write_in(folder):
+        return FeatureCheck(
+            "cache", "broken", f"{folder} cannot be written to", "set BURG_DRAKE_CACHE to a folder"
+        )
+    return FeatureCheck("cache", "ok", f"{folder_bytes(folder) / 1e6:.0f} MB in {folder}")
+
+
+def _libraries_remedy(missing: list[str]) -> str:
+    return (
+        apt_command(missing)
+        if shutil.which("apt-get")
+        else "install with the package manager of this system"
+    )
+
+
+def _check_renderer() -> FeatureCheck:
+    feature = "camera images (Drake's renderer)"
+    if missing := missing_render_libraries():
+        return FeatureCheck(feature, "missing", ", ".join(missing), _libraries_remedy(missing))
+    return FeatureCheck(feature, "ok")
+
+
+def _check_allocator() -> FeatureCheck:
+    feature = "faster memory (mimalloc)"
+    if sys.platform != "linux":
+        return FeatureCheck(feature, "ok", "not used on this system")
+    from burg_drake.core import worker_preload
+
+    if missing_useful_libraries():
+        return FeatureCheck(
+            feature, "missing", SystemLibrary.atomic, _libraries_remedy([SystemLibrary.atomic])
+        )
+    if found := worker_preload().get(AllocatorSettings.preload_variable):
+        return FeatureCheck(feature, "ok", Path(found.rpartition(":")[2]).name)
+    return FeatureCheck(
+        feature, "missing", "trials are a quarter slower", f"{pip_install()} cmeel-mimalloc"
+    )
+
+
+def _check_extra(extra: OptionalFeature, installed: list[str]) -> FeatureCheck:
+    remedy = install_command(extra.name, [name for name in installed if name != extra.name])
+    found = installed_version(extra.package)
+    if found is None:
+        return FeatureCheck(extra.feature, "missing", "", remedy)
+    if unmet := unmet_requirements(extra.name):
+        return FeatureCheck(extra.feature, "broken", f"needs {', '.join(unmet)}", remedy)
+    if error := import_error(extra.modules):
+        return FeatureCheck(extra.feature, "broken", error, remedy)
+    return FeatureCheck(extra.feature, "ok", f"{extra.package} {found}")
+
+
+def _check_blender(installed: list[str]) -> FeatureCheck:
+    variable = "BURG_DRAKE_BLENDER"
+    bpy_pythons = ((3, 11), (3, 13))  # Python versions for which bpy has wheels.
+    given = os.environ.get(variable)
+    if given:
+        program = shutil.which(given)
+        if program is None:
+            return FeatureCheck(
+                BLENDER_EXTRA.feature,
+                "broken",
+                f"{variable}={given} is not a program",
+                f"set {variable} to a Blender, or to a Python that has bpy",
+            )
+        return FeatureCheck(BLENDER_EXTRA.feature, "ok", program)
+    if importlib.util.find_spec("bpy") is None and sys.version_info[:2] not in bpy_pythons:
+        return FeatureCheck(
+            BLENDER_EXTRA.feature,
+            "missing",
+            f"bpy has no wheel for Python {sys.version_info[0]}.{sys.version_info[1]}",
+            f"install Blender and set {variable} to it",
+        )
+    return _check_extra(BLENDER_EXTRA, installed)
+
+
+def _check_ros() -> FeatureCheck:
+    from burg_drake.ros import CLIENT_LIBRARIES, ROS_1_HINT, ROS_2_HINT, SYSTEM_PACKAGES
+
+    feature = "ROS node (burg-drake ros)"
+    for number, client in sorted(CLIENT_LIBRARIES.items(), reverse=True):
+        places = [str(SYSTEM_PACKAGES)] if (SYSTEM_PACKAGES / client).is_dir() else []
+        if places or importlib.util.find_spec(client):
+            path = f"sys; sys.path += {places!r}; import {client}"
+            if error := import_error(path):
+                return FeatureCheck(feature, "broken", error, (ROS_1_HINT, ROS_2_HINT)[number - 1])
+            return FeatureCheck(feature, "ok", f"ROS {number} ({client})")
+    return FeatureCheck(feature, "missing", "", f"{ROS_2_HINT}; {ROS_1_HINT}")
+
+
+def _check_cameras() -> FeatureCheck:
+    feature = "cameras"
+    if sys.platform != "linux":
+        return FeatureCheck(feature, "ok", "burg-drake camera list finds them")
+    found = camera_devices()
+    if not found:
+        return FeatureCheck(feature, "missing", "", "plug one in; photos and videos need none")
+    closed = [path for path in found if not os.access(path, os.R_OK | os.W_OK)]
+    if closed:
+        remedy = "sudo usermod -aG video $USER, then log in again"
+        return FeatureCheck(feature, "broken", f"no permission for {', '.join(closed)}", remedy)
+    return FeatureCheck(feature, "ok", ", ".join(found))
+
+
+def _check_browser() -> FeatureCheck:
+    found = find_browser()
+    if found is None:
+        return FeatureCheck(
+            "browser", "missing", "", "open pages on another computer; --html writes files"
+        )
+    return FeatureCheck("browser", "ok", found)
+
+
+def _check_gpu() -> FeatureCheck:
+    found = "NVIDIA" if Path("/dev/nvidia0").exists() else "no NVIDIA card"
+    return FeatureCheck("GPU", "ok", f"{found}; none is needed, physics runs on the processor")
+
+
+def doctor_summary(checks: list[FeatureCheck]) -> Iterator[str]:
+    """What it comes to, in a line or two."""
+    prevented = [check.feature for check in checks if check.prevents_evaluation]
+    missing = [check.feature for check in checks if check.state != "ok" and not check.required]
+    if prevented:
+        yield f"burg-drake evaluate cannot run: see {', '.join(prevented)} above."
+    else:
+        yield "burg-drake evaluate has all that it needs. Try: burg-drake demo"
+    if missing:
+        yield "Install the rest only if you want the feature."
+
+
+def usable_cores() -> float:
+    """Processors that this process may use: of the machine, its affinity, its control group."""
+    cores = float(len(os.sched_getaffinity(0))) if sys.platform == "linux" else os.cpu_count() or 1
+    try:
+        quota, period = QUOTA_FILE.read_text().split()
+        return min(cores, int(quota) / int(period))
+    except (OSError, ValueError):  # none, or `max`
+        return cores
+
+
+def usable_memory() -> int:
+    """Memory that this process may use [bytes]: of the machine, or of its control group."""
+    found = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    for path in LIMIT_FILES:
+        try:
+            found = min(found, int(Path(path).read_text()))
+        except (OSError, ValueError):  # none, or `max`
+            continue
+    return found
+
+
+def can_write_in(folder: Path) -> bool:
+    """Whether files can be made in a folder, or the folder in the nearest one that there is."""
+    while not folder.exists() and folder != folder.parent:
+        folder = folder.parent
+    return folder.is_dir() and os.access(folder, os.W_OK | os.X_OK)
+
+
+def free_bytes(folder: Path) -> int:
+    """Free space of the disk that a folder is on."""
+    return shutil.disk_usage(folder).free
+
+
+def folder_bytes(folder: Path) -> int:
+    """Size of the files that lie directly in a folder."""
+    total = 0
+    for entry in folder.iterdir() if folder.is_dir() else ():
+        try:
+            total += entry.stat().st_size
+        except OSError:  # removed meanwhile, by another process
+            continue
+    return total
+
+
+def camera_devices() -> list[str]:
+    """Video devices of this machine; Linux names them, other systems do not."""
+    return sorted(str(path) for path in Path("/dev").glob("video*"))
+
+
+def find_browser() -> str | None:
+    """A browser that is installed here."""
+    programs = (
+        "chromium",
+        "chromium-browser",
+        "google-chrome",
+        "firefox",
+        "microsoft-edge",
+        "safari",
+    )
+    if sys.platform == "darwin":
+        return "the system's"
+    return next((found for name in programs if (found := shutil.which(name))), None)
+
+
+def add_doctor_options(parser: Parser) -> None:
+    """Adds the options of `burg-drake doctor`."""
+    parser.epilog = examples_text(
+        "burg-drake doctor",
+        "burg-drake doctor --json",
+        "",
+        "It changes nothing and does not use the network. Exit code 1 if `evaluate` cannot run.",
+    )
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def run_doctor(arguments: argparse.Namespace) -> int:
+    """Prints the table; 1 if something that `evaluate` needs is missing."""
+
+    checks = all_checks()
+    if arguments.json:
+        found = {"burg_drake": __version__, "checks": [asdict(check) for check in checks]}
+        print(json.dumps(found, indent=2))
+    else:
+        width = max(len(check.feature) for check in checks)
+        print(f"burg_drake {__version__}\n")
+        for check in checks:
+            state = "optional" if check.state == "missing" and not check.required else check.state
+            print(f"{state:<8}  {check.feature:<{width}}  {check.found}".rstrip())
+            if check.remedy:
+                print(f"{'':<8}  {'':<{width}}  -> {check.remedy}")
+        print("", *doctor_summary(checks), sep="\n")
+    return 1 if any(check.prevents_evaluation for check in checks) else 0

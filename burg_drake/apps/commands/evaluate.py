@@ -1,0 +1,483 @@
+"""`burg-drake evaluate`: grasps of one scene or of many, simulated and judged."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from burg_drake.apps.options.arguments import (
+    Parser,
+    add_cluster,
+    add_quiet,
+    add_retry_failed,
+    add_station,
+    add_workers,
+    cluster_from_options,
+    examples_text,
+    retry_advice,
+    scene_names,
+)
+from burg_drake.apps.options.evaluated_grasps import (
+    add_grasp_file_options,
+    add_motion_options,
+    add_sampling_options,
+    grasps_per_object,
+    motion_from_options,
+    read_grasps_from_options,
+    refuse_sampling_options_with_file,
+    refuse_standoff_without_arm,
+    require_grasp_file,
+)
+from burg_drake.apps.options.settings_options import add_settings_options, settings_from
+from burg_drake.core import CONTESTED_CONFIDENCE, InvalidInputError, list_names
+
+if TYPE_CHECKING:
+    from burg_drake.core import GraspSet, Mode
+    from burg_drake.evaluation import (
+        Campaign,
+        Columns,
+        EvaluationSettings,
+        Executor,
+        GraspsLike,
+        Run,
+        Summary,
+    )
+    from burg_drake.scene import Scene
+    from burg_drake.station import Engine, GraspMotion, Station
+
+
+def requested_settings(
+    arguments: argparse.Namespace, mode: Mode, motion: GraspMotion
+) -> EvaluationSettings:
+    """The settings that options ask for, on a station that has this mode and motion."""
+    from burg_drake.evaluation import EvaluationSettings
+
+    return settings_from(
+        arguments,
+        EvaluationSettings,
+        grasps_per_object=grasps_per_object(arguments),
+        only=arguments.only,
+        mode=mode,
+        motion=motion,
+        scene_reports=arguments.scene_reports,
+    )
+
+
+SECOND_OPINION_COLUMNS = ("judged_again", "outcome_before", "outcome", "confidence")
+"""Columns that `second_opinion_line` reads."""
+
+
+def add_rejudge_contested(parser: Parser) -> None:
+    """Adds --rejudge."""
+    parser.add_argument(
+        "--rejudge",
+        choices=("contested",),
+        help="afterwards, evaluate contested grasps again with the preset of --engine",
+    )
+
+
+def first_engine(arguments: argparse.Namespace, folder: str, mode: Mode) -> Engine | str:
+    """The engine that judges all grasps: with --rejudge that of the run in the folder, and standard
+    of a new one.
+
+    Raises:
+        InvalidInputError: a shard is asked for; and see `require_second_engine`, also for other
+            errors.
+    """
+    from burg_drake.evaluation import RUN_FILE, is_campaign, open_results, require_second_engine
+    from burg_drake.station import DEFAULT_ENGINE, ENGINES
+
+    chosen: str = arguments.engine
+    if arguments.rejudge is None:
+        return chosen
+    exists = is_campaign(folder) or (Path(folder) / RUN_FILE).exists()
+    engine = open_results(folder).document.engine if exists else ENGINES[DEFAULT_ENGINE]
+    if arguments.shard is not None:
+        raise InvalidInputError(
+            "--rejudge settles a whole run; merge the shards first (burg-drake merge), or leave"
+            " --shard out"
+        )
+    require_second_engine(chosen, engine, mode)
+    return engine
+
+
+Judged = TypeVar("Judged", "Run", "Campaign")
+
+
+def rejudge_contested(
+    run: Judged, arguments: argparse.Namespace, executor: Executor | None
+) -> Judged:
+    """Judges contested grasps again, if that is asked for, and says what came of it."""
+    if arguments.rejudge is None:
+        return run
+    from burg_drake.evaluation import judge_again
+
+    return judge_again(
+        run,
+        engine=arguments.engine,
+        executor=executor,
+        workers=arguments.workers,
+        progress=not arguments.quiet,
+    )
+
+
+def second_opinion_line(columns: Columns) -> str:
+    """How many verdicts another engine has settled, and how many of them changed.
+
+    Args:
+        columns: `SECOND_OPINION_COLUMNS` of a run.
+    """
+    import numpy as np
+
+    engine, before, outcome, confidence = (columns[name] for name in SECOND_OPINION_COLUMNS)
+    again = np.flatnonzero(engine != "")
+    if not len(again):
+        known = np.isfinite(confidence).any()
+        return "no verdict is contested" if known else "no verdict has a confidence to go by"
+    engines = ", ".join(sorted(set(engine[again].tolist())))
+    changed = Counter(
+        f"{was} to {now}"
+        for was, now in zip(before[again].tolist(), outcome[again].tolist(), strict=True)
+        if was != now
+    )
+    many = "" if len(again) == 1 else "s"
+    text = f"settled {len(again)} contested grasp{many} by {engines}; changed {changed.total()}"
+    details = ", ".join(f"{n} from {what}" for what, n in changed.most_common())
+    text += f" ({details})" if details else ""
+    close = int((confidence[again] < CONTESTED_CONFIDENCE).sum())
+    return f"{text}; close for it, too: {close}" if close else text
+
+
+def evaluate_many(
+    arguments: argparse.Namespace, references: Sequence[str], executor: Executor | None = None
+) -> int:
+    """Evaluates; 1 if scenes could not be judged, or grasps not be simulated.
+
+    Args:
+        arguments: of the verb.
+        references: the scenes.
+        executor: judges in place of processes of this machine.
+    """
+    from burg_drake.evaluation import evaluate, mode_for, motion_text
+    from burg_drake.station import GraspMotion, load_station
+
+    if arguments.output is None:
+        raise InvalidInputError(
+            f"{len(references)} scenes are given; name a folder for the run with -o RUN"
+        )
+    station = load_station(arguments.station)
+    mode = mode_for(station, arguments.mode)
+    refuse_standoff_without_arm(arguments, mode)
+    motion = motion_from_options(arguments, station)
+    settings = requested_settings(arguments, mode, motion)
+    settings = replace(settings, engine=first_engine(arguments, arguments.output, mode))
+    campaign = evaluate(
+        list(references),
+        station,
+        arguments.output,
+        settings=settings,
+        grasps=_grasps_from_file(arguments, station),
+        executor=executor,
+        workers=arguments.workers,
+        retry_failed=arguments.retry_failed,
+        progress=not arguments.quiet,
+    )
+    campaign = rejudge_contested(campaign, arguments, executor)
+    print_campaign(campaign)
+    if arguments.rejudge is not None:
+        print(second_opinion_line(campaign.columns(SECOND_OPINION_COLUMNS)))
+    if motion != GraspMotion():
+        print(f"motion  {motion_text(motion)}")
+    return campaign_exit_code(campaign)
+
+
+def print_campaign(campaign: Campaign) -> None:
+    """Prints the tables of a run over many scenes, and where what is."""
+    from rich.console import Console
+
+    from burg_drake.evaluation import PARTS_FOLDER, REPORT_FILE, summarize, summary_view
+
+    summary = summarize(campaign)
+    Console().print(summary_view(summary), crop=False)
+    _scene_table(summary).show()
+    if campaign.document.shard:
+        print(f"shard   {campaign.document.shard}; merge all of them with burg-drake merge")
+    scenes = f"{campaign.path}/scenes/NAME"
+    if any(campaign.folder(name).joinpath(REPORT_FILE).exists() for name in campaign.names):
+        print(f"runs    {scenes}, each with a table and a report")
+    else:
+        print(f"runs    {scenes}, each with a table; burg-drake report {scenes} makes a report")
+    print(f"tables  {campaign.path / PARTS_FOLDER} (Parquet, all scenes)")
+    if campaign.report_path.exists():
+        print(f"report  {campaign.report_path}")
+
+
+def campaign_exit_code(campaign: Campaign) -> int:
+    """Says what could not be judged; the exit code."""
+    states = campaign.states.values()
+    failed, interrupted = sum(s.failed for s in states), sum(s.interrupted for s in states)
+    for name, why in campaign.failed.items():
+        print(f"burg-drake: scene {name} could not be judged: {why}", file=sys.stderr)
+    if failed:
+        where = list_names([s.scene for s in states if s.failed])
+        print(
+            f"burg-drake: {failed} grasps could not be simulated (scenes {where});"
+            f" {retry_advice(interrupted, failed)}",
+            file=sys.stderr,
+        )
+    return 1 if failed or campaign.failed else 0
+
+
+def _scene_table(summary: Summary) -> Any:
+    """The scenes in which the smallest share of the executed grasps was lifted."""
+    max_rows = 20  # Scenes with a row of their own.
+    from burg_drake.core import TextTable, format_count, format_percent
+
+    def share(group: Any) -> float:
+        return group.lifted / group.executed if group.executed else -1.0
+
+    groups = sorted(summary.scenes, key=share)[:max_rows]
+    more = len(summary.scenes) - len(groups)
+    title = f"Scenes, the {max_rows} with the least success" if more else "Scenes"
+    table = TextTable(title).names("scene")
+    table.numbers(*summary.steps, "success")
+    for group in groups:
+        success = format_percent(share(group)) if group.executed else "-"
+        table.row(
+            group.name, *(format_count(group.funnel[name]) for name in summary.steps), success
+        )
+    if more:
+        table.caption = f"{more:,} more scenes are in the columns of the store"
+    return table
+
+
+def _grasps_from_file(arguments: argparse.Namespace, station: Station) -> GraspsLike | None:
+    """The grasps of the file: those in the frames of their objects as a set for all scenes."""
+    from burg_drake.apps.options.grasp_files import POSE_FRAMES, gripper_for
+    from burg_drake.core import content_hash
+    from burg_drake.evaluation import read_input
+    from burg_drake.formats import read_poses, with_objects_renamed
+
+    if arguments.grasps is None:
+        return None
+    imported = read_input(
+        arguments.grasps,
+        arguments.grasps_format,
+        gripper_for(arguments, station),
+        arguments.correction,
+    )
+    for note in imported.notes:
+        print(f"note: {note}")
+    frame = POSE_FRAMES.get(arguments.grasps_frame) or imported.frame
+    if frame != "object":
+        poses = arguments.camera_pose
+        placing = [read_poses(poses) if poses else None, sorted(arguments.object_ids.items())]
+        content = content_hash(Path(arguments.grasps), arguments.correction, frame, *placing)
+        return _SceneGraspFile(arguments, station, content, arguments.correction)
+    return with_objects_renamed(imported.grasps, dict(arguments.grasps_object))
+
+
+@dataclass(frozen=True)
+class _SceneGraspFile:
+    """Grasps in the frame of a scene or camera: each scene gets those that a file has of it, by
+    the column `scene_id`.
+
+    Attributes:
+        arguments: of the verb.
+        station: has the hand.
+        content: hash of the grasps and of what places them.
+        correction: with which they are read.
+    """
+
+    arguments: argparse.Namespace
+    station: Station
+    content: str
+    correction: tuple[str, ...]
+
+    def __call__(self, scene: Scene) -> Mapping[str, GraspSet]:
+        from burg_drake.core import UnknownNameError
+        from burg_drake.evaluation import NoSceneIdsError
+
+        chosen = argparse.Namespace(**{**vars(self.arguments), "run": None})
+        chosen.scene_id = scene.name
+        try:
+            return read_grasps_from_options(chosen, scene, self.station).by_instance
+        except UnknownNameError:
+            return {}
+        except NoSceneIdsError as error:
+            raise InvalidInputError(
+                f"{self.arguments.grasps} has grasps in the frame of a scene or camera, without"
+                " saying which; evaluate that scene alone"
+            ) from error
+
+
+RUNS_FOLDER = "runs"  # Parent folder of runs for which no folder is given.
+
+
+def add_evaluate_options(parser: Parser) -> None:
+    """Adds the options of `burg-drake evaluate`."""
+    from burg_drake.evaluation import EvaluationSettings
+
+    parser.epilog = examples_text(
+        "burg-drake evaluate tabletop_six --grasps-per-object 100 -o runs/first",
+        "burg-drake evaluate my_scene.yaml --station my_station.yaml -o runs/mine",
+        "burg-drake evaluate tabletop_six --only mug,bowl -n 500 -o runs/two",
+        "burg-drake evaluate tabletop_six --until-balanced 10 -o runs/lab",
+        "burg-drake evaluate tabletop_six -n 20 --mode arm -o runs/arm",
+        "burg-drake evaluate my_scene.yaml --grasps Mug_3f2a_0.01.h5 --grasps-object mug",
+        "burg-drake evaluate tabletop_six -n 1000 --cluster tls://head.example.org:8786",
+        "burg-drake evaluate my_scene.yaml --grasps network.npy --camera-pose camera.yaml",
+        "burg-drake evaluate scenes/ -n 100 --shard 2/8 -o runs/shard2",
+        "burg-drake evaluate tabletop_six -o runs/first --rejudge contested --engine reference",
+        "",
+        "The same command continues where an interrupted one stopped.",
+    )
+    parser.set_defaults(after_interrupt="; run the same command to continue")
+    parser.add_argument(
+        "scenes",
+        metavar="SCENE",
+        nargs="+",
+        help=f"scene file, folder of scenes, or built-in: {scene_names()}",
+    )
+    add_station(parser)
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="RUN",
+        help=f"folder of the run (default: {RUNS_FOLDER}/SCENE; required for several scenes)",
+    )
+    which = parser.add_mutually_exclusive_group()
+    add_sampling_options(parser, 100, which)
+    add_grasp_file_options(parser, which)
+    add_settings_options(
+        parser,
+        EvaluationSettings,
+        *("until_balanced", "balanced_among", "max_grasps_per_object"),
+    )
+    add_settings_options(parser, EvaluationSettings, "engine")
+    add_rejudge_contested(parser)
+    who = parser.add_mutually_exclusive_group()
+    add_workers(who)
+    add_cluster(who)
+    add_settings_options(parser, EvaluationSettings, "table", "mode", "shard")
+    add_settings_options(parser, EvaluationSettings, "tilt_limit_deg", "slip_limit_mm", "approach")
+    add_motion_options(parser)
+    add_retry_failed(parser, "grasps")
+    parser.add_argument(
+        "--scene-reports",
+        action=argparse.BooleanOptionalAction,
+        help="also write a report for each of several scenes (default: for up to 100)",
+    )
+    add_quiet(parser)
+
+
+def run_evaluate(arguments: argparse.Namespace) -> int:
+    """Evaluates; 1 if some grasps could not be simulated."""
+    from burg_drake.scene import scene_references
+
+    require_grasp_file(arguments)
+    refuse_sampling_options_with_file(arguments)
+    references = scene_references(arguments.scenes)
+    if len(references) > 1 or Path(arguments.scenes[0]).is_dir():
+        with cluster_from_options(arguments) as executor:
+            return evaluate_many(arguments, references, executor=executor)
+    return _evaluate_one(arguments, references[0])
+
+
+def _evaluate_one(arguments: argparse.Namespace, reference: str) -> int:
+    """Evaluates one scene."""
+    from burg_drake.evaluation import evaluate, mode_for
+    from burg_drake.motion import require_usable_arm
+    from burg_drake.scene import load_scene
+    from burg_drake.station import load_station, require_valid_scene
+
+    scene = load_scene(reference)
+    station = load_station(arguments.station)
+    mode = mode_for(station, arguments.mode)
+    refuse_standoff_without_arm(arguments, mode)
+    motion = motion_from_options(arguments, station)
+    given = (
+        None if arguments.grasps is None else read_grasps_from_options(arguments, scene, station)
+    )
+    for note in given.notes if given else ():
+        print(f"note: {note}")
+    warnings = require_valid_scene(scene, station)
+    if mode != "hand":
+        warnings += require_usable_arm(scene, station)
+    for warning in warnings:
+        print(f"burg-drake: warning: {warning}", file=sys.stderr)
+    folder = arguments.output or f"{RUNS_FOLDER}/{scene.name}"
+    settings = requested_settings(arguments, mode, motion)
+    settings = replace(settings, engine=first_engine(arguments, folder, mode))
+    with cluster_from_options(arguments) as executor:
+        run = evaluate(
+            scene,
+            station,
+            folder,
+            settings=settings,
+            grasps=given.by_instance if given else None,
+            executor=executor,
+            workers=arguments.workers,
+            retry_failed=arguments.retry_failed,
+            progress=not arguments.quiet,
+        )
+        run = rejudge_contested(run, arguments, executor)
+    _print_run(run, motion, rejudged=arguments.rejudge is not None)
+    return 1 if run.failures else 0
+
+
+def _print_run(run: Run, motion: GraspMotion, *, rejudged: bool) -> None:
+    """The tables of a run, where its files are, and what has failed."""
+    from burg_drake.evaluation import motion_text
+    from burg_drake.station import GraspMotion
+
+    print_summary(run)
+    if run.document.shard:
+        print(f"shard   {run.document.shard}; merge all of them with burg-drake merge")
+    if motion != GraspMotion():
+        print(f"motion  {motion_text(motion)}")
+    if rejudged or any(verdict.judged_again for verdict in run.verdicts.values()):
+        print(second_opinion_line({name: run.results[name] for name in SECOND_OPINION_COLUMNS}))
+    if contested := run.contested:
+        finer = "mujoco" if run.document.engine.name == "reference" else "reference"
+        print(
+            f"contested: {list_names(contested)}; judge them again by the same command with"
+            f" --rejudge contested --engine {finer}"
+        )
+    print(f"table   {run.table_path}")
+    print(f"report  {run.report_path}")
+    if best := run.best(each=True):
+        print("best    " + "\n        ".join(best))
+        print(_show_grasps_hint(str(run.path)))
+    if run.failures:
+        print(
+            f"burg-drake: {len(run.failures)} of {len(run.candidates)} grasps could not be"
+            f" simulated, such as {run.failures[0]}; reasons are in {run.table_path};"
+            f" {retry_advice(len(run.interrupted), len(run.failures))}",
+            file=sys.stderr,
+        )
+
+
+def _show_grasps_hint(folder: str) -> str:
+    """How to look at the best grasps, and at all that lifted."""
+    replay = shlex.join(["burg-drake", "replay", folder, "--grasp"])
+    show = shlex.join(["burg-drake", "grasps", "show", folder, "--outcome", "lifted"])
+    return (
+        "best: of each object the lifted grasp with the most room around the open hand; see one by"
+        f"\n    {replay} ID\nthe table has all lifted grasps; see them by\n    {show} --all"
+    )
+
+
+def print_summary(run: Run) -> None:
+    """Prints the tables of a run."""
+    from rich.console import Console
+
+    from burg_drake.evaluation import summarize, summary_view
+
+    Console().print(summary_view(summarize(run)), crop=False)

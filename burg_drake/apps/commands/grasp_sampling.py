@@ -1,0 +1,308 @@
+"""`burg-drake grasps sample` and `score`: antipodal grasps, and their analytic quality."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from burg_drake.apps.options.arguments import (
+    Parser,
+    add_quiet,
+    add_renaming,
+    add_station,
+    examples_text,
+)
+from burg_drake.apps.options.evaluated_grasps import (
+    add_sampling_options,
+    grasps_per_object,
+    print_shortfalls,
+)
+from burg_drake.apps.options.grasp_files import add_format_option, grasp_output
+from burg_drake.apps.options.settings_options import add_settings_options, settings_from
+from burg_drake.apps.options.values import friction, input_file, number
+from burg_drake.core import InvalidInputError, TextTable
+
+if TYPE_CHECKING:
+    from burg_drake.apps.options.grasp_files import GraspSource
+    from burg_drake.core import Array, GraspSet
+    from burg_drake.evaluation import SamplingSettings
+    from burg_drake.station import Station
+
+
+def add_grasps_sample_options(parser: Parser) -> None:
+    """Adds the options of `burg-drake grasps sample`."""
+    parser.epilog = examples_text(
+        "burg-drake grasps sample tabletop_six -n 1000 -o grasps.h5",
+        "burg-drake grasps sample tabletop_six --only mug --from-arm-side -o mug.h5",
+        "burg-drake grasps sample household --only mug -n 500 --diverse 4 -o mug.npz",
+        "burg-drake grasps sample household --standoffs-mm 0 4 -4 --approaches 6 -o many.h5",
+        "",
+        "The same seed gives the same grasps; `evaluate` and `reach` sample them, too.",
+    )
+    parser.add_argument(
+        "source", metavar="SCENE|LIB", help="scene file, library folder, or built-in name"
+    )
+    add_sampling_options(parser, 1000)
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="OUT",
+        required=True,
+        help="grasp file to write, such as .h5, or folder for a file per object",
+    )
+    add_format_option(parser)
+    add_station(parser)
+    _add_sampling_settings(parser)
+    add_quiet(parser)
+
+
+def _add_sampling_settings(parser: Parser) -> None:
+    from burg_drake.evaluation import SamplingSettings
+
+    add_settings_options(parser, SamplingSettings, "friction", "approaches", "from_arm_side")
+    parser.add_argument(
+        "--standoffs-mm",
+        metavar="MM",
+        type=number,
+        nargs="+",
+        default=[0.0],
+        help=(
+            "copies of each grasp, shifted back along its approach; negative: forward (default: 0)"
+        ),
+    )
+    parser.add_argument(
+        "--weights",
+        metavar="OBJECT=FILE.npy",
+        type=_parse_named_file,
+        action="append",
+        default=[],
+        help="weight of each mesh face when contacts are sampled; repeatable",
+    )
+    add_settings_options(parser, SamplingSettings, "margin", "conservative", "diverse")
+
+
+def run_grasps_sample(arguments: argparse.Namespace) -> int:
+    """Samples and writes a file; 1 if there are no grasps at all."""
+    from burg_drake.apps.options.grasp_files import open_grasp_source
+    from burg_drake.evaluation import SamplingSettings, sampled_set
+    from burg_drake.station import load_station, station_gripper
+
+    output = grasp_output(arguments.output, arguments.target, frame="object")
+    source = open_grasp_source(arguments.source)
+    output.require_fits(_objects_to_sample(arguments.only, source))
+    station = load_station(arguments.station)
+    settings = settings_from(
+        arguments,
+        SamplingSettings,
+        approach_angle_deg=arguments.approach_angle,
+        standoffs=tuple(1e-3 * distance for distance in arguments.standoffs_mm),
+        weights={name: _load_weights(path) for name, path in arguments.weights},
+        blind=arguments.blind,
+    )
+    asked = grasps_per_object(arguments)
+    sampled, seconds = _sample_objects(arguments, source, asked, station, settings)
+    grasps = sampled_set(
+        sampled, source.library, source.scene, station, asked, arguments.seed, settings
+    )
+    sampling_table(sampled, seconds, asked).show()
+    print_shortfalls(sampled, asked)
+    output.write(grasps, station_gripper(station))
+    return 0 if len(grasps) else 1
+
+
+def _objects_to_sample(only: list[str] | None, source: GraspSource) -> list[str]:
+    """The objects that are to be sampled on, of a scene one for each instance."""
+    from burg_drake.evaluation import chosen_instances
+
+    if source.scene is None:
+        return list(dict.fromkeys(only or source.library.objects))
+    return [source.scene.instance(name).object for name in chosen_instances(source.scene, only)]
+
+
+def _sample_objects(
+    arguments: argparse.Namespace,
+    source: GraspSource,
+    n: int,
+    station: Station,
+    settings: SamplingSettings,
+) -> tuple[dict[str, GraspSet], dict[str, float]]:
+    """Grasps, and how long they took [s], by instance or object."""
+    from burg_drake.core import Progress, ProgressMeter, Reporter
+    from burg_drake.evaluation import sample_library, sample_on_scene
+
+    seed, only = arguments.seed, arguments.only
+    if source.scene is None:
+        stream = sample_library(source.library, station, n, seed, settings, only)
+    else:
+        stream = sample_on_scene(source.scene, station, n, seed, settings, only)
+    sampled, seconds = {}, {}
+    total = len(_objects_to_sample(only, source))
+    with Reporter(not arguments.quiet) as reporter:
+        pace = ProgressMeter(reporter.show, Progress("sampling", total=total, unit="objects"))
+        start = time.perf_counter()
+        for name, grasps in stream:
+            sampled[name], seconds[name] = grasps, time.perf_counter() - start
+            pace.step(note=name)
+            start = time.perf_counter()
+    if not sampled:
+        raise InvalidInputError(f"{arguments.source} has no free objects; nothing to sample on")
+    return sampled, seconds
+
+
+def _load_weights(path: str) -> Array:
+    from pathlib import Path
+
+    from burg_drake.core import open_npy
+
+    with open_npy(Path(path)) as stored:
+        return stored.read("fiu").astype(float)
+
+
+def sampling_table(
+    sampled: Mapping[str, GraspSet], seconds: Mapping[str, float], asked: int
+) -> TextTable:
+    """What sampling came to, by instance or object."""
+    from burg_drake.core import format_count, format_number
+
+    table = TextTable().names("on").numbers("asked", "found", "rays", "tried", "seconds")
+    for name, grasps in sampled.items():
+        counts = (asked, len(grasps), grasps.provenance["rays"], grasps.provenance["tried"])
+        table.row(name, *map(format_count, counts), format_number(seconds[name], 2))
+    return table
+
+
+def _parse_named_file(text: str) -> tuple[str, str]:
+    """`OBJECT=FILE`."""
+    name, equals, path = text.partition("=")
+    if not (name and equals and path):
+        raise argparse.ArgumentTypeError(f"{text!r} is not OBJECT=FILE.npy, such as mug=rim.npy")
+    return name, path
+
+
+SCORE_COLUMNS_HELP = """\
+Adds these columns, which are nan where a pad meets nothing:
+  of the grasp  force_closure, friction_needed, antipodal_angle [rad],
+                slide [m] until the pads hold the object (inf: never)
+  of the grip   epsilon, volume, patch_area [m2], contact_offset [m],
+                load_margin (load in weights of the object, worst direction),
+                gravity_margin (the same along gravity, in a scene)
+  of the scene  clearance [m] (negative: overlap), nearest, screened,
+                collides_with"""
+"""Help text about the columns that scoring adds."""
+
+
+def add_grasps_score_options(parser: Parser) -> None:
+    """Adds the options of `burg-drake grasps score`."""
+    from burg_drake.apps.options.grasp_files import (
+        add_file_station,
+        add_reading_options,
+        add_source_options,
+    )
+    from burg_drake.grasping import DEFAULT_METRIC
+
+    parser.epilog = examples_text(
+        "burg-drake grasps score grasps.h5 -o scored.h5",
+        "burg-drake grasps score grasps.h5 --scene tabletop_six --by gravity_margin -o scored.h5",
+        "burg-drake grasps score theirs.json --library household --rename mug -o ours.h5",
+        "burg-drake grasps score grasps.h5 --friction 0.5 --friction mug=0.3",
+        "",
+        SCORE_COLUMNS_HELP,
+    )
+    parser.add_argument(
+        "file", metavar="FILE", type=input_file, help="grasp file of any format, or folder of a run"
+    )
+    add_reading_options(parser)
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="OUT",
+        help="grasp file to write, or folder (default: only print)",
+    )
+    add_format_option(parser)
+    add_source_options(parser)
+    add_file_station(parser)
+    parser.add_argument(
+        "--by",
+        metavar="METRIC",
+        default=DEFAULT_METRIC,
+        help="metric to use as score; its negative where less is better (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--friction",
+        metavar="[OBJECT=]MU",
+        type=friction,
+        action="append",
+        default=[],
+        help="friction coefficient (default: the object's); repeatable",
+    )
+    add_renaming(parser)
+    add_quiet(parser)
+
+
+def run_grasps_score(arguments: argparse.Namespace) -> int:
+    """Scores, prints a table and writes a file."""
+    from burg_drake.apps.options.grasp_files import gripper_for, load_grasp_source, station_for
+    from burg_drake.evaluation import read_input, scored_set
+    from burg_drake.formats import with_objects_renamed
+
+    output = None
+    if arguments.output is not None:
+        output = grasp_output(arguments.output, arguments.target, frame="object")
+    station = station_for(arguments, arguments.file)
+    gripper = gripper_for(arguments, station)
+    imported = read_input(arguments.file, arguments.source, gripper)
+    if imported.frame != "object":
+        raise InvalidInputError(
+            f"{arguments.file} has grasps in the {imported.frame} frame; bring them into those of"
+            " the objects with `burg-drake grasps convert`"
+        )
+    grasps = with_objects_renamed(imported.grasps, dict(arguments.rename))
+    source = load_grasp_source(arguments, grasps, arguments.file)
+    if output is not None:
+        output.require_fits(grasps.object.tolist())
+    for note in imported.notes:
+        print(f"note: {note}")
+    scored = scored_set(
+        grasps,
+        source.library,
+        station,
+        source.scene,
+        friction=dict(arguments.friction),
+        by=arguments.by,
+        progress=not arguments.quiet,
+    )
+    _print_score_tables(scored)
+    if output is not None:
+        print(f"scored by {arguments.by}")
+        output.write(scored, gripper)
+    return 0
+
+
+def _print_score_tables(grasps: GraspSet) -> None:
+    """Quantiles of each metric by object, and what the hand collides with."""
+    from collections import Counter
+
+    import numpy as np
+
+    from burg_drake.apps.commands.grasp_tables import TABLE_QUANTILES, print_numbers
+    from burg_drake.grasping import METRICS
+
+    for name in dict.fromkeys(grasps.object.tolist()):
+        own = grasps.select(grasps.object == name)
+        rows = {}
+        for metric in (*METRICS[1:], "clearance"):
+            values = own.column(metric) if metric in own.columns else np.empty(0)
+            values = values[~np.isnan(values)]
+            if len(values):
+                shown = np.quantile(values, TABLE_QUANTILES, method="nearest").tolist()
+                figures = {
+                    f"{q:.0%}": value for q, value in zip(TABLE_QUANTILES, shown, strict=True)
+                }
+                rows[metric] = (len(values), figures)
+        closed = int(own.column("force_closure").sum())
+        print_numbers(f"{name}: {len(own):,} grasps, {closed:,} in force closure", rows)
+        if "screened" in own.columns:
+            counts = Counter(own.column("screened").tolist()).most_common()
+            print("screened: " + ", ".join(f"{outcome} {count:,}" for outcome, count in counts))

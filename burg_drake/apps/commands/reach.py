@@ -1,0 +1,367 @@
+"""`burg-drake reach`: which grasps the arm can execute, and what hinders it at the others."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
+
+from burg_drake.apps.options.arguments import (
+    Parser,
+    add_quiet,
+    add_retry_failed,
+    add_scene,
+    add_station,
+    add_workers,
+    examples_text,
+    retry_advice,
+)
+from burg_drake.apps.options.evaluated_grasps import (
+    add_grasp_file_options,
+    add_motion_options,
+    add_sampling_options,
+    grasps_per_object,
+    motion_from_options,
+    print_shortfalls,
+    read_grasps_from_options,
+    refuse_sampling_options_with_file,
+    require_grasp_file,
+)
+from burg_drake.apps.options.grasp_files import GraspOutput, add_format_option, grasp_output
+from burg_drake.core import InvalidInputError, TextTable, require_writable
+
+if TYPE_CHECKING:
+    from burg_drake.core import GraspSet, Outcome
+    from burg_drake.evaluation import PlanOutput
+    from burg_drake.scene import Scene
+    from burg_drake.station import GraspMotion, Station
+
+
+def print_reach_tables(
+    grasps: GraspSet, asked: Iterable[str], motion: GraspMotion, *, given: bool = False
+) -> None:
+    """Counts by object and by outcome, what was in the way, objects without a clear or reachable
+    grasp, and how fast that was found out.
+
+    Args:
+        grasps: as `reach` has judged them.
+        asked: objects that it was asked about, of which some may have no grasp.
+        motion: of the hand.
+        given: whether the grasps are the user's own.
+    """
+    from burg_drake.core import Outcome, Stage, format_number
+    from burg_drake.evaluation import unclear_notes, unmoved_notes
+
+    outcomes = [Outcome(text) for text in grasps.column("outcome").tolist()]
+    by_object: dict[str, Counter[Outcome]] = {name: Counter() for name in asked}
+    for name, outcome in zip(grasps.object.tolist(), outcomes, strict=True):
+        by_object.setdefault(name, Counter())[outcome] += 1
+    total = Counter(outcomes)
+    reach_table(by_object, total).show()
+    outcome_table(grasps, by_object, total).show()
+    ended, blocker = grasps.column("outcome"), grasps.column("blocker")
+    notes = unclear_notes(grasps.object, ended, blocker, given=given)
+    for note in (*notes, *unmoved_notes(grasps.object, ended, blocker, motion)):
+        print(f"note: {note}")
+    clear = sum(n for o, n in total.items() if o.stage is not Stage.CLEAR)
+    seconds = float(grasps.column("cpu").sum())
+    if clear and seconds > 0.0:
+        rate = f"{format_number(clear / seconds)} clear grasps per CPU second"
+        print(f"{rate}; {format_number(seconds)} CPU seconds without set-up")
+
+
+def reach_table(by_object: Mapping[str, Counter[Outcome]], total: Counter[Outcome]) -> TextTable:
+    """How many grasps of each object the arm can execute."""
+    from burg_drake.core import Outcome, Stage, format_count, format_percent
+
+    table = TextTable("Grasps that the arm can execute").names("object")
+    table.numbers("grasps", "clear", "reachable", "of clear")
+    rows = {**by_object, "all": total} if len(by_object) != 1 else by_object
+    for name, counts in rows.items():
+        if name == "all":
+            table.gap()
+        clear = sum(n for o, n in counts.items() if o.stage is not Stage.CLEAR)
+        good = counts[Outcome.REACHABLE]
+        share = format_percent(good / clear) if clear else "-"
+        table.row(
+            name, format_count(counts.total()), format_count(clear), format_count(good), share
+        )
+    table.caption = (
+        "clear: the open hand collides with nothing at the grasp\n"
+        "reachable: hand and arm can go there, in and up again without a collision"
+    )
+    return table
+
+
+def outcome_table(
+    grasps: GraspSet, by_object: Mapping[str, Counter[Outcome]], total: Counter[Outcome]
+) -> TextTable:
+    """Outcomes by object where they fit, with what was mostly in the way."""
+    max_blockers = 3  # Most frequent bodies listed for each outcome.
+    from rich.console import Console
+
+    from burg_drake.core import Outcome, format_count, format_percent
+
+    room = Console().width - 70
+    names = [name for name in by_object if len(by_object) > 1]
+    names = names if sum(len(name) + 2 for name in names) <= room else []
+    table = TextTable("Outcomes").texts("outcome")
+    table.numbers(*names, "all", "share").texts("mostly in the way")
+    order = [Outcome.REACHABLE, *Outcome]
+    for outcome in sorted(total, key=order.index):
+        mask = (grasps.column("outcome") == outcome) & (grasps.column("blocker") != "")
+        blockers = Counter(grasps.column("blocker")[mask].tolist()).most_common(max_blockers)
+        counts = [format_count(n) if (n := by_object[name][outcome]) else "·" for name in names]
+        share = format_percent(total[outcome] / len(grasps))
+        in_the_way = ", ".join(f"{name} ({format_count(n)})" for name, n in blockers)
+        table.row(outcome.value, *counts, format_count(total[outcome]), share, in_the_way)
+    failed = [one for one in Outcome if one in total and one is not Outcome.REACHABLE]
+    table.caption = "\n".join(f"{outcome}: {outcome.meaning}" for outcome in failed)
+    return table
+
+
+def add_reach_options(parser: Parser) -> None:
+    """Adds the options of `burg-drake reach`."""
+    from burg_drake.evaluation import PlanFormat
+
+    parser.epilog = examples_text(
+        "burg-drake reach tabletop_six --grasps grasps.h5 -o reach.csv",
+        "burg-drake reach my_scene.yaml --grasps theirs.h5 --station panda_shelf -o reach.h5",
+        "burg-drake reach tabletop_six --grasps-per-object 50 --plans plans/",
+        "burg-drake reach tabletop_six --grasps grasps.h5 --only-reachable -o feasible.h5",
+        "burg-drake reach my_scene.yaml --station panda_shelf --retreat-mm 100 --least-lift-mm 20",
+        "",
+        "A grasp is reachable if the open hand is clear, the arm can follow approach, retreat and"
+        " lift, and it finds a path from home. Each yes is checked by Drake. Nothing is"
+        " simulated; `evaluate` does that.",
+    )
+    add_scene(parser)
+    which = parser.add_mutually_exclusive_group()
+    add_sampling_options(parser, 100, which)
+    add_grasp_file_options(parser, which)
+    add_station(parser)
+    add_motion_options(parser)
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="OUT",
+        help="table (.csv, .parquet), grasp file (.h5, .npz, ...), or folder for a file per"
+        " object (default: only print)",
+    )
+    add_format_option(parser)
+    parser.add_argument("--only-reachable", action="store_true", help="write only reachable grasps")
+    parser.add_argument(
+        "--plans",
+        metavar="DIR",
+        help="write the timed motion of each reachable grasp here, 1.5 MB each",
+    )
+    parser.add_argument(
+        "--plan-format",
+        choices=get_args(PlanFormat),
+        help="format of the motions: JSON like ROS's JointTrajectory, or CSV (default: json)",
+    )
+    parser.add_argument(
+        "--screening",
+        action="store_true",
+        help="twice as fast, and wrong for one or two grasps in a hundred",
+    )
+    add_workers(parser)
+    add_retry_failed(parser, "grasps")
+    add_quiet(parser)
+
+
+def run_reach(arguments: argparse.Namespace) -> int:
+    """Asks, prints tables and writes what is wanted; 1 if that failed for some grasps."""
+    from burg_drake.evaluation import mistake_notes, reach
+    from burg_drake.motion import require_usable_arm
+    from burg_drake.scene import load_scene
+    from burg_drake.station import load_station, require_valid_scene
+
+    _require_consistent_options(arguments)
+    output = _reach_output(arguments)
+    scene, station = load_scene(arguments.scene), load_station(arguments.station)
+    warnings = require_valid_scene(scene, station)
+    motion = motion_from_options(arguments, station)
+    grasps = _load_or_sample_grasps(arguments, scene, station)
+    hints = mistake_notes(grasps, station, scene) if arguments.grasps is not None else ()
+    if isinstance(output, GraspOutput):
+        output.require_fits([name for part in grasps.values() for name in part.object.tolist()])
+    for warning in (*warnings, *require_usable_arm(scene, station)):
+        print(f"burg-drake: warning: {warning}", file=sys.stderr)
+    judged = reach(
+        scene,
+        station,
+        grasps,
+        motion=motion,
+        exact=not arguments.screening,
+        plans=_plans_folder(arguments),
+        workers=arguments.workers,
+        progress=not arguments.quiet,
+    )
+    _print_answers(judged, scene, motion, arguments)
+    for hint in hints:
+        print(f"note: {hint}")
+    reachable = _reachable_mask(judged)
+    if arguments.plans is not None:
+        print(f"{(reachable & ~_unplanned_mask(judged)).sum()} plans are in {arguments.plans}")
+    if output is not None:
+        _write_grasps(
+            judged.select(reachable) if arguments.only_reachable else judged, output, station
+        )
+    return _report_failures(judged, arguments)
+
+
+def _require_consistent_options(arguments: argparse.Namespace) -> None:
+    """Refuses options without those that they belong to, and a folder that cannot be written to.
+
+    Raises:
+        InvalidInputError: names the option or the folder.
+    """
+    require_grasp_file(arguments)
+    refuse_sampling_options_with_file(arguments)
+    if arguments.plan_format and not arguments.plans:
+        raise InvalidInputError("--plan-format is for plan files; add --plans DIR")
+    if arguments.retry_failed and not arguments.plans:
+        raise InvalidInputError("--retry-failed is for plan files; add --plans DIR")
+    if arguments.only_reachable and arguments.output is None:
+        raise InvalidInputError("--only-reachable is for the output file; add -o OUT")
+    if arguments.plans:
+        require_writable(Path(arguments.plans) / "plan")
+        arguments.after_interrupt = "; run the same command to continue"
+
+
+def _print_answers(
+    judged: GraspSet, scene: Scene, motion: GraspMotion, arguments: argparse.Namespace
+) -> None:
+    """The tables, and what one has to know to read them."""
+    from burg_drake.evaluation import (
+        chosen_instances,
+        count_short_lifts,
+        missing_grasps_note,
+        motion_text,
+    )
+    from burg_drake.station import GraspMotion
+
+    names = [scene.instance(n).object for n in chosen_instances(scene, arguments.only)]
+    given = arguments.grasps is not None
+    print_reach_tables(judged.select(_judged_mask(judged)), names, motion, given=given)
+    if given and (note := missing_grasps_note(names, judged.object.tolist())):
+        print(f"note: {note}")
+    if motion != GraspMotion():
+        print(f"motion: {motion_text(motion)}")
+    lifts = count_short_lifts(judged.column("lift_height"), motion.lift_height)
+    if lifts is not None:
+        print(lifts)
+
+
+def _judged_mask(judged: GraspSet) -> Any:
+    """(N,) bool, which grasps could be judged."""
+    return judged.column("outcome") != ""
+
+
+def _reachable_mask(judged: GraspSet) -> Any:
+    """(N,) bool, which grasps the arm can execute."""
+    from burg_drake.core import Outcome
+
+    return judged.column("outcome") == Outcome.REACHABLE
+
+
+def _unplanned_mask(judged: GraspSet) -> Any:
+    """(N,) bool, which of those have no plan though one was wanted."""
+    return _reachable_mask(judged) & (judged.column("reason") != "")
+
+
+def _report_failures(judged: GraspSet, arguments: argparse.Namespace) -> int:
+    """Says of which grasps the computation has failed; 1 if there are any."""
+    answered, unplanned = _judged_mask(judged), _unplanned_mask(judged)
+    failed = judged.select(~answered)
+    retry = f"; {retry_advice(0, len(failed))}" if arguments.plans else ""
+    _print_failures(failed, "could not be judged", len(judged), retry)
+    _print_failures(judged.select(unplanned), "have no plan", int(_reachable_mask(judged).sum()))
+    return 0 if answered.all() and not unplanned.any() else 1
+
+
+def _plans_folder(arguments: argparse.Namespace) -> PlanOutput | None:
+    """Where plans go, if they are wanted."""
+    from burg_drake.evaluation import PlanOutput
+
+    if arguments.plans is None:
+        return None
+    return PlanOutput(arguments.plans, arguments.plan_format or "json", arguments.retry_failed)
+
+
+def _print_failures(failed: GraspSet, what: str, total: int, retry: str = "") -> None:
+    """A line about grasps whose computation has failed, if there are any."""
+    if len(failed):
+        reason = failed.column("reason")[0].removeprefix("no plan: ")
+        id = f"{failed.column('instance')[0]}-{failed.id[0]}"
+        print(
+            f"burg-drake: {len(failed)} of {total} grasps {what}, such as {id}: {reason}{retry}",
+            file=sys.stderr,
+        )
+
+
+def _load_or_sample_grasps(
+    arguments: argparse.Namespace, scene: Scene, station: Station
+) -> Mapping[str, GraspSet]:
+    """The grasps of the file, or sampled ones, by instance."""
+    from burg_drake.evaluation import select_instances
+
+    if arguments.grasps is not None:
+        given = read_grasps_from_options(arguments, scene, station)
+        for note in given.notes:
+            print(f"note: {note}")
+        return select_instances(scene, given.by_instance, arguments.only)
+    return sampled_grasps(arguments, scene, station)
+
+
+def sampled_grasps(
+    arguments: argparse.Namespace, scene: Scene, station: Station
+) -> dict[str, GraspSet]:
+    """Grasps by instance as the options ask for them; says what is missing."""
+    from burg_drake.core import Progress, ProgressMeter, Reporter
+    from burg_drake.evaluation import SamplingSettings, chosen_instances, sample_on_scene
+
+    settings = SamplingSettings(approach_angle_deg=arguments.approach_angle, blind=arguments.blind)
+    count, seed = grasps_per_object(arguments), arguments.seed
+    sampled = {}
+    total = len(chosen_instances(scene, arguments.only))
+    with Reporter(not arguments.quiet) as reporter:
+        pace = ProgressMeter(reporter.show, Progress("sampling", total=total, unit="objects"))
+        for name, grasps in sample_on_scene(scene, station, count, seed, settings, arguments.only):
+            sampled[name] = grasps
+            pace.step(note=name)
+    print_shortfalls(sampled, count)
+    return sampled
+
+
+def _reach_output(arguments: argparse.Namespace) -> Path | GraspOutput | None:
+    """Where to write: a table, a grasp file, or nowhere; a place that cannot be written to is
+    refused before any work."""
+    table_suffixes = (".csv", ".parquet")  # Tables have one row per grasp and no provenance.
+    if arguments.output is None:
+        return None
+    path = Path(arguments.output)
+    if arguments.target is None and path.suffix in table_suffixes and not path.is_dir():
+        from burg_drake.evaluation import require_table
+
+        require_table(path)
+        return path
+    return grasp_output(arguments.output, arguments.target, frame="object")
+
+
+def _write_grasps(grasps: GraspSet, output: Path | GraspOutput, station: Station) -> None:
+    frame_text = "x, y, z: the grasp frame's origin in the frame of its object"
+    from burg_drake.core import with_shareable_references
+    from burg_drake.evaluation import reach_columns, write_table
+    from burg_drake.station import station_gripper
+
+    if isinstance(output, GraspOutput):
+        output.write(grasps, station_gripper(station))
+        return
+    provenance = with_shareable_references(grasps.provenance, output.absolute().parent)
+    write_table(output, reach_columns(grasps), provenance)
+    print(f"wrote {len(grasps)} grasps to {output}; {frame_text}")

@@ -1,0 +1,142 @@
+"""`burg-drake render`: images of a scene; without colours where Drake cannot render them."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from burg_drake.apps.options.arguments import Parser, add_scene, add_station, examples_text
+from burg_drake.apps.options.settings_options import add_settings_options
+
+if TYPE_CHECKING:
+    from burg_drake.dataset import DatasetRecipe, Images
+
+
+def warn_without_colors(consequence: str) -> bool:
+    """Whether colours cannot be rendered here; a line on stderr then says what to install.
+
+    Args:
+        consequence: begins the line, such as `the data set has no colours`.
+    """
+    from burg_drake.system_libraries import describe_missing, missing_render_libraries
+
+    missing = missing_render_libraries()
+    if missing:
+        line = f"burg-drake: warning: {consequence}: {describe_missing(missing)}"
+        print(line, file=sys.stderr)
+    return bool(missing)
+
+
+def without_unavailable_colors(recipe: DatasetRecipe, folder: Path) -> DatasetRecipe:
+    """A recipe without colours where they cannot be rendered, which a line on stderr says.
+
+    Args:
+        recipe: as asked for.
+        folder: of the data set, which may be there.
+
+    Raises:
+        MissingDependencyError: the folder has samples with colours, and cannot be continued here.
+        DocumentError: its document is damaged, or of another version.
+    """
+    from dataclasses import replace
+
+    from burg_drake.core import MissingDependencyError
+    from burg_drake.system_libraries import describe_missing, missing_render_libraries
+
+    missing = missing_render_libraries()
+    if not recipe.colors or recipe.renderer != "drake" or not missing:
+        return recipe
+    if _has_colors(folder):
+        raise MissingDependencyError(
+            f"the samples of {folder} have colours, and so must new ones:"
+            f" {describe_missing(missing)}"
+        )
+    dark = ", and its sensor depth no holes at dark surfaces" if recipe.sensor else ""
+    warn_without_colors(f"the data set has no colours{dark}")
+    return replace(recipe, colors=False)
+
+
+def _has_colors(folder: Path) -> bool:
+    """Whether a folder holds a data set that is generated with colours."""
+    from burg_drake.dataset import DATASET_FILE, load_dataset_document
+
+    if not (folder / DATASET_FILE).exists():
+        return False
+    return bool((load_dataset_document(folder / DATASET_FILE).recipe or {}).get("colors"))
+
+
+def add_render_options(parser: Parser) -> None:
+    """Adds the options of `burg-drake render`."""
+    from burg_drake.dataset import DatasetRecipe
+
+    parser.epilog = examples_text(
+        "burg-drake render tabletop_six --camera board -o view.png",
+        "burg-drake render tabletop_six --camera overview --arm -o view.png --depth --labels",
+        "burg-drake render tabletop_six --renderer blender -o view.png",
+        "",
+        "Depth, labels and normals are written beside it: view.depth.png (16 bit, 0.1 mm, 0:"
+        " none), view.labels.png (instances from 1, 0: the rest), view.normals.png (16 bit,"
+        " component = (value - 32768) / 32767, camera frame).",
+    )
+    add_scene(parser)
+    add_station(parser)
+    parser.add_argument(
+        "--camera",
+        metavar="NAME",
+        default="board",
+        help="camera of the station (default: %(default)s)",
+    )
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", required=True, help="file to write (.png)"
+    )
+    parser.add_argument("--arm", action="store_true", help="show the arm in its home posture")
+    add_settings_options(parser, DatasetRecipe, "renderer")
+    for kind in ("depth", "labels", "normals"):
+        parser.add_argument(f"--{kind}", action="store_true", help=f"also write {kind}")
+
+
+def run_render(arguments: argparse.Namespace) -> int:
+    """Writes the images; 1 if there is none that can be made."""
+    from burg_drake.core import InvalidInputError, atomic_write, require_writable
+    from burg_drake.dataset import ImageKind, depth_unit_of, encode_image, render, station_view
+    from burg_drake.scene import load_scene
+    from burg_drake.station import load_station
+
+    output = Path(arguments.output)
+    if output.suffix.lower() != ".png":
+        raise InvalidInputError(f"{output}: only PNG is written; end the name with .png")
+    kinds: list[ImageKind] = []
+    by_drake = arguments.renderer == "drake"
+    if not (by_drake and warn_without_colors(f"{output} is not written, as it has colours")):
+        kinds.append("color")
+    if arguments.depth:
+        kinds.append("depth")
+    if arguments.labels:
+        kinds.append("labels")
+    if arguments.normals:
+        kinds.append("normals")
+    if not kinds:
+        return 1
+    scene, station = load_scene(arguments.scene), load_station(arguments.station)
+    view = station_view(station, arguments.camera, arm=arguments.arm)
+    require_writable(output)
+    images = render(scene, station, view, kinds, renderer=arguments.renderer)
+    for kind in kinds:
+        path = output if kind == "color" else output.with_suffix(f".{kind}.png")
+        image = getattr(images, kind)
+        atomic_write(path, encode_image(kind, image, depth_unit_of(view.depth_range)))
+        print(f"wrote {path}")
+    if images.labels is not None:
+        _print_numbers(images, [*scene.instances, *scene.background])
+    return 0
+
+
+def _print_numbers(images: Images, names: list[str]) -> None:
+    import numpy as np
+
+    assert images.labels is not None
+    counts = np.bincount(images.labels.ravel(), minlength=len(names) + 1)
+    for number, name in enumerate(names, 1):
+        print(f"  {number} {name}: {counts[number]} pixels")

@@ -1,0 +1,396 @@
+"""`burg-drake scene sample`: random scenes from a recipe, one or thousands."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.options.arguments import (
+    Parser,
+    add_quiet,
+    add_station,
+    add_workers,
+    examples_text,
+)
+from burg_drake.apps.options.settings_options import add_settings_options, settings_from
+from burg_drake.apps.options.values import names, positive_int
+from burg_drake.core import InvalidInputError
+
+if TYPE_CHECKING:
+    from burg_drake.generation import ReproducedScene, SampledFolder, SampledScene
+    from burg_drake.objects import ObjectLibrary
+    from burg_drake.scene import Scene, SceneDocument, SceneRecipe
+    from burg_drake.station import Station
+
+
+def require_another_file(scene: Path, output: str) -> None:
+    """Refuses to write over the scene that is read.
+
+    Raises:
+        InvalidInputError: the files are one.
+    """
+    if os.path.realpath(output) == os.path.realpath(scene):
+        raise InvalidInputError(f"-o {output} is the scene itself; choose another file")
+
+
+def library_reference(given: str, library: ObjectLibrary, folder: Path) -> str:
+    """How a scene file in `folder` refers to a library so that it is found from there: the name of
+    a built-in one, else package:// or the relative path."""
+    from burg_drake.core import builtin_names, portable_reference
+
+    return given if given in builtin_names("models") else portable_reference(library.root, folder)
+
+
+def station_reference(given: str, station: Station, folder: Path) -> str:
+    """The same for a station."""
+    from burg_drake.core import builtin_names, portable_reference
+
+    return given if given in builtin_names("stations") else portable_reference(station.path, folder)
+
+
+def add_recipe_options(parser: Any) -> None:
+    """Adds them."""
+    _add_object_options(parser)
+    _add_layout_options(parser)
+    _add_rule_options(parser)
+
+
+def recipe_defaults() -> dict[str, Any]:
+    """Values of the options that nobody gave, by name."""
+    parser = argparse.ArgumentParser(add_help=False)
+    add_recipe_options(parser)
+    return vars(parser.parse_args([]))
+
+
+def recipe_option_name(name: str) -> str:
+    """How the option of a value is written."""
+    return "-n" if name == "objects" else f"--{name.replace('_', '-')}"
+
+
+def _add_object_options(parser: Any) -> None:
+    from burg_drake.scene import SceneRecipe
+
+    group = parser.add_argument_group("objects")
+    group.add_argument(
+        "-n",
+        metavar="N",
+        dest="objects",
+        type=positive_int,
+        default=SceneRecipe.count,
+        help="objects in a scene (default: %(default)d)",
+    )
+    group.add_argument(
+        "--only", metavar="A,B", type=names, action="extend", help="only these objects"
+    )
+    add_settings_options(group, SceneRecipe, "repeat", "poses", "seed")
+    group.add_argument(
+        "--count",
+        metavar="N",
+        type=positive_int,
+        default=1,
+        help="number of scenes (default: %(default)d)",
+    )
+    add_workers(group, "worker processes (default: %(default)d)", default=1)
+
+
+def _add_layout_options(parser: Any) -> None:
+    other_layouts = ("random", "packed", "heap")  # Layouts with an option of their own.
+    from burg_drake.scene import LAYOUTS, SceneRecipe
+
+    group = parser.add_argument_group("layout")
+    group.add_argument(
+        "--size",
+        metavar="SIZE",
+        default="A2",
+        help="size of the board: A4 to A0, or WxH in mm (default: %(default)s)",
+    )
+    group.add_argument("--portrait", action="store_true", help="board in portrait format")
+    how = group.add_mutually_exclusive_group()
+    how.add_argument(
+        "--spacing",
+        choices=[name for name in LAYOUTS if name not in other_layouts],
+        help="space between objects: 40 mm, 2 to 10 mm, or contact (default: random)",
+    )
+    how.add_argument("--packed", action="store_true", help="pack objects side by side")
+    how.add_argument("--heap", action="store_true", help="drop objects in a heap")
+    add_settings_options(group, SceneRecipe, "tries", "fewer", "settle")
+
+
+def _add_rule_options(parser: Any) -> None:
+    from burg_drake.scene import SceneRecipe
+
+    group = parser.add_argument_group("rules")
+    add_station(group)
+    add_settings_options(group, SceneRecipe, "within_reach")
+    add_settings_options(group, SceneRecipe, "clear_grasps", "visible_from", unset=True)
+    add_settings_options(group, SceneRecipe, "attempts")
+
+
+def recipe_from_options(
+    arguments: argparse.Namespace, library: ObjectLibrary, station: Station, folder: Path
+) -> SceneRecipe:
+    """The recipe that the options ask for, with references that start from a folder."""
+    max_objects = 1000
+    from burg_drake.core import InvalidInputError
+    from burg_drake.scene import Board, SceneRecipe
+
+    if arguments.objects > max_objects:
+        raise InvalidInputError(
+            f"-n {arguments.objects}: a scene has {max_objects} objects at most"
+        )
+    layout: Any = "packed" if arguments.packed else "heap" if arguments.heap else arguments.spacing
+    return settings_from(
+        arguments,
+        SceneRecipe,
+        library=library_reference(arguments.library, library, folder),
+        count=arguments.objects,
+        only=tuple(sorted(set(arguments.only or ()))),
+        board=Board(size=board_extents(arguments.size, upright=arguments.portrait)),
+        layout=layout or "random",
+        station=station_reference(arguments.station, station, folder),
+    )
+
+
+def board_extents(size: str, *, upright: bool) -> tuple[float, float]:
+    """Extents along x and y of a board [m]: A4 to A0, across unless upright, or WxH in mm.
+
+    Raises:
+        UnknownNameError: there is no such size.
+    """
+    from burg_drake.compose import BOARD_SIZES, board_size
+    from burg_drake.core import UnknownNameError, suggest_names
+
+    own = re.fullmatch(r"(\d+(?:\.\d+)?)\s*[x×]\s*(\d+(?:\.\d+)?)(?:\s*mm)?", size.lower())
+    if own:
+        return float(own[1]) * 1e-3, float(own[2]) * 1e-3
+    if size.upper() not in BOARD_SIZES:
+        raise UnknownNameError(
+            f"board size {size!r} does not exist; {suggest_names(size, BOARD_SIZES)}; or give WxH"
+            " in mm, such as 700x500"
+        )
+    return board_size(size.upper(), upright=upright)
+
+
+def add_scene_sample_options(parser: Parser) -> None:
+    """Adds the options of `burg-drake scene sample`."""
+    parser.epilog = examples_text(
+        "burg-drake scene sample household -n 5 --seed 7 -o scene.yaml",
+        "burg-drake scene sample household -n 6 --spacing close --count 1000 --workers 2 -o close/",
+        "burg-drake scene sample household -n 10 --heap --station panda_bin -o heap.yaml",
+        "burg-drake scene sample household -n 3 --within-reach --clear-grasps 5 --visible-from"
+        " board -o scene.yaml",
+        "burg-drake scene sample --again close/scene_0007.yaml -o same.yaml",
+        "",
+        "A scene is sampled again until it meets all rules, and is settled in simulation. The"
+        " same command continues where an interrupted one stopped; a larger --count adds scenes."
+        " Exit code 1 if scenes are missing; scenes.csv says why.",
+    )
+    parser.add_argument(
+        "library",
+        metavar="LIBRARY",
+        nargs="?",
+        help="folder of a library, or the built-in household",
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="SCENES",
+        required=True,
+        help="folder to write, or for one scene a file (.yaml)",
+    )
+    add_recipe_options(parser)
+    parser.add_argument(
+        "--again",
+        metavar="SCENE",
+        help="make this scene again, from the origin recorded in its file",
+    )
+    parser.add_argument(
+        "--force",
+        action="store_true",
+        help="with --again, even if library, station or versions differ",
+    )
+    add_quiet(parser)
+
+
+def run_scene_sample(arguments: argparse.Namespace) -> int:
+    """Writes scenes; 1 if not all were accepted."""
+    from burg_drake.core import InvalidInputError
+    from burg_drake.objects import load_library
+    from burg_drake.station import load_station
+
+    single = Path(arguments.output).suffix.lower() in (".yaml", ".yml")
+    if (arguments.library is None) == (arguments.again is None):
+        raise InvalidInputError("give a LIBRARY to sample from, or --again SCENE")
+    if arguments.again is not None:
+        _refuse_recipe_options(arguments)
+        return _reproduce_scene(arguments)
+    if arguments.force:
+        raise InvalidInputError("--force goes with --again")
+    if single and arguments.count > 1:
+        raise InvalidInputError(
+            f"-o {arguments.output} is a file, for a single scene; give a folder for"
+            f" {arguments.count}"
+        )
+    library, station = load_library(arguments.library), load_station(arguments.station)
+    output = Path(arguments.output)
+    recipe = recipe_from_options(arguments, library, station, output.parent if single else output)
+    if single:
+        return _sample_one(arguments, recipe, library, station)
+    arguments.after_interrupt = "; what is done is kept, run the same command to continue"
+    return _sample_many(arguments, recipe, library, station)
+
+
+def _sample_one(
+    arguments: argparse.Namespace, recipe: SceneRecipe, library: ObjectLibrary, station: Station
+) -> int:
+    """Writes one file."""
+    from burg_drake.core import Progress, ProgressMeter, Reporter, require_writable
+    from burg_drake.generation import SceneSampler
+    from burg_drake.scene import save_scene
+
+    require_writable(arguments.output)
+    with Reporter(not arguments.quiet) as reporter:
+        pace = ProgressMeter(
+            reporter.show, Progress("sampling", 0, recipe.attempts, unit="attempts at most")
+        )
+        sampled = SceneSampler(recipe, library, station).sample(0, refused=pace.step)
+    if sampled.accepted:
+        save_scene(sampled.scene.document, arguments.output)
+    _print_refused(Counter(sampled.refused))
+    if not sampled.accepted:
+        print(f"burg-drake: no scene: {_refusal_text(sampled, recipe)}", file=sys.stderr)
+        return 1
+    _print_missing(sampled)
+    print(f"wrote {arguments.output}: {_object_count_text(sampled.placed)}")
+    return 0
+
+
+def _sample_many(
+    arguments: argparse.Namespace, recipe: SceneRecipe, library: ObjectLibrary, station: Station
+) -> int:
+    """Fills a folder."""
+    from burg_drake.core import Progress, ProgressMeter, Reporter
+    from burg_drake.generation import sample_scenes
+
+    with Reporter(not arguments.quiet) as reporter:
+        paces: list[ProgressMeter] = []
+
+        def begin(known: int) -> None:
+            event = Progress("starting", known, arguments.count, unit="scenes")
+            paces.append(ProgressMeter(reporter.show, event, "sampling"))
+
+        found = sample_scenes(
+            recipe,
+            library,
+            station,
+            arguments.output,
+            arguments.count,
+            workers=arguments.workers,
+            known=begin,
+            progress=lambda sampled: paces[0].step(),
+        )
+    return _print_folder(found, arguments)
+
+
+def _print_folder(found: SampledFolder, arguments: argparse.Namespace) -> int:
+    refused: Counter[str] = Counter()
+    for row in found.rows.values():
+        refused.update(row.refused)
+    _print_refused(refused)
+    accepted = sum(row.accepted for row in found.rows.values())
+    fewer = sum(bool(row.accepted and row.missing) for row in found.rows.values())
+    new = f" ({len(found.new)} new)" if len(found.new) < len(found.rows) else ""
+    print(f"{arguments.output}: {accepted} of {arguments.count} scenes accepted{new}")
+    if fewer:
+        print(
+            f"{fewer} of them have fewer than {_object_count_text(arguments.objects)};"
+            " see scenes.csv"
+        )
+    if found.failed:
+        number, reason = min(found.failed.items())
+        print(
+            f"burg-drake: {len(found.failed)} scenes could not be sampled, and are tried again the"
+            f" next time; scene {number}: {reason}",
+            file=sys.stderr,
+        )
+    return 0 if accepted == arguments.count else 1
+
+
+def _refuse_recipe_options(arguments: argparse.Namespace) -> None:
+    """Refuses options of a recipe beside --again, which has that of its scene.
+
+    Raises:
+        InvalidInputError: there is one.
+    """
+    from burg_drake.core import InvalidInputError
+
+    for name, default in recipe_defaults().items():
+        if getattr(arguments, name) != default:
+            raise InvalidInputError(
+                f"--again takes the recipe of its scene: leave out {recipe_option_name(name)}"
+            )
+
+
+def _reproduce_scene(arguments: argparse.Namespace) -> int:
+    """Makes a scene again, and says whether it is the same."""
+    from burg_drake.core import InvalidInputError, require_writable
+    from burg_drake.generation import sample_again
+    from burg_drake.scene import load_scene, save_scene
+
+    scene = load_scene(arguments.again)
+    require_another_file(scene.path, arguments.output)
+    if Path(arguments.output).suffix.lower() not in (".yaml", ".yml"):
+        raise InvalidInputError(f"-o {arguments.output} has to be a scene file (.yaml)")
+    require_writable(arguments.output)
+    again = sample_again(scene, force=arguments.force)
+    for line in again.differences:
+        print(f"burg-drake: warning: {scene.path}: {line}", file=sys.stderr)
+    if again.scene is None:
+        print(f"burg-drake: {scene.path}: no scene was accepted this time", file=sys.stderr)
+        return 1
+    save_scene(
+        _with_references(again, again.scene, Path(arguments.output).parent), arguments.output
+    )
+    print(f"wrote {arguments.output}: {'the same scene' if again.same else 'another scene'}")
+    return 0 if again.same else 1
+
+
+def _with_references(again: ReproducedScene, scene: Scene, folder: Path) -> SceneDocument:
+    """A scene's document whose references start from a folder."""
+    from dataclasses import replace
+
+    document, origin = scene.document, scene.document.origin
+    assert origin is not None
+    library = library_reference(document.library, scene.library, folder)
+    station = station_reference(origin.recipe.station, again.station, folder)
+    recipe = replace(origin.recipe, library=library, station=station)
+    return replace(document, library=library, origin=replace(origin, recipe=recipe))
+
+
+def _print_refused(refused: Counter[str]) -> None:
+    """Says on standard error how many attempts were refused, and why."""
+    for reason, count in refused.most_common():
+        print(f"burg-drake: {count} refused: {reason}", file=sys.stderr)
+
+
+def _refusal_text(sampled: SampledScene, recipe: SceneRecipe) -> str:
+    """Why no attempt was accepted, and what helps."""
+    text = f"none of {sampled.attempts} attempts was accepted"
+    if sampled.missing:
+        text += "; an object found no place (--fewer accepts scenes without it)"
+    return f"{text}; give a larger --size, a smaller -n, another --seed or more --attempts"
+
+
+def _print_missing(sampled: SampledScene) -> None:
+    if sampled.missing:
+        names = ", ".join(sampled.missing)
+        print(f"burg-drake: no place was found for {names}", file=sys.stderr)
+
+
+def _object_count_text(count: int) -> str:
+    return f"{count} object" if count == 1 else f"{count} objects"

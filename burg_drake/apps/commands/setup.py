@@ -1,0 +1,129 @@
+"""`burg-drake setup`: the scene editor in the browser."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import sys
+from typing import TYPE_CHECKING
+
+from burg_drake.apps.options.arguments import (
+    Parser,
+    add_page_options,
+    add_station,
+    examples_text,
+    scene_names,
+)
+from burg_drake.apps.terminal import (
+    ignore_interrupts,
+    open_in_browser,
+    sigterm_as_interrupt,
+    wait_for_interrupt,
+)
+
+if TYPE_CHECKING:
+    from burg_drake.compose import ComposeSession
+    from burg_drake.ui import ServedPage
+
+
+def add_setup_options(parser: Parser) -> None:
+    """Adds the options of `burg-drake setup`."""
+    parser.epilog = examples_text(
+        "burg-drake setup",
+        "burg-drake setup my_scene.yaml --station my_station.yaml",
+        "burg-drake setup my_library",
+        "burg-drake setup tabletop_six --open",
+        "burg-drake setup my_scene.yaml --host 0.0.0.0",
+    )
+    default_library = "household"
+    parser.add_argument(
+        "what",
+        metavar="SCENE|LIBRARY",
+        nargs="?",
+        default=default_library,
+        help=f"scene to edit, or library for a new scene: a path, or built-in: {scene_names()},"
+        f" {default_library} (default: %(default)s)",
+    )
+    add_station(parser)
+    add_page_options(
+        parser,
+        "others can open it by the address that is printed, good for one browser",
+    )
+
+
+def run_setup(arguments: argparse.Namespace) -> int:
+    """Serves the page until told to end."""
+    from burg_drake.ui import require_viser
+
+    require_viser()  # before anything that takes time
+    limit_picture_size()
+    with sigterm_as_interrupt():
+        closing = contextlib.ExitStack()
+        try:
+            session = closing.enter_context(_open_session(arguments))
+            closing.callback(_print_unsaved, session)
+            door = _serve_setup_page(arguments, session, closing)
+            _print_opened(door, session)
+            if arguments.open:
+                open_in_browser(door.url)
+            wait_for_interrupt()
+        except KeyboardInterrupt:
+            print(file=sys.stderr)
+        finally:
+            with ignore_interrupts():
+                closing.close()
+    return 0
+
+
+def limit_picture_size() -> None:
+    """Has OpenCV refuse larger pictures; it looks when it is imported."""
+    max_pixels = 1 << 27  # OpenCV's own limit of 2**30 would allow three gigabytes.
+    os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(max_pixels))
+
+
+def _open_session(arguments: argparse.Namespace) -> ComposeSession:
+    from burg_drake.compose import ComposeSession
+    from burg_drake.station import load_station
+
+    return ComposeSession.open(arguments.what, load_station(arguments.station))
+
+
+def _serve_setup_page(
+    arguments: argparse.Namespace, session: ComposeSession, closing: contextlib.ExitStack
+) -> ServedPage:
+    """Serves the page until all is closed."""
+    from burg_drake.ui import SetupPage, serve_page
+
+    door = closing.enter_context(
+        serve_page(arguments.host, arguments.port, title="burg_drake: setup")
+    )
+    closing.callback(SetupPage(door.server, session).close)
+    session.announce(door.address)
+    door.admission.on_admitted = lambda address: _print_admitted(door, address)
+    return door
+
+
+def _print_opened(door: ServedPage, session: ComposeSession) -> None:
+    view = session.view
+    count = len(view.instances)
+    objects = "no objects yet" if count == 0 else f"{count} object{'s' if count > 1 else ''}"
+    where = view.path or f"not saved yet, to be saved in {session.folder}"
+    print(f"{view.document.name} ({objects}, {where}): open {door.url} in a browser", flush=True)
+    for notice in view.notices:
+        print(f"burg-drake: {notice}", file=sys.stderr, flush=True)
+    print("Press Ctrl-C to end.", flush=True)
+
+
+def _print_unsaved(session: ComposeSession) -> None:
+    view = session.view
+    if not view.saved and (view.undo_label or view.redo_label):
+        print(
+            f"burg-drake: changes of {view.document.name} are not saved; opening the same scene"
+            " again restores them",
+            file=sys.stderr,
+        )
+
+
+def _print_admitted(door: ServedPage, address: str) -> None:
+    print(f"opened by {address}; another browser: open {door.url}", flush=True)

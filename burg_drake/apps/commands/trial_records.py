@@ -1,0 +1,446 @@
+"""`burg-drake trials record`, `show` and `restore`: outcomes of trials on the robot.
+
+Begins with the arguments that all commands of `burg-drake trials` share.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import sys
+from collections.abc import Sequence
+from datetime import date, datetime
+from typing import TYPE_CHECKING, Any, Literal
+
+from burg_drake.apps.options.arguments import (
+    Parser,
+    add_depth_unit,
+    add_intrinsics,
+    add_measured_board,
+    examples_text,
+    print_scale_from_options,
+)
+from burg_drake.apps.options.values import not_negative, positive_int
+from burg_drake.core import InvalidInputError, quote_value
+
+if TYPE_CHECKING:
+    from burg_drake.cameras import PlacementCheck
+    from burg_drake.experiment import MissingValues, RealTrial, TrialBook, TrialSheet
+
+
+def add_trials_argument(parser: Parser) -> None:
+    """The argument TRIALS."""
+    parser.add_argument("trials", metavar="TRIALS", help="trials file of `trials plan`")
+
+
+def add_moved_run_option(parser: Parser) -> None:
+    """The option --run, for folders that have moved."""
+    parser.add_argument(
+        "--run",
+        dest="moved",
+        metavar="KEY=FOLDER",
+        type=_parse_moved_run,
+        action="append",
+        default=[],
+        help="folder of a run, if it has moved",
+    )
+
+
+def add_show_simulated_option(parser: Parser, more: str = "") -> None:
+    """The option --show-simulated, of verbs that operators look at.
+
+    Args:
+        parser: gets it.
+        more: is hidden, too, after "the simulated outcomes".
+    """
+    parser.add_argument(
+        "--show-simulated",
+        action="store_true",
+        help=f"show the simulated outcomes{more}; hidden to keep operators blind",
+    )
+
+
+def print_damage(book: TrialBook) -> bool:
+    """Prints damaged lines of the journal to standard error. Returns True if there are any."""
+    damage = book.damage()
+    if damage:
+        print(f"burg-drake: {damage}", file=sys.stderr)
+    return bool(damage)
+
+
+def _parse_moved_run(text: str) -> tuple[str, str]:
+    key, equals, folder = text.partition("=")
+    if not key or not equals or not folder:
+        raise argparse.ArgumentTypeError(f"{quote_value(text)} is not KEY=FOLDER")
+    return key, folder
+
+
+def add_trials_record_options(parser: Parser) -> None:
+    """Adds the options of `burg-drake trials record`."""
+    parser.epilog = examples_text(
+        "burg-drake trials record trials.yaml 17 --outcome lifted",
+        "burg-drake trials record trials.yaml next --outcome slipped --note 'wet fingers'",
+        "burg-drake trials record trials.yaml 17 --photo photo.png --intrinsics K.yaml",
+        "burg-drake trials record trials.yaml 17 --outcome dropped --correct",
+        "",
+        "Only this trial changes in the file; a journal beside it keeps every entry. Exit code 1"
+        " if a photo does not show the board; the rest is recorded.",
+    )
+    add_trials_argument(parser)
+    parser.add_argument("number", metavar="NUMBER", help="number of the trial, or next")
+    parser.add_argument(
+        "--outcome", metavar="OUTCOME", help="outcome, such as lifted, slipped, no_ik"
+    )
+    for name, what in (("note", "a note"), ("operator", "name of the operator")):
+        parser.add_argument(f"--{name}", metavar="TEXT", help=what)
+    parser.add_argument(
+        "--time",
+        metavar="TIME",
+        type=_parse_moment,
+        help="time in ISO 8601, or a day (default: now)",
+    )
+    robot = parser.add_argument_group("what the robot measured at the end")
+    robot.add_argument(
+        "--width-mm", metavar="MM", type=not_negative, help="distance between the pads"
+    )
+    robot.add_argument("--effort-n", metavar="N", type=not_negative, help="gripping force")
+    _add_photo_options(parser.add_argument_group("photo of the scene before the trial"))
+    add_moved_run_option(parser)
+    how = parser.add_mutually_exclusive_group()
+    how.add_argument("--correct", action="store_true", help="replace the entry")
+    how.add_argument(
+        "--again",
+        action="store_true",
+        help="the trial was repeated: replace all its entries",
+    )
+
+
+def _add_photo_options(group: Any) -> None:
+    group.add_argument("--photo", metavar="FILE", help="photo, copied to photos/")
+    add_intrinsics(group, "intrinsics of the camera; the placement of objects is then measured")
+    group.add_argument("--depth", metavar="FILE", help="depth image of the same camera")
+    add_depth_unit(group)
+    group.add_argument("--scene", metavar="SCENE", help="scene file (default: the run's copy)")
+    add_measured_board(group)
+    group.add_argument(
+        "--placement", metavar="FILE", help="placement file of `camera placement`, if there is one"
+    )
+
+
+def run_trials_record(arguments: argparse.Namespace) -> int:
+    """Measures and records; 1 if the photo has no board."""
+    from burg_drake.experiment import (
+        TrialBook,
+        parse_real_outcome,
+        save_photo_and_placement,
+        summarize_placements,
+    )
+
+    _require_consistent_record_options(arguments)
+    if arguments.outcome is not None:
+        parse_real_outcome(arguments.outcome)
+    book = TrialBook(arguments.trials)
+    sheet = book.sheet()
+    trial = book.trial(_resolve_trial_number(arguments.number, sheet))
+    entry = _entry_from_options(arguments)
+    book.require_open(trial, entry, correct=arguments.correct, again=arguments.again)
+    check = _placement_check(arguments, sheet, trial)
+    found = check is not None and not check.reason
+    if arguments.photo or check is not None:
+        kept = check if found else None
+        photo = save_photo_and_placement(
+            arguments.trials, trial.number, photo=arguments.photo, check=kept
+        )
+        entry |= {"photo": photo} if photo else {}
+    if check is not None and found:
+        entry["placement"] = summarize_placements(check)
+    recorded = _record_trial(book, arguments, trial, entry)
+    if arguments.photo and not (arguments.intrinsics or arguments.placement):
+        print("no placement was measured: --intrinsics FILE of the camera is missing")
+    _print_recorded(recorded, book.sheet(), check if found else None)
+    if arguments.width_mm is not None:
+        _warn_of_width(arguments, sheet, recorded)
+    if check is not None and not found:
+        print(
+            f"burg-drake: {arguments.photo}: {check.reason}; recorded without placement",
+            file=sys.stderr,
+        )
+    return 0 if check is None or found else 1
+
+
+def _record_trial(
+    book: TrialBook, arguments: argparse.Namespace, trial: RealTrial, entry: dict[str, Any]
+) -> RealTrial:
+    """Records it. `next` is the first open trial at this very moment; but if there is evidence it
+    is the one that the evidence is about, or none."""
+    from burg_drake.experiment import TrialChanged
+
+    how = {"correct": arguments.correct, "again": arguments.again}
+    if arguments.number != "next":
+        return book.record(trial.number, **how, **entry)
+    if not (arguments.photo or arguments.placement):
+        return book.record("next", **how, **entry)
+    try:
+        return book.record(trial.number, expected=trial, **how, **entry)
+    except TrialChanged as error:
+        kept = f", but the photo is kept as {entry['photo']}" if "photo" in entry else ""
+        raise InvalidInputError(
+            f"{error}; nothing was recorded{kept}: give the number of its trial instead of next"
+        ) from error
+
+
+def _resolve_trial_number(text: str, sheet: TrialSheet) -> int | Literal["next"]:
+    max_digits = 9
+    if text == "next":
+        return "next"
+    if text.isascii() and text.isdecimal() and len(text) < max_digits:
+        return int(text)
+    numbers = [trial.number for trial in sheet.trials]
+    span = f", {min(numbers)} to {max(numbers)}," if numbers else ""
+    raise InvalidInputError(f"{quote_value(text)}: give the number of a trial{span} or next")
+
+
+def _parse_moment(text: str) -> str:
+    """A moment, with the zone of this place if there is none, or a day."""
+    try:
+        with contextlib.suppress(ValueError):
+            return date.fromisoformat(text).isoformat()
+        moment = datetime.fromisoformat(text)
+        return (moment if moment.tzinfo else moment.astimezone()).isoformat()
+    except (ValueError, OverflowError) as error:
+        raise argparse.ArgumentTypeError(
+            f"{quote_value(text)} is not a time; give ISO 8601 such as 2026-05-04T16:30"
+        ) from error
+
+
+def _require_consistent_record_options(arguments: argparse.Namespace) -> None:
+    """Refuses options without those that they belong to, and calls that record nothing."""
+    # Options that are about a photo.
+    photo_options = ("intrinsics", "depth", "depth_unit", "scene")
+    if not arguments.photo:
+        for name in photo_options:
+            if getattr(arguments, name) is not None:
+                option = name.replace("_", "-")
+                raise InvalidInputError(f"--{option} is for photos; add --photo FILE")
+    elif arguments.depth and not arguments.intrinsics:
+        raise InvalidInputError("--depth needs --intrinsics FILE of its camera")
+    if arguments.placement and arguments.intrinsics:
+        raise InvalidInputError(
+            "--placement is already a measurement; leave out either it or --intrinsics"
+        )
+    if not (_entry_from_options(arguments) or arguments.photo or arguments.placement):
+        raise InvalidInputError("nothing to record; give --outcome, --note or --photo, for example")
+
+
+def _entry_from_options(arguments: argparse.Namespace) -> dict[str, Any]:
+    """What the options tell, but for photo and placement."""
+    text_fields = ("note", "operator")
+    names = ("outcome", "note", "operator", "time")
+    entry = {name: getattr(arguments, name) for name in names}
+    robot = {name: getattr(arguments, name) for name in ("width_mm", "effort_n")}
+    known = {name: value for name, value in robot.items() if value is not None}
+    given = {name: value for name, value in entry.items() if value is not None}
+    if not arguments.correct:  # which may replace them by nothing
+        given = {k: v for k, v in given.items() if k not in text_fields or v.strip()}
+    return given | ({"robot": known} if known else {})
+
+
+def _placement_check(
+    arguments: argparse.Namespace, sheet: TrialSheet, trial: RealTrial
+) -> PlacementCheck | None:
+    """The placement check, of a file or of the photo, if one is wanted."""
+    from burg_drake.experiment import measure_placement, require_same_scene, require_scene_of_check
+
+    if arguments.placement:
+        from burg_drake.cameras import load_placement
+
+        check = load_placement(arguments.placement)
+        require_scene_of_check(check, sheet, trial, arguments.placement)
+        return check
+    if not arguments.photo or not arguments.intrinsics:
+        return None
+    from burg_drake.scene import load_scene
+
+    if arguments.scene:
+        scene = load_scene(arguments.scene)
+        require_same_scene(scene, sheet, trial)
+    else:
+        from burg_drake.experiment import load_source_run
+
+        run = load_source_run(sheet, arguments.trials, trial.run, moved=dict(arguments.moved))
+        scene = run.scene()
+    return measure_placement(
+        scene,
+        arguments.photo,
+        arguments.intrinsics,
+        depth=arguments.depth,
+        depth_unit=arguments.depth_unit,
+        scale=print_scale_from_options(arguments),
+    )
+
+
+def _warn_of_width(arguments: argparse.Namespace, sheet: TrialSheet, trial: RealTrial) -> None:
+    """Says that a width is beyond what the hand opens, where the run can tell."""
+    from burg_drake.core import BurgError
+    from burg_drake.experiment import load_source_run
+
+    with contextlib.suppress(BurgError):
+        run = load_source_run(sheet, arguments.trials, trial.run, moved=dict(arguments.moved))
+        hand = run.station().hand
+        if arguments.width_mm > 1e3 * hand.opening[1]:
+            print(
+                f"burg-drake: --width-mm {arguments.width_mm:g} is recorded, but hand"
+                f" {hand.name!r} opens {1e3 * hand.opening[1]:g} mm",
+                file=sys.stderr,
+            )
+
+
+def _print_recorded(trial: RealTrial, sheet: TrialSheet, check: PlacementCheck | None) -> None:
+    from burg_drake.apps.commands.camera_placement import placement_table
+
+    if check is not None:
+        placement_table(check.instances).show()
+    outcome = "no outcome yet" if trial.outcome is None else trial.outcome.value
+    print(f"trial {trial.number}: {outcome} ({trial.grasp})")
+    left = sum(not other.carried_out for other in sheet.trials)
+    if sheet.next is not None:
+        print(
+            f"{left} of {len(sheet.trials)} left; next is {sheet.next.number}: {sheet.next.grasp}"
+        )
+    else:
+        print("all trials have an outcome")
+
+
+def add_trials_show_options(parser: Parser) -> None:
+    """Adds the options of `burg-drake trials show`."""
+    parser.epilog = examples_text(
+        "burg-drake trials show trials.yaml",
+        "burg-drake trials show trials.yaml --all",
+        "",
+        "Exit code 1 if the file lacks entries of its journal, as after an editor saved an old"
+        " version: `trials restore` brings them back.",
+    )
+    add_trials_argument(parser)
+    parser.add_argument("--all", action="store_true", help="also print a line for each trial")
+    add_show_simulated_option(parser, " and the notes on the selection")
+
+
+def run_trials_show(arguments: argparse.Namespace) -> int:
+    """Prints; 1 if entries are missing, or the journal is damaged."""
+    from burg_drake.experiment import TrialBook
+
+    book = TrialBook(arguments.trials)
+    sheet = book.sheet()
+    for key, run in sheet.runs.items():
+        print(f"run {key}: {run.hash}, scene {run.scene.name}, mode {run.mode}, in {run.path}")
+    if arguments.all:
+        _print_trials(sheet.trials, arguments.show_simulated)
+    _print_progress(sheet, arguments.show_simulated)
+    begun = any(trial.carried_out for trial in sheet.trials)
+    for note in () if begun or not arguments.show_simulated else sheet.notes:
+        print(f"note: {note}")
+    if sheet.next is not None:
+        print(f"next is {sheet.next.number}: {sheet.next.grasp}")
+    lacking = book.missing_values()
+    _print_missing_entries(arguments.trials, lacking)
+    damage = print_damage(book)
+    return 1 if damage or any(found.values for found in lacking) else 0
+
+
+def _print_progress(sheet: TrialSheet, simulated: bool) -> None:
+    """How many trials of each object are done, and how they ended."""
+    from burg_drake.core import TextTable
+    from burg_drake.experiment import is_success
+
+    table = TextTable().names("object")
+    table.numbers("trials", "done", "tried")
+    table.numbers(*(["success\nin simulation"] if simulated else []), "success\non the robot")
+    success = sheet.selection.success
+
+    def row(name: str, trials: Sequence[RealTrial], *, bold: bool = False) -> None:
+        outcomes = [t.outcome for t in trials if t.outcome is not None]
+        counts = (
+            len(trials),
+            len(outcomes),
+            sum(outcome.attempted for outcome in outcomes),
+            *([sum(is_success(t.simulated, success) for t in trials)] if simulated else []),
+            sum(is_success(outcome, success) for outcome in outcomes),
+        )
+        table.row(name, *map(str, counts), bold=bold)
+
+    for name in sorted({trial.object for trial in sheet.trials}):
+        row(name, [trial for trial in sheet.trials if trial.object == name])
+    row("all", sheet.trials, bold=True)
+    table.show()
+
+
+def _print_trials(trials: Sequence[RealTrial], simulated: bool) -> None:
+    from burg_drake.core import TextTable
+
+    table = TextTable().numbers("trial", "block").texts("grasp", "outcome", "note")
+    table.texts(*(["simulated"] if simulated else []))
+    for trial in trials:
+        outcome = "" if trial.outcome is None else trial.outcome.value
+        cells = [str(trial.number), str(trial.block), trial.grasp, outcome, trial.note]
+        table.row(*cells, *([trial.simulated.value] if simulated else []))
+    table.show()
+
+
+def _print_missing_entries(path: str, lacking: Sequence[MissingValues]) -> None:
+    """What the journal has and the file has not."""
+    for found in lacking:
+        if found.values:
+            text = ", ".join(
+                f"{name} {value}" if isinstance(value, str) else name
+                for name, value in found.values.items()
+            )
+            print(
+                f"burg-drake: trial {found.number} lacks what was recorded: {text}", file=sys.stderr
+            )
+        if found.edited:
+            print(f"trial {found.number}: {', '.join(found.edited)} edited by hand since recorded")
+    if any(found.values for found in lacking):
+        print(
+            f"burg-drake: `burg-drake trials restore {path}` brings it back; with --keep the file"
+            " stays as it is",
+            file=sys.stderr,
+        )
+
+
+def add_trials_restore_options(parser: Parser) -> None:
+    """Adds the options of `burg-drake trials restore`."""
+    parser.epilog = examples_text(
+        "burg-drake trials restore trials.yaml",
+        "burg-drake trials restore trials.yaml --number 17",
+        "burg-drake trials restore trials.yaml --number 17 --keep",
+        "",
+        "Values that were edited by hand stay.",
+    )
+    add_trials_argument(parser)
+    parser.add_argument(
+        "--number",
+        metavar="N",
+        type=positive_int,
+        action="append",
+        help="number of a trial (default: all); repeatable",
+    )
+    parser.add_argument(
+        "--keep", action="store_true", help="keep the file as it is; it is right, not the journal"
+    )
+
+
+def run_trials_restore(arguments: argparse.Namespace) -> int:
+    """Restores, and says what; 1 if the journal is damaged."""
+    from burg_drake.experiment import TrialBook
+
+    book = TrialBook(arguments.trials)
+    for number in arguments.number or ():
+        book.trial(number)
+    done = (book.keep if arguments.keep else book.restore)(arguments.number)
+    what = "kept as it is in the file" if arguments.keep else "restored"
+    for trial in done:
+        outcome = "no outcome" if trial.outcome is None else trial.outcome.value
+        print(f"trial {trial.number}: {what}, {outcome}")
+    if not done:
+        print("nothing to restore")
+    return 1 if print_damage(book) else 0

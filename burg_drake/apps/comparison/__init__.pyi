@@ -1,4 +1,0 @@
-from . import (
-    compare as compare,
-    gap as gap,
-)

@@ -1,2 +1,0 @@
-from . import render as render
-from .verbs import add_to as add_to

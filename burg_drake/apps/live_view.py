@@ -1,0 +1,329 @@
+"""The live view of `burg-drake ar`: HTTP server, state as JSON, summary of a scripted session."""
+
+from __future__ import annotations
+
+import math
+import sys
+import threading
+from dataclasses import asdict
+from http import HTTPStatus
+from typing import Any
+
+from burg_drake.apps.commands.camera_placement import extra_object_line
+from burg_drake.apps.options.arguments import MAX_PAGE_CONNECTIONS
+from burg_drake.apps.page_server import PageHandler, PageServer, parse_address, parse_picture_number
+from burg_drake.cameras import (
+    LiveSession,
+    OverlayStyle,
+    Picture,
+    Placement,
+    PlacementCheck,
+    ViewActions,
+    describe_pose,
+    placement_order,
+    placement_summary,
+    position_sd,
+)
+from burg_drake.core import RequestError, require_local_host
+
+
+def session_status(live: LiveSession, actions: ViewActions, after: int = 0) -> dict[str, Any]:
+    """All that the page shows beside the picture.
+
+    Args:
+        live: the session.
+        actions: on it.
+        after: events up to this number are left out.
+
+    Returns:
+        Plain data without NaN; what is not known is None.
+    """
+    scene, recording = live.processor.scene, actions.recording
+    style = live.processor.style
+    return {
+        "scene": {"name": scene.name, "objects": placement_order(scene)},
+        "source": {
+            "name": live.source.name,
+            "live": live.source.live,
+            "state": live.reader.state,
+            "fault": live.reader.fault,
+        },
+        "frames": live.counts.frames,
+        "settings": asdict(live.settings),
+        "tolerance": {
+            "mm": 1e3 * style.tolerance,
+            "deg": math.degrees(style.angle_tolerance),
+        },
+        "picture": None if live.picture is None else _picture_status(live, live.picture),
+        "recording": recording
+        and {
+            "path": str(recording.path),
+            "seconds": recording.frames / recording.frames_per_second,
+        },
+        "checking": actions.checking,
+        "placement": None if live.placement is None else _placement_status(live.placement, style),
+        "events": [asdict(event) for event in live.events.after(after)],
+    }
+
+
+def _picture_status(live: LiveSession, picture: Picture) -> dict[str, Any]:
+    sight, board = picture.located, live.processor.scene.board
+    estimate = sight.estimate
+    return {
+        "number": picture.number,
+        "name": sight.frame.name,
+        "time": sight.frame.time,
+        "valid": estimate.valid,
+        "doubt": estimate.reason if estimate.valid else "",
+        "line": describe_pose(estimate, board),
+        "markers": len(estimate.ids),
+        "of_markers": len(board.layout.ids),
+        "reprojection_error": _finite_or_none(estimate.reprojection_error),
+        "position_sd_mm": _finite_or_none(1e3 * position_sd(estimate)),
+        "p_SC_mm": [round(1e3 * x, 2) for x in estimate.X_SC[:3, 3]] if estimate.valid else None,
+        "scale": _finite_or_none(estimate.scale),
+        "rate": live.rate,
+        "milliseconds": picture.milliseconds,
+    }
+
+
+def _placement_status(check: PlacementCheck, style: OverlayStyle) -> dict[str, Any]:
+    return {
+        "reason": check.reason,
+        "summary": placement_summary(check),
+        "method": check.method,
+        "taken": check.taken,
+        "objects": {name: placement_row(placed, style) for name, placed in check.instances.items()},
+        "extra": [
+            {"xy_mm": [round(1e3 * c, 1) for c in e.position], "wide_mm": round(1e3 * e.width, 1)}
+            for e in check.extra
+        ],
+    }
+
+
+def placement_row(placed: Placement, style: OverlayStyle) -> dict[str, Any]:
+    """One object's row: distance and turn, with their standard deviations."""
+    off = None if placed.displacement is None else 1e3 * math.hypot(*placed.displacement)
+    turn = None if placed.angle is None else math.degrees(placed.angle)
+    sd = placed.displacement_sd
+    within = (
+        off is not None
+        and off <= 1e3 * style.tolerance
+        and abs(turn or 0.0) <= math.degrees(style.angle_tolerance)
+    )
+    return {
+        "status": placed.status,
+        "reason": placed.reason,
+        "within": within,
+        "mm": off,
+        "xy_mm": placed.displacement and [1e3 * d for d in placed.displacement],
+        "sd_mm": None if sd is None else 1e3 * math.hypot(*sd),
+        "deg": turn,
+        "sd_deg": None if placed.angle_sd is None else math.degrees(placed.angle_sd),
+        "seen": placed.seen,
+    }
+
+
+def _finite_or_none(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+LIVE_PICTURE_TIMEOUT = 1.0
+"""Seconds that a request for a picture waits for a newer one."""
+LIVE_VIEW_FILES = {
+    "/": ("page.html", "text/html; charset=utf-8"),
+    "/page.css": ("page.css", "text/css; charset=utf-8"),
+    "/page.js": ("page.js", "text/javascript; charset=utf-8"),
+}
+"""File name and content type of the live view's page, by path."""
+
+
+class ViewServer(PageServer):
+    """Serves a live session until it is closed.
+
+    Args:
+        live: the session.
+        actions: on it.
+        host: address to listen on; only this machine can reach the default.
+        port: to listen on; the first free one from `FIRST_PORT` on if None, any if 0.
+        connections: that are served at a time.
+
+    Raises:
+        InvalidInputError: the port is taken, or the address is not this machine's.
+    """
+
+    first_port = 7100
+    title = "view"
+
+    def __init__(
+        self,
+        live: LiveSession,
+        actions: ViewActions,
+        *,
+        host: str = "127.0.0.1",
+        port: int | None = None,
+        connections: int = MAX_PAGE_CONNECTIONS,
+    ) -> None:
+        self.live, self.actions = live, actions
+        self.closing = threading.Event()
+        super().__init__(ViewHandler, host=host, port=port, connections=connections)
+
+    def close(self) -> None:
+        """Stops serving; requests that are being answered end soon."""
+        self.closing.set()
+        super().close()
+
+
+class ViewHandler(PageHandler):
+    """Answers one connection's requests."""
+
+    server: ViewServer
+    folder = "live_page"
+    pages = LIVE_VIEW_FILES
+    policy = "default-src 'self'; img-src 'self' blob: data:; frame-ancestors 'none'"
+
+    def do_GET(self) -> None:
+        """Pages, pictures, status."""
+        self.answer(
+            {
+                "/frame.jpg": self._send_picture,
+                "/stream.mjpg": self._send_stream,
+                "/status": self._send_status,
+            }
+        )
+
+    def do_POST(self) -> None:
+        """Actions."""
+        self.answer(
+            {
+                "/settings": self._change_settings,
+                "/snapshot": self._take_snapshot,
+                "/record": self._record,
+                "/check": self._check,
+            }
+        )
+
+    def admitted(self) -> tuple[str, dict[str, str]]:
+        """Only this machine is meant, and only the page itself may be led to from elsewhere."""
+        require_local_host(self.headers.get, served=self.server.host, is_page=self.path == "/")
+        return parse_address(self.path)
+
+    def _send_picture(self, query: dict[str, str]) -> None:
+        picture = self.server.live.next_picture(parse_picture_number(query), LIVE_PICTURE_TIMEOUT)
+        if picture is None:
+            self.send(HTTPStatus.NO_CONTENT)
+        else:
+            self.send(HTTPStatus.OK, "image/jpeg", picture.jpeg, {"X-Picture": str(picture.number)})
+
+    def _send_stream(self, query: dict[str, str]) -> None:
+        boundary = "picture"
+        self.close_connection = True
+        kind = f"multipart/x-mixed-replace; boundary={boundary}"
+        self.send_head(HTTPStatus.OK, {"Content-Type": kind})
+        self.end_headers()
+        number = 0
+        while not self.server.closing.is_set():
+            picture = self.server.live.next_picture(number, LIVE_PICTURE_TIMEOUT)
+            if picture is None:
+                continue
+            number = picture.number
+            head = (
+                f"--{boundary}\r\nContent-Type: image/jpeg\r\n"
+                f"Content-Length: {len(picture.jpeg)}\r\nX-Picture: {number}\r\n\r\n"
+            )
+            self.wfile.write(head.encode() + picture.jpeg + b"\r\n")
+
+    def _send_status(self, query: dict[str, str]) -> None:
+        self.send_json(
+            session_status(self.server.live, self.server.actions, parse_picture_number(query))
+        )
+
+    def _change_settings(self, body: dict[str, Any]) -> None:
+        self.server.live.change(**body)
+        self.send_json({})
+
+    def _take_snapshot(self, body: dict[str, Any]) -> None:
+        self.send_json({"path": str(self.server.actions.snapshot())})
+
+    def _record(self, body: dict[str, Any]) -> None:
+        if not isinstance(body.get("on"), bool):
+            raise RequestError(HTTPStatus.BAD_REQUEST, '"on" must be true or false')
+        actions = self.server.actions
+        path = actions.start_recording() if body["on"] else actions.stop_recording()
+        self.send_json({"path": path and str(path)})
+
+    def _check(self, body: dict[str, Any]) -> None:
+        self.server.actions.start_check()
+        self.send_json({})
+
+
+def finish_script(
+    live: LiveSession, actions: ViewActions, *, check: bool, snapshot: str | None
+) -> None:
+    """Tells what was found, and does what is to be done with the last frame that gave a pose.
+
+    Args:
+        live: the session, closed.
+        actions: on it.
+        check: measure how far objects are off.
+        snapshot: folder for a snapshot, if one is wanted.
+    """
+    located, counts = live.last_located, live.counts
+    if located is None:
+        return
+    if counts.frames > 1:
+        print(f"{live.source.name}: {counts.valid} of {counts.frames} frames gave a pose")
+    estimate = located.estimate
+    print(f"{located.frame.name}: {describe_pose(estimate, live.processor.scene.board)}")
+    if estimate.valid:
+        x, y, z = 1e3 * estimate.X_SC[:3, 3]
+        print(
+            f"camera at x {x:.2f}, y {y:.2f}, z {z:.2f} mm from the board's origin, reprojection"
+            f" error {estimate.reprojection_error:.3f} px"
+        )
+    placement = None
+    if check and estimate.valid:
+        placement = live.processor.check(located)
+        for line in placement_lines(placement, live.processor.style):
+            print(line)
+    if snapshot is not None:
+        actions.snapshot(snapshot, live.picture_of(located, placement))
+
+
+def placement_exit_code(live: LiveSession) -> int:
+    """The exit code of a script; says why if no frame gave a pose."""
+    if live.counts.valid:
+        return 0
+    reason = live.counts.reason or live.reader.fault or "no image arrived"
+    print(f"burg-drake: no frame gave a pose: {reason}", file=sys.stderr)
+    return 1
+
+
+def placement_lines(check: PlacementCheck, style: OverlayStyle) -> list[str]:
+    """A placement check in words, a line an object."""
+    if not check.instances:
+        return [f"placement: {check.reason}"]
+    width = max(map(len, check.instances))
+    return [
+        f"  {name:{width}}  {_placement_row_text(placement_row(placed, style))}"
+        for name, placed in check.instances.items()
+    ] + [f"  {extra_object_line(extra)}" for extra in check.extra]
+
+
+def _placement_row_text(row: dict[str, Any]) -> str:
+    if row["mm"] is None:
+        return ": ".join(filter(None, (row["status"].replace("_", " "), row["reason"])))
+    x, y = row["xy_mm"]
+    words = (
+        f"{row['mm']:5.2f} mm off (x {x:+.2f}, y {y:+.2f}{_standard_deviation_text(row['sd_mm'])})"
+    )
+    if row["deg"] is not None:
+        words += f", rotated by {row['deg']:+.2f}{_standard_deviation_text(row['sd_deg'], '')} deg"
+    if row["status"] != "measured":
+        return f"{words}; {row['status']}: {row['reason']}"
+    return f"{words}; {'placed' if row['within'] else 'off its target'}"
+
+
+def _standard_deviation_text(sd: float | None, before: str = ",") -> str:
+    """A standard deviation behind its value; nothing where it is not known."""
+    return "" if sd is None else f"{before} ± {sd:.2f}"

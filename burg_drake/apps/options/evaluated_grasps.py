@@ -1,0 +1,204 @@
+"""Options about the grasps that are evaluated: sampled or from a file, and how the hand moves."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.options.arguments import Parser, add_only
+from burg_drake.apps.options.grasp_files import (
+    POSE_FRAMES,
+    add_camera_options,
+    add_correction_options,
+    gripper_for,
+)
+from burg_drake.apps.options.settings_options import add_settings_options, fields_from_options
+from burg_drake.apps.options.values import input_file, renaming
+from burg_drake.core import FieldError, InvalidInputError, option_name
+
+if TYPE_CHECKING:
+    from burg_drake.core import GraspSet
+    from burg_drake.evaluation import GivenGrasps
+    from burg_drake.scene import Scene
+    from burg_drake.station import GraspMotion, Station
+
+
+def add_sampling_options(parser: Parser, default: int, which: Any = None) -> None:
+    """Adds the options.
+
+    Args:
+        parser: gets them.
+        default: number of grasps for each object.
+        which: group in which the number of grasps is an alternative, such as to grasps of a file.
+    """
+    from burg_drake.evaluation import EvaluationSettings
+
+    add_settings_options(
+        which or parser, EvaluationSettings, "grasps_per_object", unset=True, shown_default=default
+    )
+    parser.set_defaults(default_grasps=default)
+    add_settings_options(parser, EvaluationSettings, "blind")
+    add_only(parser, "grasps")
+    add_settings_options(parser, EvaluationSettings, "approach_angle_deg", unset=True)
+    add_settings_options(parser, EvaluationSettings, "seed")
+
+
+def grasps_per_object(arguments: argparse.Namespace) -> int:
+    """How many grasps are asked for."""
+    return int(arguments.grasps_per_object or arguments.default_grasps)
+
+
+def refuse_sampling_options_with_file(arguments: argparse.Namespace) -> None:
+    """Refuses an option about sampling where grasps come from a file.
+
+    Raises:
+        InvalidInputError: names the option.
+    """
+    for name in ("blind", "approach_angle", "until_balanced"):
+        if getattr(arguments, name, None) and arguments.grasps is not None:
+            raise InvalidInputError(
+                f"--{name.replace('_', '-')} is for sampled grasps; leave out either it or --grasps"
+            )
+
+
+def print_shortfalls(sampled: Mapping[str, GraspSet], asked: int) -> None:
+    """A line for each object with fewer grasps than asked, that says why."""
+    from burg_drake.evaluation import shortfall_note
+
+    for name, grasps in sampled.items():
+        note = shortfall_note(name, asked, grasps.provenance, len(grasps))
+        if note:
+            print(f"note: {note}")
+
+
+def add_grasp_file_options(parser: Parser, which: Any) -> None:
+    """Adds the options.
+
+    Args:
+        parser: gets a group of options.
+        which: group that --grasps is an alternative in.
+    """
+    which.add_argument(
+        "--grasps",
+        metavar="FILE|RUN",
+        type=input_file,
+        help="grasps of this file or run, instead of sampling",
+    )
+    group = parser.add_argument_group(
+        "with --grasps",
+        "`burg-drake grasps convert --formats` lists the formats.",
+    )
+    group.add_argument(
+        "--grasps-format", metavar="NAME", help="format of the file (default: recognised)"
+    )
+    add_correction_options(group)
+    group.add_argument(
+        "--grasps-object",
+        metavar="[THEIRS=]OURS",
+        action="append",
+        type=renaming,
+        default=[],
+        help="object or instance of the grasps; once for each name in the file",
+    )
+    group.add_argument(
+        "--grasps-frame",
+        choices=tuple(POSE_FRAMES),
+        help="frame of the poses, if not the format's",
+    )
+    add_camera_options(group)
+
+
+def require_grasp_file(arguments: argparse.Namespace) -> None:
+    """Refuses options about a file where none is given.
+
+    Raises:
+        InvalidInputError: names the option.
+    """
+    names = ("grasps_format", "grasps_object", "grasps_frame", "camera_pose", "object_ids")
+    for name in (*names, "scene_id", "gripper_link", "correction"):
+        if getattr(arguments, name) and arguments.grasps is None:
+            raise InvalidInputError(
+                f"--{name.replace('_', '-')} is for grasp files; add --grasps FILE"
+            )
+
+
+def read_grasps_from_options(
+    arguments: argparse.Namespace, scene: Scene, station: Station
+) -> GivenGrasps:
+    """The grasps of the file that --grasps names, on the instances of a scene."""
+    from burg_drake.evaluation import FileReading, MisplacedGraspsError, find_mistake, read_grasps
+    from burg_drake.formats import read_poses
+
+    poses = arguments.camera_pose
+    try:
+        return read_grasps(
+            scene,
+            arguments.grasps,
+            gripper_for(arguments, station),
+            format=FileReading(arguments.grasps_format, arguments.correction),
+            objects=dict(arguments.grasps_object),
+            frame=POSE_FRAMES.get(arguments.grasps_frame),  # type: ignore[arg-type]
+            X_SF=read_poses(poses) if poses else None,
+            object_ids=arguments.object_ids,
+            scene_id=arguments.scene_id,
+        )
+    except MisplacedGraspsError as error:
+        mistake = find_mistake(error.grasps, station, scene)
+        if mistake is None:
+            raise
+        raise InvalidInputError(f"{error}. {mistake.text()}") from error
+
+
+def add_motion_options(parser: Parser) -> None:
+    """Adds the options."""
+    from burg_drake.station import GraspMotion
+
+    group = parser.add_argument_group(
+        "motion of the hand",
+        "Default: what the station says, else 100 mm approach and 300 mm lift.",
+    )
+    add_settings_options(group, GraspMotion, unset=True)
+
+
+def motion_fields_from_options(arguments: argparse.Namespace) -> dict[str, object]:
+    """The fields of `GraspMotion` that options give."""
+    from burg_drake.station import GraspMotion
+
+    return fields_from_options(arguments, GraspMotion)
+
+
+def motion_from_options(arguments: argparse.Namespace, station: Station) -> GraspMotion:
+    """The motion that options ask for, where the station's is another.
+
+    Raises:
+        InvalidInputError: they do not go together; names the option.
+    """
+    given = motion_fields_from_options(arguments)
+    try:
+        return replace(station.document.motion, **given)  # type: ignore[arg-type]
+    except FieldError as error:
+        options = ", ".join(motion_option(field) for field in given)
+        raise InvalidInputError(f"{error} ({options})") from error
+
+
+def motion_option(field: str) -> str:
+    """The option of a field of `GraspMotion`."""
+    from burg_drake.station import GraspMotion
+
+    return option_name(GraspMotion, field)
+
+
+def refuse_standoff_without_arm(arguments: argparse.Namespace, mode: str) -> None:
+    """Refuses a standoff where no arm is asked.
+
+    Raises:
+        InvalidInputError: it is given, and the hand begins at the grasp.
+    """
+    approaches = mode != "hand" or getattr(arguments, "approach", False)
+    if not approaches and arguments.standoff_mm is not None:
+        raise InvalidInputError(
+            "--standoff-mm is the length of the approach; in mode 'hand' the trial begins at the"
+            " grasp: leave it out, or give --approach, or --mode reach or arm"
+        )

@@ -1,0 +1,388 @@
+"""Options about grasp files: the gripper, the objects that the grasps belong to, and the output."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.apps.options.arguments import DEFAULT_STATION, Parser, add_station
+from burg_drake.apps.options.values import input_file
+from burg_drake.core import (
+    InvalidInputError,
+    UnknownNameError,
+    is_resolved,
+    list_names,
+    require_writable,
+    suggest_names,
+)
+
+if TYPE_CHECKING:
+    from burg_drake.core import GraspSet
+    from burg_drake.formats import GraspFormat, Gripper
+    from burg_drake.objects import ObjectLibrary
+    from burg_drake.scene import Scene
+    from burg_drake.station import Station
+
+DEFAULT_HAND = "panda_hand"
+
+POSE_FRAMES = {"object": "object", "scene": "world", "camera": "camera"}
+"""Frames of poses in grasp files: option values, and their names in `formats`."""
+
+
+def add_reading_options(parser: Parser, *, in_full: bool = False) -> None:
+    """The options --from, --gripper-link and --correction, by which a file is read."""
+    parser.add_argument(
+        "--from", dest="source", metavar="FORMAT", help="format to read (default: recognised)"
+    )
+    add_correction_options(parser, in_full=in_full)
+
+
+def add_correction_options(parser: Any, *, in_full: bool = False) -> None:
+    """The options --gripper-link and --correction."""
+    # After the first one, in a help text.
+    other_corrections = (
+        " (degrees about x, y or z), forward:103.4 (mm along the approach), inverse, transposed,"
+        " wxyz, xyzw, y_up, z_up, millimetres, half_widths"
+    )
+    parser.add_argument(
+        "--gripper-link",
+        metavar="NAME",
+        help="hand's link in isaac_grasp files (default: its own)",
+    )
+    parser.add_argument(
+        "--correction",
+        metavar="NAME,...",
+        type=lambda text: tuple(text.split(",")),
+        default=(),
+        help="correct poses, such as turn:z90"
+        + (other_corrections if in_full else " (see burg-drake grasps convert --help)"),
+    )
+
+
+def add_hand(parser: Parser, default: str | None = DEFAULT_HAND) -> None:
+    """The option --hand, of verbs that have no station; without a default the file is asked."""
+    parser.add_argument(
+        "--hand",
+        metavar="HAND",
+        default=default,
+        help="hand file or built-in name (default:"
+        f" {default or f'that of the file, else {DEFAULT_HAND}'})",
+    )
+
+
+def add_camera_options(group: Any) -> None:
+    """The options --camera-pose, --object-ids and --scene-id, of files about a scene."""
+    group.add_argument(
+        "--camera-pose",
+        metavar="FILE",
+        type=input_file,
+        nargs="+",
+        default=[],
+        help="pose of the camera in the scene: 4x4 .npy, FILE:INDEX, or YAML; several are"
+        " multiplied",
+    )
+    group.add_argument(
+        "--object-ids",
+        metavar="ID=NAME,...",
+        type=parse_object_ids,
+        default={},
+        help="instances by object id (default: the object between the fingers)",
+    )
+    group.add_argument("--scene-id", metavar="ID", help="scene to read from a file of several")
+
+
+def parse_object_ids(text: str) -> dict[int, str]:
+    """`ID=NAME,ID=NAME`."""
+    names: dict[int, str] = {}
+    for part in text.split(","):
+        number, _, name = part.partition("=")
+        if not number.strip().isdecimal() or not name.strip():
+            raise argparse.ArgumentTypeError(f"{part!r} is not ID=NAME, such as 5=mug")
+        names[int(number)] = name.strip()
+    return names
+
+
+def gripper_for(
+    arguments: argparse.Namespace, station: Station | None = None, path: str | None = None
+) -> Gripper:
+    """The hand of a station, or else the one that --hand or a file names, with the link of
+    --gripper-link."""
+    if station is None:
+        gripper = gripper_by_name(arguments.hand) if arguments.hand else _gripper_of_file(path)
+    else:
+        from burg_drake.station import station_gripper
+
+        gripper = station_gripper(station)
+    return replace(gripper, body=arguments.gripper_link) if arguments.gripper_link else gripper
+
+
+def add_file_station(parser: Parser) -> None:
+    """The option --station, of verbs whose files may name one."""
+    add_station(
+        parser,
+        f"station file or built-in name (default: that of the file, else {DEFAULT_STATION})",
+        default=None,
+    )
+
+
+def station_for(arguments: argparse.Namespace, path: str) -> Station:
+    """The station that --station names, or else a file or a run, or else the default.
+
+    Raises:
+        UnknownNameError: it is not there.
+    """
+    from burg_drake.core import UnknownNameError, is_resolved
+    from burg_drake.evaluation import station_reference
+    from burg_drake.station import load_station
+
+    if arguments.station is not None:
+        return load_station(arguments.station)
+    reference = station_reference(path)
+    if reference is not None and not is_resolved(reference, "stations"):
+        raise UnknownNameError(
+            f"{path} names a station that is not there: {reference}; give --station"
+        )
+    try:
+        return load_station(reference or DEFAULT_STATION)
+    except UnknownNameError as error:
+        raise UnknownNameError(f"{path} names a station: {error}; give --station") from error
+
+
+def gripper_by_name(hand: str) -> Gripper:
+    """What formats know of a hand; of the Panda's without a look into its model."""
+    from burg_drake.formats import PANDA_GRIPPER
+
+    if hand == DEFAULT_HAND:
+        return PANDA_GRIPPER
+    from burg_drake.station import gripper_of, locate_hand
+
+    return gripper_of(*locate_hand(hand))
+
+
+def _gripper_of_file(path: str | None) -> Gripper:
+    """The hand that a file or a run says its grasps are for, else the default."""
+    from burg_drake.core import BurgError, UnknownNameError
+    from burg_drake.evaluation import hand_reference
+
+    reference = None if path is None else hand_reference(path)
+    if reference is None:
+        return gripper_by_name(DEFAULT_HAND)
+    try:
+        return gripper_by_name(reference)
+    except BurgError as error:
+        raise UnknownNameError(
+            f"the hand that {path} names cannot be used; give another (--hand): {error}"
+        ) from error
+
+
+@dataclass(frozen=True, eq=False)
+class GraspSource:
+    """Objects that grasps refer to.
+
+    Attributes:
+        library: has every object.
+        scene: where they stand, if that is known.
+    """
+
+    library: ObjectLibrary
+    scene: Scene | None = None
+
+    def reference(self) -> dict[str, str]:
+        """How the provenance of grasps names it; `load_grasp_source` finds it again."""
+        if self.scene is not None:
+            return {"scene": str(self.scene.path)}
+        return {"library": str(self.library.root)}
+
+
+def open_grasp_source(reference: str) -> GraspSource:
+    """Opens the argument SCENE|LIB.
+
+    Args:
+        reference: a scene file or a library folder, or the name of a built-in one.
+
+    Raises:
+        UnknownNameError: there is neither.
+        DocumentError: its document does not fit the schema.
+    """
+    from burg_drake.core import builtin_names, expand_home
+    from burg_drake.objects import LIBRARY_FILE, load_library
+    from burg_drake.scene import load_scene
+
+    scenes, libraries = builtin_names("scenes"), builtin_names("models")
+    path = expand_home(reference)
+    is_library = path.is_dir() or path.name == LIBRARY_FILE or reference in libraries
+    if not is_library and reference not in scenes and not path.exists():
+        raise UnknownNameError(
+            f"{reference} is neither a scene nor an object library;"
+            f" {suggest_names(reference, [*scenes, *libraries])}"
+        )
+    if is_library:
+        return GraspSource(load_library(reference))
+    scene = load_scene(reference)
+    return GraspSource(scene.library, scene)
+
+
+def add_source_options(parser: Parser) -> None:
+    """The options --scene and --library."""
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument(
+        "--scene",
+        metavar="SCENE",
+        help="scene of the grasps (default: what the file names)",
+    )
+    which.add_argument(
+        "--library", metavar="LIB", help="library of the grasps (default: what the file names)"
+    )
+
+
+def load_grasp_source(arguments: argparse.Namespace, grasps: GraspSet, path: str) -> GraspSource:
+    """The objects of a grasp file.
+
+    Args:
+        arguments: with the options of `add_source_options`.
+        grasps: the grasps; their provenance is asked where no option is given.
+        path: of the file, for messages.
+
+    Raises:
+        InvalidInputError: neither option is given and the file names nothing, or the grasps are
+            far from their objects.
+        UnknownNameError: what is named is not there, or lacks an object of the grasps.
+    """
+    from burg_drake.evaluation import require_near
+
+    named = [arguments.scene, arguments.library]
+    named += [grasps.provenance.get(key) for key in ("scene", "library")]
+    reference = next((name for name in named if name), None)
+    if reference is None:
+        raise InvalidInputError(
+            f"{path} does not say where its objects are; give --scene or --library"
+        )
+    try:
+        from_file = reference not in (arguments.scene, arguments.library)
+        if from_file and not is_resolved(str(reference), "scenes", "models"):
+            raise UnknownNameError(str(reference))
+        source = open_grasp_source(str(reference))
+    except UnknownNameError as error:
+        if reference in (arguments.scene, arguments.library):
+            raise
+        raise UnknownNameError(
+            f"{path} says that its objects are in {reference}, which is not there; give --scene or"
+            " --library"
+        ) from error
+    for name in sorted(set(grasps.object.tolist())):
+        if name not in source.library.objects:
+            raise UnknownNameError(
+                f"{path} has grasps of object {name!r}, which is not in library"
+                f" {source.library.root}; {suggest_names(name, source.library.objects)}"
+            )
+    require_near(grasps, source.library, path)
+    return source
+
+
+@dataclass(frozen=True, eq=False)
+class GraspOutput:
+    """A place and a format that go together, known before there are grasps.
+
+    Attributes:
+        path: file or folder.
+        format: of the file, or of each file in the folder.
+        is_folder: which of the two.
+    """
+
+    path: Path
+    format: GraspFormat
+    is_folder: bool
+
+    def require_fits(self, objects: Collection[str]) -> None:
+        """Refuses grasps of several objects for a file that can hold those of one.
+
+        Raises:
+            InvalidInputError: they do not fit.
+        """
+        if self.format.one_object and not self.is_folder and len(set(objects)) > 1:
+            raise InvalidInputError(
+                f"a file of {self.format.title} holds grasps of one object, and these are of"
+                f" {len(set(objects))} ({list_names(sorted(set(objects)))}); choose one, or give a"
+                f" folder for a file per object: {self.path.with_suffix('')}/"
+            )
+
+    def write(self, grasps: GraspSet, gripper: Gripper) -> None:
+        """Writes, and prints what was written and what the format has no place for."""
+        from burg_drake.formats import write_each_object
+
+        as_what = "" if self.format.name == "burg_drake" else f" as {format_title(self.format)}"
+        said = f"wrote {len(grasps)} grasps to {self.path}{as_what}"
+        if not self.is_folder:
+            notes = self.format.write(grasps, self.path, gripper)
+            print(said)
+            print_notes(notes)
+            return
+        written = write_each_object(grasps, self.path, self.format, gripper)
+        print(said)
+        print(f"  {list_names([path.name for path in written])}")
+        for note, paths in _files_by_note(written).items():
+            if len(paths) < len(written):
+                note = f"{list_names([path.name for path in paths])}: {note}"
+            print_notes([note])
+
+
+def add_format_option(parser: Parser) -> None:
+    """The option --to."""
+    parser.add_argument(
+        "--to", dest="target", metavar="FORMAT", help="format to write (default: by the suffix)"
+    )
+
+
+def grasp_output(path: str, target: str | None, *, frame: str | None = None) -> GraspOutput:
+    """Where to write, checked as far as it can be without grasps.
+
+    Args:
+        path: file, or folder: one that is there, or a name that ends in `/` or has no suffix.
+        target: name of the format; None to tell by the suffix.
+        frame: what the grasps are measured in, if nothing can be done about that.
+
+    Raises:
+        InvalidInputError: the place cannot be written to, the format is not told, or it wants
+            another frame.
+        UnknownNameError: there is no such format.
+    """
+    from burg_drake.formats import format_by_suffix, format_named
+
+    out = Path(path)
+    is_folder = out.is_dir() or path.endswith("/") or not out.suffix
+    if is_folder and target is None:
+        raise InvalidInputError(f"{out} is a folder; say in which format to write (--to)")
+    try:
+        format = format_named(target) if target else format_by_suffix(out)
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{error} (--to)") from error
+    if frame is not None and format.frame != frame:
+        raise InvalidInputError(
+            f"{format.title} has grasps in the {format.frame} frame; write a .h5 file, then convert"
+            " it with `burg-drake grasps convert`"
+        )
+    require_writable(out / "grasps" if is_folder else out)
+    return GraspOutput(out, format, is_folder)
+
+
+def format_title(format: GraspFormat) -> str:
+    """A format's name and title."""
+    return format.name if format.title == format.name else f"{format.name} ({format.title})"
+
+
+def _files_by_note(written: Mapping[Path, Sequence[str]]) -> dict[str, list[Path]]:
+    """The files that each note is about."""
+    found: dict[str, list[Path]] = {}
+    for path, notes in written.items():
+        for note in notes:
+            found.setdefault(note, []).append(path)
+    return found
+
+
+def print_notes(notes: Sequence[str]) -> None:
+    """Prints sentences about the line above."""
+    for note in notes:
+        print(f"  {note}")

@@ -1,0 +1,197 @@
+"""Terminal output and Meshcat views of commands, and how commands end that run until Ctrl-C."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import logging
+import select
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, NoReturn
+
+if TYPE_CHECKING:
+    from pydrake.geometry import Meshcat
+    from rich.text import Text
+
+    from burg_drake.visualization import ColorBar, GraspPicker, LegendEntry
+
+
+def wait_for_interrupt() -> NoReturn:
+    """Waits, in the main thread, for Ctrl-C; see `sigterm_as_interrupt`.
+
+    The system may deliver a signal in any thread. Python handles it in the main thread, which that
+    does not wake: a wait without end would sleep on.
+
+    Raises:
+        KeyboardInterrupt: that is how it ends.
+    """
+    poll_interval = 0.5  # Seconds between checks for an interrupt.
+    while True:
+        time.sleep(poll_interval)
+
+
+@contextlib.contextmanager
+def sigterm_as_interrupt() -> Iterator[None]:
+    """SIGTERM ends as Ctrl-C does, so that what is open is finished."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+@contextlib.contextmanager
+def ignore_interrupts() -> Iterator[None]:
+    """Ignores Ctrl-C while the last results are written: an interrupt would lose them."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def print_legend(legend: Sequence[LegendEntry | ColorBar]) -> None:
+    """Prints what colours stand for; of numbers their histogram, the bar and its numbers."""
+    from rich.console import Console
+    from rich.text import Text
+
+    from burg_drake.visualization import ColorBar
+
+    console = Console()
+    for entry in legend:
+        if isinstance(entry, ColorBar):
+            for line in _color_bar_lines(entry, with_colors=console.color_system is not None):
+                console.print(line, no_wrap=True, crop=False, overflow="ignore")
+        else:
+            console.print(Text("■ ", style=entry.color) + Text(entry.label, style="default"))
+
+
+def _color_bar_lines(bar: ColorBar, with_colors: bool) -> list[Text]:
+    columns_per_bin = 2  # Columns of the terminal that a bin of a colour bar takes.
+    block_characters = " ▁▂▃▄▅▆▇█"
+    from rich.text import Text
+
+    most = max(1, *bar.counts)
+    levels = [-(-count * (len(block_characters) - 1) // most) for count in bar.counts]  # rounded up
+    histogram, colors = Text(), Text()
+    for level, color in zip(levels, bar.colors, strict=True):
+        histogram.append(block_characters[level] * columns_per_bin, style=color)
+        colors.append("█" * columns_per_bin, style=color)
+    lines = [Text(bar.title), histogram, *([colors] if with_colors else [])]
+    lines.append(Text(tick_line(bar.ticks, columns_per_bin * len(bar.colors))))
+    return [*lines, Text(bar.note)] if bar.note else lines
+
+
+def tick_line(ticks: Sequence[tuple[float, str]], width: int) -> str:
+    """Numbers below a bar of `width` columns, each below its place, as far as there is room.
+
+    Args:
+        ticks: places along the bar in [0, 1], rising, and texts; the first and last one stay.
+    """
+    (_, first), *inner, (_, last) = ticks
+    line = first
+    end = width - len(last)
+    for place, text in inner:
+        start = round(place * width - len(text) / 2)
+        if start > len(line) and start + len(text) < end:
+            line = line.ljust(start) + text
+    return line.ljust(max(end, len(line) + 1)) + last
+
+
+def open_view(arguments: argparse.Namespace) -> Meshcat:
+    """The Meshcat that a verb draws into; an unwritable page is refused before any work.
+
+    Raises:
+        InvalidInputError: the page's folder cannot be written, or the port is taken.
+    """
+    from pathlib import Path
+
+    from burg_drake.core import InvalidInputError, ensure_writable_folder
+    from burg_drake.visualization import open_meshcat
+
+    if arguments.html is not None:
+        page = Path(arguments.html)
+        if page.is_dir():
+            raise InvalidInputError(
+                f"--html {page} is a folder; give a file such as {page}/view.html"
+            )
+        ensure_writable_folder(page.parent)
+    logging.getLogger("drake").setLevel(logging.WARNING)  # pydrake sets it when imported
+    return open_meshcat(arguments.port)
+
+
+def present_view(
+    meshcat: Meshcat,
+    arguments: argparse.Namespace,
+    *,
+    title: str,
+    caption: Sequence[str] = (),
+    legend: Sequence[LegendEntry | ColorBar] = (),
+    controls: GraspPicker | None = None,
+) -> None:
+    """Saves the page if --html was given; else prints the address and waits, unless told not to.
+
+    Args:
+        meshcat: the view.
+        arguments: those of `add_view_options`.
+        title: of the page.
+        caption: lines of the page.
+        legend: of the page.
+        controls: of the page; in the live view a slider of Meshcat does the same.
+    """
+    if arguments.html is not None:
+        from burg_drake.visualization import save_html
+
+        save_html(
+            meshcat, arguments.html, title=title, caption=caption, legend=legend, controls=controls
+        )
+        print(f"wrote {arguments.html}")
+        return
+    if arguments.no_wait:  # the address would be gone before anyone can open it
+        print(f"{title}: not kept open; give --html FILE for a page that stays")
+        return
+    print(f"{title}: open {meshcat.web_url()} in a browser", flush=True)
+    if controls is not None:
+        controls.add_slider(meshcat)
+    meshcat.Flush()
+    wait_for_user(None if controls is None else lambda: controls.follow_slider(meshcat))
+
+
+def wait_for_user(poll: Callable[[], None] | None = None) -> None:
+    """Returns on Enter (at a terminal) or Ctrl-C.
+
+    Args:
+        poll: called several times a second until then.
+    """
+    poll_interval = 0.1  # Seconds between checks of a live view's controls.
+    terminal = sys.stdin is not None and sys.stdin.isatty()
+    try:
+        key = "Enter" if terminal else "Ctrl-C"
+        print(f"It is served until you press {key}.", flush=True)
+        while True:
+            if poll is not None:
+                poll()
+            if not terminal:
+                time.sleep(poll_interval)
+            elif select.select([sys.stdin], [], [], poll_interval)[0]:
+                return
+    except KeyboardInterrupt:
+        print()
+
+
+def open_in_browser(url: str) -> None:
+    """Opens a page in the user's browser, or says that there is none."""
+    import webbrowser
+
+    if not webbrowser.open(url):
+        print("burg-drake: no browser was found to open it in", file=sys.stderr)

@@ -1,1 +1,0 @@
-from .verbs import add_to as add_to

@@ -1,0 +1,179 @@
+"""Guide the user to a good calibration: select views, name missing ones, rate the result."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from burg_drake.cameras.calibration.charuco_target import CharucoTarget, CharucoView, find_target
+from burg_drake.cameras.calibration.estimation import (
+    MAX_VIEW_BLUR,
+    CalibratedView,
+    Calibration,
+    calibrate_views,
+    corner_displacement,
+)
+from burg_drake.cameras.calibration.lens_uncertainty import (
+    MAX_KNOWN_ERROR_PX,
+    NOTABLE_ERROR_PX,
+    Promise,
+    corner_coverage,
+    unseen_parts,
+)
+from burg_drake.cameras.frame_source import Frame
+from burg_drake.cameras.intrinsics import excludes_most_parts
+from burg_drake.core import InvalidInputError, transform_points
+
+TILT_DIRECTIONS = {"left": (0, 1.0), "right": (0, -1.0), "up": (1, 1.0), "down": (1, -1.0)}
+"""Axis and sign of the target's z axis in the camera frame when it faces a side."""
+MIN_GOOD_VIEWS = 10  # Views of a good calibration, at least.
+
+
+def wanted_views(calibration: Calibration) -> tuple[str, ...]:
+    """What to do with the target, in a few words each; none if there are views enough."""
+    camera, promise = calibration.intrinsics, calibration.promise
+    bound = promise.parts
+    counts = corner_coverage(
+        [used.view for used in calibration.views], (camera.width, camera.height)
+    )
+    unseen = unseen_parts(counts)
+    worst_first = sorted(bound, key=lambda name: -bound[name])
+    hidden = [name for name in worst_first if name in unseen]
+    poor = [name for name in worst_first if not (name in unseen or bound[name] <= NOTABLE_ERROR_PX)]
+    lines = []
+    if hidden:
+        lines.append(f"move the target into and across the {_list_parts(hidden, promise)}")
+    lines += _missing_tilts(calibration.views)
+    lines += _missing_distances(calibration)
+    if poor:
+        lines.append(f"show more of the target at the {_list_parts(poor, promise)}")
+    count = len(calibration.views)
+    if not lines and count < MIN_GOOD_VIEWS:
+        lines = [f"take more views from all sides; {count} are too few"]
+    return tuple(lines)
+
+
+def _list_parts(names: Sequence[str], promise: Promise) -> str:
+    """Parts of the image and what is known of them; the first is the worst."""
+    first, *others = names
+    text = f"{first} of the image, where the error may be {promise.bound(first)} pixels"
+    return ", ".join([text, *(f"then the {name} ({promise.bound(name)})" for name in others)])
+
+
+def _missing_tilts(views: Sequence[CalibratedView]) -> list[str]:
+    """The sides to which the target was hardly tilted."""
+    # Radians. Views tilted less hardly separate focal length from distance.
+    min_tilt = np.radians(15.0)
+    min_tilted_views = 2  # For each side.
+    min_side_share = 0.5  # Fraction of the tilt that must be toward a side.
+    toward = np.array([used.X_CT[:2, 2] for used in views if used.tilt > min_tilt]).reshape(-1, 2)
+    toward /= np.maximum(np.linalg.norm(toward, axis=1, keepdims=True), 1e-9)
+    missing = [
+        side
+        for side, (axis, sign) in TILT_DIRECTIONS.items()
+        if (sign * toward[:, axis] > min_side_share).sum() < min_tilted_views
+    ]
+    if not missing:
+        return []
+    return [f"tilt the target by 20 to 45 degrees, so that it faces {', then '.join(missing)}"]
+
+
+def _missing_distances(calibration: Calibration) -> list[str]:
+    """Whether the target was always as far away."""
+    min_distance_ratio = 1.3  # Farthest view over nearest view, at least.
+    near_square_side = 45.0  # Pixels. The nearest view is near if its squares are larger.
+    views, middle = calibration.views, np.array([*calibration.target.size, 0.0]) / 2.0
+    places = transform_points(np.array([used.X_CT for used in views]), middle[None])
+    distance = np.linalg.norm(places, axis=-1)
+    if distance.max() > min_distance_ratio * distance.min():
+        return []
+    near = max(used.view.side for used in views) >= near_square_side
+    return ["take some views from farther away" if near else "take some views from nearer"]
+
+
+def calibration_advice(calibration: Calibration) -> list[str]:
+    """What would make a calibration better, a sentence each; empty if it is good."""
+    max_rms = 1.0  # Pixels. Sharp images of a flat target give 0.05 to 0.3.
+    views, promise = calibration.views, calibration.promise
+    lines = list(wanted_views(calibration))
+    if len(views) < MIN_GOOD_VIEWS:
+        lines.insert(0, f"{len(views)} views are too few; take 15 to 30")
+    if calibration.rms > max_rms:
+        lines.append(
+            f"the reprojection error of {calibration.rms:.2f} pixels is large: is the target flat,"
+            " do its squares and markers have the given sizes, and was the focus fixed?"
+        )
+    if not promise.known_to <= NOTABLE_ERROR_PX or excludes_most_parts(promise.except_at):
+        lines.append(f"the camera is {promise}")
+    return lines
+
+
+def is_useless(calibration: Calibration) -> bool:
+    """Images that this camera model is used for would be misread by pixels."""
+    max_unknown_share = 0.5  # Fraction of the image, or of its parts.
+    promise = calibration.promise
+    bounds = promise.parts.values()
+    parts = sum(not bound <= MAX_KNOWN_ERROR_PX for bound in bounds) / len(bounds)
+    known = (
+        promise.known_to <= MAX_KNOWN_ERROR_PX and max(promise.unknown, parts) < max_unknown_share
+    )
+    return not known or calibration.rms > MAX_KNOWN_ERROR_PX
+
+
+@dataclass(eq=False)
+class ViewCollector:
+    """Chooses views from frames.
+
+    Attributes:
+        target: that the camera sees.
+        views: that were taken.
+        wanted: what to tell the one who holds the target.
+        enough: the views that were taken make a good calibration.
+    """
+
+    target: CharucoTarget
+    views: list[CharucoView] = field(default_factory=list)
+    wanted: str = "show the target"
+    enough: bool = False
+    _before: CharucoView | None = None
+
+    def offer(self, frame: Frame) -> tuple[bool, str]:
+        """Looks at a frame, and takes it if it is a good, new view.
+
+        Returns:
+            `(taken, word)`: whether it was taken, and what to tell the one who holds the target.
+        """
+        # Fraction of the diagonal between two frames; avoids blur and rolling shutter.
+        max_motion = 0.004
+        # Fraction of the diagonal; a tilt by 25 degrees moves corners as far.
+        min_difference = 0.025
+        name = f"view {len(self.views) + 1}"
+        view = find_target(frame.image, self.target, name)
+        before, self._before = self._before, None if isinstance(view, str) else view
+        if isinstance(view, str):
+            return False, f"the image {view}"
+        if before is None or corner_displacement(view, before) > max_motion:
+            return False, "hold still"
+        if view.blur > MAX_VIEW_BLUR * view.side:
+            return False, "blurred: add light, or focus"
+        if any(corner_displacement(view, other) < min_difference for other in self.views):
+            return False, self.wanted
+        self.views.append(view)
+        self.wanted, self.enough = self._missing()
+        return True, self.wanted
+
+    def _missing(self) -> tuple[str, bool]:
+        """What view is wanted next, and whether there are enough."""
+        min_views = 5  # Views needed before missing ones can be named.
+        if len(self.views) < min_views:
+            return "show the target from other sides, tilted by 20 to 45 degrees", False
+        try:
+            calibration = calibrate_views(self.views, self.target)
+        except InvalidInputError as error:
+            return str(error), False
+        wanted = wanted_views(calibration)
+        if wanted:
+            return wanted[0], False
+        return f"enough, the camera is {calibration.promise}", True

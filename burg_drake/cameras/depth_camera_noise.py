@@ -1,0 +1,518 @@
+"""Add the errors of a depth camera to a perfect depth image.
+
+`noisy_depth` adds flying pixels, lateral and axial noise and quantization. Then it removes
+pixels in holes and pixels that the second imager does not see.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import cv2
+import numpy as np
+from scipy.special import ndtri
+
+from burg_drake.cameras.depth_camera_presets import DepthNoise
+from burg_drake.cameras.intrinsics import FieldOfView, Intrinsics
+from burg_drake.core import Array, Booleans, Bytes, Indices, InvalidInputError, Single
+
+
+def noisy_depth(
+    depth: Single,
+    noise: DepthNoise,
+    intrinsics: Intrinsics,
+    rng: np.random.Generator,
+    *,
+    normals: Single | None = None,
+    color: Bytes | None = None,
+) -> Single:
+    """A depth image as a camera measures it.
+
+    Edges fray and pixels at them mix; then depth gets its errors and steps; what light does not
+    reach or come back from, is lost. The same generator gives the same image. Where nothing was,
+    nothing is.
+
+    Args:
+        depth: (H, W) without errors [m]; 0 where nothing is.
+        noise: what the camera does to it, see `depth_noise` for presets.
+        intrinsics: of the image.
+        rng: of all that is random.
+        normals: (H, W, 3) unit normals of the surfaces in the camera's frame, 0 where nothing is;
+            those of the depth image if None.
+        color: (H, W, 3) red, green, blue of the same pixels; no surface is dark if None.
+
+    Returns:
+        (H, W) depth [m], 0 where nothing is measured; a new array.
+
+    Raises:
+        InvalidInputError: an image has another size than the intrinsics or another kind of values,
+            or depth is not finite or below 0.
+    """
+    depth = _checked_depth(depth, intrinsics)
+    _check_image_shape("normals", normals, depth.shape, np.floating)
+    _check_image_shape("color", color, depth.shape, np.uint8)
+    angle = incidence_angle(depth, intrinsics, normals) if noise.uses_angles else None
+    lost = _missing_pixels(depth, angle, noise, intrinsics, rng, color)
+    measured = _add_depth_errors(depth, angle, noise, intrinsics.focal[0], rng)
+    measured[lost] = 0.0
+    return measured
+
+
+def _add_depth_errors(
+    depth: Single,
+    angle: Single | None,
+    noise: DepthNoise,
+    focal: float,
+    rng: np.random.Generator,
+) -> Single:
+    """Depth with its errors, before anything is lost."""
+    measured = depth.copy()
+    if noise.lateral_base or noise.lateral_angle or noise.flying:
+        edges = depth_edges(depth)
+        if noise.flying:
+            measured = add_flying_pixels(measured, edges, noise, rng)
+        if noise.lateral_base or noise.lateral_angle:
+            measured = add_lateral_noise(measured, edges, angle, noise, rng)
+    if noise.axial_base or noise.axial_square or noise.axial_angle:
+        measured = add_axial_noise(measured, angle, noise, rng)
+    if noise.disparity_sigma or noise.disparity_step:
+        measured = add_disparity_noise(measured, focal, noise, rng)
+    if noise.depth_step:
+        measured = quantize_depth(measured, noise)
+    return measured
+
+
+def _missing_pixels(
+    depth: Single,
+    angle: Single | None,
+    noise: DepthNoise,
+    intrinsics: Intrinsics,
+    rng: np.random.Generator,
+    color: Bytes | None,
+) -> Booleans:
+    """(H, W) pixels that give no depth."""
+    kept = np.ones(depth.shape, dtype=np.float32)
+    if angle is not None and noise.grazing_from_deg < 90.0:
+        kept -= grazing_probability(angle, noise)
+    if color is not None and noise.dark_below and noise.dark_probability:
+        kept *= 1.0 - dark_probability(color, noise)
+    lost = random_holes(np.float32(1.0) - kept, noise.hole_size, rng)
+    if noise.second_view != "none":
+        same_view = noise.second_view == "same"
+        lost |= hidden_from_second_imager(
+            depth, intrinsics.focal[0], noise.baseline, same_view=same_view
+        )
+    return lost
+
+
+def _checked_depth(depth: Single, intrinsics: Intrinsics) -> Single:
+    values = np.asarray(depth)
+    if values.ndim != 2 or not np.issubdtype(values.dtype, np.floating):
+        raise InvalidInputError(
+            f"depth has shape {values.shape} and type {values.dtype}; expected (H, W) floats in"
+            " metres"
+        )
+    intrinsics.require_size(values.shape[1], values.shape[0], "the depth image")
+    wrong = ~(np.isfinite(values) & (values >= 0.0))
+    if wrong.any():
+        row, column = np.argwhere(wrong)[0]
+        raise InvalidInputError(
+            f"depth has {np.count_nonzero(wrong)} pixels that are negative or not finite, such as"
+            f" {values[row, column]:g} in row {row}, column {column}; use 0 where nothing was"
+            " measured"
+        )
+    return values.astype(np.float32, copy=False)
+
+
+def _check_image_shape(
+    name: str, image: np.ndarray | None, shape: tuple[int, ...], kind: type[np.generic]
+) -> None:
+    """Refuses an image of other pixels than those of depth."""
+    if image is None:
+        return
+    if image.shape != (*shape, 3) or not np.issubdtype(image.dtype, kind):
+        raise InvalidInputError(
+            f"{name} has shape {image.shape} and type {image.dtype}; a depth image of shape"
+            f" {shape} needs shape {(*shape, 3)} and type {kind.__name__}"
+        )
+
+
+DEPTH_EDGE_THRESHOLD = 0.01
+"""Second difference of inverse depth at an edge, as a fraction of it."""
+
+
+def inverse_depth(depth: Single) -> Single:
+    """(H, W) 1 / z [1/m]; 0 where nothing is."""
+    return np.reciprocal(np.where(depth > 0.0, depth, np.float32(np.inf)))
+
+
+def depth_edges(depth: Single) -> Booleans:
+    """(H, W) pixels beside which, in their row or column, another surface or nothing is.
+
+    Args:
+        depth: (H, W) [m], 0 for none.
+    """
+    w = inverse_depth(depth)
+    limit = np.float32(DEPTH_EDGE_THRESHOLD) * w
+    edges = np.zeros(depth.shape, dtype=bool)
+    for turned, bound, found in ((w, limit, edges), (w.T, limit.T, edges.T)):
+        second = turned[:, :-2] + turned[:, 2:]
+        second -= 2.0 * turned[:, 1:-1]
+        found[:, 1:-1] |= np.abs(second, out=second) > bound[:, 1:-1]
+    return edges & (depth > 0.0)
+
+
+def incidence_angle(depth: Single, intrinsics: Intrinsics, normals: Single | None = None) -> Single:
+    """(H, W) angle between a surface's normal and the ray that sees it [rad]; 0 where nothing is.
+
+    Args:
+        depth: (H, W) [m], 0 for none.
+        intrinsics: of the camera.
+        normals: (H, W, 3) unit normals in the camera's frame. If None, they are those of the depth
+            image, without lens distortion.
+    """
+    if normals is None:
+        cosine = _incidence_cosine(inverse_depth(depth), intrinsics)
+    else:
+        products = cv2.multiply(np.asarray(normals, dtype=np.float32), _pixel_rays(intrinsics))
+        cosine = np.abs(cv2.transform(products, np.ones((1, 3), np.float32)))
+    angle: Single = np.arccos(np.minimum(cosine, np.float32(1.0)))
+    return np.where(depth > 0.0, angle, np.float32(0.0))
+
+
+def _incidence_cosine(w: Single, intrinsics: Intrinsics) -> Single:
+    """A plane n . X = 1 has w = n . r, with the ray r = X / z; so its slopes over the image are
+    n_x / f_x and n_y / f_y, and the cosine between n and r is w / (|n| |r|)."""
+    (fx, fy), (cx, cy) = intrinsics.focal, intrinsics.center
+    x = ((np.arange(w.shape[1]) - cx) / fx).astype(np.float32)
+    y = ((np.arange(w.shape[0])[:, None] - cy) / fy).astype(np.float32)
+    nx = np.float32(fx) * _slope(w)
+    ny = np.float32(fy) * _slope(np.ascontiguousarray(w.T)).T
+    nz = w - nx * x
+    nz -= ny * y
+    squares = nx * nx
+    squares += ny * ny
+    squares += nz * nz
+    squares *= x * x + y * y + np.float32(1.0)
+    np.maximum(squares, np.float32(np.finfo(np.float32).tiny), out=squares)
+    return np.asarray(w / np.sqrt(squares))
+
+
+def _slope(w: Single) -> Single:
+    """(H, W) change along the rows, per pixel: towards the neighbour on the same surface, which is
+    the one with the smaller change."""
+    steps = np.diff(w, axis=1)
+    slope = np.empty_like(w)
+    slope[:, 0], slope[:, 1:] = steps[:, 0], steps
+    sizes = np.abs(steps)
+    np.copyto(slope[:, 1:-1], steps[:, 1:], where=sizes[:, 1:] < sizes[:, :-1])
+    return slope
+
+
+@lru_cache(maxsize=2)
+def _pixel_rays(intrinsics: Intrinsics) -> Single:
+    """(H, W, 3) unit vectors along which pixels look, in the camera's frame."""
+    directions = FieldOfView(intrinsics).directions
+    lengths = np.linalg.norm(directions, axis=-1, keepdims=True)
+    rays: Single = (directions / lengths).astype(np.float32)
+    rays.setflags(write=False)
+    return rays
+
+
+MAX_NOISE_ANGLE = math.radians(82.0)
+"""Radians. At larger angles noise stays constant; the formulas would diverge at 90 degrees."""
+
+
+def axial_sigma(depth: Single, angle: Single | None, noise: DepthNoise) -> Single:
+    """(H, W) standard deviation of depth [m].
+
+    `a + b (z - c)^2`, and beyond 60 degrees in addition `d / sqrt(z) (t / (pi/2 - t))^2`, with the
+    angle t (Nguyen, Izadi and Lovell 2012, equations of the axial noise). Their angle is that of a
+    turned plane in the image's middle; here it is the one against the ray. The second term begins
+    with a step, as theirs does, of 0.4 mm at 1 m.
+
+    Args:
+        depth: (H, W) [m], 0 for none.
+        angle: (H, W) of incidence [rad]; None if `axial_angle` is 0.
+        noise: has a, b, c and d as `axial_base`, `axial_square`, `axial_center`, `axial_angle`.
+    """
+    # Radians. Noise does not depend on smaller angles (Nguyen et al. 2012).
+    min_steep_angle = math.radians(60.0)
+    sigma: Single = np.float32(noise.axial_square) * np.square(
+        depth - np.float32(noise.axial_center)
+    )
+    sigma += np.float32(noise.axial_base)
+    if noise.axial_angle and angle is not None:
+        steep = (angle > min_steep_angle) & (depth > 0.0)
+        t = np.minimum(angle[steep], np.float32(MAX_NOISE_ANGLE))
+        growth = np.square(t / (np.float32(np.pi / 2) - t))
+        sigma[steep] += np.float32(noise.axial_angle) * growth / np.sqrt(depth[steep])
+    return sigma
+
+
+def add_axial_noise(
+    depth: Single, angle: Single | None, noise: DepthNoise, rng: np.random.Generator
+) -> Single:
+    """Depth with normal errors of `axial_sigma`, each pixel's for itself; see there."""
+    moved = rng.standard_normal(depth.shape, dtype=np.float32)
+    moved *= axial_sigma(depth, angle, noise)
+    moved += depth
+    return _drop_invalid(moved, depth)
+
+
+def add_disparity_noise(
+    depth: Single, focal: float, noise: DepthNoise, rng: np.random.Generator
+) -> Single:
+    """Depth of disparities with normal errors of `disparity_sigma`, in steps of `disparity_step`.
+
+    As long as they are small against z, the depth's standard deviation is `z^2 sigma / (f b)`
+    (Grunnet-Jepsen, Sweetser and Woodfill, "Tuning depth cameras for best performance"; Keselman et
+    al., "Intel RealSense stereoscopic depth cameras", CVPR workshops 2017, equation 2), and steps
+    are `z^2 step / (f b)` apart (Khoshelham and Elberink, Sensors 12, 2012). A disparity that is 0
+    or below, gives no depth.
+
+    Args:
+        depth: (H, W) [m], 0 for none.
+        focal: f_x [pixels].
+        noise: has sigma and step, either of which may be 0, and the baseline b.
+        rng: of the errors; not asked if there are none.
+    """
+    scale = np.float32(focal * abs(noise.baseline))
+    disparity = scale * inverse_depth(depth)
+    if noise.disparity_sigma:
+        errors = rng.standard_normal(depth.shape, dtype=np.float32)
+        errors *= np.float32(noise.disparity_sigma)
+        disparity += errors
+    if noise.disparity_step:
+        disparity /= np.float32(noise.disparity_step)
+        np.rint(disparity, out=disparity)
+        disparity *= np.float32(noise.disparity_step)
+    disparity[disparity <= 0.0] = np.inf
+    return _drop_invalid(np.asarray(scale / disparity), depth)
+
+
+def quantize_depth(depth: Single, noise: DepthNoise) -> Single:
+    """Depth in whole multiples of `depth_step`, as cameras write it; 0 below half of one."""
+    step = np.float32(noise.depth_step)
+    return np.asarray(step * np.rint(depth / step))
+
+
+def _drop_invalid(moved: Single, depth: Single) -> Single:
+    """Nothing where nothing was, or where an error leads to the camera and beyond."""
+    return np.where((depth > 0.0) & (moved > 0.0), moved, np.float32(0.0))
+
+
+def lateral_sigma(angle: Single | Array, noise: DepthNoise) -> Array:
+    """Standard deviation of where an edge is, along rows and along columns [pixels].
+
+    `a + b t / (pi/2 - t)`, with the angle of incidence t (Nguyen, Izadi and Lovell 2012, the
+    equation of the lateral noise in pixels).
+
+    Args:
+        angle: of incidence, of any shape [rad].
+        noise: has a and b as `lateral_base` and `lateral_angle`.
+    """
+    t = np.minimum(np.asarray(angle, dtype=float), MAX_NOISE_ANGLE)
+    return np.asarray(noise.lateral_base + noise.lateral_angle * t / (np.pi / 2 - t))
+
+
+def add_lateral_noise(
+    depth: Single,
+    edges: Booleans,
+    angle: Single | None,
+    noise: DepthNoise,
+    rng: np.random.Generator,
+) -> Single:
+    """Depth with frayed edges: pixels near them show what is a random step away.
+
+    Only pixels within reach of an edge do: their noise was measured at edges, and within a surface
+    it would add to the axial noise, which was measured as a whole. Barron and Malik ("Intrinsic
+    scene properties from a single RGB-D image", CVPR 2013) and Handa et al. ("A benchmark for RGB-D
+    visual odometry, 3D reconstruction and SLAM", ICRA 2014) displace all pixels, by a standard
+    deviation of half a pixel, and interpolate, which puts pixels in between.
+
+    Args:
+        depth: (H, W) [m], 0 for none.
+        edges: (H, W) see `depth_edges`.
+        angle: (H, W) of incidence [rad]; 0 everywhere if None.
+        noise: see `lateral_sigma`.
+        rng: of the steps.
+    """
+    max_sigmas = 3.0  # Standard deviations of lateral noise that are sampled.
+    largest = float(lateral_sigma(np.array(MAX_NOISE_ANGLE if angle is not None else 0.0), noise))
+    size = 2 * int(np.ceil(max_sigmas * largest)) + 1
+    near = cv2.dilate(edges.astype(np.uint8), np.ones((size, size), np.uint8)) > 0
+    rows, columns = np.divmod(np.flatnonzero(near & (depth > 0.0)), depth.shape[1])
+    sigma = lateral_sigma(np.zeros(len(rows)) if angle is None else angle[rows, columns], noise)
+    steps = np.rint(sigma * rng.standard_normal((2, len(rows)), dtype=np.float32)).astype(np.intp)
+    height, width = depth.shape
+    frayed = depth.copy()
+    frayed[rows, columns] = depth[
+        np.clip(rows + steps[0], 0, height - 1), np.clip(columns + steps[1], 0, width - 1)
+    ]
+    return frayed
+
+
+def add_flying_pixels(
+    depth: Single, edges: Booleans, noise: DepthNoise, rng: np.random.Generator
+) -> Single:
+    """Depth in which a share of the pixels at edges lie anywhere between near and far.
+
+    A pixel that sees two surfaces measures a mixture ("Color-guided flying pixel correction in
+    depth images", arXiv 2410.08084); of which of their parts, is random here, an estimate. There
+    is none at an edge beyond which nothing is.
+
+    Args:
+        depth: (H, W) [m], 0 for none.
+        edges: (H, W) see `depth_edges`.
+        noise: has the share, `flying`.
+        rng: of the choice and the mixture.
+    """
+    around = np.ones((3, 3), np.uint8)
+    far = cv2.dilate(depth, around)
+    near = cv2.erode(np.where(depth > 0.0, depth, np.float32(np.inf)), around)
+    rows, columns = np.divmod(np.flatnonzero(edges & (depth > 0.0)), depth.shape[1])
+    low, high = near[rows, columns], far[rows, columns]
+    mixed = rng.random(len(rows)) < noise.flying
+    mixed &= high - low > DEPTH_EDGE_THRESHOLD * low
+    part = rng.random(len(rows), dtype=np.float32)
+    result = depth.copy()
+    result[rows[mixed], columns[mixed]] = (low + part * (high - low))[mixed]
+    return result
+
+
+def hidden_from_second_imager(
+    depth: Single, focal: float, baseline: float, *, same_view: bool
+) -> Booleans:
+    """Pixels whose points are not seen from a second centre beside the camera's.
+
+    Pixel u of depth z is seen there at `u - f b / z`, in the same row. Left of a box at z1 before a
+    wall at z2 the shadow of a centre to the right is `f b (1 / z1 - 1 / z2)` pixels wide. Points
+    that the camera itself does not see hide nothing. Images are taken as rectified: there is no
+    lens distortion.
+
+    Args:
+        depth: (H, W) [m], 0 for none.
+        focal: f_x [pixels].
+        baseline: x of the second centre in the camera's frame [m].
+        same_view: the second image is as wide as the first, so that a band at the side of the
+            second centre's opposite is not seen; else all is seen that nothing hides.
+
+    Returns:
+        (H, W); False where nothing is.
+    """
+    # Pixels. A surface occludes another one if its disparity is larger by this.
+    min_disparity_step = 0.5
+    if baseline < 0.0:
+        turned = hidden_from_second_imager(depth[:, ::-1], focal, -baseline, same_view=same_view)
+        return turned[:, ::-1]
+    seen = depth > 0.0
+    disparity = np.float32(focal * baseline) * inverse_depth(depth)
+    there = np.arange(depth.shape[1], dtype=np.float32) - disparity
+    hidden = np.zeros(depth.shape, dtype=bool)
+    overtaken = np.flatnonzero(_overtaken_pixels(there, disparity) & seen)
+    if len(overtaken):
+        nearest, pixels = _second_view_disparity(there, disparity)
+        before = (
+            nearest.ravel()[pixels.ravel()[overtaken]]
+            > disparity.ravel()[overtaken] + min_disparity_step
+        )
+        hidden.ravel()[overtaken[before]] = True
+    if same_view:
+        hidden |= seen & (there < -0.5)
+    return hidden
+
+
+def _overtaken_pixels(there: Single, disparity: Single) -> Booleans:
+    """Pixels right of which another one is seen farther left from the second centre. Of surfaces
+    that both centres see there are none, however steep. Where a nearer surface begins, it does so
+    half a pixel before its first pixel's centre. What is not there has no disparity, and so
+    overtakes nothing."""
+    begins = there.copy()
+    nearer = disparity[:, 1:] > disparity[:, :-1] + np.float32(1.0)
+    np.subtract(begins[:, 1:], np.float32(0.5), out=begins[:, 1:], where=nearer)
+    leftmost = np.minimum.accumulate(begins[:, ::-1], axis=1)[:, ::-1]
+    overtaken = np.zeros(there.shape, dtype=bool)
+    np.greater(there[:, :-1], leftmost[:, 1:], out=overtaken[:, :-1])
+    return overtaken
+
+
+def _second_view_disparity(there: Single, disparity: Single) -> tuple[Single, Indices]:
+    """Largest disparity at each pixel of the second image (H, V), which reaches as far to the left
+    as needed, two widths at most; and the pixels (H, W), counted row by row, where the first
+    image's are in it. Gaps of one pixel, as in surfaces that are wider there, are filled."""
+    height, width = there.shape
+    left = min(int(np.ceil(disparity.max())) + 1, 2 * width)
+    image = np.zeros((height, left + width), dtype=np.float32)
+    pixels = np.rint(np.maximum(there, np.float32(-left))).astype(np.intp)
+    pixels += (left + image.shape[1] * np.arange(height))[:, None]
+    np.maximum.at(image.ravel(), pixels.ravel(), disparity.ravel())
+    return cv2.morphologyEx(image, cv2.MORPH_CLOSE, np.ones((1, 3), np.uint8)), pixels
+
+
+def grazing_probability(angle: Single, noise: DepthNoise) -> Single:
+    """(H, W) probability of a hole: 0 up to `grazing_from_deg`, 1 from `grazing_to_deg` on, linear
+    in between.
+
+    Args:
+        angle: (H, W) of incidence [rad].
+        noise: has the two angles.
+    """
+    low, high = np.deg2rad([noise.grazing_from_deg, noise.grazing_to_deg])
+    if high <= low:
+        return np.asarray(angle > low, dtype=np.float32)
+    rising: Single = (angle - np.float32(low)) / np.float32(high - low)
+    return np.clip(rising, 0.0, 1.0)
+
+
+def dark_probability(color: Bytes, noise: DepthNoise) -> Single:
+    """(H, W) probability of a hole: `dark_probability` at black, 0 from `dark_below` on, linear in
+    the luma (ITU-R BT.601) in between.
+
+    Args:
+        color: (H, W, 3) red, green, blue.
+        noise: has the two figures.
+    """
+    luma = cv2.cvtColor(np.ascontiguousarray(color), cv2.COLOR_RGB2GRAY).astype(np.float32)
+    dark = np.maximum(np.float32(1.0) - luma / np.float32(noise.dark_below), np.float32(0.0))
+    return np.asarray(np.float32(noise.dark_probability) * dark)
+
+
+def random_holes(probability: Single, size: float, rng: np.random.Generator) -> Booleans:
+    """Random holes.
+
+    Args:
+        probability: (H, W) of a hole in each pixel; with patches it holds
+            within 0.005.
+        size: standard deviation of the Gaussian that makes patches of single holes, at least
+            1 [pixels]; none if 0.
+        rng: of where they are.
+
+    Returns:
+        (H, W) True in a hole.
+    """
+    if not probability.any():
+        return np.zeros(probability.shape, dtype=bool)
+    if size == 0.0:
+        return rng.random(probability.shape, dtype=np.float32) < probability
+    found = probability >= 1.0
+    unsure = (probability > 0.0) & ~found
+    field = _smooth_field(probability.shape, size, rng)
+    found[unsure] = field[unsure] < ndtri(probability[unsure])
+    return found
+
+
+def _smooth_field(shape: tuple[int, ...], size: float, rng: np.random.Generator) -> Single:
+    """(H, W) standard normal numbers, neighbours of which are alike: smoothed uniform ones, whose
+    distribution function differs from the normal one by less than 0.005."""
+    margin = int(np.ceil(3.0 * size))
+    kernel = cv2.getGaussianKernel(2 * margin + 1, size, cv2.CV_32F)
+    kernel /= np.linalg.norm(kernel)  # of unit variance after it
+    height, width = shape
+    wide = (height + 2 * margin, width + 2 * margin)
+    uniform = rng.random(wide, dtype=np.float32)
+    uniform -= np.float32(0.5)
+    uniform *= np.float32(np.sqrt(12.0))
+    field = cv2.sepFilter2D(uniform, -1, kernel, kernel)
+    return np.asarray(field[margin : margin + height, margin : margin + width])

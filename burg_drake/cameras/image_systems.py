@@ -1,0 +1,301 @@
+"""Drake systems for images: frames of a source, depth noise and the overlay."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.common.value import AbstractValue, Value
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context, InputPort, LeafSystem
+from pydrake.systems.sensors import ImageDepth32F, ImageRgba8U
+
+from burg_drake.cameras.depth_camera_noise import noisy_depth
+from burg_drake.cameras.depth_camera_presets import DepthNoise
+from burg_drake.cameras.frame_source import CameraLost, Frame, FrameSource
+from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.cameras.overlay import Overlay, OverlayStyle
+from burg_drake.cameras.placement.document import PlacementCheck
+from burg_drake.cameras.pose.board_estimate import BoardEstimate
+from burg_drake.core import MAX_DOCUMENT_SEED, Bytes, InvalidInputError, rng_from
+from burg_drake.scene import SceneLike, as_scene
+
+
+class CameraSource(LeafSystem):
+    """Shows the frames of a source.
+
+    Ports:
+        color_image (output, ImageRgba8U): the newest frame.
+        depth_image (output, ImageDepth32F): its depth [m], infinite where nothing was measured;
+            only if the source has depth.
+        valid (output, 1): 1 as long as the source gives frames; 0 when the camera is lost or the
+            source has ended, and the images are the last that there were.
+        frame_time (output, 1): time of the frame, as the source tells it [s].
+
+    Frames are read at the times of the periodic update and are state, so that all that depends on
+    them sees the same. A simulator runs as fast as it can: for a live camera set its target
+    real-time rate to 1. While a camera is lost, updates wait for it for a moment each.
+
+    Args:
+        source: of frames; it stays the caller's to close.
+        fps: updates a second; the source's own, or 30, if not given.
+
+    Raises:
+        InvalidInputError: the source has no frame at all.
+    """
+
+    def __init__(self, source: FrameSource, fps: float | None = None) -> None:
+        default_fps = 30.0  # Frames per second of sources that do not state them.
+        super().__init__()
+        first = _next_frame(source)
+        if first is None:
+            raise InvalidInputError(f"{source.name} has no frames")
+        self._source = source
+        color = self.DeclareAbstractState(Value(color_image(first)))
+        self.DeclareStateOutputPort("color_image", color)
+        self._depth = None
+        if first.depth is not None:
+            self._depth = self.DeclareAbstractState(Value(_depth_image(first)))
+            self.DeclareStateOutputPort("depth_image", self._depth)
+        self._color = color
+        numbers = self.DeclareDiscreteState(np.array([1.0, first.time]))
+        for k, name in enumerate(("valid", "frame_time")):
+            self.DeclareVectorOutputPort(
+                name,
+                1,
+                lambda context, output, k=k: output.SetAtIndex(
+                    0, context.get_discrete_state(numbers).GetAtIndex(k)
+                ),
+                {self.discrete_state_ticket(numbers)},
+            )
+        period = 1.0 / (fps or source.fps or default_fps)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(period, period, self._update)
+
+    def _update(self, context: Any, state: Any) -> None:
+        numbers = state.get_mutable_discrete_state().get_mutable_vector(0)
+        try:
+            frame = _next_frame(self._source)
+        except CameraLost:
+            frame = None
+        if frame is None:
+            numbers.SetAtIndex(0, 0.0)
+            return
+        numbers.SetFromVector([1.0, frame.time])
+        state.get_mutable_abstract_state(self._color).set_value(color_image(frame))
+        if self._depth is not None and frame.depth is not None:
+            state.get_mutable_abstract_state(self._depth).set_value(_depth_image(frame))
+
+
+def _next_frame(source: FrameSource) -> Frame | None:
+    """The next frame that can be read."""
+    while True:
+        try:
+            return source.read()
+        except InvalidInputError:  # one broken file of several
+            continue
+
+
+def color_image(frame: Frame) -> ImageRgba8U:
+    """A frame's image as Drake has them."""
+    height, width = frame.image.shape[:2]
+    image = ImageRgba8U(width, height)
+    image.mutable_data[..., :3] = frame.image
+    image.mutable_data[..., 3] = 255
+    return image
+
+
+def _depth_image(frame: Frame) -> ImageDepth32F:
+    assert frame.depth is not None
+    height, width = frame.depth.shape
+    image = ImageDepth32F(width, height)
+    image.mutable_data[..., 0] = np.where(np.isnan(frame.depth), np.inf, frame.depth)
+    return image
+
+
+class DepthNoiseSystem(LeafSystem):
+    """Makes of a perfect depth image one as a camera measures it.
+
+    Input ports:
+        depth_image: `ImageDepth32F` of the intrinsics' size [m]; 0, infinite or NaN where nothing
+            is, as `RgbdSensor` has it.
+        color_image: `ImageRgba8U` of the same pixels, optional: dark surfaces have holes.
+        normals: `Value[object]`, optional: (H, W, 3) unit normals in the camera's frame; those of
+            the depth image are taken, if not connected.
+
+    Output port:
+        depth_image: `ImageDepth32F` [m], infinite where nothing is measured.
+
+    The output is a function of the inputs and of the time; there is no state. Noise is drawn from
+    the seed and the context's time: it is the same however often and in whatever order the output
+    is evaluated, and another one at another time or with another seed.
+
+    Args:
+        noise: what the camera does to the image.
+        intrinsics: of the image.
+        seed: of the noise; cameras with the same seed have the same noise.
+        period: between images [s]: noise changes with each, and stays in between, as it must
+            behind an image that is held (`RgbdSensorDiscrete`). It changes with every time at
+            which the output is evaluated if None.
+
+    Raises:
+        InvalidInputError: the seed is below 0 or has more than 64 bits, or the period is not above
+            0; while it runs: an image does not fit, or none is connected.
+    """
+
+    def __init__(
+        self,
+        noise: DepthNoise,
+        intrinsics: Intrinsics,
+        *,
+        seed: int = 0,
+        period: float | None = None,
+    ) -> None:
+        if not 0 <= seed <= MAX_DOCUMENT_SEED:
+            raise InvalidInputError(f"seed of depth noise is {seed}; give 0 to {MAX_DOCUMENT_SEED}")
+        if period is not None and not 0.0 < period < math.inf:
+            raise InvalidInputError(f"period of depth noise is {period:g} s; give more than 0")
+        super().__init__()
+        self.set_name("depth_noise")
+        self.noise, self.intrinsics = noise, intrinsics
+        self._seed, self._period = seed, period
+        blank = ImageDepth32F(intrinsics.width, intrinsics.height)
+        self._depth = self.DeclareAbstractInputPort("depth_image", Value(blank))
+        self._color = self.DeclareAbstractInputPort(
+            "color_image", Value(ImageRgba8U(intrinsics.width, intrinsics.height))
+        )
+        self._normals = self.DeclareAbstractInputPort("normals", Value[object]())
+        self.DeclareAbstractOutputPort(
+            "depth_image",
+            lambda: Value(blank),
+            self._measure,
+            prerequisites_of_calc={self.all_input_ports_ticket(), self.time_ticket()},
+        )
+
+    def _measure(self, context: Context, output: AbstractValue) -> None:
+        if not self._depth.HasValue(context):
+            raise InvalidInputError(
+                f"{self.get_name()}: input port depth_image has no value; connect or fix it"
+            )
+        perfect = self._depth.Eval(context).data[..., 0]
+        measured = noisy_depth(
+            np.where(np.isfinite(perfect), perfect, np.float32(0.0)),
+            self.noise,
+            self.intrinsics,
+            rng_from("depth noise", self._seed, self._moment(context)),
+            normals=self._optional(context, self._normals),
+            color=self._dark(context),
+        )
+        result = ImageDepth32F(self.intrinsics.width, self.intrinsics.height)
+        result.mutable_data[..., 0] = np.where(measured > 0.0, measured, np.float32(np.inf))
+        output.set_value(result)
+
+    def _dark(self, context: Context) -> Bytes | None:
+        """The colour image, if it makes a difference: it may have to be rendered first."""
+        image = self._optional(context, self._color) if self.noise.dark_probability else None
+        return None if image is None else image.data[..., :3]
+
+    def _moment(self, context: Context) -> float | int:
+        """What the noise is drawn for: the number of the image, or the time [s]."""
+        rounding_tolerance = 1e-6  # Periods before an image at which a time belongs to it.
+        time = float(context.get_time())
+        return (
+            time if self._period is None else math.floor(time / self._period + rounding_tolerance)
+        )
+
+    def _optional(self, context: Context, port: InputPort) -> Any:
+        return port.Eval(context) if port.HasValue(context) else None
+
+
+class SceneOverlay(LeafSystem):
+    """Draws the objects of a scene, at their places, over images of a camera.
+
+    Input ports:
+        color_image: `ImageRgba8U` of the intrinsics' size.
+        X_SC: `Value[RigidTransform]`, camera's optical frame in the scene frame.
+        valid: (1,), optional: above 0.5 if `X_SC` can be used; always, if not connected.
+        estimate: `Value[BoardEstimate]`, optional: its `reason` is written where `X_SC` is not
+            valid; where `valid` is not connected, this one's counts.
+        placement: `Value[PlacementCheck]`, optional: how far the objects stand from their places;
+            None while that is not known.
+
+    Output port:
+        overlay_image: `ImageRgba8U`; where the pose is not valid, the plain image with a line that
+            says why.
+
+    The output is a function of the current inputs, computed when one of them has changed and
+    somebody asks; there is no state, and nothing lags by a frame.
+    """
+
+    def __init__(
+        self, scene: SceneLike, intrinsics: Intrinsics, style: OverlayStyle | None = None
+    ) -> None:
+        """Loads the objects' surfaces.
+
+        Args:
+            scene: whose objects.
+            intrinsics: of the camera.
+            style: for good, as part of the system; the default one if None.
+
+        Raises:
+            UnknownNameError: a mesh file of the library is missing.
+        """
+        scene = as_scene(scene)
+        super().__init__()
+        self.set_name("scene_overlay")
+        self._overlay = Overlay(scene, intrinsics, style)
+        blank = ImageRgba8U(intrinsics.width, intrinsics.height)
+        self._color_image = self.DeclareAbstractInputPort("color_image", Value(blank))
+        self._X_SC = self.DeclareAbstractInputPort("X_SC", Value(RigidTransform()))
+        self._valid = self.DeclareVectorInputPort("valid", 1)
+        self._estimate = self.DeclareAbstractInputPort(
+            "estimate", AbstractValue.Make(BoardEstimate())
+        )
+        self._placement = self.DeclareAbstractInputPort("placement", Value[object]())
+        self.DeclareAbstractOutputPort(
+            "overlay_image",
+            lambda: Value(blank),
+            self._draw,
+            prerequisites_of_calc={self.all_input_ports_ticket()},
+        )
+
+    def _draw(self, context: Context, output: AbstractValue) -> None:
+        no_pose = "no pose of the camera"  # Notice on the image if no reason is known.
+        image = self._required(context, self._color_image).data
+        size = self._overlay.intrinsics
+        size.require_size(image.shape[1], image.shape[0], "the image at port color_image")
+        colors = np.ascontiguousarray(image[..., :3])
+        estimate = self._optional(context, self._estimate)
+        valid = estimate is None or estimate.valid
+        if self._valid.HasValue(context):
+            valid = self._valid.Eval(context)[0] > 0.5
+        if valid:
+            X_SC = self._required(context, self._X_SC).GetAsMatrix4()
+            drawn = self._overlay.draw(colors, X_SC, placement=self._checked(context))
+        else:
+            drawn = self._overlay.notice(colors, (estimate and estimate.reason) or no_pose)
+        result = ImageRgba8U(size.width, size.height)
+        result.mutable_data[:] = _add_opacity(drawn)
+        output.set_value(result)
+
+    def _checked(self, context: Context) -> PlacementCheck | None:
+        check = self._optional(context, self._placement)
+        if check is None or isinstance(check, PlacementCheck):
+            return check
+        raise InvalidInputError(f"port placement takes a PlacementCheck, not {check!r}")
+
+    def _required(self, context: Context, port: Any) -> Any:
+        if not port.HasValue(context):
+            raise InvalidInputError(
+                f"{self.get_name()}: input port {port.get_name()} has no value; connect or fix it"
+            )
+        return port.Eval(context)
+
+    def _optional(self, context: Context, port: Any) -> Any:
+        return port.Eval(context) if port.HasValue(context) else None
+
+
+def _add_opacity(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """(H, W, 4) with an opacity of 255."""
+    return np.concatenate([image, np.full((*image.shape[:2], 1), 255, np.uint8)], axis=2)

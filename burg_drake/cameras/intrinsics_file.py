@@ -1,0 +1,411 @@
+"""Read and write intrinsics: files of this project, ROS and OpenCV, and cameras of stations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+from xml.parsers import expat
+
+import yaml
+
+from burg_drake.cameras.intrinsics import (
+    FISHEYE_COEFFICIENTS,
+    Intrinsics,
+    LensModel,
+    camera_intrinsics,
+)
+from burg_drake.core import (
+    MAX_INTEGER_DIGITS,
+    STANDARD_TAGS,
+    DocumentError,
+    FileLimits,
+    InvalidInputError,
+    Tree,
+    UnknownNameError,
+    atomic_write,
+    parse_document,
+    parse_plain_yaml,
+    quote_value,
+    read_text,
+    save_document,
+    suggest_names,
+)
+from burg_drake.station import Station, load_station
+
+SIMULATED_PREFIX = "sim:"  # Prefix of references to cameras of stations.
+DEFAULT_CAMERA = "board"  # Camera of a station with several cameras if the reference names none.
+
+
+def find_simulated_camera(reference: str) -> tuple[Station, str]:
+    """Station and name of the camera of `sim:STATION[/CAMERA]`.
+
+    A station is a built-in name or a file. Without a name of a camera it is the one called
+    `board`, or the only one.
+
+    Raises:
+        UnknownNameError: no such station or camera.
+        InvalidInputError: the station has several cameras and none is named, or it has none.
+    """
+    text = reference.removeprefix(SIMULATED_PREFIX)
+    named = None
+    try:
+        station = load_station(text)
+    except UnknownNameError as error:
+        before, slash, named = text.rpartition("/")
+        if not slash:
+            raise UnknownNameError(f"station of {reference}: {error}") from None
+        try:
+            station = load_station(before)
+        except UnknownNameError as without_camera:
+            reason = error if text.endswith((".yaml", ".yml")) else without_camera
+            raise UnknownNameError(f"station of {reference}: {reason}") from None
+    known = station.document.cameras
+    if not known:
+        raise InvalidInputError(f"station {station.name!r} ({station.path}) has no cameras")
+    camera = named or (next(iter(known)) if len(known) == 1 else DEFAULT_CAMERA)
+    if named is None and camera not in known:
+        raise InvalidInputError(
+            f"{reference} has several cameras; name one, as in {reference}/CAMERA;"
+            f" {suggest_names(DEFAULT_CAMERA, known)}"
+        )
+    station.camera(camera)
+    return station, camera
+
+
+def is_opencv(text: str) -> bool:
+    """Whether OpenCV wrote a file."""
+    # Texts that only OpenCV's files contain.
+    file_marks = ("%YAML:1.0", "!!opencv-matrix", "<opencv_storage>")
+    return any(mark in text for mark in file_marks)
+
+
+def read_opencv(text: str, name: str) -> Tree:
+    """The contents of a file.
+
+    Args:
+        text: of the file.
+        name: stands for the file in messages.
+
+    Raises:
+        DocumentError: it is neither such YAML nor such XML, or beyond the limits of documents.
+    """
+    if text.lstrip().startswith("<"):
+        return _XmlReader(name).read(text)
+    if text.startswith("%YAML"):  # `%YAML:1.0`, which YAML does not know, on a line of its own
+        text = "#" + text
+    return parse_plain_yaml(text, name, tags=STANDARD_TAGS | {"tag:yaml.org,2002:opencv-matrix"})
+
+
+class _XmlReader:
+    """Elements as dicts by tag; the text of one that is called `data` is a list of words."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._values = 0
+        self._opened: list[dict[str, Any]] = [{}]
+        self._text = ""
+        self._parser = expat.ParserCreate()
+        self._parser.buffer_text = True
+        self._parser.StartElementHandler = self._start
+        self._parser.EndElementHandler = self._end
+        self._parser.CharacterDataHandler = self._characters
+        self._parser.StartDoctypeDeclHandler = self._doctype
+
+    def read(self, text: str) -> Tree:
+        try:
+            self._parser.Parse(text.encode(), True)
+        except expat.ExpatError as error:
+            problem = expat.ErrorString(error.code)
+            raise DocumentError(f"{self._name}:{error.lineno}: not valid XML: {problem}") from error
+        return self._opened[0].get("opencv_storage", {})
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        self._values += 1
+        if len(self._opened) > FileLimits.document.depth:
+            raise self._failure(f"nested more than {FileLimits.document.depth} levels deep")
+        if self._values > FileLimits.document.values:
+            raise self._failure(f"more than {FileLimits.document.values:,} values")
+        self._opened.append({})
+        self._text = ""
+
+    def _end(self, tag: str) -> None:
+        inner = self._opened.pop()
+        value: Tree = inner or (self._text.split() if tag == "data" else self._text.strip())
+        if tag != "_" and tag in self._opened[-1]:  # `_` is the item of a list
+            raise self._failure(f"{tag!r} appears twice in the same element")
+        self._opened[-1][tag] = value
+        self._text = ""
+
+    def _characters(self, text: str) -> None:
+        self._text += text
+
+    def _doctype(self, *_: object) -> None:
+        raise self._failure("document type declarations (DOCTYPE) are not supported; remove it")
+
+    def _failure(self, what: str) -> DocumentError:
+        return DocumentError(f"{self._name}:{self._parser.CurrentLineNumber}: {what}")
+
+
+ROS_MATRIX_KEYS = ("camera_matrix", "K", "k")
+"""Keys of K in a calibration file and in messages of ROS 1 and ROS 2."""
+ROS_DISTORTION_KEYS = ("distortion_coefficients", "D", "d")
+"""Keys of the distortion in a calibration file and in messages of ROS 1 and ROS 2."""
+ROS_FISHEYE_MODEL = "equidistant"  # Name of the fisheye model in ROS.
+ROS_LENS_MODELS = {
+    "plumb_bob": (4, 5),
+    "rational_polynomial": (8,),
+    ROS_FISHEYE_MODEL: (4,),
+    "none": (0,),
+    "": (0,),
+}
+"""Supported distortion models of ROS and their possible numbers of coefficients."""
+
+
+def load_intrinsics(path: str | Path) -> Intrinsics:
+    """Reads intrinsics.
+
+    Args:
+        path: our document; a `camera_info` file of ROS, or a message printed from a `camera_info`
+            topic; a file of OpenCV's calibration sample (YAML or XML); or `sim:STATION[/CAMERA]`,
+            the camera of a station.
+
+    Raises:
+        DocumentError: the file cannot be read, or does not fit.
+        InvalidInputError: a camera or distortion model that is not supported.
+        UnknownNameError: no such station or camera.
+    """
+    if str(path).startswith(SIMULATED_PREFIX):
+        station, camera = find_simulated_camera(str(path))
+        return camera_intrinsics(station.camera(camera))
+    text = read_text(path)
+    name = str(path)
+    if is_opencv(text):
+        return _intrinsics_from_opencv(read_opencv(text, name), name)
+    data = parse_plain_yaml(
+        text, name, empty="the document is empty; expected a camera's intrinsics"
+    )
+    if (
+        isinstance(data, dict)
+        and "focal" not in data
+        and any(key in data for key in ROS_MATRIX_KEYS)
+    ):
+        return _intrinsics_from_ros(data, name)
+    return parse_document(text, Intrinsics, name)
+
+
+def save_intrinsics(intrinsics: Intrinsics, path: str | Path, header: str = "") -> None:
+    """Writes our document."""
+    save_document(intrinsics, path, header)
+
+
+def save_camera_info(intrinsics: Intrinsics, path: str | Path) -> None:
+    """Writes a `camera_info` file, as ROS's `camera_info_manager` reads it.
+
+    Raises:
+        InvalidInputError: ROS has no name for this number of distortion coefficients.
+    """
+    data = camera_info_data(intrinsics)
+    atomic_write(path, yaml.dump(data, sort_keys=False, default_flow_style=None, width=100))
+
+
+def camera_info_data(intrinsics: Intrinsics) -> dict[str, Any]:
+    """Contents of a `camera_info` file; a rectified image has the same K without distortion.
+
+    Raises:
+        InvalidInputError: ROS has no name for this number of distortion coefficients.
+    """
+    model, coefficients = ros_distortion(intrinsics)
+    K = intrinsics.K
+    return {
+        "image_width": intrinsics.width,
+        "image_height": intrinsics.height,
+        "camera_name": intrinsics.camera or "camera",
+        "camera_matrix": _matrix_data(3, 3, K.ravel().tolist()),
+        "distortion_model": model,
+        "distortion_coefficients": _matrix_data(1, len(coefficients), coefficients),
+        "rectification_matrix": _matrix_data(3, 3, [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]),
+        "projection_matrix": _matrix_data(
+            3, 4, [value for row in K.tolist() for value in (*row, 0.0)]
+        ),
+    }
+
+
+def ros_distortion(intrinsics: Intrinsics) -> tuple[str, list[float]]:
+    """ROS's name of the distortion model, and its coefficients.
+
+    Raises:
+        InvalidInputError: ROS has no name for this number of coefficients.
+    """
+    k = list(intrinsics.distortion)
+    if intrinsics.is_fisheye:
+        return ROS_FISHEYE_MODEL, k
+    if len(k) > 8:
+        raise InvalidInputError(
+            f"ROS has no distortion model of {len(k)} coefficients; calibrate with 8 (rational) or"
+            " fewer"
+        )
+    return ("rational_polynomial", k) if len(k) == 8 else ("plumb_bob", k + [0.0] * (5 - len(k)))
+
+
+def _matrix_data(rows: int, columns: int, data: list[float]) -> dict[str, Any]:
+    return {"rows": rows, "cols": columns, "data": data}
+
+
+def _intrinsics_from_ros(data: Tree, name: str) -> Intrinsics:
+    model = _read_text(data, "distortion_model", name)
+    K = _read_camera_matrix(data, name)
+    _refuse_cropped_image(data, name)
+    coefficients = _read_numbers(data, ROS_DISTORTION_KEYS, name)
+    if model not in ROS_LENS_MODELS:
+        raise InvalidInputError(
+            f"{name}: distortion_model {quote_value(model)} is not supported; supported are plumb_bob,"
+            f" rational_polynomial and {ROS_FISHEYE_MODEL} (fisheye): calibrate with `burg-drake camera"
+            " calibrate`"
+        )
+    if any(coefficients) and len(coefficients) not in ROS_LENS_MODELS[model]:
+        raise DocumentError(
+            f"{name}: distortion_model {model!r} has {len(coefficients)} coefficients;"
+            f" {' or '.join(map(str, ROS_LENS_MODELS[model]))} are expected"
+        )
+    fisheye = is_ros_fisheye(model, coefficients)
+    return _build_intrinsics(
+        name,
+        camera=_read_text(data, "camera_name", name),
+        size=_read_size(data, name),
+        K=K,
+        model="fisheye" if fisheye else "perspective",
+        coefficients=coefficients if any(coefficients) or fisheye else [],
+    )
+
+
+def is_ros_fisheye(model: str, coefficients: Sequence[float]) -> bool:
+    """Whether a distortion model of ROS is a fisheye's. With four zeros it is one, whose angles are
+    even; messages without coefficients, or with five zeros, are of cameras without distortion."""
+    return model == ROS_FISHEYE_MODEL and (
+        len(coefficients) == FISHEYE_COEFFICIENTS or any(coefficients)
+    )
+
+
+def _refuse_cropped_image(data: Tree, name: str) -> None:
+    """A message tells K of the sensor's image, and which part of it the images are."""
+    binning = [_read_integer(data, key, name) for key in ("binning_x", "binning_y") if key in data]
+    roi = data.get("roi")
+    if isinstance(roi, dict):
+        keys = ("x_offset", "y_offset", "width", "height")
+        part = [_read_integer(roi, key, name) for key in keys if key in roi]
+    else:
+        part = []
+    if any(n > 1 for n in binning) or any(part):
+        raise InvalidInputError(
+            f"{name}: binning or roi is set, so images show only a part of what the camera matrix"
+            " describes; that is not supported: calibrate at the resolution that you use"
+        )
+
+
+def _read_size(data: Tree, name: str) -> tuple[int, int]:
+    """Width and height, which messages call by other keys than files."""
+    keys = [
+        side if side in data and f"image_{side}" not in data else f"image_{side}"
+        for side in ("width", "height")
+    ]
+    return _read_integer(data, keys[0], name), _read_integer(data, keys[1], name)
+
+
+def _read_integer(data: Tree, key: str, name: str) -> int:
+    value = data.get(key)
+    if isinstance(value, str) and len(value) <= MAX_INTEGER_DIGITS and value.isdecimal():
+        return int(value)
+    raise DocumentError(f"{name}: {key} must be a whole number of pixels, not {quote_value(value)}")
+
+
+def _read_text(data: Tree, key: str, name: str) -> str:
+    value = data.get(key, "")
+    if not isinstance(value, str):
+        raise DocumentError(f"{name}: {key} is a list or mapping; expected text")
+    return value
+
+
+def _read_camera_matrix(data: Tree, name: str) -> list[float]:
+    K = _read_numbers(data, ROS_MATRIX_KEYS, name)
+    if len(K) != 9:
+        raise DocumentError(f"{name}: the camera matrix has {len(K)} numbers; 9 are needed")
+    if K[0] == 0.0:
+        raise DocumentError(f"{name}: the camera is not calibrated (its fx is 0)")
+    if not abs(K[1]) <= 1e-6 * abs(K[0]):
+        raise InvalidInputError(
+            f"{name}: the camera matrix has skew {K[1]:g}, which is not supported; calibrate"
+            " without skew"
+        )
+    if [K[3], *K[6:]] != [0.0, 0.0, 0.0, 1.0]:
+        raise DocumentError(
+            f"{name}: the camera matrix must have 0 below fx and 0, 0, 1 in its last row; it has"
+            f" {K[3]:g} and {K[6]:g}, {K[7]:g}, {K[8]:g}"
+        )
+    return K
+
+
+def _read_numbers(data: Tree, keys: tuple[str, ...], name: str) -> list[float]:
+    """A matrix of a file, or a list of a message, whose key may be any of some."""
+    key = next((key for key in keys if key in data), None)
+    value = None if key is None else data[key]
+    if isinstance(value, dict):
+        value = value.get("data")
+    try:
+        if isinstance(value, list):
+            return [float(item) for item in value]
+    except (TypeError, ValueError):
+        pass
+    raise DocumentError(f"{name}: {key or keys[0]} is not a list of finite numbers")
+
+
+def _intrinsics_from_opencv(data: Tree, name: str) -> Intrinsics:
+    if not isinstance(data, dict) or "camera_matrix" not in data:
+        raise DocumentError(f"{name}: camera_matrix with 3 x 3 numbers is missing")
+    K = _read_camera_matrix(data, name)
+    try:
+        is_fisheye = float(data.get("fisheye_model", 0)) == 1.0
+        rms = float(data["avg_reprojection_error"]) if "avg_reprojection_error" in data else None
+    except (TypeError, ValueError) as error:
+        raise DocumentError(
+            f"{name}: fisheye_model and avg_reprojection_error must be numbers"
+        ) from error
+    key = ROS_DISTORTION_KEYS[0]
+    coefficients = _read_numbers(data, (key,), name) if key in data else []
+    if not any(coefficients[5:]):
+        coefficients = coefficients[:5]  # OpenCV pads to the longest model
+    return _build_intrinsics(
+        name,
+        camera="",
+        size=_read_size(data, name),
+        K=K,
+        model="fisheye" if is_fisheye else "perspective",
+        coefficients=coefficients if any(coefficients) or is_fisheye else [],
+        residual=rms,
+    )
+
+
+def _build_intrinsics(
+    name: str,
+    *,
+    camera: str,
+    size: tuple[int, int],
+    K: list[float],
+    model: LensModel,
+    coefficients: list[float],
+    residual: float | None = None,
+) -> Intrinsics:
+    """Intrinsics from numbers of a file; what is wrong names the file."""
+    try:
+        return Intrinsics(
+            camera=camera,
+            width=size[0],
+            height=size[1],
+            focal=(K[0], K[4]),
+            center=(K[2], K[5]),
+            model=model,
+            distortion=tuple(coefficients),
+            residual=residual,
+        )
+    except InvalidInputError as error:
+        raise DocumentError(f"{name}: {error}") from error

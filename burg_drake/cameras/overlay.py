@@ -1,0 +1,639 @@
+"""Draw a scene's objects over a camera image of the board."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.cameras.intrinsics import FieldOfView, Intrinsics
+from burg_drake.cameras.placement.document import ExtraObject, Placement, PlacementCheck
+from burg_drake.cameras.scene_mesh import SceneMesh, build_scene_mesh, object_footprints
+from burg_drake.cameras.scene_projection import (
+    NO_OWNER,
+    OUTLINE_KIND,
+    SurfaceCamera,
+    SurfaceImage,
+    VisibleLines,
+    clip_lines,
+    visible_lines,
+)
+from burg_drake.cameras.text_tags import TEXT_COLOR, draw_notice, render_tag, write_tags
+from burg_drake.core import (
+    CATEGORY_COLORS,
+    Array,
+    Bytes,
+    Indices,
+    InvalidInputError,
+    Units,
+    distinct_colors,
+    inverse,
+    setting,
+    transform_points,
+)
+from burg_drake.scene import SceneLike, as_scene
+
+
+@dataclass(frozen=True, kw_only=True)
+class OverlayStyle:
+    """What is drawn of a scene over an image.
+
+    Attributes:
+        opacity: of the objects' surfaces, 0 (outlines alone) to 1.
+        outline_width: of the outlines [pixels]; inner lines are thinner.
+        names: write each object's name.
+        footprints: draw where objects touch the board.
+        errors: draw how far each object stands from its place, where a placement check is given.
+        tolerance: displacement up to which an object counts as placed [m].
+        angle_tolerance: the same for its turn [rad].
+        shown: instances that are drawn, as if there were no others; all if None.
+    """
+
+    opacity: float = setting(
+        0.45,
+        "opacity of the drawn objects, 0 (outlines) to 1",
+        metavar="X",
+        low=0,
+        high=1,
+        noun="a number",
+    )
+    outline_width: float = 2.0
+    names: bool = True
+    footprints: bool = True
+    errors: bool = True
+    tolerance: float = setting(
+        1e-3,
+        "objects within this distance of their target are green",
+        unit=Units.millimetres,
+        metavar="X",
+        above=0,
+    )
+    angle_tolerance: float = setting(
+        math.radians(1.0),
+        "objects within this angle of their target are green",
+        unit=Units.degrees,
+        name="tolerance_deg",
+        metavar="X",
+        above=0,
+    )
+    shown: tuple[str, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.opacity <= 1.0:
+            raise InvalidInputError(f"opacity {self.opacity:g} of an overlay must be 0 to 1")
+        if not 0.0 <= self.outline_width <= 20.0:
+            raise InvalidInputError(
+                f"outline_width {self.outline_width:g} of an overlay must be 0 to 20 pixels"
+            )
+        if min(self.tolerance, self.angle_tolerance) < 0.0:
+            raise InvalidInputError("tolerances of an overlay must be at least 0")
+
+
+LIGHT_DIRECTION = np.array([0.35, -0.45, 0.82])
+"""Direction to the light, in the sheet's frame S."""
+
+
+class OverlayLines:
+    """Overlay lines."""
+
+    inner_width = 0.6  # Width of inner lines, as a fraction of that of outlines.
+    rim_opacity = 0.65  # Opacity of the dark rim of outlines and arrows.
+    inner_rim_opacity = 0.25  # Opacity of the dark rim of inner lines and footprints.
+    footprint_width = 1.2  # Pixels.
+    arrow_width = 3.0  # Pixels.
+    footprint_opacity = 0.7
+
+
+@dataclass(frozen=True, eq=False)
+class _DrawState:
+    """What one `draw` works with."""
+
+    shape: SceneMesh
+    X_CS: Array
+    lines: VisibleLines
+    surface: SurfaceImage
+    marks: dict[str, CorrectionMark]
+
+
+class Overlay:
+    """Draws the objects of a scene over images of one camera.
+
+    Attributes:
+        scene: whose objects.
+        intrinsics: of the camera.
+        style: used where `draw` is given none; may be replaced at any time.
+    """
+
+    def __init__(
+        self, scene: SceneLike, intrinsics: Intrinsics, style: OverlayStyle | None = None
+    ) -> None:
+        """Loads the objects' surfaces.
+
+        Args:
+            scene: whose objects.
+            intrinsics: of the camera.
+            style: the default one if None.
+
+        Raises:
+            UnknownNameError: a mesh file of the library is missing.
+        """
+        scene = as_scene(scene)
+        self.scene, self.intrinsics = scene, intrinsics
+        self.style = style or OverlayStyle()
+        self._view = FieldOfView(intrinsics)
+        self._whole = build_scene_mesh(scene)
+        self._shown: dict[tuple[str, ...] | None, tuple[SurfaceCamera, Array, Indices]] = {}
+        self._colors = {name: _instance_color(i) for i, name in enumerate(self._whole.names)}
+
+    def draw(
+        self,
+        image: Bytes,
+        X_SC: Array,
+        *,
+        placement: PlacementCheck | None = None,
+        style: OverlayStyle | None = None,
+    ) -> Bytes:
+        """The image with the objects drawn over it.
+
+        Args:
+            image: (H, W, 3) red, green, blue.
+            X_SC: (4, 4) camera's optical frame in the scene frame.
+            placement: how far the objects stand from their places, if that is known.
+            style: instead of the overlay's own.
+
+        Returns:
+            (H, W, 3) another image; the given one stays as it is.
+
+        Raises:
+            InvalidInputError: the image is of another size or kind than the camera's.
+            UnknownNameError: `style.shown` names an instance that the scene does not have.
+        """
+        style = style or self.style
+        drawn = self._copy(image)
+        camera, standing, standing_owner = self._camera(style.shown)
+        shape = camera.shape
+        if not shape.names:
+            return drawn
+        lines = visible_lines(shape, self._view, X_SC)
+        surface = camera.render(X_SC, lines, _face_brightness(shape))
+        marks = _correction_marks(shape, placement, style)
+        state = _DrawState(shape, inverse(X_SC), lines, surface, marks)
+        colors = np.array([self._colors[name] for name in shape.names], dtype=float)
+        blend_surfaces(drawn, surface, colors, style.opacity)
+        inks = [_outline_lines(state, _brighten(colors), style.outline_width), *self._arrows(state)]
+        if placement is not None and style.errors:
+            inks += [
+                self._lines(circle_extra_object(extra), "off", state.X_CS)
+                for extra in placement.extra
+            ]
+        if style.footprints:
+            inks.append(self._footprints(state, standing, standing_owner, _brighten(colors)))
+        blend_lines(drawn, inks)
+        if style.names or marks:
+            self._write(drawn, state, style.names)
+        return drawn
+
+    def notice(self, image: Bytes, text: str) -> Bytes:
+        """The plain image with a line of text, such as why nothing is drawn over it.
+
+        Args:
+            image: (H, W, 3) red, green, blue.
+            text: one line.
+        """
+        return draw_notice(self._copy(image), text)
+
+    def _copy(self, image: Bytes) -> Bytes:
+        if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8:
+            raise InvalidInputError(
+                f"the image has shape {image.shape} and type {image.dtype}; expected RGB, (H, W,"
+                " 3) uint8"
+            )
+        self.intrinsics.require_size(image.shape[1], image.shape[0], "image")
+        return np.array(image, order="C")
+
+    def _camera(self, shown: tuple[str, ...] | None) -> tuple[SurfaceCamera, Array, Indices]:
+        """What looks at the instances shown, and their footprints with the instances' numbers."""
+        if shown not in self._shown:
+            shape = self._whole.of(shown)
+            self._shown[shown] = (SurfaceCamera(shape, self._view), *object_footprints(shape))
+        return self._shown[shown]
+
+    def _footprints(
+        self, state: _DrawState, lines: Array, owner: Indices, colors: Array
+    ) -> LineSet:
+        """Where objects stand, as far as no other object is seen there."""
+        ends, line = clip_lines(transform_points(state.X_CS, lines), self._view)
+        pixels, owner = self.intrinsics.project(ends), owner[line]
+        height, width = state.surface.owner.shape
+        x, y = np.round(pixels.mean(axis=1)).astype(int).T
+        at = np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)
+        there = state.surface.owner[at]
+        seen = (there == owner) | (there == NO_OWNER)
+        return _line_set(
+            pixels[seen],
+            colors[owner[seen]],
+            OverlayLines.footprint_width,
+            OverlayLines.footprint_opacity,
+            OverlayLines.inner_rim_opacity,
+        )
+
+    def _arrows(self, state: _DrawState) -> list[LineSet]:
+        return [self._lines(note.lines, note.verdict, state.X_CS) for note in state.marks.values()]
+
+    def _lines(self, lines: Array, verdict: PlacementVerdict, X_CS: Array) -> LineSet:
+        """Lines (N, 2, 3) in S, in the color of what they say."""
+        ends, _ = clip_lines(transform_points(X_CS, lines), self._view)
+        colors = np.tile(np.array(VERDICT_COLORS[verdict], dtype=float), (len(ends), 1))
+        return _line_set(
+            self.intrinsics.project(ends),
+            colors,
+            OverlayLines.arrow_width,
+            1.0,
+            OverlayLines.rim_opacity,
+        )
+
+    def _write(self, drawn: Bytes, state: _DrawState, names: bool) -> None:
+        """Names of what can be seen, and how it stands."""
+        font_height = 0.028  # Fraction of the image's height.
+        min_named_pixels = 12  # Instances that show fewer pixels get no name tag.
+        owner = state.surface.owner
+        seen = np.bincount(owner[owner != NO_OWNER], minlength=len(state.shape.names))
+        boxes, plates = [], []
+        for number in np.flatnonzero(seen >= min_named_pixels):
+            ends = state.lines.ends[state.lines.owner == number].reshape(-1, 2)
+            name = state.shape.names[number]
+            note = state.marks.get(name)
+            words = [name] * names + ([note.text] if note else [])
+            if len(ends) and words:
+                size = self.intrinsics.width - 1, self.intrinsics.height - 1
+                boxes.append(np.clip([ends.min(axis=0), ends.max(axis=0)], 0, size))
+                color = VERDICT_COLORS[note.verdict] if note else TEXT_COLOR
+                plates.append(render_tag("  ".join(words), color, round(font_height * len(drawn))))
+        if plates:
+            write_tags(drawn, np.array(boxes), plates, owner != NO_OWNER)
+
+
+def instance_labels(scene: SceneLike, intrinsics: Intrinsics, X_SC: Array) -> NDArray[np.int16]:
+    """Which instance each pixel shows.
+
+    Args:
+        scene: whose objects, at their places; as loaded, or a reference for `load_scene`.
+        intrinsics: of the camera.
+        X_SC: (4, 4) camera's optical frame in the scene frame.
+
+    Returns:
+        (H, W) numbers of the instances, in the order of `scene.instances` and then
+        `scene.background`; -1 where there is none.
+    """
+    shape, view = build_scene_mesh(as_scene(scene)), FieldOfView(intrinsics)
+    lines = visible_lines(shape, view, X_SC)
+    return SurfaceCamera(shape, view).render(X_SC, lines, _face_brightness(shape)).owner
+
+
+def _correction_marks(
+    shape: SceneMesh, placement: PlacementCheck | None, style: OverlayStyle
+) -> dict[str, CorrectionMark]:
+    """By instance, what is left to do."""
+    if placement is None or not style.errors:
+        return {}
+    return {
+        name: correction_mark(placement.instances[name], style, float(box[1, 2]))
+        for name, box in zip(shape.names, shape.boxes, strict=True)
+        if name in placement.instances
+    }
+
+
+def _outline_lines(state: _DrawState, colors: Array, width: float) -> LineSet:
+    """Outlines and inner lines; the former say by their colour how an object stands, and are dashed
+    where that is uncertain."""
+    lines, rims = state.lines, np.array(colors)
+    for number, name in enumerate(state.shape.names):
+        if name in state.marks:
+            rims[number] = VERDICT_COLORS[state.marks[name].verdict]
+    outer = lines.kind == OUTLINE_KIND
+    chosen = np.where(outer[:, None], rims[lines.owner], colors[lines.owner])
+    widths = width * np.where(outer, 1.0, OverlayLines.inner_width)
+    for number, name in enumerate(state.shape.names):
+        if name in state.marks and state.marks[name].verdict == "uncertain":
+            dashed = outer & (lines.owner == number)
+            widths[dashed] *= _dash_mask(lines.ends[dashed])
+    return _line_set(
+        lines.ends,
+        chosen,
+        widths,
+        1.0,
+        np.where(outer, OverlayLines.rim_opacity, OverlayLines.inner_rim_opacity),
+    )
+
+
+def _dash_mask(ends: Array) -> NDArray[np.bool_]:
+    """(N,) which of the short lines (N, 2, 2) around an object [pixels] belong to a dash: those in
+    every other sector about its middle, as lines do not come in the order of the outline."""
+    dash_length = 7.0  # Pixels. About half the distance between dashes.
+    arms = ends.mean(axis=1) - ends.mean(axis=(0, 1))
+    around = 2 * np.pi * np.linalg.norm(arms, axis=1).mean() if len(arms) else 0.0
+    dashes = max(round(around / (2 * dash_length)), 4)
+    share = np.arctan2(arms[:, 1], arms[:, 0]) / (2 * np.pi) % 1.0
+    return np.asarray((share * dashes) % 1.0 < 0.6)
+
+
+def _line_set(
+    ends: Array, colors: Array, width: float | Array, opacity: float, rim: float | Array
+) -> LineSet:
+    values = [np.broadcast_to(np.asarray(v, dtype=float), len(ends)) for v in (width, opacity, rim)]
+    return LineSet(ends, colors, *values)
+
+
+def _instance_color(number: int) -> tuple[int, int, int]:
+    """Of an instance by its place in the scene: the first ones' stay apart for all eyes."""
+    rest = number - len(CATEGORY_COLORS)
+    rgb = CATEGORY_COLORS[number][:3] if rest < 0 else distinct_colors(rest + 1)[rest]
+    r, g, b = (round(255 * c) for c in rgb)
+    return r, g, b
+
+
+def _brighten(colors: Array) -> Array:
+    brightening = 0.4  # Fraction of the difference to white.
+    return colors + brightening * (255.0 - colors)
+
+
+def _face_brightness(shape: SceneMesh) -> Bytes:
+    """(F,) brightness of faces, lit from above."""
+    ambient = 0.4  # Brightness of faces that the light does not reach.
+    lit = np.clip(
+        shape.outline.normals @ (LIGHT_DIRECTION / np.linalg.norm(LIGHT_DIRECTION)), 0.0, 1.0
+    )
+    return np.asarray(np.round(255 * (ambient + (1.0 - ambient) * lit)), np.uint8)
+
+
+PlacementVerdict = Literal["placed", "off", "uncertain", "not_seen"]
+
+VERDICT_COLORS: dict[PlacementVerdict, tuple[int, int, int]] = {
+    "placed": (70, 230, 120),
+    "off": (255, 110, 70),
+    "uncertain": (255, 205, 70),
+    "not_seen": (190, 195, 200),
+}
+"""RGB of outlines, arrows and texts."""
+
+
+class ArrowStyle:
+    """Arrow style."""
+
+    min_length = 0.035  # Metres. Arrows for shorter corrections are drawn this long.
+    head_length = 0.010  # Metres.
+    arc_radius = 0.030  # Metres.
+    arc_angle = math.radians(80.0)  # Radians.
+    arc_segments = 12  # Straight lines of an arc.
+
+
+@dataclass(frozen=True, eq=False)
+class CorrectionMark:
+    """What is drawn for one object.
+
+    Attributes:
+        verdict: how it stands.
+        text: in words; empty if there is nothing to say.
+        lines: (N, 2, 3) arrows in S [m].
+    """
+
+    verdict: PlacementVerdict
+    text: str
+    lines: Array
+
+
+def correction_mark(placement: Placement, style: OverlayStyle, height: float) -> CorrectionMark:
+    """What is left to do with an object.
+
+    Args:
+        placement: how it stands.
+        style: has the tolerances.
+        height: at which arrows are drawn, z in S [m].
+    """
+    nothing = np.empty((0, 2, 3))
+    uncertain = placement.status == "uncertain"
+    if placement.displacement is None:
+        return (
+            CorrectionMark("uncertain", "?", nothing)
+            if uncertain
+            else CorrectionMark("not_seen", "not seen", nothing)
+        )
+    move = -np.array(placement.displacement)
+    turn = -(placement.angle or 0.0)
+    far, turned = math.hypot(*move) > style.tolerance, abs(turn) > style.angle_tolerance
+    verdict: PlacementVerdict = "off" if far or turned else "placed"
+    if uncertain:
+        verdict = "uncertain"
+    target = (placement.target.matrix() @ (*(placement.reference or (0.0, 0.0, 0.0)), 1.0))[:3]
+    target[2] = height
+    lines = [nothing]
+    if far:
+        lines.append(_arrow_lines(target, np.array([*move, 0.0])))
+    if turned:
+        lines.append(_turn_arrow_lines(target, turn))
+    return CorrectionMark(verdict, _correction_text(placement, uncertain), np.concatenate(lines))
+
+
+def circle_extra_object(extra: ExtraObject) -> Array:
+    """(N, 2, 3) lines on the board around something that is no object of the scene, in S [m]."""
+    around = np.linspace(0.0, 2.0 * np.pi, 2 * ArrowStyle.arc_segments + 1)
+    radius = max(0.6 * extra.width, ArrowStyle.head_length)
+    x, y = extra.position
+    points = np.column_stack(
+        [x + radius * np.cos(around), y + radius * np.sin(around), np.zeros_like(around)]
+    )
+    return np.stack([points[:-1], points[1:]], axis=1)
+
+
+def _correction_text(placement: Placement, uncertain: bool) -> str:
+    """Distance and turn, of an uncertain object with a question mark and standard deviations."""
+    far_sd = placement.displacement_sd if uncertain else None
+    turn_sd = placement.angle_sd if uncertain else None
+    far = 1e3 * math.hypot(*(placement.displacement or (0.0, 0.0)))
+    text = _format_number(far, None if far_sd is None else 1e3 * math.hypot(*far_sd)) + " mm"
+    if placement.angle is not None:
+        turn = abs(math.degrees(placement.angle))
+        text += f" {_format_number(turn, None if turn_sd is None else math.degrees(turn_sd))}°"
+    return f"? {text}" if uncertain else text
+
+
+def _format_number(value: float, sd: float | None) -> str:
+    text = f"{value:.1f}" if value < 9.95 else f"{value:.0f}"
+    return text if sd is None else f"{text}±{_format_number(sd, None)}"
+
+
+def _arrow_lines(target: Array, move: Array) -> Array:
+    """To the target, along a move, drawn longer than that where it is short."""
+    length = float(np.linalg.norm(move))
+    drawn = max(length, ArrowStyle.min_length)
+    along = move / length
+    return np.concatenate(
+        [[[target - drawn * along, target]], _arrow_head_lines(target, along, 0.4 * drawn)]
+    )
+
+
+def _turn_arrow_lines(center: Array, angle: float) -> Array:
+    """An arc about the vertical, with a head at its end."""
+    around = (
+        math.copysign(1.0, angle)
+        * np.linspace(
+            -ArrowStyle.arc_angle / 2, ArrowStyle.arc_angle / 2, ArrowStyle.arc_segments + 1
+        )
+        - math.pi / 2
+    )
+    radial = np.column_stack([np.cos(around), np.sin(around), np.zeros_like(around)])
+    points = center + ArrowStyle.arc_radius * radial
+    lines = np.stack([points[:-1], points[1:]], axis=1)
+    along = points[-1] - points[-2]
+    return np.concatenate(
+        [
+            lines,
+            _arrow_head_lines(points[-1], along / np.linalg.norm(along), ArrowStyle.head_length),
+        ]
+    )
+
+
+def _arrow_head_lines(tip: Array, along: Array, length: float) -> Array:
+    across = np.array([-along[1], along[0], 0.0])
+    length = min(length, ArrowStyle.head_length)
+    back = tip - length * along
+    return np.array([[back + 0.6 * length * across, tip], [back - 0.6 * length * across, tip]])
+
+
+def blend_surfaces(image: Bytes, surface: SurfaceImage, colors: Array, opacity: float) -> None:
+    """Blends surfaces into an image (H, W, 3), in place.
+
+    Args:
+        surface: what each pixel shows.
+        colors: (N, 3) of the instances, 0 to 255.
+        opacity: 0 to 1.
+    """
+    at = np.flatnonzero(surface.owner.ravel() != NO_OWNER)
+    if not len(at) or opacity == 0.0:
+        return
+    weight = round(256 * opacity)
+    # All colours that occur, times their weight; the row is 256 times the instance plus the shade.
+    shaded = colors[:, None, :] * np.arange(256)[None, :, None] / 255.0
+    table = np.round(weight * shaded).astype(np.uint16).reshape(-1, 3)
+    row = surface.owner.ravel()[at].astype(np.int32) * 256 + surface.shade.ravel()[at]
+    flat = image.reshape(-1, 3)
+    mixed = np.take(flat, at, axis=0) * np.uint16(256 - weight)
+    mixed += np.take(table, row, axis=0)
+    mixed >>= 8
+    flat[at] = mixed
+
+
+@dataclass(frozen=True, eq=False)
+class LineSet:
+    """Lines to be drawn.
+
+    Attributes:
+        ends: (N, 2, 2) of short lines [pixels].
+        colors: (N, 3), 0 to 255.
+        width: (N,) [pixels].
+        opacity: (N,) 0 to 1.
+        rim: (N,) opacity of the dark rim, 0 to 1.
+    """
+
+    ends: Array
+    colors: Array
+    width: Array
+    opacity: Array
+    rim: Array
+
+
+def blend_lines(image: Bytes, inks: Sequence[LineSet]) -> None:
+    """Draws lines into an image (H, W, 3), in place; a pixel takes the nearest."""
+    rim_width = 1.2  # Pixels. Dark rim on both sides of a line, for contrast with white paper.
+    ends, colors, width, opacity, rim = (
+        np.concatenate([getattr(ink, field.name) for ink in inks]) for field in fields(LineSet)
+    )
+    drawn = width > 0.0
+    ends, colors, width = ends[drawn], colors[drawn], width[drawn]
+    if not len(ends):
+        return
+    pixels = rasterize_lines(ends, 0.5 * width, rim_width + 0.5, (image.shape[1], image.shape[0]))
+    flat = image.reshape(-1, 3)
+    dark = rim[drawn][pixels.line] * pixels.cover(rim_width)
+    under = np.take(flat, pixels.at, axis=0) * (1.0 - dark[:, None])
+    core = (opacity[drawn][pixels.line] * pixels.cover())[:, None]
+    flat[pixels.at] = np.round(under + core * (colors[pixels.line] - under)).astype(np.uint8)
+
+
+@dataclass(frozen=True, eq=False)
+class LinePixels:
+    """Pixels at lines.
+
+    Attributes:
+        at: (P,) indices into the flattened image.
+        distance: (P,) from the rim of the line, negative within it [pixels].
+        line: (P,) which of the lines is nearest.
+    """
+
+    at: NDArray[np.int64]
+    distance: Array
+    line: NDArray[np.int64]
+
+    def cover(self, wider: float = 0.0) -> Array:
+        """(P,) share of each pixel that the line covers, or one that is wider on both sides."""
+        return np.clip(0.5 + wider - self.distance, 0.0, 1.0)
+
+
+def rasterize_lines(
+    ends: Array, half_width: Array, reach: float, size: tuple[int, int]
+) -> LinePixels:
+    """The pixels at lines.
+
+    Args:
+        ends: (N, 2, 2) ends of the lines [pixels], short ones.
+        half_width: (N,) [pixels].
+        reach: distance from a line's rim up to which pixels are wanted [pixels].
+        size: width and height of the image [pixels].
+    """
+    steps_per_pixel = 1 << 10  # Resolution of the distances.
+    unreached = np.iinfo(np.int64).max  # Value of pixels that no line reaches.
+    width, height = size
+    nearest = np.full(width * height, unreached)
+    if len(ends):
+        at, distance, line = _pixels_near_lines(ends, half_width + reach, size)
+        past = distance - half_width[line] + float(half_width.max())  # at least 0
+        np.minimum.at(nearest, at, (past * steps_per_pixel).astype(np.int64) * len(ends) + line)
+    at = np.flatnonzero(nearest != unreached)
+    steps, line = np.divmod(nearest[at], max(len(ends), 1))
+    return LinePixels(at, (steps + 0.5) / steps_per_pixel - half_width.max(initial=0.0), line)
+
+
+def _pixels_near_lines(
+    ends: Array, limit: Array, size: tuple[int, int]
+) -> tuple[NDArray[np.int64], Array, NDArray[np.int64]]:
+    """Pixels nearer to each line than its limit: where, how near, and the line's index."""
+    width, height = size
+    center = np.round(ends.mean(axis=1)).astype(np.int64)
+    half = 0.5 * float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
+    around = int(half + float(limit.max()) + 0.5)
+    offset = np.arange(-around, around + 1)
+    # About the lines' middles, where single precision is enough.
+    (ax, ay), (bx, by) = (ends - center[:, None]).astype(np.float32).transpose(1, 2, 0)
+    ex, ey = bx - ax, by - ay
+    square = np.maximum(ex * ex + ey * ey, np.float32(1e-12))
+    x = offset.astype(np.float32) - ax[:, None]
+    y = offset.astype(np.float32) - ay[:, None]
+    along = (x * (ex / square)[:, None])[:, None, :] + (y * (ey / square)[:, None])[:, :, None]
+    np.clip(along, 0.0, 1.0, out=along)
+    dx = x[:, None, :] - along * ex[:, None, None]
+    dy = y[:, :, None] - np.multiply(along, ey[:, None, None], out=along)
+    square_distance = np.multiply(dx, dx, out=dx)
+    square_distance += np.multiply(dy, dy, out=dy)
+    close = square_distance < (limit * limit).astype(np.float32)[:, None, None]
+    columns, rows = center[:, :1] + offset, center[:, 1:] + offset
+    close &= ((columns >= 0) & (columns < width))[:, None, :]
+    close &= ((rows >= 0) & (rows < height))[:, :, None]
+    found = np.flatnonzero(close)
+    line, place = np.divmod(found, len(offset) ** 2)
+    shift = (offset[:, None] * width + offset).ravel()
+    at = (center[:, 1] * width + center[:, 0])[line] + shift[place]
+    return at, np.sqrt(square_distance.ravel()[found]), line

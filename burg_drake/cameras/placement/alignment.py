@@ -1,0 +1,199 @@
+"""Alignment of an object with an image: interface, result, and robust least squares."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.cameras.placement.object_shape import TargetShape
+from burg_drake.cameras.placement.pinhole_view import ImageContour, PinholeView, Window
+from burg_drake.core import Array
+
+
+@dataclass(frozen=True, eq=False)
+class DisplacementFit:
+    """A displacement that measurements agree on.
+
+    Attributes:
+        step: (3,) x, y [m] and angle [rad]; the angle is 0 where it is not fitted.
+        covariance: (3, 3) of it.
+        weights: (N,) of the measurements, in [0, 1]; 0 for outliers.
+        scale: standard deviation of the measurements over what they claim.
+        sensitivity: (3, N) by how much each measurement moves the result.
+    """
+
+    step: Array
+    covariance: Array
+    weights: Array
+    scale: float
+    sensitivity: Array
+
+
+def fit_displacement(
+    along: Array,
+    offset: Array,
+    deviation: Array,
+    groups: NDArray[np.int64],
+    symmetric: bool,
+    unit: Array,
+    nuisance: Array | None = None,
+) -> DisplacementFit | None:
+    """Solves `along @ step + nuisance @ unknown = offset` with Tukey's weights.
+
+    Args:
+        along: (N, 3).
+        offset: (N,) measured.
+        deviation: (N,) standard deviations of `offset`.
+        groups: (N,) number of the neighbourhood that a measurement belongs to. The covariance is
+            the sandwich of clustered errors [White 1980; Liang and Zeger 1986]: errors may be alike
+            within a neighbourhood.
+        symmetric: leave the angle out.
+        unit: (3,) typical sizes of the step's parts, against bad scaling.
+        nuisance: (N, M) what other unknowns, of mean 0 and standard deviation 1, add to `offset`.
+
+    Returns:
+        None if the measurements do not determine the step.
+    """
+    used = [0, 1] if symmetric else [0, 1, 2]
+    extra = np.empty((len(offset), 0)) if nuisance is None else nuisance
+    A = np.hstack([(along * unit)[:, used], extra]) / deviation[:, None]
+    b = offset / deviation
+    prior = np.diag([0.0] * len(used) + [1.0] * extra.shape[1])
+    solved = _solve_robustly(A, b, prior, len(used))
+    if solved is None:
+        return None
+    x, weights, scale = solved
+    bread = np.linalg.inv((A * weights[:, None]).T @ A + prior)
+    scores = A * (weights * (b - A @ x))[:, None]
+    _, group = np.unique(groups, return_inverse=True)
+    sums = np.zeros((group.max() + 1, A.shape[1]))
+    np.add.at(sums, group, scores)
+    few = len(sums) / max(len(sums) - len(used), 1)
+    covariance = few * bread @ sums.T @ sums @ bread + bread
+    n, unit = len(used), unit[used]
+    step, spread, gain = np.zeros(3), np.zeros((3, 3)), np.zeros((3, len(b)))
+    step[used] = x[:n] * unit
+    spread[np.ix_(used, used)] = covariance[:n, :n] * np.outer(unit, unit)
+    gain[used] = unit[:, None] * (bread @ (A * weights[:, None]).T)[:n] / deviation
+    return DisplacementFit(step, spread, weights, scale, gain)
+
+
+def _solve_robustly(A: Array, b: Array, prior: Array, n: int) -> tuple[Array, Array, float] | None:
+    """Solution, weights and scale of `A x = b`; None where its first `n` are not determined."""
+    mad_to_sd = 1.4826  # Standard deviation over median absolute deviation of normal errors.
+    max_rounds = 12  # Rounds of reweighting.
+    if len(b) < 4 * n:
+        return None
+    x: Array = np.zeros(A.shape[1])
+    scale = max(mad_to_sd * float(np.median(np.abs(b))), 1.0)
+    weights: Array = np.ones(len(b))
+    for _ in range(max_rounds):
+        weights = _tukey_weights((b - A @ x) / scale)
+        if weights.sum() < 4 * n:
+            return None
+        normal = (A * weights[:, None]).T @ A + prior
+        values = np.linalg.eigvalsh(normal[:n, :n])
+        if values[0] <= 1e-6 * values[-1]:
+            return None
+        x = np.asarray(np.linalg.solve(normal, (A * weights[:, None]).T @ b), dtype=float)
+        near = (b - A @ x)[weights > 0.0]
+        scale = max(min(scale, mad_to_sd * float(np.median(np.abs(near)))), 0.3)
+    return x, weights, scale
+
+
+def _tukey_weights(residual: Array) -> Array:
+    tukey_limit = 4.685  # Standard deviations; 95 % efficiency on normal errors.
+    r = residual / tukey_limit
+    return np.where(np.abs(r) < 1.0, (1.0 - r**2) ** 2, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Alignment:
+    """An object that was aligned.
+
+    Attributes:
+        q: (3,) displacement, see `TargetShape.displacement`.
+        covariance: (3, 3) of `q`, but for the camera's error.
+        camera: (3, 6) by how much `q` changes with the camera's error, as in `BoardEstimate`.
+        agreement: share of what should be seen that the result agrees with.
+        coverage: share of all that was looked at that agrees, also of what cannot tell.
+        residual: root mean square that is left of what agrees; pixels, or metres for depth.
+        measurements: number of those that agree.
+        ambiguous: another place fits almost as well.
+        turnable: turns from here that fit as well [rad]; see `rotation_ambiguity`.
+    """
+
+    q: Array
+    covariance: Array
+    camera: Array
+    agreement: float
+    coverage: float
+    residual: float
+    measurements: int
+    ambiguous: bool = False
+    turnable: tuple[float, ...] = ()
+
+    def spread(self, camera: Array) -> Array:
+        """(3, 3) covariance of `q` with the camera's error.
+
+        Args:
+            camera: (6, 6) covariance of the camera's pose; NaN where it is not known.
+        """
+        known = np.where(np.isfinite(camera), camera, 0.0)
+        return self.covariance + self.camera @ known @ self.camera.T
+
+
+class Aligner(Protocol):
+    """Aligns an object with an image."""
+
+    view: PinholeView
+    evidence: Array
+    smear: float
+    """How far evidence reaches beyond what stands there [pixels]."""
+    residual_floor: float
+    """Residuals below this tell nothing about which of two alignments is better."""
+    convincing_rating: float
+    """Rating of a place near the target's angle at which no other is tried; at most 3, or 4
+    with colors."""
+    required_gain: float
+    """By how much a place far from the target's angle must be rated higher."""
+    clearly: float
+    """By how much a place must be rated higher than any other to be sure."""
+    strict: bool
+    """What stands beside the object speaks against a place."""
+    sees_colors: bool
+    """The image has colors."""
+    rough: float
+    """Root mean square that the alignment of the right object does not leave."""
+
+    def align(
+        self, shape: TargetShape, q: Array, others: Array, *, far: bool = True, turn: bool = True
+    ) -> Alignment | None:
+        """Aligns an object; None if the image does not determine where it is."""
+
+    def likeness(self, shape: TargetShape, q: Array, others: Array) -> float:
+        """How well the colors of a displaced object agree, from 0 to 1; 0 for an image without,
+        0.5 for an object without."""
+
+    def misfit(
+        self, shape: TargetShape, q: Array, others: Array, window: Window
+    ) -> tuple[float, float]:
+        """What disagrees with an object at a displacement, and its silhouette [raster pixels]."""
+
+
+def are_different_places(a: Alignment, b: Alignment) -> bool:
+    """Whether two alignments mean different places."""
+    # Metres and radians within which two alignments mean the same place.
+    same_place = (0.003, np.deg2rad(5.0))
+    turn = (a.q[2] - b.q[2] + np.pi) % (2.0 * np.pi) - np.pi
+    return bool(np.hypot(*(a.q - b.q)[:2]) > same_place[0] or abs(turn) > same_place[1])
+
+
+def outline_sectors(contour: ImageContour) -> NDArray[np.int64]:
+    """(N,) number of the neighbourhood around the outline that each point belongs to."""
+    sector_count = 36  # Neighbouring points of a sector may have correlated errors.
+    x, y = (contour.pixels - contour.pixels.mean(axis=0)).T if len(contour) else np.empty((2, 0))
+    return np.floor(np.arctan2(y, x) / (2.0 * np.pi) * sector_count).astype(np.int64)

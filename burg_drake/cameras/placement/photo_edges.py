@@ -1,0 +1,347 @@
+"""Find an object's edge in a photo along the normals of its expected outline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from burg_drake.cameras.placement.board_background import EmptyBoard
+from burg_drake.cameras.placement.pinhole_view import ImageContour, sample_nearest
+from burg_drake.core import Array
+
+TONE_WEIGHTS = (np.diag([1.0, 0.5, 0.5]) @ np.linalg.qr(np.ones((3, 1)), "complete")[0].T).astype(
+    np.float32
+)
+"""(3, 3) RGB to brightness and two tones; tones count half, as JPEG blurs them more."""
+
+
+@dataclass(frozen=True, eq=False)
+class StepLines:
+    """Lines across steps.
+
+    Attributes:
+        t: (T,) distances from the expected step, outwards [pixels].
+        light: (N, T, 3) of the photo.
+        behind: (N, T, 3) what is behind the object in the light from farther outside.
+        color: (N, 3) of the object, farther in.
+        tone: (N, 3) of the object at its edge, expected, over that.
+        strip: (N,) where, from the step, another material begins [pixels]; -infinity where none
+            does.
+        used: (N, T) samples that count.
+    """
+
+    t: Array
+    light: Array
+    behind: Array
+    color: Array
+    tone: Array
+    strip: Array
+    used: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """Steps that were fitted.
+
+    Attributes:
+        offset: (N,) where they are [pixels].
+        variance: (N,) of that.
+        rms: (N,) root mean square of what is left of the light.
+        contrast: (N,) of both sides.
+        color: (N, 3) of the object at its edge.
+    """
+
+    offset: Array
+    variance: Array
+    rms: Array
+    contrast: Array
+    color: Array
+
+
+def fit_steps(lines: StepLines, blur: float, noise: float, paper: float) -> Steps:
+    """Fits all lines by Gauss and Newton.
+
+    Args:
+        lines: the lines.
+        blur: of the photo and of sampling [pixels].
+        noise: of the photo over paper.
+        paper: light of paper.
+    """
+    # Pixels from the outline between which the light outside is linear.
+    knot_distances = (0.0, 1.0, 2.0, 4.0)
+    # Relative change of the light between knots; shadows begin at the object.
+    change_sds = (0.6, 0.35, 0.12)
+    max_offset = 2.5  # Pixels of a step from its expected place.
+    gauss_newton_steps = 4  # Iterations.
+    t = lines.t
+    knots = np.stack(
+        [np.interp(t, knot_distances, row) for row in np.eye(len(knot_distances))[:-1]], axis=1
+    )
+    rise = np.diff(np.eye(len(knot_distances)), axis=0)[:, :-1] / np.array(change_sds)[:, None]
+    strip = np.isfinite(lines.strip)
+    n = len(knot_distances) + 6
+    at, outer, edge, inner = (
+        0,
+        slice(1, len(knot_distances)),
+        slice(len(knot_distances), n - 3),
+        slice(n - 3, n),
+    )
+    prior = np.zeros((len(lines.color), n, n))
+    prior[:, at, at] = 0.1
+    prior[:, outer, outer] = rise.T @ rise
+    # the edge's color keeps to the inner one's, or may be quite another
+    tie = _tone_prior(lines.color * lines.tone, strip, paper)
+    prior[:, edge, edge] = tie
+    prior[:, inner, inner] = _tone_prior(lines.color, np.zeros_like(strip), paper) + tie
+    prior[:, edge, inner] = prior[:, inner, edge] = -tie
+    sigma = noise * np.sqrt(0.3 + np.maximum(lines.light.mean(axis=-1), 0.0) / paper)
+    weight = np.broadcast_to((lines.used / sigma)[..., None], lines.light.shape).astype(np.float32)
+    x = np.zeros((len(lines.color), n))
+    count = 3 * lines.used.sum(axis=1) + 1e-9
+    for _ in range(gauss_newton_steps):
+        away = (x[:, :1] - t) / blur
+        covered = ndtr(away)[..., None]
+        slope = (np.exp(-0.5 * away**2) / np.sqrt(2.0 * np.pi) / blur)[..., None]
+        beyond = away + np.where(strip, lines.strip, -1e3)[:, None] / blur
+        deep = np.where(strip[:, None], ndtr(beyond), 0.0)[..., None]
+        fall = np.exp(-0.5 * beyond**2)[..., None] / np.sqrt(2.0 * np.pi) / blur
+        lit = lines.behind * np.maximum(1.0 + x[:, outer] @ knots.T, 0.0)[..., None]
+        first = (lines.color * lines.tone + x[:, edge])[:, None]
+        second = (lines.color + x[:, inner])[:, None]
+        left = lines.light - lit - covered * (first - lit) - deep * (second - first)
+        J = np.zeros((*left.shape, n), np.float32)
+        J[..., at] = slope * (first - lit) + fall * (second - first)
+        J[..., outer] = ((1.0 - covered) * lines.behind)[..., None] * knots[:, None]
+        for channel in range(3):
+            J[..., channel, edge.start + channel] = (covered - deep)[..., 0]
+            J[..., channel, inner.start + channel] = deep[..., 0]
+        J = (TONE_WEIGHTS @ J * weight[..., None]).reshape(len(x), -1, n)
+        e = (left @ TONE_WEIGHTS.T * weight).reshape(len(x), -1).astype(np.float32)
+        # what is rough on a line says less
+        rough = np.maximum((e**2).sum(axis=1) / count, 1.0)[:, None, None]
+        normal = J.transpose(0, 2, 1) @ J / rough + prior
+        pull = (J.transpose(0, 2, 1) @ e[..., None] / rough - prior @ x[..., None])[..., 0]
+        x = x + np.linalg.solve(normal, pull[..., None])[..., 0]
+        x[:, at] = np.clip(x[:, at], -max_offset, max_offset)
+        x[:, outer] = np.clip(x[:, outer], -0.95, 1.0)
+    # neighbouring samples share pixels, hence 2
+    variance = 2.0 * np.linalg.inv(normal)[:, at, at]
+    rms = np.sqrt((lines.used[..., None] * left**2).sum(axis=(1, 2)) / count)
+    here = int(np.argmin(np.abs(t)))
+    contrast = np.linalg.norm(first[:, 0] - lit[:, here], axis=1) / np.sqrt(3.0)
+    return Steps(x[:, at], variance, rms, contrast, first[:, 0])
+
+
+def _tone_prior(color: Array, strip: NDArray[np.bool_], paper: float) -> Array:
+    """(N, 3, 3) inverse covariance of colors (N, 3), which vary by their brightness more than by
+    their tone."""
+    surface_sds = (0.15, 0.03)  # Relative brightness and tone of the object at its edge ...
+    strip_sds = (0.8, 0.15)  # ... and of a strip of another material.
+    bright, tone = np.where(strip[:, None], strip_sds, surface_sds).T
+    length = np.linalg.norm(color, axis=1)
+    along = color / np.maximum(length, 1e-6)[:, None]
+    of_tone = (tone * paper) ** -2.0
+    of_bright = (bright * length + tone * paper) ** -2.0
+    outer = along[:, :, None] * along[:, None]
+    inverse: Array = of_tone[:, None, None] * np.eye(3)
+    return np.asarray(inverse + (of_bright - of_tone)[:, None, None] * outer)
+
+
+PROFILE_STEP_PX = 0.5
+"""Distance of samples on a normal, in pixels."""
+MIN_EDGE_CONTRAST = 0.05
+"""Contrast of an edge, at least, as a fraction of that of paper and ink."""
+FINE_SEARCH_PX = 5.0
+"""Pixels on both sides of an outline that the fine search covers."""
+
+
+@dataclass(frozen=True, eq=False)
+class PhotoEdges:
+    """Edges of a photo on the normals of an outline.
+
+    Attributes:
+        offset: (N,) where they are, outwards from the outline [pixels].
+        deviation: (N,) their standard deviations [pixels].
+        shading: (N,) how far inwards it is measured, per share by which the object is darker at its
+            very edge than beside it, as round objects are [pixels].
+        found: (N,) there is one.
+        expected: (N,) there should be one: nothing else is in the way, and what is inside the
+            outline looks different from what is outside.
+    """
+
+    offset: Array
+    deviation: Array
+    shading: Array
+    found: NDArray[np.bool_]
+    expected: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class NormalProfiles:
+    """What is on the normals of an outline.
+
+    Attributes:
+        t: (T,) distances from the outline [pixels].
+        light: (N, T, 3) the photo, linear.
+        board: (N, T, 3) the board without objects and shadows.
+        evidence: (N, T) of something that stands there.
+        known: (N, T) `board` can be relied on.
+        covered: (N, T) the object covers it.
+        strip: (N,) where the surface that begins at the outline ends inwards: at a bend, another
+            material, or a part that it hides [pixels]; -infinity if it does not.
+        tone: (N, 3) its reflectance over that of what begins there.
+        occluded: (N, T) another object covers it.
+    """
+
+    t: Array
+    light: Array
+    board: Array
+    evidence: Array
+    known: NDArray[np.bool_]
+    covered: NDArray[np.bool_]
+    strip: Array
+    tone: Array
+    occluded: NDArray[np.bool_]
+
+
+def sample_normal_profiles(
+    contour: ImageContour,
+    light: NDArray[np.float32],
+    picture: EmptyBoard,
+    others: Array,
+    reach: float,
+) -> NormalProfiles:
+    """Samples a photo on the normals of an outline.
+
+    Args:
+        contour: the outline.
+        light: (H, W, 3) of the photo, linear.
+        picture: of the empty board.
+        others: (H, W) depth of other objects, infinity where there is none.
+        reach: to both sides [pixels].
+    """
+    t = np.arange(-reach, reach + PROFILE_STEP_PX / 2, PROFILE_STEP_PX)
+    points = contour.points(t)
+    at = points.astype(np.float32)
+
+    def sampled(values: NDArray[np.float32]) -> Array:
+        found = cv2.remap(
+            values, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+        )
+        return np.asarray(found).reshape(len(contour), len(t), *values.shape[2:])
+
+    other = np.isfinite(sample_nearest(others, points, np.inf))
+    known = (sample_nearest(picture.sheet, points, 0.0) > 0.0) & ~other
+    return NormalProfiles(
+        t,
+        sampled(light),
+        sampled(picture.color),
+        sampled(picture.evidence.astype(np.float32)),
+        known,
+        *contour.inside(points, t),
+        other,
+    )
+
+
+def find_far_edges(on: NormalProfiles, picture: EmptyBoard) -> PhotoEdges:
+    """The best place on each line for a step from the object to the background: by the evidence on
+    the sheet, by colors beyond it."""
+    t, reach = on.t, float(on.t[-1])
+    far_in, far_out = np.asarray(t < -reach / 2), np.asarray(t > reach / 2)
+    usable: NDArray[np.bool_] = np.asarray((on.covered & far_in).any(axis=1))
+    usable &= ~(on.occluded & (t > -1.0)).any(axis=1)
+    tolerance = 2.0 * MIN_EDGE_CONTRAST * picture.contrast
+    inner = _mean_of_samples(on.light, on.covered & far_in)
+    outer = _mean_of_samples(on.light, np.broadcast_to(far_out, on.covered.shape))
+    off_object = np.minimum(np.linalg.norm(on.light - inner[:, None], axis=-1) / tolerance, 1.0)
+    off_outer = np.minimum(np.linalg.norm(on.light - outer[:, None], axis=-1) / tolerance, 1.0)
+    inside = np.where(on.known, np.maximum(-on.evidence, 0.0), off_object**2)
+    outside = np.where(on.known, np.maximum(on.evidence, 0.0), off_outer**2)
+    cost = np.cumsum(inside, axis=1) + (outside.sum(axis=1)[:, None] - np.cumsum(outside, axis=1))
+    best = cost.argmin(axis=1)
+    ends = np.minimum(cost[:, 0], cost[:, -1])
+    gain = ends - cost.min(axis=1)
+    found = usable & (best > 0) & (best < len(t) - 1) & (gain > 2.0)
+    even = np.zeros(len(best))
+    return PhotoEdges(t[best] + PROFILE_STEP_PX / 2, even + 1.0, even, found, usable)
+
+
+def find_near_edges(on: NormalProfiles, picture: EmptyBoard) -> PhotoEdges:
+    """Edges near to the outline, by least squares: a blurred step between two explained sides.
+
+    Outside is the board B(t) in a light g(t) that may change, most next to the object, whose shadow
+    begins there; inside is the object's color F. With the blurred step s the photo is
+    g B + s(offset - t) (F - g B). Where F is grey as well, a shadow's edge looks like the object's,
+    and the offset's standard deviation says so, as g is solved for with it. An outline that has the
+    board on both sides is a shadow's, and no edge.
+    """
+    pixel_blur = 0.4  # Pixels. Standard deviation from pixel area and interpolation.
+    clear_sigmas = 1.75  # Blur standard deviations from an edge at which it is no longer seen.
+    inner_width = 0.6  # Pixels over which the object's colour is sampled; many objects have a rim.
+    model_sd = 0.08  # Pixels at the contrast of paper and ink; grows as the contrast falls.
+    outer_width = 3.0  # Pixels over which the light outside is sampled.
+    max_rms_share = 0.2  # Residual of a good edge, as a fraction of the contrast of paper and ink.
+    strip_depth = 2.5  # Pixels. Thickest strip of another material along an outline.
+    max_board_evidence = -0.4  # Evidence inside the outline below which the board is seen there.
+    max_edge_sd = 1.5  # Pixels. Edges with a larger standard deviation are dropped.
+    t = on.t
+    blur = float(np.hypot(picture.blur, pixel_blur))
+    clear = max(clear_sigmas * blur, 0.9)
+    core = on.covered & np.roll(on.covered, round(clear / PROFILE_STEP_PX), axis=1)
+    strip = np.where(on.strip > -clear - inner_width - strip_depth, on.strip, -np.inf)
+    # the object's color, from beyond a strip of another material if there is one
+    start = -clear + np.where(np.isfinite(strip), strip, 0.0)[:, None]
+    inner = core & (t <= start) & (t >= start - inner_width)
+    outer = (
+        np.broadcast_to((t >= clear) & (t <= clear + outer_width), on.covered.shape) & ~on.covered
+    )
+    usable = inner.any(axis=1) & outer.any(axis=1) & ~(on.covered & (t > 0.7)).any(axis=1)
+    mixed = (on.occluded & (t > 0.0)).any(axis=1) & ~(on.occluded | (t < 0.0)).all(axis=1)
+    usable &= ~mixed & ~(on.occluded & (t < 0.0) & (t > -2.0) & ~on.covered).any(axis=1)
+    color = _mean_of_samples(on.light, inner)
+    behind, left_outside = _background_light(on, outer)
+    used = (core | (t > -1.0)) & (t > start - inner_width) & (t < clear + outer_width)
+    paper = picture.contrast
+    seen = used.any(axis=0)
+    lines = StepLines(
+        t[seen], on.light[:, seen], behind[:, seen], color, on.tone, strip, used[:, seen]
+    )
+    fit = fit_steps(lines, blur, picture.noise, paper)
+    variance = fit.variance + (model_sd * paper / np.maximum(fit.contrast, 1e-4)) ** 2
+    known: NDArray[np.bool_] = np.asarray(np.all(on.known[:, t >= 0.0], axis=1))
+    board_inside = known & (
+        _mean_of_samples(on.evidence[..., None], inner)[:, 0] < max_board_evidence
+    )
+    explained = ~known | (left_outside < max_rms_share * paper)
+    expected = usable & (explained | board_inside) & (variance < max_edge_sd**2)
+    expected &= fit.contrast > MIN_EDGE_CONTRAST * paper
+    found = (
+        expected & (np.abs(fit.offset) < 2.4) & ~board_inside & (fit.rms < max_rms_share * paper)
+    )
+    across = fit.color - behind[:, t == 0.0].mean(axis=1)
+    shading = (fit.color * across).sum(axis=1) / np.maximum((across**2).sum(axis=1), 1e-4)
+    return PhotoEdges(fit.offset, np.sqrt(variance), shading, found, expected)
+
+
+def _background_light(on: NormalProfiles, outer: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """(N, T, 3) what is behind the object, and (N,) root mean square of what
+    that leaves outside. Where the board is not known, it is the mean of what is outside.
+    """
+    known: NDArray[np.bool_] = np.asarray(np.all(on.known[:, on.t >= 0.0], axis=1))
+    B = np.where(outer[..., None], on.board, 0.0)
+    level = (B * on.light).sum(axis=(1, 2)) / ((B * B).sum(axis=(1, 2)) + 1e-9)
+    model = on.board * level[:, None, None]
+    left = (((on.light - model) ** 2).mean(axis=-1) * outer).sum(axis=1)
+    mean = np.broadcast_to(_mean_of_samples(on.light, outer)[:, None], model.shape)
+    model = np.where(known[:, None, None], model, mean)
+    return model, np.sqrt(left / np.maximum(outer.sum(axis=1), 1))
+
+
+def _mean_of_samples(values: Array, where: NDArray[np.bool_]) -> Array:
+    """(N, C) mean of (N, T, C) at some samples (N, T) of each line; 0 where there is none."""
+    count = np.maximum(where.sum(axis=1), 1)
+    return (values * where[..., None]).sum(axis=1) / count[:, None]

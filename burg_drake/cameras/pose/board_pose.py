@@ -1,0 +1,420 @@
+"""Estimate the pose of a camera over a board from one image."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.cameras.pose.board_estimate import BoardEstimate
+from burg_drake.cameras.pose.coarse_pose import CoarsePose, estimate_coarse_pose
+from burg_drake.cameras.pose.edge_measurement import marker_edges
+from burg_drake.cameras.pose.edge_refinement import EdgeRefinement, EdgeRound, RefinedPose
+from burg_drake.cameras.pose.marker_detection import (
+    MIN_FOREIGN_MARKERS,
+    Detection,
+    MarkerDetector,
+    find_foreign_markers,
+)
+from burg_drake.cameras.pose.sheet_deviations import (
+    MIN_SCALE_DEVIATION,
+    implausible_reason,
+    print_doubt,
+    scale_by_depth,
+    scale_by_height,
+    wrong_marker_size,
+)
+from burg_drake.cameras.pose.wrong_board import WrongBoardCheck
+from burg_drake.core import Array, InvalidInputError, rotation_angle, srgb_to_linear
+from burg_drake.scene import Board
+
+
+class BoardPose:
+    """Estimates poses of one camera over one board.
+
+    Holds tables that take some milliseconds to make; keep it for images that follow each other.
+
+    Args:
+        board: the board.
+        intrinsics: of the camera.
+        scale: size of the print against the document along x and y, if it was measured. The origin
+            of S stays in the corner of the sheet.
+    """
+
+    def __init__(
+        self, board: Board, intrinsics: Intrinsics, scale: tuple[float, float] = (1.0, 1.0)
+    ) -> None:
+        if min(scale) <= 0.0:
+            raise InvalidInputError(f"scale {list(scale)} of a print must be positive")
+        self.board = board
+        self.intrinsics = intrinsics
+        self.scale = scale
+        self._layout = board.layout
+        self._p_SQ = self._layout.p_SQ * [*scale, 1.0]
+        self._detector = MarkerDetector(self._layout)
+        self._edges = marker_edges(self._layout, scale)
+        self._refinement = EdgeRefinement(self._edges, self._p_SQ, intrinsics)
+        self._other_board = WrongBoardCheck(board, intrinsics, scale)
+
+    def estimate(
+        self,
+        image: NDArray[np.uint8],
+        *,
+        depth: NDArray[np.floating[Any]] | None = None,
+        X_SC_known: Array | None = None,
+    ) -> BoardEstimate:
+        """Estimates the pose.
+
+        Args:
+            image: (H, W), RGB (H, W, 3) or RGBA (H, W, 4).
+            depth: (H, W) depth image of the same camera [m], to measure the print's size.
+            X_SC_known: (4, 4) where the camera is known to be, for the same purpose.
+
+        Raises:
+            InvalidInputError: not an image, or one of another size than the intrinsics.
+        """
+        grey = grey_image(image)
+        self.intrinsics.require_size(grey.shape[1], grey.shape[0], "the image")
+        if depth is not None and np.shape(depth) != grey.shape:
+            raise InvalidInputError(
+                f"the depth image has shape {np.shape(depth)}, but the image {grey.shape}; give"
+                " images of the same camera"
+            )
+        try:
+            return self._estimate_coarse_to_fine(grey, _untinted_light(image), depth, X_SC_known)
+        except (np.linalg.LinAlgError, cv2.error):  # a degenerate view, such as one line of edges
+            return BoardEstimate(reason="the visible part of the board does not determine a pose")
+
+    def _estimate_coarse_to_fine(
+        self,
+        grey: NDArray[np.uint8],
+        light: NDArray[np.float32],
+        depth: NDArray[np.floating[Any]] | None,
+        X_SC_known: Array | None,
+    ) -> BoardEstimate:
+        """Finds markers, and from them the pose."""
+        seen = self._detector.detect(grey)
+        if len(seen.twice) >= MIN_FOREIGN_MARKERS:
+            return BoardEstimate(
+                reason=_two_copies_reason(f"{len(seen.twice)} markers appear twice")
+            )
+        if not len(seen.index):
+            reason = self._mirrored_reason(grey, seen) or self._no_markers_reason(grey, seen)
+            return BoardEstimate(reason=reason)
+        coarse = estimate_coarse_pose(self._p_SQ[seen.index], seen.corners, self.intrinsics)
+        wrong = self._copy_reason(seen, coarse) or self._other_board_reason(seen, coarse)
+        if wrong:
+            return BoardEstimate(reason=self._mirrored_reason(grey, seen) or wrong)
+        found = seen.index[coarse.inliers]
+        refined, wrong = self._refine(light, coarse.X_SC, found, seen.corners[coarse.inliers])
+        if refined is None:
+            return BoardEstimate(reason=self._mirrored_reason(grey, seen) or wrong)
+        wrong = self._wrong_print_reason(refined)
+        if wrong:
+            return BoardEstimate(reason=wrong)
+        return self._estimate(grey, light, refined, depth, X_SC_known)
+
+    def _refine(
+        self,
+        light: NDArray[np.float32],
+        poses: list[Array],
+        found: NDArray[np.intp],
+        corners: Array,
+    ) -> tuple[RefinedPose | None, str]:
+        """The pose that fits the edges best, or why there is none."""
+        # Radians. Poses that differ by less are merged with a larger covariance.
+        max_joint_turn = 0.03
+        min_edge_share = 0.3  # Fraction of the read markers' edges that must be seen.
+        max_same_turn = 0.01  # Radians. Poses that differ by less are the same.
+        max_position_sd = 0.05  # Fraction of the camera's distance from the board.
+        attempts = [self._refinement.refine(light, X_SC, found, corners) for X_SC in poses]
+        rounds = sorted((r for r in attempts if r is not None), key=lambda r: self._off(r, found))
+        if not rounds:
+            return (
+                None,
+                "the edges of the markers are not clear enough; improve focus, contrast or light",
+            )
+        best = self._refinement.with_disturbance(light, rounds[0])
+        turn = _rotation_angle(rounds[0], rounds[1]) if len(rounds) > 1 else 0.0
+        if turn > max_same_turn and not self._decided(rounds[0], rounds[1], found):
+            if turn > max_joint_turn:
+                return None, (
+                    f"{_format_marker_count(len(found))} in sight: two poses fit equally well; move closer or"
+                    " show more of the board"
+                )
+            best = replace(best, covariance=_joint_covariance(best, rounds[1]))
+        known = np.sqrt(np.linalg.eigvalsh(best.covariance[3:, 3:])[-1])
+        if known > max_position_sd * np.linalg.norm(
+            best.X_SC[:3, 3] - self._p_SQ[found].mean(axis=(0, 1))
+        ):
+            return None, (
+                f"{_format_marker_count(len(found))} in sight: the position of the camera is only known to"
+                f" {1e3 * known:.0f} mm; move closer or show more of the board"
+            )
+        own = np.isin(self._edges.marker[best.views.which], found)
+        if (best.weight[own] > 0.0).mean() < min_edge_share:
+            return None, "the cells of the markers do not match their corners: is it another board?"
+        return best, ""
+
+    def _decided(self, best: EdgeRound, second: EdgeRound, found: NDArray[np.intp]) -> bool:
+        """Whether the edges of the markers that were read are clearly nearer to where the first
+        pose puts them than to where the second one does."""
+        # For one marker. Wrong poses fitted up to 0.6 worse in 92 test images.
+        min_error_ratio = 0.7
+        return self._off(second, found) > (1.0 + min_error_ratio / len(found)) * self._off(
+            best, found
+        )
+
+    def _off(self, last: EdgeRound, found: NDArray[np.intp]) -> float:
+        """How far the edges of the markers that were read are off, the median [pixels]."""
+        own = np.isin(self._edges.marker[last.views.which], found)
+        return float(np.median(np.abs(last.residual[own])))
+
+    def _estimate(
+        self,
+        grey: NDArray[np.uint8],
+        light: NDArray[np.float32],
+        refined: RefinedPose,
+        depth: NDArray[np.floating[Any]] | None,
+        X_SC_known: Array | None,
+    ) -> BoardEstimate:
+        """What to tell about a pose."""
+        wrong = self._other_board.beyond(grey, light, refined.X_SC)
+        if wrong:
+            return BoardEstimate(reason=wrong)
+        used, corners, error = self._seen_corners(refined)
+        p_SQ = self._p_SQ[used]
+        scale = float("nan")
+        if depth is not None:
+            scale = scale_by_depth(p_SQ, self.intrinsics, refined.X_SC, depth)
+        if X_SC_known is not None:
+            scale = scale_by_height(refined.X_SC, X_SC_known)
+        if abs(scale - 1.0) > MIN_SCALE_DEVIATION:
+            return BoardEstimate(reason=_scale_doubt(scale), scale=scale)
+        blank = self._other_board.blank(light, refined.X_SC, used) if len(used) else ""
+        return BoardEstimate(
+            X_SC=refined.X_SC,
+            valid=True,
+            reason=blank or print_doubt(refined.disturbance) or _residual_doubt(error),
+            reprojection_error=error,
+            covariance=refined.covariance,
+            ids=tuple(int(i) for i in self._layout.ids[used]),
+            corners=corners,
+            scale=scale,
+        )
+
+    def _seen_corners(self, refined: RefinedPose) -> tuple[NDArray[np.intp], Array, float]:
+        """Markers that were used, their corners (N, 4, 2) as their edges put them, and how far that
+        is from where the pose puts them, root mean square [pixels]."""
+        min_edges = 6  # Visible edges of a marker that counts as used.
+        marker = self._edges.marker[refined.views.which]
+        weight = refined.weight / refined.sd**2
+        normal = refined.views.across / np.linalg.norm(refined.views.across, axis=1, keepdims=True)
+        count = np.bincount(marker[refined.weight > 0.0], minlength=len(self._p_SQ))
+        outer = weight[:, None, None] * normal[:, :, None] * normal[:, None]
+        total = np.zeros((len(self._p_SQ), 2, 2))
+        np.add.at(total, marker, outer)
+        toward = np.zeros((len(self._p_SQ), 2))
+        np.add.at(toward, marker, (weight * refined.residual)[:, None] * normal)
+        used = np.flatnonzero((count >= min_edges) & (np.linalg.cond(total) < 1e3))
+        shift = np.linalg.solve(total[used], toward[used][..., None])[..., 0]
+        p_C = (self._p_SQ[used] - refined.X_SC[:3, 3]) @ refined.X_SC[:3, :3]
+        error = float(np.sqrt((shift**2).sum(axis=1).mean())) if len(used) else float("nan")
+        return used, self.intrinsics.project(p_C) + shift[:, None], error
+
+    def _no_markers_reason(self, grey: NDArray[np.uint8], seen: Detection) -> str:
+        """Why no marker of the board was found."""
+        layout = self._layout
+        other = find_foreign_markers(grey, layout) if seen.candidates else None
+        if other is None:
+            return "no marker of the board in sight"
+        start = f"another board: {_format_marker_count(len(other.ids))} of {other.dictionary}"
+        if other.dictionary == layout.dictionary:
+            listed = ", ".join(map(str, other.ids[:3])) + (" ..." if len(other.ids) > 3 else "")
+            return (
+                f"{start} with ids {listed} in sight, but this one has {layout.ids[0]} to"
+                f" {layout.ids[-1]}; is first_id right?"
+            )
+        return f"{start} in sight, but this one has {layout.dictionary}"
+
+    def _mirrored_reason(self, grey: NDArray[np.uint8], seen: Detection) -> str:
+        """That more markers can be read in the mirrored image, if so."""
+        min_mirrored = 4  # Markers in the mirrored image; two may be read by chance.
+        if seen.candidates < MIN_FOREIGN_MARKERS:
+            return ""
+        mirrored = self._detector.detect(np.ascontiguousarray(grey[:, ::-1]))
+        if mirrored.count < max(min_mirrored, len(seen.index) + 1):
+            return ""
+        return (
+            f"the image is mirrored: {mirrored.count} markers of the board can be read in the"
+            " flipped image; turn off mirroring in the camera's settings or driver"
+        )
+
+    def _copy_reason(self, seen: Detection, coarse: CoarsePose) -> str:
+        """That markers beside the board stand as on another print of it, or on a board with
+        another first id; empty if none do."""
+        min_copy_markers = 3  # Markers of a second print of the board.
+        rest = ~coarse.inliers
+        if not coarse.X_SC or rest.sum() < min_copy_markers:
+            return ""
+        places, corners = self._p_SQ[seen.index[rest]], seen.corners[rest]
+        copy = estimate_coarse_pose(places, corners, self.intrinsics)
+        if not copy.X_SC or copy.inliers.sum() < min_copy_markers:
+            return ""
+        # Another board's markers would be within this one's grid: two sheets lie side by side.
+        rays = self.intrinsics.rays(corners[copy.inliers].mean(axis=1)) @ coarse.X_SC[0][:3, :3].T
+        at = coarse.X_SC[0][:2, 3] - coarse.X_SC[0][2, 3] * rays[:, :2] / rays[:, 2:]
+        low, high = self._p_SQ.min(axis=(0, 1))[:2], self._p_SQ.max(axis=(0, 1))[:2]
+        if ((at > low) & (at < high)).all(axis=1).any():
+            return ""
+        if self._continue_rows(seen.index[rest][copy.inliers], at):
+            return _misplaced_reason(len(seen.index), int(coarse.inliers.sum()))
+        return _two_copies_reason(
+            f"{_format_marker_count(len(at))} belong to a second print next to it"
+        )
+
+    def _continue_rows(self, index: NDArray[np.intp], at: Array) -> bool:
+        """Whether markers stand where the board's rows would have them if they went on past its
+        columns, as on a board with another first id.
+
+        Args:
+            index: (N,) of the markers.
+            at: (N, 2) where they are on the sheet [m].
+        """
+        max_grid_offset = 0.2  # Marker pitches along both axes.
+        middles = self._p_SQ.mean(axis=1)[:, :2]
+        columns = len(np.unique(np.round(middles[:, 0], 9)))
+        pitch = (self._layout.side + self.board.markers.spacing) * np.array(self.scale)
+        column, row = ((at - middles[0]) / pitch * [1.0, -1.0]).T
+        off = np.abs(column - np.round(column)) + np.abs(row - np.round(row))
+        follows = np.round(row) * columns + np.round(column) == index
+        return bool(follows.all() and off.max() < max_grid_offset)
+
+    def _other_board_reason(self, seen: Detection, coarse: CoarsePose) -> str:
+        """Why the markers that were found are not this board; empty if they are."""
+        scale_limits = 0.05, 1.5  # Fraction and pixels; overexposure shifts sides by a pixel.
+        share, pixels = scale_limits
+        off = abs(coarse.marker_scale - 1.0)
+        if off > share and off * _median_side(seen.corners) / 2.0 > pixels:
+            return self._other_size_reason(coarse.marker_scale)
+        n, fit = len(seen.index), int(coarse.inliers.sum())
+        if not coarse.X_SC or fit < max(1, n / 2) or (n > 1 and fit < 2):
+            return _misplaced_reason(n, fit)
+        return ""
+
+    def _wrong_print_reason(self, refined: RefinedPose) -> str:
+        """Why a print is none of this board; empty if it is."""
+        at = self.intrinsics.project((self._p_SQ - refined.X_SC[:3, 3]) @ refined.X_SC[:3, :3])
+        used = np.unique(self._edges.marker[refined.views.which[refined.weight > 0.0]])
+        marker_scale = wrong_marker_size(refined.disturbance, _median_side(at[used]))
+        if marker_scale != 1.0:
+            return self._other_size_reason(marker_scale)
+        return implausible_reason(refined.disturbance)
+
+    def _other_size_reason(self, marker_scale: float) -> str:
+        markers = self.board.markers
+        return (
+            f"another board: its markers are {marker_scale:.2f} times as large, relative to their"
+            f" spacing, as those of this one (side {1e3 * markers.side:g} mm, spacing"
+            f" {1e3 * markers.spacing:g} mm)"
+        )
+
+
+def estimate_board(
+    image: NDArray[np.uint8],
+    intrinsics: Intrinsics,
+    board: Board,
+    *,
+    depth: NDArray[np.floating[Any]] | None = None,
+    X_SC_known: Array | None = None,
+) -> BoardEstimate:
+    """The pose of a camera over a board, from one image; see `BoardPose.estimate`."""
+    return BoardPose(board, intrinsics).estimate(image, depth=depth, X_SC_known=X_SC_known)
+
+
+def _untinted_light(image: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """(H, W) linear light of the lightest channel: the tints of a height map, which is printed
+    below the markers, look as white in it as paper does."""
+    image = np.asarray(image)
+    if image.ndim == 2:
+        return srgb_to_linear(np.ascontiguousarray(image))
+    red, green, blue = cv2.split(image[..., :3])
+    return srgb_to_linear(cv2.max(red, cv2.max(green, blue)))
+
+
+def grey_image(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """(H, W) brightness of an image (H, W), RGB (H, W, 3) or RGBA (H, W, 4).
+
+    Raises:
+        InvalidInputError: it is of another shape or type.
+    """
+    image = np.asarray(image)
+    if image.dtype != np.uint8 or image.ndim not in (2, 3):
+        raise InvalidInputError(
+            f"the image has shape {image.shape} and type {image.dtype}; expected (H, W), (H, W, 3)"
+            " or (H, W, 4) uint8"
+        )
+    if image.ndim == 2:
+        return np.ascontiguousarray(image)
+    codes = {3: cv2.COLOR_RGB2GRAY, 4: cv2.COLOR_RGBA2GRAY}
+    if image.shape[2] not in codes:
+        raise InvalidInputError(f"the image has {image.shape[2]} channels; expected 3 or 4")
+    return np.asarray(cv2.cvtColor(np.ascontiguousarray(image), codes[image.shape[2]]))
+
+
+def _median_side(corners: Array) -> float:
+    """Median length of the sides of markers (N, 4, 2) [pixels]."""
+    return float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
+
+
+def _rotation_angle(one: EdgeRound, other: EdgeRound) -> float:
+    """Angle between two poses [rad]."""
+    return float(rotation_angle(one.X_SC[:3, :3].T @ other.X_SC[:3, :3]))
+
+
+def _joint_covariance(one: RefinedPose, other: EdgeRound) -> Array:
+    """(6, 6) covariance of a pose if another one is as likely."""
+    turn = Rotation.from_matrix(other.X_SC[:3, :3] @ one.X_SC[:3, :3].T).as_rotvec()
+    apart = np.r_[turn, other.X_SC[:3, 3] - one.X_SC[:3, 3]]
+    return np.asarray(one.covariance + np.outer(apart, apart))
+
+
+def _scale_doubt(scale: float) -> str:
+    """What is wrong with a print of another size: distances by it are false by as much."""
+    return (
+        f"the board is printed at {scale:.3g} of its size: print it at 100 %, or give the measured"
+        " lengths of its rulers"
+    )
+
+
+def _residual_doubt(error: float) -> str:
+    """What is doubtful about residuals; empty if nothing is."""
+    max_residual = 0.3  # Pixels. With more, intrinsics are wrong or the board is not flat.
+    if error > max_residual:
+        return (
+            f"markers are off by {error:.1f} pixels on average: check the intrinsics, and that the"
+            " board is flat"
+        )
+    return ""
+
+
+def _misplaced_reason(count: int, fit: int) -> str:
+    """That markers stand as another board has them."""
+    return (
+        f"another board: only {fit} of {_format_marker_count(count)} in sight are where this one has them;"
+        " are columns, rows and first_id right?"
+    )
+
+
+def _two_copies_reason(seen: str) -> str:
+    """Why no pose is given: nothing tells on which of the sheets the objects belong."""
+    return f"two copies of this board in sight: {seen}; remove or cover one of them"
+
+
+def _format_marker_count(count: int) -> str:
+    return "1 marker" if count == 1 else f"{count} markers"

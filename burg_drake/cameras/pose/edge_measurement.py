@@ -1,0 +1,393 @@
+"""Edges of a board's markers: on the sheet, projected into an image, and measured there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.core import Array
+from burg_drake.scene import MarkerLayout
+
+NEIGHBOUR_EDGES = 2
+"""Edges before and behind an edge that its surroundings include."""
+NEIGHBOUR_OFFSETS = np.arange(-NEIGHBOUR_EDGES, NEIGHBOUR_EDGES + 1)
+"""Cells from an edge to the edges in its surroundings."""
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerEdges:
+    """Edges of all markers of a board, in an order of which every beginning is spread over all.
+
+    Coordinates around an edge, in cells from its middle: u across the edge, along S's x (`axis` 0)
+    or y (`axis` 1), and v along the edge, along the other of the two.
+
+    Attributes:
+        p_SE: (N, 3) middles of the edges [m].
+        axis: (N,) 0 if u runs along x, 1 if along y.
+        steps: (N, 3, 2 REACH + 1) change of color at u = -REACH ... REACH: 1 from black to white,
+            -1 from white to black, 0 none, in the rows of cells around v = -1, 0, 1.
+        marker: (N,) which of the layout's markers each belongs to.
+        from_center: (N, 3) from the middle of its marker [m].
+        cell: (2,) size of a cell along x and y [m].
+    """
+
+    p_SE: Array
+    axis: NDArray[np.intp]
+    steps: NDArray[np.float32]
+    marker: NDArray[np.intp]
+    from_center: Array
+    cell: Array
+
+
+def marker_edges(layout: MarkerLayout, scale: tuple[float, float] = (1.0, 1.0)) -> MarkerEdges:
+    """The edges of a board's markers.
+
+    Args:
+        layout: the markers.
+        scale: size of the print against the document, along x and y, from S's origin.
+    """
+    parts = [_edges_along_axis(layout, axis) for axis in (0, 1)]
+    p_SE, steps, marker = (np.concatenate(part) for part in zip(*parts, strict=True))
+    axis = np.repeat([0, 1], [len(part[0]) for part in parts])
+    # Shuffled within each marker, then one edge of every marker after the other.
+    chance = np.random.default_rng(0).permutation(len(marker))
+    by_marker = np.lexsort((chance, marker))
+    rank = np.empty(len(marker), dtype=np.intp)
+    first = np.searchsorted(marker[by_marker], marker[by_marker])
+    rank[by_marker] = np.arange(len(marker)) - first
+    order = np.lexsort((marker, rank))
+    cell = np.array(scale) * layout.side / layout.cells
+    printed = [*scale, 1.0]
+    from_center = (p_SE - layout.p_SQ.mean(axis=1)[marker]) * printed
+    p_SE = p_SE * printed
+    steps = steps[order].astype(np.float32)
+    return MarkerEdges(p_SE[order], axis[order], steps, marker[order], from_center[order], cell)
+
+
+def _edges_along_axis(layout: MarkerLayout, axis: int) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Middles, steps and markers of the edges across one axis."""
+    pad = NEIGHBOUR_EDGES + 2
+    white = np.pad(~layout.black, ((0, 0), (pad, pad), (pad, pad)), constant_values=True)
+    # Rows from the bottom, so that both indices rise with x and y; then u is the last index.
+    grid = white[:, ::-1].astype(float)
+    if axis == 1:
+        grid = grid.transpose(0, 2, 1)
+    step = np.diff(grid, axis=2)  # step[:, v, u] lies between the cells u and u + 1
+    marker, v, u = np.nonzero(step)
+    rows = [
+        step[marker[:, None], v[:, None] + row, u[:, None] + NEIGHBOUR_OFFSETS]
+        for row in (-1, 0, 1)
+    ]
+    across, along = u + 1.0 - pad, v + 0.5 - pad
+    x, y = (across, along) if axis == 0 else (along, across)
+    lower_left = layout.p_SQ[marker, 3]
+    cell = layout.side / layout.cells
+    return lower_left + cell * np.column_stack([x, y, 0.0 * x]), np.stack(rows, axis=1), marker
+
+
+EDGE_MARGIN_PX = 8
+"""Distance of edges from the image's border, in pixels."""
+MIN_VISIBLE_DEPTH = 1e-3
+"""Metres before the camera from which on points are visible."""
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeViews:
+    """Edges as a camera sees them, by a pose.
+
+    Attributes:
+        which: (N,) indices into the table of edges.
+        at: (N, 2) middles in the image [pixels].
+        across, along: (N, 2) gradients of u and v in the image [cells per pixel].
+        motion: (N, 6) how far an edge moves along `across` [pixels] with a small rotation [rad] and
+            translation [m] of the camera, both in S as in `BoardEstimate.covariance`.
+        print: (N, 2) the same if the print is longer along y by a share and shorter by it along x,
+            about S's origin; and if its markers are larger by a share, each about its middle
+            [pixels].
+        bloom: (N,) the same if light spreads, so that white grows by a pixel on all sides: 1 or -1.
+    """
+
+    which: NDArray[np.intp]
+    at: Array
+    across: Array
+    along: Array
+    motion: Array
+    print: Array
+    bloom: Array
+
+
+def project_edges(
+    edges: MarkerEdges,
+    which: NDArray[np.intp],
+    intrinsics: Intrinsics,
+    X_SC: Array,
+    bloom: float = 0.0,
+) -> EdgeViews:
+    """Projects edges, and leaves out those that are not in the image.
+
+    Args:
+        edges: table.
+        which: of them, as indices.
+        intrinsics: of the camera.
+        X_SC: (4, 4) pose.
+        bloom: by which white is larger on all sides [pixels].
+    """
+    R_SC = X_SC[:3, :3]
+    q_S = edges.p_SE[which] - X_SC[:3, 3]
+    p_CE = q_S @ R_SC
+    keep = p_CE[:, 2] > MIN_VISIBLE_DEPTH
+    if not keep.all():
+        which, q_S, p_CE = which[keep], q_S[keep], p_CE[keep]
+    at, by_C = project_with_derivatives(intrinsics, p_CE)
+    margin = EDGE_MARGIN_PX + abs(bloom)
+    limit = np.array([intrinsics.width, intrinsics.height]) - 1 - margin
+    keep = np.asarray(((at > margin) & (at < limit)).all(axis=1))
+    if not keep.all():
+        which, q_S, at, by_C = which[keep], q_S[keep], at[keep], by_C[keep]
+    by_S = by_C @ R_SC.T  # pixels per metre
+    across, along = _cell_gradients(edges, which, by_S)
+    normal = across / np.sqrt((across**2).sum(axis=1, keepdims=True))
+    g = np.einsum("ni,nij->nj", normal, by_S)
+    # p_CE = R_SC^T (p_SE - p_SC): a rotation w and translation d give R_SC^T (q x w - d).
+    motion = np.hstack([cross_product(g, q_S), -g])
+    aspect = g[:, 1] * edges.p_SE[which, 1] - g[:, 0] * edges.p_SE[which, 0]
+    growth = (g * edges.from_center[which]).sum(axis=1)
+    toward_black = -edges.steps[which, 1, NEIGHBOUR_EDGES].astype(float)
+    return EdgeViews(
+        which,
+        at + bloom * toward_black[:, None] * normal,
+        across,
+        along,
+        motion,
+        np.column_stack([aspect, growth]),
+        toward_black,
+    )
+
+
+def project_with_motion(intrinsics: Intrinsics, X_SC: Array, p_S: Array) -> tuple[Array, Array]:
+    """Image points (N, 2) of points (N, 3), and (N, 2, 6) how they move with a small rotation and
+    translation of the camera, as in `BoardEstimate.covariance`. Points behind it are anywhere."""
+    q_S = p_S - X_SC[:3, 3]
+    p_C = q_S @ X_SC[:3, :3]
+    ahead = p_C[:, 2:] > MIN_VISIBLE_DEPTH
+    at, by_C = project_with_derivatives(intrinsics, np.where(ahead, p_C, [0.0, 0.0, 1.0]))
+    by_S = by_C @ X_SC[:3, :3].T
+    return at, np.concatenate([cross_product(by_S, q_S[:, None]), -by_S], axis=2)
+
+
+def predict_pixels(
+    p_SQ: Array, intrinsics: Intrinsics, X_SC: Array, covariance: Array
+) -> tuple[Array, Array]:
+    """Places (..., 2) in the image of points (..., 3) [pixels], and their variance (...) along the
+    larger axis [pixels^2]: infinite for points behind the camera."""
+    p_S = p_SQ.reshape(-1, 3)
+    ahead = (p_S - X_SC[:3, 3]) @ X_SC[:3, 2] > MIN_VISIBLE_DEPTH
+    at, motion = project_with_motion(intrinsics, X_SC, p_S)
+    spread = motion @ covariance @ motion.transpose(0, 2, 1)
+    variance = np.where(ahead, np.linalg.eigvalsh(spread)[:, -1], np.inf)
+    return at.reshape(*p_SQ.shape[:-1], 2), variance.reshape(p_SQ.shape[:-1])
+
+
+def perturbed_pose(X_SC: Array, step: Array, p_SA: Array | None = None) -> Array:
+    """A pose after a small rotation and translation (6,), see `BoardEstimate.covariance`.
+
+    Args:
+        X_SC: (4, 4) pose.
+        step: (6,) rotation [rad] and translation [m].
+        p_SA: (3,) point about which the rotation turns the camera, shifted before; the camera
+            itself if None. To first order it makes no difference; a point in the middle of what is
+            seen makes longer steps hold.
+    """
+    R = Rotation.from_rotvec(step[:3]).as_matrix()
+    X = np.eye(4)
+    X[:3, :3] = R @ X_SC[:3, :3]
+    if p_SA is None:
+        X[:3, 3] = X_SC[:3, 3] + step[3:]
+    else:
+        arm = X_SC[:3, 3] - p_SA
+        X[:3, 3] = p_SA + R @ (arm + step[3:] - np.cross(step[:3], arm))
+    return X
+
+
+def project_with_derivatives(intrinsics: Intrinsics, p_CQ: Array) -> tuple[Array, Array]:
+    """Image points (N, 2) and their derivatives (N, 2, 3) by the points in the camera's frame."""
+    step = 1e-4  # Finite difference for the derivatives of the distortion.
+    x = p_CQ[:, :2] / p_CQ[:, 2:]
+    by_C = np.zeros((len(x), 2, 3))
+    by_C[:, 0, 0] = by_C[:, 1, 1] = 1.0 / p_CQ[:, 2]
+    by_C[:, :, 2] = -x / p_CQ[:, 2:]
+    if intrinsics.is_pinhole:
+        focal = np.array(intrinsics.focal)
+        return x * focal + intrinsics.center, by_C * focal[:, None]
+    points = np.ones((3, len(x), 3))
+    points[:, :, :2] = x
+    points[1, :, 0] += step
+    points[2, :, 1] += step
+    at, right, down = intrinsics.project(points)
+    return at, np.stack([right - at, down - at], axis=2) / step @ by_C
+
+
+def cross_product(a: Array, b: Array) -> Array:
+    """Vector products (..., 3), as `numpy.cross` in a third of its time for few vectors."""
+    (ax, ay, az), (bx, by, bz) = np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0)
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+
+
+def _cell_gradients(
+    edges: MarkerEdges, which: NDArray[np.intp], by_S: Array
+) -> tuple[Array, Array]:
+    """Gradients of u and v [cells per pixel]: the inverse of the sheet's affine map to pixels."""
+    cell = by_S[:, :, :2] * edges.cell
+    det = cell[:, 0, 0] * cell[:, 1, 1] - cell[:, 0, 1] * cell[:, 1, 0]
+    x = np.column_stack([cell[:, 1, 1], -cell[:, 0, 1]]) / det[:, None]
+    y = np.column_stack([-cell[:, 1, 0], cell[:, 0, 0]]) / det[:, None]
+    is_x = (edges.axis[which] == 0)[:, None]
+    return np.where(is_x, x, y), np.where(is_x, y, x)
+
+
+WINDOW_OFFSETS_PX = np.arange(-3, 4)
+"""Pixels across an edge that are fitted; every second of twice as many in blurred images."""
+
+MAX_EDGE_OFFSET_PX = 1.5
+"""Largest offset of an edge that a fit measures reliably, in pixels."""
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeFits:
+    """Where edges were found.
+
+    Attributes:
+        offset: (N,) from the predicted place, along the gradient of u [pixels].
+        contrast: (N,) white minus black [linear light]; negative if colors are the wrong
+            way round.
+        information: (N,) inverse variance of the offset for noise that equals the contrast
+            [1/pixels^2].
+        noise: (N,) root mean square of what the fit leaves [linear light].
+        widening: (N, 2) numerator and denominator of the increase of the blur's variance across the
+            edge that would fit it better [pixels^2].
+    """
+
+    offset: Array
+    contrast: Array
+    information: Array
+    noise: Array
+    widening: Array
+
+
+def fit_edges(
+    light: NDArray[np.float32], edges: MarkerEdges, views: EdgeViews, blur: Array
+) -> EdgeFits:
+    """Fits brightness, contrast and offset of each edge.
+
+    Args:
+        light: (H, W) image in linear light.
+        edges: table.
+        views: N of them.
+        blur: covariance of lens, motion and pixel together [pixels^2], (2, 2) of all edges or
+            (N, 2, 2) of each.
+    """
+    blurred_variance = 1.2  # Square pixels; from there on the window is twice as wide.
+    wide_cell = 2.2  # Pixels. Larger cells keep what is two cells away out of the window.
+    sigma_u, sigma_v = (_blur_width(blur, gradient) for gradient in (views.across, views.along))
+    normal = np.sqrt((views.across**2).sum(axis=1, keepdims=True))
+    sigma = sigma_u / normal  # across the edge [pixels]
+    in_row = (np.abs(views.across[:, 0]) >= np.abs(views.across[:, 1]))[:, None]
+    nearest = np.rint(views.at).astype(np.intp)
+    window = np.where(sigma**2 < blurred_variance, WINDOW_OFFSETS_PX, 2 * WINDOW_OFFSETS_PX)
+    columns = nearest[:, :1] + np.where(in_row, window, 0)
+    rows = nearest[:, 1:] + np.where(in_row, 0, window)
+    dx, dy = columns - views.at[:, :1], rows - views.at[:, 1:]
+    # Half the memory and time of doubles, and 1e-5 pixels at worst.
+    u = (views.across[:, :1] * dx + views.across[:, 1:] * dy).astype(np.float32)
+    v = (views.along[:, :1] * dx + views.along[:, 1:] * dy).astype(np.float32)
+
+    before, behind = (
+        _normal_cdf_and_density((-0.5 - v) / sigma_v)[0],
+        _normal_cdf_and_density((v - 0.5) / sigma_v)[0],
+    )
+    share = np.stack([before, 1.0 - before - behind, behind], axis=-1)  # of the rows of cells
+    wide = bool((normal * wide_cell < 1.0).all() and (sigma**2 < blurred_variance).all())
+    reach = 1 if wide else NEIGHBOUR_EDGES
+    near = slice(NEIGHBOUR_EDGES - reach, NEIGHBOUR_EDGES + reach + 1)
+    steps = share @ edges.steps[views.which][:, :, near]
+    z = (u[..., None] - NEIGHBOUR_OFFSETS[near].astype(np.float32)) / sigma_u[..., None]
+    below, density = _normal_cdf_and_density(z)
+    bell = steps * density
+    shape = np.einsum("nwk,nwk->nw", steps, below)
+    slope = bell.sum(axis=-1) / sigma  # derivatives by the distance in pixels
+    bend = np.einsum("nwk,nwk->nw", bell, z) / -(sigma**2)
+    return _fit_profiles(light[rows, columns].astype(float), shape, slope, bend)
+
+
+def has_expected_profile(fits: EdgeFits) -> NDArray[np.bool_]:
+    """Edges with the right colors, enough contrast, and a profile that fits."""
+    min_contrast_share = 0.25  # Fraction of the upper quartile of all edges.
+    max_residual_share = 0.15  # Fraction of the contrast, besides the image's noise.
+    right = fits.contrast > 0.0
+    if not right.any():
+        return right
+    usual = np.quantile(fits.contrast[right], 0.75)
+    noise = np.median(fits.noise[right])
+    return np.asarray(
+        (fits.contrast > min_contrast_share * usual)
+        & (fits.noise < max_residual_share * fits.contrast + 2.0 * noise)
+        & (np.abs(fits.offset) < MAX_EDGE_OFFSET_PX)
+        & (fits.contrast**2 * fits.information > 4.0 * fits.noise**2)
+    )
+
+
+def offset_variance(fits: EdgeFits, good: NDArray[np.bool_]) -> Array:
+    """(N,) variance of offsets by the image's noise [pixels^2]: light is noisy by its root."""
+    contrast = np.maximum(np.abs(fits.contrast), 4e-6)
+    noise = np.median(fits.noise[good] / np.sqrt(contrast[good]))
+    return np.asarray(noise**2 / (contrast * np.maximum(fits.information, 1e-6)))
+
+
+def _blur_width(blur: Array, gradient: Array) -> NDArray[np.float32]:
+    """(N, 1) standard deviation of a blur along gradients (N, 2), in their units."""
+    variance = ((gradient[:, None] @ blur)[:, 0] * gradient).sum(axis=1, keepdims=True)
+    return np.asarray(np.sqrt(variance), dtype=np.float32)
+
+
+def _fit_profiles(values: Array, shape: Array, slope: Array, bend: Array) -> EdgeFits:
+    """Least squares of `values = brightness + contrast (shape - offset slope)`, edge by edge."""
+    min_contrast = 4e-4  # Linear light; keeps the division finite.
+    parts = np.stack([values, shape, slope, bend])
+    values, shape, slope, bend = parts - parts.mean(axis=2, keepdims=True)
+    aa, ab, bb = _dot_rows(shape, shape), _dot_rows(shape, slope), _dot_rows(slope, slope)
+    va, vb = _dot_rows(values, shape), _dot_rows(values, slope)
+    det = np.maximum(aa * bb - ab**2, 1e-12)
+    contrast = (va * bb - vb * ab) / det
+    tilt = (vb * aa - va * ab) / det
+    rest = values - contrast[:, None] * shape - tilt[:, None] * slope
+    half_bend = 0.5 * contrast[:, None] * bend  # a Gaussian's derivative by its variance
+    return EdgeFits(
+        offset=-tilt / np.where(np.abs(contrast) < min_contrast, min_contrast, contrast),
+        contrast=contrast,
+        information=det / np.maximum(aa, 1e-12),
+        noise=np.sqrt(_dot_rows(rest, rest) / (len(WINDOW_OFFSETS_PX) - 3)),
+        widening=np.stack([_dot_rows(rest, half_bend), _dot_rows(half_bend, half_bend)], axis=1),
+    )
+
+
+def _dot_rows(one: Array, other: Array) -> Array:
+    """Scalar products (N,) of rows."""
+    return np.asarray(np.einsum("nw,nw->n", one, other))
+
+
+def _normal_cdf_and_density(z: NDArray[np.floating[Any]]) -> tuple[Array, Array]:
+    """The normal distribution and its density, the former within 1e-7 (Abramowitz and Stegun,
+    Handbook of Mathematical Functions, 1964, 26.2.17): a third of the time of the exact one."""
+    density = np.exp(-0.5 * z * z) * (1.0 / np.sqrt(2.0 * np.pi))
+    t = 1.0 / (1.0 + 0.2316419 * np.abs(z))
+    tail = 1.330274429 * t
+    for coefficient in (-1.821255978, 1.781477937, -0.356563782, 0.319381530):
+        tail += coefficient
+        tail *= t
+    tail *= density
+    return np.where(z > 0.0, 1.0 - tail, tail), density

@@ -1,0 +1,458 @@
+"""Refine a pose with thousands of edges of all markers instead of four corners each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.cameras.pose.edge_measurement import (
+    EDGE_MARGIN_PX,
+    MAX_EDGE_OFFSET_PX,
+    EdgeFits,
+    EdgeViews,
+    MarkerEdges,
+    fit_edges,
+    has_expected_profile,
+    offset_variance,
+    perturbed_pose,
+    predict_pixels,
+    project_edges,
+)
+from burg_drake.cameras.pose.sheet_deviations import (
+    Disturbance,
+    DisturbanceFit,
+    MarkerShifts,
+    SheetModes,
+    residuals_within_markers,
+)
+from burg_drake.core import Array
+
+INITIAL_BLURS = np.array(
+    [variance * np.eye(2) for variance in (0.1, 0.5, 2.5)]
+    + [[[0.4 + 4.0 * c * c, 4.0 * c * s], [4.0 * c * s, 0.4 + 4.0 * s * s]]
+       for c, s in ((1.0, 0.0), (0.7071, 0.7071), (0.0, 1.0), (0.7071, -0.7071))]
+)  # fmt: skip
+"""Initial covariances of the blur in square pixels: sharp, and motion of 7 pixels."""
+
+
+class EdgeRefinementSettings:
+    """Edge refinement settings."""
+
+    first_edges = 160  # Edges of the first rounds, in which the pose is coarse.
+    unread_edges = 320  # Edges of markers that were not read.
+    last_edges = 800  # Edges of the last rounds.
+    min_motion = 0.05  # Pixels, root mean square. Smaller motions of edges end the rounds.
+    max_full_rounds = 3  # Rounds with all edges.
+    long_motion = 0.3  # Pixels. A first step that moves an edge farther is repeated.
+    unread_share = 0.25  # Unread over read markers above which unread ones are added.
+    model_sd = 0.01  # Pixels. Error of an offset in images without noise.
+    weight_rounds = 3  # Rounds of robust weights in a step.
+    min_edges = 24  # Edges of a refined pose.
+    unused_share = 0.05  # Fraction of read markers above which misplaced markers are searched.
+    marker_rounds = 2  # Rounds of that search.
+
+
+@dataclass(frozen=True, eq=False)
+class LightSpread:
+    """How light spreads in an image.
+
+    Attributes:
+        blur: (2, 2) covariance of lens, motion and pixel together [pixels^2].
+        bloom: by which white is larger on all sides than the print has it: overexposure, another
+            encoding of the levels than sRGB, ink that is short [pixels].
+    """
+
+    blur: Array
+    bloom: float = 0.0
+
+    @property
+    def variance(self) -> float:
+        """Mean of both directions [pixels^2]."""
+        return float(np.trace(self.blur)) / 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeRound:
+    """What a round of looking for edges found.
+
+    Attributes:
+        X_SC: (4, 4).
+        covariance: (6, 6), see `BoardEstimate`.
+        views, fits: edges as seen by the pose before the round, and where they were found.
+        weight: (N,) of each edge, 0 to 1; 0 for what does not belong.
+        residual: (N,) of each edge [pixels].
+        sd: (N,) expected standard deviation of each edge's offset [pixels].
+        spread: of the light.
+        moved: edges by the round, root mean square [pixels].
+    """
+
+    X_SC: Array
+    covariance: Array
+    views: EdgeViews
+    fits: EdgeFits
+    weight: Array
+    residual: Array
+    sd: Array
+    spread: LightSpread
+    moved: float
+
+
+@dataclass(frozen=True, eq=False)
+class RefinedPose(EdgeRound):
+    """A pose by edges, and what each is off from there: the last round's, less what else moves the
+    markers.
+
+    Attributes:
+        disturbance: what else that is.
+    """
+
+    disturbance: Disturbance
+
+
+class EdgeRefinement:
+    """Refines poses over one board with one camera."""
+
+    def __init__(self, edges: MarkerEdges, p_SQ: Array, intrinsics: Intrinsics) -> None:
+        """Takes the table of edges, the markers' corners (N, 4, 3), and the camera."""
+        self._edges = edges
+        self._corners = p_SQ
+        self._intrinsics = intrinsics
+        self._modes = SheetModes(p_SQ, edges.p_SE)
+
+    def refine(
+        self,
+        light: NDArray[np.float32],
+        X_SC: Array,
+        markers: NDArray[np.intp],
+        corners: Array,
+    ) -> EdgeRound | None:
+        """Refines a pose.
+
+        Args:
+            light: (H, W) image in linear light.
+            X_SC: (4, 4) pose that puts the edges of `markers` within about a pixel.
+            markers: those that were found, as indices of the layout's.
+            corners: (N, 4, 2) of them in the image [pixels].
+
+        Returns:
+            The last round; None if too few edges look as they should.
+        """
+        read = np.zeros(len(self._corners), dtype=bool)
+        read[markers] = True
+        found = np.flatnonzero(read[self._edges.marker])
+        spread = self._first_spread(light, X_SC, found[: EdgeRefinementSettings.first_edges])
+        result = self._iterate(light, X_SC, found[: EdgeRefinementSettings.first_edges], spread)
+        if (
+            result
+            and np.abs(result.fits.offset - result.residual).max()
+            > EdgeRefinementSettings.long_motion
+        ):
+            result = self._iterate(
+                light, result.X_SC, found[: EdgeRefinementSettings.first_edges], result.spread
+            )
+        others = self._missed_markers(result, read) if result else read
+        if result and others.sum() > EdgeRefinementSettings.unread_share * read.sum():
+            unread = np.flatnonzero(others[self._edges.marker])
+            which = np.concatenate(
+                [
+                    found[: EdgeRefinementSettings.first_edges],
+                    unread[: EdgeRefinementSettings.unread_edges],
+                ]
+            )
+            result = self._iterate(light, result.X_SC, which, result.spread)
+            found = found if result is None else self._seen(result, found)
+        for _ in range(EdgeRefinementSettings.max_full_rounds):
+            result = result and self._iterate(
+                light, result.X_SC, found[: EdgeRefinementSettings.last_edges], result.spread
+            )
+            if result is None or result.moved < EdgeRefinementSettings.min_motion:
+                break
+        if result is None:
+            return None
+        shift = np.zeros((len(self._corners), 2))
+        p_C = (self._corners[markers] - result.X_SC[:3, 3]) @ result.X_SC[:3, :3]
+        shift[markers] = (corners - self._intrinsics.project(p_C)).mean(axis=1)
+        if self._beside(result, shift) > max(
+            2.0, EdgeRefinementSettings.unused_share * len(markers)
+        ):
+            for _ in range(EdgeRefinementSettings.marker_rounds):
+                result, shift = self._iterate_by_marker(
+                    light, result, found[: EdgeRefinementSettings.last_edges], shift
+                )
+        return result
+
+    def _beside(self, result: EdgeRound, shift: Array) -> int:
+        """Markers of which most edges are not where the pose puts them, nor the corners that were
+        read: edges of small or half hidden markers are unclear without being elsewhere."""
+        min_shift = 1.0  # Pixels. Half of the edges of a marker shifted so far lose their profile.
+        marker, n = self._edges.marker[result.views.which], len(self._corners)
+        used = np.bincount(marker, weights=result.weight > 0.0, minlength=n)
+        unused = used < 0.5 * np.bincount(marker, minlength=n)
+        return int((unused & (np.linalg.norm(shift, axis=1) > min_shift)).sum())
+
+    def _iterate_by_marker(
+        self,
+        light: NDArray[np.float32],
+        last: EdgeRound,
+        which: NDArray[np.intp],
+        shift: Array,
+        step: bool = True,
+    ) -> tuple[EdgeRound, Array]:
+        """A round that looks for the edges of each marker beside its place, and weighs them by how
+        they fit to each other in the marker, not to the pose: pages that are glued beside their
+        places would drop out otherwise.
+
+        Args:
+            light: (H, W) image in linear light.
+            last: round.
+            which: edges, as indices.
+            shift: (M, 2) of each marker from where the pose puts it [pixels].
+            step: the pose moves to where it fits all markers best.
+
+        Returns:
+            The round, or the last one if too few edges are left, and the shifts from its pose.
+        """
+        max_shift = EDGE_MARGIN_PX / 2.0  # Pixels. The fit across an edge stays within the image.
+        views = project_edges(self._edges, which, self._intrinsics, last.X_SC, last.spread.bloom)
+        marker = self._edges.marker[views.which]
+        normal = views.across / np.sqrt((views.across**2).sum(axis=1, keepdims=True))
+        shift = np.clip(shift, -max_shift, max_shift)
+        looked_at = replace(views, at=views.at + shift[marker])
+        fits = fit_edges(light, self._edges, looked_at, last.spread.blur)
+        good = has_expected_profile(fits)
+        if good.sum() < EdgeRefinementSettings.min_edges:
+            return last, shift
+        sd = np.sqrt(offset_variance(fits, good) + EdgeRefinementSettings.model_sd**2)
+        weight = good.astype(float)
+        for _ in range(EdgeRefinementSettings.weight_rounds):
+            information = weight / sd**2
+            rest = (
+                residuals_within_markers(normal, views.print, fits.offset, information, marker) / sd
+            )
+            weight = good * _tukey_weight(rest, good)
+        offset = fits.offset + (normal * shift[marker]).sum(axis=1)
+        J = np.column_stack([views.motion, views.bloom])
+        motion = np.zeros(7)
+        if step:
+            motion = _weighted_step(J / sd[:, None], offset / sd, weight)
+        middle = self._edges.p_SE[views.which].mean(axis=0)
+        changed = {
+            "X_SC": perturbed_pose(last.X_SC, motion[:6], middle),
+            "views": views,
+            "fits": fits,
+            "weight": weight,
+            "residual": offset - J @ motion,
+            "sd": sd,
+        }
+        found = replace(last, **changed)
+        return found, self._shifts_by_marker(found, found.residual)
+
+    def _shifts_by_marker(self, found: EdgeRound, offset: Array) -> Array:
+        """(M, 2) shifts of markers by the offsets (N,) of their edges [pixels]; 0 for markers
+        without edges."""
+        views = found.views
+        normal = views.across / np.sqrt((views.across**2).sum(axis=1, keepdims=True))
+        marker = self._edges.marker[views.which]
+        information = found.weight / found.sd**2
+        G, g = np.zeros((len(self._corners), 2, 2)), np.zeros((len(self._corners), 2))
+        np.add.at(G, marker, information[:, None, None] * normal[:, :, None] * normal[:, None])
+        np.add.at(g, marker, (information * offset)[:, None] * normal)
+        G += np.eye(2) / MAX_EDGE_OFFSET_PX**2
+        return np.asarray(np.linalg.solve(G, g[..., None])[..., 0])
+
+    def with_disturbance(self, light: NDArray[np.float32], last: EdgeRound) -> RefinedPose:
+        """The pose of the last round if markers may be shifted."""
+        found = self._disturbance(last)
+        if replace(found.shifts, size=0.0) != MarkerShifts():
+            # Weights by how edges fit the pose leave out those that shifts move most, so that
+            # shifts look smaller than they are.
+            last = self._fit_shifted(light, last, found)
+            found = self._disturbance(last)
+            good = has_expected_profile(last.fits)
+            last = replace(last, weight=good * _tukey_weight(found.rest / last.sd, good))
+            found = self._disturbance(last)
+        X_SC = perturbed_pose(last.X_SC, found.step)
+        covariance = found.covariance.copy()
+        covariance[:3, :3] += self._shift_by_blur(last)
+        covariance[3:, 3:] += found.mean_square_aspect * self._unknown_size(X_SC[:3, 3])
+        changed = {
+            "X_SC": X_SC,
+            "covariance": covariance,
+            "residual": last.residual - last.views.motion @ found.step,
+        }
+        return RefinedPose(**(vars(last) | changed), disturbance=found)
+
+    def _fit_shifted(
+        self, light: NDArray[np.float32], last: EdgeRound, found: Disturbance
+    ) -> EdgeRound:
+        """A round that looks for the edges where shifts put their markers."""
+        rest = last.residual - last.views.motion @ found.step
+        there = replace(last, X_SC=perturbed_pose(last.X_SC, found.step), residual=rest)
+        shift = self._shifts_by_marker(there, rest)
+        return self._iterate_by_marker(light, there, last.views.which, shift, step=False)[0]
+
+    def _disturbance(self, last: EdgeRound) -> Disturbance:
+        return DisturbanceFit(
+            last.views,
+            last.residual,
+            last.weight / last.sd**2,
+            self._edges.marker[last.views.which],
+            self._modes,
+            self._intrinsics.height,
+        ).fit(_bloom_prior(), self._intrinsics.known_to or 0.0)
+
+    def _unknown_size(self, p_SC: Array) -> Array:
+        """(3, 3) covariance of the camera's position over a print that is longer along one axis by
+        as much as its length: which of both axes is right, the image does not say, nor to which
+        part of the sheet S belongs."""
+        middle = np.r_[self._modes.middle, 0.0]
+        arm = p_SC - middle
+        return np.asarray(0.25 * (np.outer(arm, arm) + np.diag(middle**2)))
+
+    def _shift_by_blur(self, last: EdgeRound) -> Array:
+        """(3, 3) covariance of the rotation that a blur makes which is not alike on both sides."""
+        sharp_variance = 0.5  # Square pixels of lens and pixel in a sharp image.
+        # Shift by motion or defocus, as a fraction of the blur's standard deviation.
+        asymmetry = 0.04
+        sideways = last.X_SC[:3, :2] / self._intrinsics.focal  # rotation of a pixel
+        beyond = max(last.spread.variance - sharp_variance, 0.0)
+        return np.asarray(asymmetry**2 * beyond * sideways @ sideways.T)
+
+    def _first_spread(
+        self, light: NDArray[np.float32], X_SC: Array, which: NDArray[np.intp]
+    ) -> LightSpread:
+        """The blur with which edges are most like what they should be."""
+        tried = np.tile(
+            which[: EdgeRefinementSettings.first_edges // len(INITIAL_BLURS)], len(INITIAL_BLURS)
+        )
+        views = project_edges(self._edges, tried, self._intrinsics, X_SC)
+        if len(views.which) == 0:
+            return LightSpread(INITIAL_BLURS[0])
+        blurs = np.repeat(INITIAL_BLURS, len(views.which) // len(INITIAL_BLURS), axis=0)
+        unlike = fit_edges(light, self._edges, views, blurs).noise.reshape(len(INITIAL_BLURS), -1)
+        return LightSpread(INITIAL_BLURS[int(np.argmin(np.median(unlike, axis=1)))])
+
+    def _missed_markers(self, result: EdgeRound, read: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(N,) other markers that the image may show, whose place the pose tells well enough."""
+        max_prediction_sd = 0.5  # Pixels.
+        at, variance = predict_pixels(
+            self._corners, self._intrinsics, result.X_SC, result.covariance
+        )
+        size = [self._intrinsics.width, self._intrinsics.height]
+        in_image = np.asarray(((at > 0.0) & (at < size)).all(axis=2)).any(axis=1)
+        return np.asarray(~read & in_image & (variance < max_prediction_sd**2).all(axis=1))
+
+    def _seen(self, result: EdgeRound, found: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Edges of the markers of which a part is in sight, and of those that were found."""
+        min_edge_share = 0.2  # Fraction of a marker's edges that must have the expected profile.
+        sure_markers = 3  # With fewer read markers, half of a marker's edges must fit.
+        marker, n = self._edges.marker[result.views.which], len(self._corners)
+        good = np.bincount(marker, weights=result.weight > 0.0, minlength=n)
+        read = np.unique(self._edges.marker[found])
+        share = min_edge_share if len(read) >= sure_markers else 0.5
+        seen = np.asarray(good > share * np.maximum(np.bincount(marker, minlength=n), 1))
+        seen[read] = True
+        return np.flatnonzero(seen[self._edges.marker])
+
+    def _iterate(
+        self, light: NDArray[np.float32], X_SC: Array, which: NDArray[np.intp], spread: LightSpread
+    ) -> EdgeRound | None:
+        max_bloom = 4.0  # Pixels; with more, no cell can be read.
+        views = project_edges(self._edges, which, self._intrinsics, X_SC, spread.bloom)
+        if len(views.which) < EdgeRefinementSettings.min_edges:
+            return None
+        fits = fit_edges(light, self._edges, views, spread.blur)
+        good = has_expected_profile(fits)
+        if good.sum() < EdgeRefinementSettings.min_edges:
+            return None
+        sd = np.sqrt(offset_variance(fits, good) + EdgeRefinementSettings.model_sd**2)
+        J = np.column_stack([views.motion, views.bloom])
+        step, weight = _robust_step(J, fits.offset, sd, good)
+        residual = fits.offset - J @ step
+        blur = _better_blur(spread.blur, views, fits.widening, weight > 0.5)
+        bloom = float(np.clip(spread.bloom + step[6], -max_bloom, max_bloom))
+        spread = LightSpread(blur, bloom)
+        return EdgeRound(
+            perturbed_pose(X_SC, step[:6], self._edges.p_SE[views.which].mean(axis=0)),
+            self._covariance(views, residual, sd, weight) * max(1.0, spread.variance),
+            views,
+            fits,
+            weight,
+            residual,
+            sd,
+            spread,
+            float(np.sqrt(np.average((J @ step) ** 2, weights=weight))),
+        )
+
+    def _covariance(self, views: EdgeViews, residual: Array, sd: Array, weight: Array) -> Array:
+        """Covariance (6, 6) of a step, by the residuals' own scale.
+
+        What the model errs by is alike within a marker, so that it counts once a marker, not once
+        an edge.
+        """
+        marker_sd = 0.006  # Pixels. Part of the error that edges of one marker share.
+        total = weight.sum()
+        markers = np.count_nonzero(np.bincount(self._edges.marker[views.which[weight > 0.0]]))
+        scale = (weight * (residual / sd) ** 2).sum() / max(total - 7.0, 1.0)
+        alike = max(total / max(markers, 1) - 1.0, 0.0) * marker_sd**2
+        J = np.column_stack([views.motion, views.bloom])
+        J = J * np.sqrt(weight / (scale * sd**2 + alike))[:, None]
+        covariance: Array = np.linalg.inv(J.T @ J + _bloom_prior())[:6, :6]
+        return covariance
+
+
+def _bloom_prior() -> Array:
+    """(7, 7) information about a step that is known before."""
+    bloom_sd = 1.0  # Pixels by which white may look larger on all sides.
+    prior = np.zeros((7, 7))
+    prior[6, 6] = 1.0 / bloom_sd**2
+    return prior
+
+
+def _better_blur(blur: Array, views: EdgeViews, widening: Array, good: NDArray[np.bool_]) -> Array:
+    """(2, 2) the blur with which edges fit better; of a change that no edge tells, none."""
+    min_variance = 0.08  # Square pixels.
+    max_variance = 16.0  # Square pixels.
+    n = views.across[good]
+    n = n / np.sqrt((n**2).sum(axis=1, keepdims=True))
+    across, information = widening[good].T
+    A = np.column_stack([n[:, 0] ** 2, 2.0 * n[:, 0] * n[:, 1], n[:, 1] ** 2])
+    normal = (A * information[:, None]).T @ A
+    normal += 1e-3 * max(np.trace(normal), 1e-9) * np.eye(3)
+    x = np.linalg.solve(normal, A.T @ across)
+    root = np.linalg.cholesky(blur)
+    inverse = np.linalg.inv(root)
+    relative = inverse @ np.array([[x[0], x[1]], [x[1], x[2]]]) @ inverse.T
+    share, axes = np.linalg.eigh(relative)
+    better = blur + root @ (axes * np.clip(share, -0.3, 0.5)) @ axes.T @ root.T
+    variance, axes = np.linalg.eigh(better)
+    return np.asarray((axes * np.clip(variance, min_variance, max_variance)) @ axes.T)
+
+
+def _robust_step(
+    motion: Array, offset: Array, sd: Array, good: NDArray[np.bool_]
+) -> tuple[Array, Array]:
+    """Least squares with Tukey's weights: step (7,), pose and bloom, and weights (N,)."""
+    J, e = motion / sd[:, None], offset / sd
+    weight = good.astype(float)
+    step = _weighted_step(J, e, weight)
+    for _ in range(EdgeRefinementSettings.weight_rounds):
+        rest = e - J @ step
+        weight = good * _tukey_weight(rest, good)
+        step = _weighted_step(J, e, weight)
+    return step, weight
+
+
+def _tukey_weight(rest: Array, good: NDArray[np.bool_]) -> Array:
+    """(N,) weights of residuals (N,) by the spread of the good ones."""
+    tukey_limit = 4.685  # 95 % efficiency on normal residuals.
+    scale = 1.4826 * np.median(np.abs(rest[good]))  # of normal residuals
+    return np.asarray(np.maximum(1.0 - (rest / (tukey_limit * scale)) ** 2, 0.0) ** 2)
+
+
+def _weighted_step(J: Array, e: Array, weight: Array) -> Array:
+    weighted = J * weight[:, None]
+    return np.asarray(np.linalg.solve(weighted.T @ J + _bloom_prior(), weighted.T @ e))

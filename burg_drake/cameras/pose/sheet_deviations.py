@@ -1,0 +1,486 @@
+"""Deviations of a printed sheet from its document, and their effect on the pose.
+
+A page may be glued beside its place, the sheet may bulge, the print may be longer along one
+axis, and a camera may move while its rows are exposed. `print_doubt` reports them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.cameras.pose.edge_measurement import MIN_VISIBLE_DEPTH, EdgeViews
+from burg_drake.core import Array
+
+MARKER_SIGMAS_PX = 0.006, 0.02, 0.06, 0.2
+"""Shifts of single markers, for whatever else is not as assumed; standard deviations that are tried
+[pixels]. In images without noise the first one is right."""
+MIN_MODE_VARIANCE = 1e-3
+"""Variance of a pattern, as a fraction of the strongest one's."""
+SHIFT_SIGMAS: dict[str, tuple[float, ...]] = {
+    "rows": (0.8, 4.0),
+    "aspect": (0.01,),
+    "size": (0.01,),
+    "in_plane": (1.5e-4, 6e-4, 2e-3),
+    "out_of_plane": (4e-4, 1.5e-3, 4e-3),
+}
+"""Standard deviations that are tried: rows in pixels, ratios, pages and heights in metres."""
+
+
+@dataclass(frozen=True)
+class MarkerShifts:
+    """Standard deviations of shifts; 0 for those that are not.
+
+    Attributes:
+        alone: of single markers [pixels].
+        in_plane: along the sheet [m].
+        out_of_plane: of the sheet's height [m].
+        rows: while the rows of the image are exposed [pixels].
+        aspect: of the print's length along y for that along x [-].
+        size: of the markers for their distances [-].
+    """
+
+    alone: float = MARKER_SIGMAS_PX[0]
+    in_plane: float = 0.0
+    out_of_plane: float = 0.0
+    rows: float = 0.0
+    aspect: float = 0.0
+    size: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Disturbance:
+    """A step of a pose that allows for shifts of markers.
+
+    Attributes:
+        step: (6,) from the pose at which edges were looked for, see `perturbed_pose`.
+        covariance: (6, 6) of it.
+        shifts: how large they are.
+        in_plane: largest shift along the sheet of a marker that was seen [m]. This, and what
+            follows, is 0 where the residuals tell no such shift beyond chance.
+        out_of_plane: largest height of one [m].
+        rows: by what markers move in the time from the first row of the image to the last one,
+            root mean square [pixels].
+        aspect: how much longer the print is along y than along x [-].
+        size: by how much the markers are larger for their distances [-].
+        mean_square_aspect: of how much longer the print may be along y than along x, by
+            probability, whether told or not [-].
+        rest: (N,) offsets of all edges, less the patterns of the most probable shifts [pixels].
+    """
+
+    step: Array
+    covariance: Array
+    shifts: MarkerShifts
+    in_plane: float
+    out_of_plane: float
+    rows: float
+    aspect: float
+    size: float
+    mean_square_aspect: float
+    rest: Array
+
+
+class SheetModes:
+    """Patterns of shifts of a board's edges, which are independent of each other, and of which the
+    first few make up nearly all.
+
+    The frame S of a sheet with errors is the one that fits all its markers best, so that a pattern
+    neither shifts nor turns the sheet as a whole.
+
+    Attributes:
+        middle: (2,) of the markers [m].
+        in_plane: (N, 2, K) of shifts along x and y, of unit variance.
+        out_of_plane: (N, L) of heights, of unit variance.
+    """
+
+    def __init__(self, p_SQ: Array, p_SE: Array) -> None:
+        """Takes the markers' corners (M, 4, 3) and the edges' middles (N, 3) [m]."""
+        # Metres within which shifts along the sheet are correlated: half an A4 page.
+        page_length = 0.15
+        bulge_length = 0.14  # Metres within which heights are correlated.
+        center = p_SQ.mean(axis=1)
+        n = len(center)
+        self.middle = center[:, :2].mean(axis=0)
+        x, y = (center[:, :2] - self.middle).T
+        one, zero = np.ones(n), np.zeros(n)
+        moved = np.stack([[one, zero], [zero, one], [-y, x]], axis=-1)  # (2, n, 3)
+        alike, between = _correlated_covariance(center, p_SE, page_length)
+        along_both = np.asarray(np.kron(alike, np.eye(2)), dtype=float)
+        modes = _covariance_modes(along_both, moved.transpose(1, 0, 2).reshape(2 * n, 3))
+        self.in_plane = np.tensordot(between, modes.reshape(n, 2, -1), axes=1)
+        # Not by the markers' middles alone: an edge that curls rises most beyond the last of them.
+        corners = p_SQ.reshape(-1, 3)
+        alike, between = _correlated_covariance(corners, p_SE, bulge_length)
+        plane = np.column_stack([np.ones(len(corners)), corners[:, :2] - self.middle])
+        self.out_of_plane = between @ _covariance_modes(alike, plane)
+
+
+def _correlated_covariance(points: Array, p_SE: Array, within: float) -> tuple[Array, Array]:
+    """(M, M) covariance of shifts of points (M, 3) that are alike within a distance [m], and
+    (N, M) shifts of edges by those of the points."""
+    covariance, to_edges = (
+        np.exp(-((p[:, None] - points) ** 2).sum(axis=-1) / (2.0 * within**2))
+        for p in (points, p_SE)
+    )
+    known = covariance + MIN_MODE_VARIANCE * np.eye(len(points))
+    return covariance, np.linalg.solve(known, to_edges.T).T
+
+
+def _covariance_modes(covariance: Array, whole: Array) -> Array:
+    """(N, K) independent patterns of a covariance (N, N) without what moves all (N, 3)."""
+    max_modes = 40  # Patterns of each kind of shift.
+    Q, _ = np.linalg.qr(whole)
+    rest = np.eye(len(covariance)) - Q @ Q.T
+    variance, patterns = np.linalg.eigh(rest @ covariance @ rest)
+    kept = np.flatnonzero(variance > MIN_MODE_VARIANCE * variance[-1])[-max_modes:]
+    return np.asarray(patterns[:, kept] * np.sqrt(variance[kept]))
+
+
+@dataclass(frozen=True, eq=False)
+class _ShiftSolution:
+    """What shifts of some size leave of the step.
+
+    Attributes:
+        logarithm: of the probability of what was seen, but for a constant.
+        shifts: the size.
+        x, covariance: (K,) and (K, K) step of pose and bloom, and strengths of patterns.
+        columns: (K,) of all that there are.
+    """
+
+    logarithm: float
+    shifts: MarkerShifts
+    x: Array
+    covariance: Array
+    columns: NDArray[np.intp]
+
+
+class DisturbanceFit:
+    """Fits shifts of markers to the edges of an image.
+
+    Args:
+        views: edges as seen by a pose.
+        offset: (N,) of each from there [pixels].
+        information: (N,) inverse variance of each by the image's noise, 0 for those that do not
+            count.
+        marker: (N,) that each belongs to.
+        modes: patterns of shifts of the sheet.
+        height: of the image [pixels].
+    """
+
+    def __init__(
+        self,
+        views: EdgeViews,
+        offset: Array,
+        information: Array,
+        marker: NDArray[np.intp],
+        modes: SheetModes,
+        height: int,
+    ) -> None:
+        kept = information > 0.0
+        used, belongs = np.unique(marker, return_inverse=True)
+        self._kept, self._marker = kept, belongs
+        self._normal = views.across / np.sqrt((views.across**2).sum(axis=1, keepdims=True))
+        self._offset = offset
+        # sums of edges by marker, weighted
+        self._sums = np.zeros((len(used), len(belongs)))
+        self._sums[belongs, np.arange(len(belongs))] = information
+        self._sums /= self._spread_within_markers(views, information)
+        self._modes = modes.in_plane[views.which], modes.out_of_plane[views.which]
+        J = views.motion
+        row = views.at[:, 1:] / height - 0.5
+        x, y = modes.middle  # about which the sheet is longer: S is the frame that fits best
+        strength = np.sqrt((J[kept] ** 2).mean(axis=0)) + 1e-9
+        # What the camera does from the first row to the last one moves each edge by [pixels].
+        self._turning = J / strength / np.sqrt(6.0)
+        parts = {
+            "pose": np.column_stack([J, views.bloom]),
+            "rows": row * self._turning,
+            "aspect": 0.5 * (views.print[:, :1] + (J[:, 3:5] * [-x, y]).sum(axis=1)[:, None]),
+            "size": views.print[:, 1:],
+            "in_plane": (J[:, None, 3:5] @ self._modes[0])[:, 0],
+            "out_of_plane": J[:, 5:] * self._modes[1],
+            "center": self._normal,
+        }
+        ends = np.cumsum([0, *(part.shape[1] for part in parts.values())])
+        self._columns = {kind: np.arange(*ends[k : k + 2]) for k, kind in enumerate(parts)}
+        self._J = np.column_stack(list(parts.values()))
+        self._add_up()
+        self._equations = {alone: self._normal_equations(alone) for alone in MARKER_SIGMAS_PX}
+
+    def fit(self, prior: Array, center: float = 0.0) -> Disturbance:
+        """The most probable shifts, and the step of the pose with them.
+
+        Args:
+            prior: (7, 7) information about the step of pose and bloom that is known before.
+            center: standard deviation of the camera's principal point along u and v [pixels].
+        """
+        solved = {s: self._solve(s, prior) for s in map(MarkerShifts, MARKER_SIGMAS_PX)}
+        best = max(solved.values(), key=_log_probability)
+        for _ in range(len(SHIFT_SIGMAS)):
+            others = [s for s in _neighbouring_shifts(best.shifts) if s not in solved]
+            solved |= {s: self._solve(s, prior) for s in others}
+            better = max(solved.values(), key=_log_probability)
+            if better is best:
+                break
+            best = better
+        return self._disturbance(best, list(solved.values()), center)
+
+    def _by_marker(self) -> tuple[Array, Array]:
+        """(n, 2, 2) information about the shift of each marker, and (n, 2) times what is seen."""
+        G = self._sums @ (self._normal[:, :, None] * self._normal[:, None]).reshape(-1, 4)
+        return G.reshape(-1, 2, 2), self._sums @ (self._normal * self._offset[:, None])
+
+    def _spread_within_markers(self, views: EdgeViews, information: Array) -> float:
+        """Variance of offsets within markers over that by the image's noise."""
+        min_freedom = 5  # Degrees of freedom from which on the spread is known.
+        min_spread = 1e-3  # Relative to noise; keeps probabilities finite.
+        alike = np.column_stack([views.motion, views.bloom, views.print])
+        rest = residuals_within_markers(
+            self._normal, alike, self._offset, information, self._marker
+        )
+        markers = len(np.unique(self._marker[self._kept]))
+        freedom = np.count_nonzero(self._kept) - 2 * markers - alike.shape[1]
+        if freedom < min_freedom:
+            return 1.0
+        return float(max((information * rest**2).sum() / freedom, min_spread))
+
+    def _add_up(self) -> None:
+        """Sums over all edges, and those by marker, of the columns and of what is seen."""
+        G, g = self._by_marker()
+        both = self._sums @ (self._normal[:, :, None] * self._J[:, None]).reshape(len(self._J), -1)
+        both = np.concatenate([both.reshape(*g.shape, -1), g[..., None]], axis=2)
+        self._G, self._shares = G, both  # (n, 2, 2), (n, 2, K + 1)
+        weight = self._sums.sum(axis=0)
+        seen = np.column_stack([self._J, self._offset])
+        self._squares = (seen * weight[:, None]).T @ seen
+
+    def _normal_equations(self, alone: float) -> tuple[Array, Array, float]:
+        """(K, K) and (K,) normal equations of all columns if single markers are shifted as well,
+        and what that leaves of the logarithm of the probability."""
+        inner = self._G + np.eye(2) / alone**2
+        a, b, c = inner[:, 0, 0], inner[:, 0, 1], inner[:, 1, 1]
+        det = a * c - b * b
+        inverse = np.stack([c, -b, -b, a], axis=-1).reshape(-1, 2, 2) / det[:, None, None]
+        shares = self._shares.reshape(-1, self._shares.shape[2])
+        left = self._squares - shares.T @ (inverse @ self._shares).reshape(shares.shape)
+        volume = float(np.log(det * alone**4).sum())
+        return left[:-1, :-1], left[:-1, -1], -0.5 * (float(left[-1, -1]) + volume)
+
+    def _solve(self, shifts: MarkerShifts, prior: Array) -> _ShiftSolution:
+        log_prior_penalty = 6.0  # For each kind of shift; twice for its largest size.
+        pose = self._columns["pose"]
+        sds = {kind: getattr(shifts, kind) for kind in SHIFT_SIGMAS if getattr(shifts, kind)}
+        columns = np.concatenate([pose, *(self._columns[kind] for kind in sds)])
+        known = np.repeat(np.array(list(sds.values())), [len(self._columns[kind]) for kind in sds])
+        A, b, logarithm = self._equations[shifts.alone]
+        A, b = A[np.ix_(columns, columns)], b[columns]
+        A[: len(pose), : len(pose)] += prior
+        A[range(len(pose), len(A)), range(len(pose), len(A))] += known**-2.0
+        covariance = np.linalg.inv(A)
+        x = covariance @ b
+        logarithm += 0.5 * float(b @ x) - 0.5 * float(np.linalg.slogdet(A)[1])
+        rare = sum(
+            1 + (sds[k] == SHIFT_SIGMAS[k][-1] and len(SHIFT_SIGMAS[k]) > 1)
+            for k in _present_kinds(shifts)
+        )
+        logarithm -= float(np.log(known).sum()) + log_prior_penalty * rare
+        return _ShiftSolution(logarithm, shifts, x, covariance, columns)
+
+    def _disturbance(
+        self, best: _ShiftSolution, solved: list[_ShiftSolution], center: float
+    ) -> Disturbance:
+        """What the best solution says, its step and covariance those of all, by probability. The
+        step takes the principal point as it is known, so that the pose fits the image with it."""
+        report_threshold = 8.0  # Gain of log probability from which on a kind of shift is reported.
+        temperature = 4.0  # Divides log probabilities: the patterns only approximate a real sheet.
+        x = np.zeros(self._J.shape[1])
+        x[best.columns] = best.x
+        chosen = _present_kinds(best.shifts)
+        for kind in SHIFT_SIGMAS:
+            without = (s for s in solved if not _present_kinds(s.shifts) - (chosen - {kind}))
+            if best.logarithm - max(map(_log_probability, without)) < report_threshold:
+                x[self._columns[kind]] = 0.0
+        rows, aspect, size, in_plane, out_of_plane = (
+            x[self._columns[kind]] for kind in SHIFT_SIGMAS
+        )
+        weight = np.exp((np.array([s.logarithm for s in solved]) - best.logarithm) / temperature)
+        weight /= weight.sum()
+        aspects = [s.x[s.columns == self._columns["aspect"][0]].sum() for s in solved]
+        steps = np.array([s.x[:6] for s in solved])
+        step = weight @ steps
+        apart = steps - step
+        covariance = np.einsum("s,sij->ij", weight, [s.covariance[:6, :6] for s in solved])
+        covariance += (apart * weight[:, None]).T @ apart
+        A, _, _ = self._equations[best.shifts.alone]
+        by_center = (best.covariance @ A[np.ix_(best.columns, self._columns["center"])])[:6]
+        covariance += center**2 * by_center @ by_center.T
+        return Disturbance(
+            step,
+            covariance,
+            best.shifts,
+            float(np.linalg.norm(self._modes[0][self._kept] @ in_plane, axis=1).max()),
+            float(np.abs(self._modes[1][self._kept] @ out_of_plane).max()),
+            float(np.sqrt(2.0 * ((self._turning[self._kept] @ rows) ** 2).mean())),
+            float(aspect[0]),
+            float(size[0]),
+            float(weight @ np.square(aspects)),
+            self._offset - self._J[:, best.columns] @ best.x,
+        )
+
+
+def residuals_within_markers(
+    normal: Array, alike: Array, offset: Array, information: Array, marker: NDArray[np.intp]
+) -> Array:
+    """(N,) offsets of edges without what a shift of each marker explains, and changes that are
+    alike for all markers [pixels].
+
+    Args:
+        normal: (N, 2) directions of the offsets.
+        alike: (N, K) motion of edges by such changes.
+        offset: (N,) of edges [pixels].
+        information: (N,) inverse variance of each offset.
+        marker: (N,) that each belongs to.
+    """
+    seen = np.column_stack([alike, offset])
+    n = marker.max() + 1
+    G, g = np.zeros((n, 2, 2)), np.zeros((n, 2, seen.shape[1]))
+    weighted = information[:, None, None] * normal[:, :, None]
+    np.add.at(G, marker, weighted * normal[:, None])
+    np.add.at(g, marker, weighted * seen[:, None])
+    G += (1e-6 * np.trace(G, axis1=1, axis2=2)[:, None, None] + 1e-9) * np.eye(2)
+    seen = seen - np.einsum("ni,nik->nk", normal, np.linalg.solve(G, g)[marker])
+    root = np.sqrt(information)
+    factors = np.linalg.lstsq(seen[:, :-1] * root[:, None], seen[:, -1] * root, rcond=1e-9)[0]
+    return np.asarray(seen[:, -1] - seen[:, :-1] @ factors)
+
+
+def _log_probability(solution: _ShiftSolution) -> float:
+    return solution.logarithm
+
+
+def _present_kinds(shifts: MarkerShifts) -> set[str]:
+    return {kind for kind in SHIFT_SIGMAS if getattr(shifts, kind)}
+
+
+def _neighbouring_shifts(shifts: MarkerShifts) -> Iterator[MarkerShifts]:
+    """Shifts that differ from some in one kind, and in those of single markers."""
+    for alone in {shifts.alone, MARKER_SIGMAS_PX[0]}:
+        for kind, values in SHIFT_SIGMAS.items():
+            for value in values:
+                yield replace(shifts, alone=alone, **{kind: value})
+
+
+class PrintTolerances:
+    """Print tolerances."""
+
+    aspect = 0.003, 0.05  # Unequal scale that is reported, and that means another board.
+    # Relative marker size error that is reported, and that means another board.
+    marker_size = 0.01, 0.015
+    bloom = 0.5  # Pixels. Shift of a marker's outline that overexposure may cause.
+    row_motion = 0.5  # Pixels between first and last row that are reported.
+    max_row_motion = 10.0  # Pixels; with more, no pose is given.
+    max_page_shift = 5e-3  # Metres; with more, no pose is given.
+    max_bulge_height = 8e-3  # Metres; with more, no pose is given.
+    page_shift = 2e-4  # Metres that are reported.
+    bulge_height = 5e-4  # Metres that are reported.
+
+
+MIN_SCALE_DEVIATION = 0.01
+"""Relative scale error that is reported; depth cameras err by as much."""
+
+
+def wrong_marker_size(found: Disturbance, side: float) -> float:
+    """Size of the markers against their distances if no light makes that, so that it is another
+    board; 1 otherwise.
+
+    Args:
+        found: in the image.
+        side: of a marker in the image [pixels].
+    """
+    other = (
+        abs(found.size) > PrintTolerances.marker_size[1]
+        and abs(found.size) * side / 2.0 > PrintTolerances.bloom
+    )
+    return 1.0 + found.size if other else 1.0
+
+
+def implausible_reason(found: Disturbance) -> str:
+    """Why no print of a board looks like that; empty if one may."""
+    if abs(found.aspect) > PrintTolerances.aspect[1]:
+        return (
+            f"another board, or wrong intrinsics: it is {1.0 + found.aspect:.2f} times as long"
+            " along y as along x"
+        )
+    if (
+        found.rows > PrintTolerances.max_row_motion
+        or found.in_plane > PrintTolerances.max_page_shift
+        or found.out_of_plane > PrintTolerances.max_bulge_height
+    ):
+        return (
+            "markers are not where a flat board at rest has them: check the intrinsics and the"
+            " light, and that the board is one sheet"
+        )
+    return ""
+
+
+def print_doubt(found: Disturbance) -> str:
+    """What is doubtful about a print, how it lies, or the camera's motion; empty if all is well."""
+    if abs(found.aspect) > PrintTolerances.aspect[0]:
+        return (
+            f"the board is printed {1.0 + found.aspect:.3f} times as long along y as along x:"
+            " measure its rulers and print it again with the measured lengths, or check the"
+            " intrinsics"
+        )
+    if abs(found.size) > PrintTolerances.marker_size[0]:
+        return (
+            f"the scale is uncertain: markers look {1.0 + found.size:.3f} times as large, relative"
+            " to their spacing: too much light, or another board?"
+        )
+    if found.rows > PrintTolerances.row_motion:
+        return (
+            f"the camera moved by {found.rows:.1f} pixels during its rolling shutter: hold it"
+            " still, or add light"
+        )
+    if found.in_plane > PrintTolerances.page_shift:
+        return (
+            f"markers are up to {1e3 * found.in_plane:.1f} mm from their positions in the plane:"
+            " check the intrinsics, and that pages are glued exactly"
+        )
+    if found.out_of_plane > PrintTolerances.bulge_height:
+        return (
+            f"the sheet is up to {1e3 * found.out_of_plane:.1f} mm out of its plane: check the"
+            " intrinsics, and that it lies flat"
+        )
+    return ""
+
+
+def scale_by_depth(
+    p_SQ: Array, intrinsics: Intrinsics, X_SC: Array, depth: NDArray[np.floating[Any]]
+) -> float:
+    """Size of the printed board against the document, by a depth image; NaN if it shows too little.
+
+    Args:
+        p_SQ: (..., 3) points of the board that are in sight [m].
+        intrinsics: of the depth image too.
+        X_SC: (4, 4) pose that the image gives with the document's size.
+        depth: (H, W) distance along the optical axis [m]; 0, NaN or infinite where unknown.
+    """
+    min_depths = 12  # Corners with a depth.
+    p_C = (p_SQ.reshape(-1, 3) - X_SC[:3, 3]) @ X_SC[:3, :3]
+    p_C = p_C[p_C[:, 2] > MIN_VISIBLE_DEPTH]
+    columns, rows = np.rint(intrinsics.project(p_C)).astype(np.intp).reshape(-1, 2).T
+    inside = (columns >= 0) & (columns < depth.shape[1]) & (rows >= 0) & (rows < depth.shape[0])
+    measured = np.asarray(depth, dtype=float)[rows[inside], columns[inside]]
+    ratio = measured / p_C[inside, 2]
+    ratio = ratio[np.isfinite(ratio) & (measured > 0.0)]
+    return float(np.median(ratio)) if len(ratio) >= min_depths else float("nan")
+
+
+def scale_by_height(X_SC: Array, X_SC_known: Array) -> float:
+    """Size of the printed board against the document, by the known height of the camera over it."""
+    return float(X_SC_known[2, 3] / X_SC[2, 3])

@@ -1,0 +1,248 @@
+"""The surfaces of a scene's objects as one mesh, their contours and their footprints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull, QhullError
+
+from burg_drake.core import (
+    Array,
+    Indices,
+    UnknownNameError,
+    inverse,
+    suggest_names,
+    transform_points,
+)
+from burg_drake.geometry import RayCaster
+from burg_drake.scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class MeshContour:
+    """Edges of a mesh at which it turns away from a point of view.
+
+    Attributes:
+        edges: (N,) indices into `MeshOutline.edges`.
+        faces: (N,) a face at each that is seen from the front; for open edges the only one.
+    """
+
+    edges: Indices
+    faces: Indices
+
+
+class MeshOutline:
+    """A mesh, prepared to tell its contour from any point of view.
+
+    Closed surfaces wound outward have exact contours. The boundary of an open one counts as
+    contour, as it does on a sheet. Where surfaces touch along an edge, each pair is told apart.
+
+    Attributes:
+        vertices: (V, 3) in the object frame O [m].
+        faces: (F, 3) corners of the triangles that have an area.
+        kept: (F,) which of the given faces these are.
+        edges: (E, 2) vertices at the edges' ends; where more than two faces meet there is one for
+            every pair of them.
+        sides: (E, 2) faces at each edge; the second is -1 for an open one.
+    """
+
+    def __init__(self, vertices: Array, faces: Indices) -> None:
+        """Prepares a mesh.
+
+        Args:
+            vertices: (V, 3) [m]; those that coincide must be merged.
+            faces: (F, 3) corners, counter-clockwise seen from outside.
+        """
+        self.vertices = np.asarray(vertices, dtype=float)
+        corners = self.vertices[faces]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        area = np.linalg.norm(normals, axis=1)
+        self.kept = np.flatnonzero(area > 0.0)
+        self.faces = np.asarray(faces, dtype=np.int64)[self.kept]
+        normals = normals[self.kept] / area[self.kept, None]
+        offsets = -np.einsum("ij,ij->i", normals, corners[self.kept, 0])
+        self._planes = np.column_stack([normals, offsets])
+        self.edges, self.sides = _mesh_edges(self.faces)
+        self._bend = self._bends()
+        self._open = self.sides[:, 1] < 0
+        self._rim = np.flatnonzero(self._open)
+        self._outward = ~self._open & (self._bend > 0.0)
+        self._first, self._second = self.sides.T.copy()
+
+    @property
+    def normals(self) -> Array:
+        """(F, 3) unit normals of the faces in O."""
+        return self._planes[:, :3]
+
+    def contour(self, p_OC: Array) -> MeshContour:
+        """The contour from a point of view.
+
+        Edges that the solid bends inwards at are left out: one of their faces hides them.
+
+        Args:
+            p_OC: (3,) point of view in O [m].
+        """
+        front = self.front(p_OC)
+        turns = (front[self._first] != front[self._second]) & self._outward
+        edges = np.flatnonzero(turns)
+        first, second = self.sides[edges].T
+        faces = np.where(front[first], first, second)
+        return MeshContour(
+            np.concatenate([edges, self._rim]), np.concatenate([faces, self._first[self._rim]])
+        )
+
+    def segments(self, X_CO: Array) -> Array:
+        """(N, 2, 3) ends of the contour's edges in the camera's frame [m], hidden ones as well.
+
+        Args:
+            X_CO: (4, 4) object in the camera's frame.
+        """
+        contour = self.contour(inverse(X_CO)[:3, 3])
+        return transform_points(X_CO, self.vertices[self.edges[contour.edges]])
+
+    def front(self, p_OC: Array, faces: Indices | None = None) -> NDArray[np.bool_]:
+        """Which faces a point of view in O sees from the front, if nothing is before them.
+
+        Args:
+            p_OC: (3,) [m].
+            faces: indices of any shape, which is that of the result; all (F,) if None.
+        """
+        planes = self._planes if faces is None else self._planes[faces]
+        return np.asarray(planes @ np.append(p_OC, 1.0) > 0.0)
+
+    @cached_property
+    def creases(self) -> Indices:
+        """(N,) edges at which the surface bends outwards or inwards by more than `CREASE`, as far
+        as they hang together over `CREASE_LENGTH`."""
+        min_angle = np.deg2rad(35.0)  # Radians between two faces.
+        min_length = 0.02  # Metres. Shorter creases are bumps of a scan.
+        sharp = np.flatnonzero((np.abs(self._bend) > min_angle) & ~self._open)
+        starts, ends = self.edges[sharp].T
+        graph = coo_array((np.ones(len(sharp)), (starts, ends)), shape=(len(self.vertices),) * 2)
+        _, group = connected_components(graph, directed=False)
+        length = np.linalg.norm(self.vertices[ends] - self.vertices[starts], axis=1)
+        whole = np.bincount(group[starts], length)
+        return np.asarray(sharp[whole[group[starts]] > min_length])
+
+    def _bends(self) -> Array:
+        """(E,) angle between the faces at an edge, positive where it sticks out [rad]."""
+        first, second = self.normals[self.sides[:, 0]], self.normals[self.sides[:, 1]]
+        across = np.linalg.norm(np.cross(first, second), axis=1)
+        angle = np.arctan2(across, np.einsum("ij,ij->i", first, second))
+        middle = self.vertices[self.faces].mean(axis=1)
+        apart = middle[self.sides[:, 1]] - middle[self.sides[:, 0]]
+        signed: Array = np.where(np.einsum("ij,ij->i", first, apart) <= 0.0, angle, -angle)
+        return signed
+
+
+def _mesh_edges(faces: Indices) -> tuple[Indices, Indices]:
+    """Edges (E, 2) and the two faces at each (E, 2), -1 where there is no second."""
+    pairs = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    owner = np.repeat(np.arange(len(faces)), 3)
+    order = np.lexsort(pairs.T)
+    pairs, owner = pairs[order], owner[order]
+    new = np.ones(len(pairs) + 1, bool)
+    new[1:-1] = (pairs[1:] != pairs[:-1]).any(axis=1)
+    alone = new[:-1] & new[1:]
+    joined = np.flatnonzero(~new[1:-1])  # this one and the next are of the same edge
+    edges = np.concatenate([pairs[alone], pairs[joined]])
+    single = np.column_stack([owner[alone], np.full(int(alone.sum()), -1)])
+    double = np.column_stack([owner[joined], owner[joined + 1]])
+    return edges, np.concatenate([single, double])
+
+
+TriangleArrays = tuple[Array, Indices]
+
+
+class SceneMesh:
+    """What of a scene can be seen.
+
+    Attributes:
+        names: instances, free ones first, in the scene's order; their index is their number.
+        outline: all surfaces as one mesh; its frame is S.
+        owner: (F,) number of the instance that each of its faces belongs to.
+        boxes: (N, 2, 3) corners of each instance's bounding box along the axes of S [m].
+    """
+
+    def __init__(self, placed: dict[str, TriangleArrays]) -> None:
+        """Joins surfaces.
+
+        Args:
+            placed: by instance, vertices (V, 3) in S [m] and faces (F, 3).
+        """
+        self._placed = placed
+        self.names = tuple(placed)
+        vertices = [np.empty((0, 3)), *(v for v, _ in placed.values())]
+        starts = np.cumsum([len(v) for v in vertices])
+        faces = [f + start for (_, f), start in zip(placed.values(), starts, strict=False)]
+        owner = np.repeat(np.arange(len(faces)), [len(f) for f in faces])
+        joined = np.concatenate([np.empty((0, 3), np.int64), *faces])
+        self.outline = MeshOutline(np.concatenate(vertices), joined)
+        self.owner: Indices = owner[self.outline.kept]
+        corners = [[v.min(axis=0), v.max(axis=0)] for v in vertices[1:]]
+        self.boxes: Array = np.array(corners).reshape(-1, 2, 3)
+
+    def of(self, names: tuple[str, ...] | None) -> SceneMesh:
+        """Some of the instances alone; all if None.
+
+        Raises:
+            UnknownNameError: there is no such instance.
+        """
+        if names is None:
+            return self
+        for name in names:
+            if name not in self._placed:
+                raise UnknownNameError(
+                    f"instance {name!r} does not exist; {suggest_names(name, self.names)}"
+                )
+        return SceneMesh({name: self._placed[name] for name in names})
+
+    def vertices(self, name: str) -> Array:
+        """(V, 3) of an instance, in S [m]."""
+        return self._placed[name][0]
+
+    @cached_property
+    def rays(self) -> RayCaster:
+        """Casts rays at the surfaces, in S."""
+        return RayCaster(self.outline.vertices, self.outline.faces)
+
+
+def build_scene_mesh(scene: Scene) -> SceneMesh:
+    """The surfaces of all instances of a scene, background included, at their places.
+
+    Raises:
+        UnknownNameError: a mesh file of the library is missing.
+    """
+    placed = {}
+    for name in (*scene.instances, *scene.background):
+        surface = scene.library.surface(scene.instance(name).object)
+        faces = np.asarray(surface.faces, dtype=np.int64)
+        placed[name] = transform_points(scene.X_SO(name), surface.vertices), faces
+    return SceneMesh(placed)
+
+
+def object_footprints(shape: SceneMesh) -> tuple[Array, Indices]:
+    """Outlines of where objects stand on the board, without their dents.
+
+    Returns:
+        (N, 2, 3) ends of lines in S, in the plane of the board [m], and (N,) the number of the
+        instance of each; none for what stands on other objects.
+    """
+    max_height = 2e-3  # Metres. Lower points of an object are in contact with the board.
+    lines, owner = [np.empty((0, 2, 3))], [np.empty(0, np.int64)]
+    for number, name in enumerate(shape.names):
+        vertices = shape.vertices(name)
+        flat = vertices[vertices[:, 2] <= max_height, :2]
+        try:
+            corners = flat[ConvexHull(flat).vertices]
+        except (QhullError, ValueError):  # no, or too few, points, or all on a line
+            continue
+        ring = np.column_stack([corners, np.zeros(len(corners))])
+        lines.append(np.stack([ring, np.roll(ring, -1, axis=0)], axis=1))
+        owner.append(np.full(len(ring), number))
+    return np.concatenate(lines), np.concatenate(owner)

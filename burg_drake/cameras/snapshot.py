@@ -1,0 +1,279 @@
+"""Snapshots of a live view: a folder with the image, the overlay, the depth and a document.
+
+The image is stored without loss so that it can be analysed again.
+"""
+
+from __future__ import annotations
+
+import secrets
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.cameras.intrinsics import Intrinsics
+from burg_drake.cameras.placement.document import CheckedScene, PlacementCheck, camera_versions
+from burg_drake.cameras.pose.board_estimate import BoardEstimate
+from burg_drake.core import (
+    Array,
+    DocumentError,
+    FileLimits,
+    InvalidInputError,
+    Pose,
+    load_document,
+    open_npy,
+    read_bytes,
+    require_writable,
+    save_document,
+)
+
+if TYPE_CHECKING:
+    from burg_drake.scene import Scene
+
+
+class SnapshotFiles:
+    """Snapshot files."""
+
+    image = "image.png"
+    overlay = "overlay.png"
+    depth = "depth.npy"
+    document = "snapshot.yaml"
+    intrinsics = "intrinsics.yaml"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeenBoard:
+    """Where the board was seen.
+
+    Attributes:
+        X_SC: pose of the camera's optical frame in the scene frame; left out if it was not found.
+        reason: why there is no pose, or what is doubtful; empty if all is well.
+        reprojection_error: root mean square reprojection error of the markers' corners [pixels].
+        covariance: covariance of the camera's pose, six rows: rotation [rad], then position [m], in
+            the scene frame; empty if unknown.
+        markers: ids of the markers that were used.
+        scale: size of the printed board divided by that in the scene file, if it was measured.
+    """
+
+    X_SC: Pose | None = None
+    reason: str = ""
+    reprojection_error: float | None = None
+    covariance: tuple[tuple[float, ...], ...] = ()
+    markers: tuple[int, ...] = ()
+    scale: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class SnapshotDocument:
+    """A snapshot of the live overlay (`snapshot.yaml`).
+
+    Attributes:
+        scene: the scene that was overlaid.
+        library: object library of the scene.
+        source: camera or file that gave the picture.
+        taken: date and time of the snapshot, ISO 8601 with time zone.
+        time: time of the picture since the source was opened [s].
+        intrinsics: intrinsics of the camera.
+        board: where the board was seen in this picture.
+        X_SC_drawn: camera pose that the overlay was drawn with, if it is the mean of several
+            pictures.
+        placement: where the objects stand, if that was measured.
+        versions: versions of the software.
+    """
+
+    version: int = 1
+    scene: CheckedScene
+    library: str
+    source: str
+    taken: str = ""
+    time: float = 0.0
+    intrinsics: Intrinsics
+    board: SeenBoard = SeenBoard()
+    X_SC_drawn: Pose | None = None
+    placement: PlacementCheck | None = None
+    versions: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Snapshot:
+    """A picture, and what was drawn over it.
+
+    Attributes:
+        document: what is known about it.
+        image: (H, W, 3) uint8 RGB as the camera gave it.
+        overlay: (H, W, 3) uint8 RGB.
+        depth: (H, W) float32 distances along the optical axis [m], from cameras that have them.
+    """
+
+    document: SnapshotDocument
+    image: NDArray[np.uint8]
+    overlay: NDArray[np.uint8]
+    depth: Array | None = None
+
+
+def describe_board(estimate: BoardEstimate) -> SeenBoard:
+    """An estimate as a document; numbers that are not known are left out."""
+    known = bool(np.isfinite(estimate.covariance).all())
+    return SeenBoard(
+        X_SC=Pose.from_matrix(estimate.X_SC, quaternion=True) if estimate.valid else None,
+        reason=estimate.reason,
+        reprojection_error=_finite_or_none(estimate.reprojection_error),
+        covariance=tuple(map(tuple, estimate.covariance.tolist())) if known else (),
+        markers=tuple(int(id) for id in estimate.ids),
+        scale=_finite_or_none(estimate.scale),
+    )
+
+
+def describe_scene(scene: Scene) -> CheckedScene:
+    """What a document says about the scene it belongs to."""
+    return CheckedScene(name=scene.name, path=str(scene.path), content=scene.content)
+
+
+def save_snapshot(snapshot: Snapshot, folder: str | Path) -> None:
+    """Writes a new folder, whole or not at all.
+
+    Raises:
+        InvalidInputError: the folder exists, or cannot be written.
+    """
+    folder = require_new_folder(folder)
+    beside = None
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        beside = folder.with_name(f".{folder.name}.{secrets.token_hex(8)}")
+        beside.mkdir()
+        _write_image(beside / SnapshotFiles.image, snapshot.image)
+        _write_image(beside / SnapshotFiles.overlay, snapshot.overlay)
+        if snapshot.depth is not None:
+            np.save(beside / SnapshotFiles.depth, snapshot.depth.astype(np.float32))
+        save_document(snapshot.document, beside / SnapshotFiles.document)
+        save_document(snapshot.document.intrinsics, beside / SnapshotFiles.intrinsics)
+        beside.rename(folder)
+    except OSError as error:
+        raise InvalidInputError(
+            f"cannot write {folder}: {error.strerror or error}; choose a writable place"
+        ) from error
+    finally:
+        if beside is not None:
+            shutil.rmtree(beside, ignore_errors=True)
+
+
+def require_new_folder(folder: str | Path) -> Path:
+    """Finds out whether a snapshot can be saved there.
+
+    Raises:
+        InvalidInputError: something of that name exists, or nothing can be written there.
+    """
+    folder = Path(folder)
+    if folder.exists():
+        raise InvalidInputError(f"{folder} exists already; choose another name for the snapshot")
+    require_writable(folder)
+    return folder
+
+
+def load_snapshot(folder: str | Path) -> Snapshot:
+    """Reads what `save_snapshot` wrote.
+
+    Raises:
+        DocumentError: no snapshot there, or one that does not fit the schema.
+        InvalidInputError: a picture or the depth is missing, damaged, or of another size than the
+            intrinsics.
+    """
+    folder = Path(folder)
+    if not (folder / SnapshotFiles.document).is_file():
+        raise DocumentError(
+            f"{folder} is not the folder of a snapshot: {SnapshotFiles.document} is missing"
+        )
+    document = load_document(folder / SnapshotFiles.document, SnapshotDocument)
+    image, overlay = (
+        _read_image(folder / name) for name in (SnapshotFiles.image, SnapshotFiles.overlay)
+    )
+    height, width = image.shape[:2]
+    document.intrinsics.require_size(width, height, str(folder / SnapshotFiles.image))
+    depth = (
+        _read_depth(folder / SnapshotFiles.depth, (height, width))
+        if (folder / SnapshotFiles.depth).exists()
+        else None
+    )
+    return Snapshot(document=document, image=image, overlay=overlay, depth=depth)
+
+
+def next_free_path(
+    folder: str | Path,
+    prefix: str,
+    suffix: str = "",
+    *,
+    taken: Callable[[Path], bool] = Path.exists,
+) -> Path:
+    """The first of `prefix_001`, `prefix_002`, ... in a folder that is not taken."""
+    number = 1
+    while taken(path := Path(folder) / f"{prefix}_{number:03d}{suffix}"):
+        number += 1
+    return path
+
+
+def describe_snapshot(
+    scene: Scene,
+    intrinsics: Intrinsics,
+    estimate: BoardEstimate,
+    *,
+    source: str,
+    taken: str,
+    time: float,
+    X_SC_drawn: Array | None = None,
+    placement: PlacementCheck | None = None,
+) -> SnapshotDocument:
+    """The document of a snapshot."""
+    if X_SC_drawn is None or not estimate.valid or np.array_equal(X_SC_drawn, estimate.X_SC):
+        drawn = None
+    else:
+        drawn = Pose.from_matrix(X_SC_drawn, quaternion=True)
+    return SnapshotDocument(
+        scene=describe_scene(scene),
+        library=scene.library.name,
+        source=source,
+        taken=taken,
+        time=time,
+        intrinsics=intrinsics,
+        board=describe_board(estimate),
+        X_SC_drawn=drawn,
+        placement=placement,
+        versions=camera_versions(),
+    )
+
+
+def _finite_or_none(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _write_image(path: Path, image: NDArray[np.uint8]) -> None:
+    done, data = cv2.imencode(".png", image[..., ::-1])
+    if not done:
+        raise OSError(f"OpenCV cannot encode an image of shape {image.shape}")
+    path.write_bytes(data.tobytes())
+
+
+def _read_image(path: Path) -> NDArray[np.uint8]:
+    data: Any = (
+        np.frombuffer(read_bytes(path, FileLimits.image_bytes), np.uint8)
+        if path.is_file()
+        else np.empty(0)
+    )
+    image = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
+    if image is None:
+        raise InvalidInputError(
+            f"{path} is missing or cannot be read as an image; take the snapshot again"
+        )
+    return np.ascontiguousarray(image[..., ::-1])
+
+
+def _read_depth(path: Path, shape: tuple[int, int]) -> Array:
+    try:
+        with open_npy(path) as stored:
+            return stored.read("f", shape)
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{error}; take the snapshot again") from error

@@ -1,4 +1,0 @@
-from .pose_filter import (
-    PoseFilter as PoseFilter,
-    Track as Track,
-)

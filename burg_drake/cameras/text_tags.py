@@ -1,0 +1,185 @@
+"""Short texts drawn into images, and where they are placed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from burg_drake.core import Array, Bytes
+
+PLATE_COLOR = (24, 28, 34)  # RGB of the plate behind a text.
+TEXT_COLOR = (255, 255, 255)  # RGB of texts.
+NOTICE_COLOR = (255, 214, 120)  # RGB of notices.
+
+
+@lru_cache(maxsize=512)
+def render_tag(
+    text: str, color: tuple[int, int, int] = TEXT_COLOR, height: int = 14
+) -> tuple[Bytes, NDArray[np.uint16]]:
+    """A line of text on a dark rounded plate.
+
+    Args:
+        text: one line.
+        color: of the letters, 0 to 255.
+        height: of the font [pixels].
+
+    Returns:
+        (h, w, 3) colours, and (h, w, 1) opacity in 0 to 256.
+    """
+    padding = (6, 3)  # Pixels at the sides, and above and below the text.
+    font = ImageFont.load_default(height)
+    left, _, right, _ = font.getbbox(text or " ")
+    # The line's height, and not the letters', so that plates of all texts are alike.
+    _, line_top, _, line_bottom = font.getbbox("Ag")
+    width = int(np.ceil(right - left)) + 2 * padding[0]
+    lines = int(np.ceil(line_bottom - line_top)) + 2 * padding[1]
+    picture = Image.new("RGB", (width, lines), PLATE_COLOR)
+    ImageDraw.Draw(picture).text(
+        (padding[0] - left, padding[1] - line_top), text, fill=color, font=font
+    )
+    plate = Image.new("L", (4 * width, 4 * lines), 0)
+    ImageDraw.Draw(plate).rounded_rectangle((0, 0, 4 * width - 1, 4 * lines - 1), 20, fill=255)
+    opacity = np.asarray(plate.resize((width, lines), Image.Resampling.BOX), np.uint16)
+    ink = np.abs(np.asarray(picture, np.int16) - PLATE_COLOR).max(axis=2) > 0
+    opacity = np.where(ink, opacity, opacity * 9 // 10)
+    return np.asarray(picture), (opacity * 256 // 255)[..., None].astype(np.uint16)
+
+
+def draw_notice(image: Bytes, text: str) -> Bytes:
+    """A copy of an image (H, W, 3) with a line of text in its corner, wrapped where it is long."""
+    notice_corner = (8, 8)  # Pixels from the upper left corner of the image.
+    drawn = np.array(image, order="C")
+    y = notice_corner[1]
+    for line in _wrap_text(text, drawn.shape[1] - 2 * notice_corner[0]):
+        plate = render_tag(line, NOTICE_COLOR)
+        paste_tag(drawn, plate, (notice_corner[0], y))
+        y += plate[0].shape[0] + 2
+    return drawn
+
+
+def _wrap_text(text: str, width: int) -> list[str]:
+    """Lines whose tags are not wider than that [pixels], unless a word is."""
+    lines = [""]
+    for word in text.split():
+        longer = f"{lines[-1]} {word}".strip()
+        if lines[-1] and render_tag(longer, NOTICE_COLOR)[0].shape[1] > width:
+            lines.append(word)
+        else:
+            lines[-1] = longer
+    return lines
+
+
+def paste_tag(
+    image: Bytes, plate: tuple[Bytes, NDArray[np.uint16]], corner: tuple[int, int]
+) -> None:
+    """Draws a tag into an image (H, W, 3), in place; what lies outside is cut off.
+
+    Args:
+        corner: where its upper left corner goes: column, row.
+    """
+    colors, opacity = plate
+    x, y = corner
+    height, width = image.shape[:2]
+    x0, y0 = max(x, 0), max(y, 0)
+    x1, y1 = min(x + colors.shape[1], width), min(y + colors.shape[0], height)
+    if x0 >= x1 or y0 >= y1:
+        return
+    a = opacity[y0 - y : y1 - y, x0 - x : x1 - x]
+    c = colors[y0 - y : y1 - y, x0 - x : x1 - x]
+    under = image[y0:y1, x0:x1]
+    image[y0:y1, x0:x1] = (under * (256 - a) + c * a) >> 8
+
+
+Corner = tuple[int, int]
+Plate = tuple[Bytes, NDArray[np.uint16]]
+
+
+def write_tags(
+    image: Bytes, boxes: Array, plates: Sequence[Plate], bodies: NDArray[np.bool_]
+) -> None:
+    """Draws tags into an image (H, W, 3), in place; see `place_tags`.
+
+    Tags that had to move away have a line to the middle of what they name.
+    """
+    leader_distance = 12.0  # Pixels. Farther tags are connected to their box by a line.
+    sizes = [(colors.shape[1], colors.shape[0]) for colors, _ in plates]
+    corners = place_tags(boxes, sizes, bodies)
+    for corner, size, box in zip(corners, sizes, boxes, strict=True):
+        low, high = np.array(corner), np.array(corner) + size
+        apart = np.maximum(np.maximum(box[0] - high, low - box[1]), 0.0)
+        if np.hypot(*apart) > leader_distance:
+            middle = np.round(box.mean(axis=0)).astype(int)
+            start = np.clip(middle, low, high)
+            cv2.line(image, start.tolist(), middle.tolist(), PLATE_COLOR, 1, cv2.LINE_AA)
+    for plate, corner in zip(plates, corners, strict=True):
+        paste_tag(image, plate, corner)
+
+
+def place_tags(
+    boxes: Array, sizes: Sequence[tuple[int, int]], bodies: NDArray[np.bool_]
+) -> list[Corner]:
+    """Finds a place for each tag.
+
+    Args:
+        boxes: (N, 2, 2) corners of what the tags name, least and largest x and y [pixels].
+        sizes: width and height of the tags [pixels].
+        bodies: (H, W) pixels of the image that show what the tags should not cover.
+
+    Returns:
+        Column and row of the tags' upper left corners: the place about the box, on no other tag,
+        that covers the least of the bodies and is the closest.
+    """
+    row_cost = 0.05  # Cost of moving a tag by its height, as a covered fraction of the tag.
+    image = bodies.shape[1], bodies.shape[0]
+    covered = cv2.integral(bodies.astype(np.uint8))
+    placed: list[tuple[int, int, int, int]] = []
+    corners: list[Corner] = [(0, 0)] * len(sizes)
+
+    def cost(corner: Corner, row: int, size: tuple[int, int]) -> float:
+        (x, y), (width, height) = corner, size
+        right, bottom = min(x + width, image[0]), min(y + height, image[1])
+        hidden = covered[bottom, right] - covered[y, right] - covered[bottom, x] + covered[y, x]
+        return float(hidden) / (width * height) + row_cost * row
+
+    # From the top of the image: tags go above, so that what is higher has its place first.
+    for i in np.argsort(boxes[:, 0, 1], kind="stable"):
+        options = [
+            (_move_into_image(c, sizes[i], image), row)
+            for c, row in _candidate_corners(boxes[i], *sizes[i])
+        ]
+        free = [
+            o for o in options if not any(_boxes_overlap((*o[0], *sizes[i]), p) for p in placed)
+        ]
+        corners[i] = min(free or options, key=lambda o: cost(o[0], o[1], sizes[i]))[0]
+        placed.append((*corners[i], *sizes[i]))
+    return corners
+
+
+def _candidate_corners(box: Array, width: int, height: int) -> list[tuple[Corner, int]]:
+    """Corners of a tag about a box with their distance in rows; of equal ones the best first."""
+    tag_gap = 4  # Pixels between a tag and its body, and between tags.
+    tag_rows = 4  # Distances from the body that are tried, a tag's height apart.
+    (left, top), (right, bottom) = np.round(box).astype(int).tolist()
+    x, y = (left + right - width) // 2, (top + bottom - height) // 2
+    options: list[tuple[Corner, int]] = []
+    for row in range(tag_rows):
+        away = tag_gap + row * (height + 2)
+        for column in (x, left, right - width):
+            options += [((column, top - height - away), row), ((column, bottom + away), row)]
+        for line in (y, top, bottom - height):
+            options += [((right + away, line), row), ((left - width - away, line), row)]
+    return [*options, ((x, y), 0)]
+
+
+def _move_into_image(corner: Corner, size: tuple[int, int], image: tuple[int, int]) -> Corner:
+    x, y = (min(max(c, 0), max(n - s, 0)) for c, s, n in zip(corner, size, image, strict=True))
+    return x, y
+
+
+def _boxes_overlap(a: tuple[int, int, int, int], b: tuple[int, int, int, int]) -> bool:
+    return all(a[k] < b[k] + b[k + 2] + 1 and b[k] < a[k] + a[k + 2] + 1 for k in (0, 1))

@@ -1,0 +1,398 @@
+"""Rectify photos of the printed board to top views that are true to scale.
+
+A calibrated camera is not needed: homography and distortion are fitted to the markers.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from burg_drake.cameras.frame_source import CameraLost, FrameSource, Image
+from burg_drake.cameras.intrinsics import NEAR_DISTANCE, Intrinsics
+from burg_drake.cameras.pose.board_pose import BoardPose, grey_image
+from burg_drake.cameras.pose.coarse_pose import CORNER_TOLERANCE
+from burg_drake.cameras.pose.marker_detection import (
+    MarkerDetector,
+    find_foreign_markers,
+    side_lengths,
+)
+from burg_drake.core import Array, InvalidInputError, inverse, transform_points
+from burg_drake.scene import Board
+
+DEFAULT_PIXEL_SIZE = 0.0005
+"""Metres. Side of a pixel of the top view."""
+MAX_PICTURE_SIDE = 2048
+"""Pixels along a side of the top view; some graphics cards take no more."""
+
+
+@dataclass(frozen=True, eq=False)
+class BoardPicture:
+    """A top view of a board.
+
+    Attributes:
+        image: (H, W, 3) RGB; the first row lies along `upper[1]`, the first column along
+            `lower[0]`.
+        lower, upper: corners of what it shows in the scene frame [m].
+        error: root mean square distance of the markers' corners from where they belong, measured in
+            the photo and taken to the sheet [m].
+        ids: markers by which the view was made.
+        note: what is doubtful about it; "" if nothing is.
+    """
+
+    image: Image
+    lower: tuple[float, float]
+    upper: tuple[float, float]
+    error: float
+    ids: tuple[int, ...]
+    note: str = ""
+
+
+class BoardRectifier:
+    """Makes top views of one board from images of one camera.
+
+    Args:
+        board: the printed board.
+        intrinsics: of the camera; if None, markers alone say how the sheet lies in the image, and
+            how its lens bends straight lines, about.
+        margin: how much around the board is shown [m].
+        resolution: side of a pixel of the top view [m]; larger ones are taken for large boards.
+
+    Raises:
+        InvalidInputError: a number is out of its range.
+    """
+
+    def __init__(
+        self,
+        board: Board,
+        intrinsics: Intrinsics | None = None,
+        *,
+        margin: float = 0.02,
+        resolution: float = DEFAULT_PIXEL_SIZE,
+    ) -> None:
+        if not (0.0 <= margin < np.inf and 0.0 < resolution < np.inf):
+            raise InvalidInputError(
+                f"margin is {margin:g} m and resolution {resolution:g} m; margin must be at least"
+                " 0, resolution above 0"
+            )
+        size = np.array(board.size)
+        self._intrinsics = intrinsics
+        self._pose = None if intrinsics is None else BoardPose(board, intrinsics)
+        self._finder = SheetFinder(board)
+        self._lower, self._upper = np.full(2, -margin), size + margin
+        extent = self._upper - self._lower
+        side = max(resolution, float(extent.max()) / MAX_PICTURE_SIDE)
+        self._shape = tuple(int(n) for n in np.maximum(np.rint(extent / side), 1)[::-1])
+
+    def picture(self, image: Image) -> BoardPicture:
+        """The top view of an image.
+
+        Args:
+            image: (H, W, 3) RGB.
+
+        Raises:
+            InvalidInputError: not an image, or of another size than the intrinsics; or it does not
+                show the board, or another one.
+        """
+        image = np.asarray(image)
+        if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
+            raise InvalidInputError(
+                f"the image has shape {image.shape} and type {image.dtype}; expected RGB, (H, W,"
+                " 3) uint8"
+            )
+        p_SQ = self._points()
+        if self._pose is None:
+            sheet = self._finder.find(image)
+            pixels, error, ids, note = sheet.project(p_SQ), sheet.error, sheet.ids, ""
+        else:
+            pixels, error, ids, note = self._by_pose(image, p_SQ)
+        return BoardPicture(
+            _sample_image(image, pixels.reshape(*self._shape, 2)),
+            (float(self._lower[0]), float(self._lower[1])),
+            (float(self._upper[0]), float(self._upper[1])),
+            error,
+            ids,
+            note,
+        )
+
+    def _points(self) -> Array:
+        """(N, 2) middles of the top view's pixels in the scene frame [m], row by row."""
+        (rows, columns), extent = self._shape, self._upper - self._lower
+        x = self._lower[0] + (np.arange(columns) + 0.5) * extent[0] / columns
+        y = self._upper[1] - (np.arange(rows) + 0.5) * extent[1] / rows
+        return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+
+    def _by_pose(self, image: Image, p_SQ: Array) -> tuple[Array, float, tuple[int, ...], str]:
+        assert self._pose is not None and self._intrinsics is not None
+        found = self._pose.estimate(image)
+        if not found.valid:
+            raise InvalidInputError(f"the board was not found in the image: {found.reason}")
+        X_CS = inverse(found.X_SC)
+        p_CQ = transform_points(X_CS, np.column_stack([p_SQ, np.zeros(len(p_SQ))]))
+        ahead = p_CQ[:, 2] >= NEAR_DISTANCE
+        pixels = np.full((len(p_SQ), 2), -1e6)
+        pixels[ahead] = self._intrinsics.project(p_CQ[ahead])
+        middle = np.append(0.5 * np.array(self._upper + self._lower), 0.0)
+        depth = float(transform_points(X_CS, middle[None])[0, 2])
+        error = found.reprojection_error * depth / float(np.mean(self._intrinsics.focal))
+        return pixels, error, found.ids, found.reason
+
+
+def board_picture(
+    image: Image,
+    board: Board,
+    intrinsics: Intrinsics | None = None,
+    *,
+    margin: float = 0.02,
+    resolution: float = DEFAULT_PIXEL_SIZE,
+) -> BoardPicture:
+    """The top view of one image; see `BoardRectifier`, which is for images that follow each other.
+
+    Args:
+        image: (H, W, 3) RGB.
+        board, intrinsics, margin, resolution: see `BoardRectifier`.
+
+    Raises:
+        InvalidInputError: see `BoardRectifier.picture`.
+    """
+    rectifier = BoardRectifier(board, intrinsics, margin=margin, resolution=resolution)
+    return rectifier.picture(image)
+
+
+def _sample_image(image: Image, pixels: Array) -> Image:
+    """(H, W, 3) colours of an image at pixels (H, W, 2); where these lie far apart, of as much of
+    the image as they stand for."""
+    outside_color = (128, 128, 128)  # RGB of places that the photo does not show.
+    step = np.concatenate([np.diff(pixels, axis=axis).reshape(-1, 2) for axis in (0, 1)])
+    shrink = max(1, int(np.median(np.linalg.norm(step, axis=1))))
+    if shrink > 1:
+        height, width = (n // shrink * shrink for n in image.shape[:2])
+        size = width // shrink, height // shrink
+        image = np.asarray(
+            cv2.resize(image[:height, :width], size, interpolation=cv2.INTER_AREA), np.uint8
+        )
+        pixels = (pixels + 0.5) / shrink - 0.5
+    at = pixels.astype(np.float32)
+    return np.asarray(
+        cv2.remap(
+            *(image, at[..., 0], at[..., 1], cv2.INTER_LINEAR),
+            borderMode=cv2.BORDER_CONSTANT,
+            borderValue=outside_color,
+        )
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class SheetFit:
+    """A sheet in an image.
+
+    Attributes:
+        H: (3, 3) homography from x and y of the scene frame [m] to undistorted image coordinates,
+            which have their origin in the image's middle and half its diagonal as their unit.
+        distortion: what a lens adds to a distance r from the middle: `r (1 + distortion r^2)`.
+        middle: (2,) [pixels].
+        radius: half the image's diagonal [pixels].
+        error: root mean square distance of the markers' corners from their places on the sheet [m].
+        ids: markers that were used.
+    """
+
+    H: Array
+    distortion: float
+    middle: Array
+    radius: float
+    error: float
+    ids: tuple[int, ...]
+
+    def project(self, p_SQ: Array) -> Array:
+        """(N, 2) pixels of points (N, 2) on the sheet [m]; far outside of the image for what no
+        camera could see there."""
+        return _project(self.H, self.distortion, p_SQ) * self.radius + self.middle
+
+
+class SheetFinder:
+    """Finds one board's sheet in images."""
+
+    def __init__(self, board: Board) -> None:
+        self._layout = board.layout
+        self._detector = MarkerDetector(board.layout)
+
+    def find(self, image: NDArray[np.uint8]) -> SheetFit:
+        """Finds it.
+
+        Args:
+            image: (H, W) or RGB (H, W, 3).
+
+        Raises:
+            InvalidInputError: the image does not show this board.
+        """
+        rough_tolerance = 0.1  # Fraction of a marker's side, without distortion.
+        max_mean_error = 0.05  # Fraction of a marker's side; with more it is another board.
+        grey = grey_image(image)
+        seen = self._detector.detect(grey)
+        if not len(seen.index):
+            raise InvalidInputError(self._no_markers_reason(grey, seen.candidates))
+        size = np.array(grey.shape[::-1], dtype=float)
+        middle, radius = 0.5 * (size - 1.0), 0.5 * float(np.linalg.norm(size))
+        p_SQ = self._layout.p_SQ[seen.index][..., :2]
+        corners = (seen.corners - middle) / radius
+        tolerance = max(
+            CORNER_TOLERANCE[0] / radius, rough_tolerance * float(side_lengths(corners).mean())
+        )
+        kept = _consistent_markers(p_SQ, corners, tolerance)
+        n, fit = len(kept), int(kept.sum())
+        if fit < max(1, n / 2) or (n > 1 and fit < 2):
+            raise InvalidInputError(
+                f"the image shows another board: only {fit} of {n} markers in sight are where this"
+                " one has them; are columns, rows and first_id right?"
+            )
+        if 2 * fit < len(self._layout.ids):
+            self._require_no_foreign_markers(grey, fit)
+        p_SQ, corners = p_SQ[kept].reshape(-1, 2), corners[kept].reshape(-1, 2)
+        H, distortion = _fit_sheet(p_SQ, corners, fit, 1.0 / radius)
+        off = _project(H, distortion, p_SQ) - corners
+        scale = self._layout.side / float(side_lengths(corners.reshape(-1, 4, 2)).mean())
+        error = scale * float(np.sqrt((off**2).sum(axis=1).mean()))
+        if error > max_mean_error * self._layout.side:
+            raise InvalidInputError(
+                "the image shows another board: the corners of its markers are off by"
+                f" {1e3 * error:.1f} mm on average; are side and spacing right, and is the sheet"
+                " flat?"
+            )
+        ids = tuple(int(i) for i in self._layout.ids[seen.index[kept]])
+        return SheetFit(H, distortion, middle, radius, error, ids)
+
+    def _require_no_foreign_markers(self, grey: NDArray[np.uint8], fit: int) -> None:
+        """Refuses a sheet that has more markers which are not this board's than fit: a part of the
+        first row is the same on boards of several sizes."""
+        layout = self._layout
+        other = find_foreign_markers(grey, layout)
+        if other is None or other.dictionary.lower() != layout.dictionary.lower():
+            return
+        foreign_markers = set(other.ids) - set(layout.ids.tolist())
+        if len(foreign_markers) > fit:
+            raise InvalidInputError(
+                f"the image shows another board: {len(foreign_markers)} markers in sight have ids"
+                f" above {layout.ids[-1]}, the last of this one; are columns and rows right?"
+            )
+
+    def _no_markers_reason(self, grey: NDArray[np.uint8], candidates: int) -> str:
+        layout = self._layout
+        other = find_foreign_markers(grey, layout) if candidates else None
+        if other is None:
+            return "the image shows no marker of the board; improve the light, or move closer"
+        own = f"this one has {layout.dictionary} with ids {layout.ids[0]} to {layout.ids[-1]}"
+        listed = ", ".join(map(str, other.ids[:3])) + (" ..." if len(other.ids) > 3 else "")
+        return (
+            f"the image shows another board: {len(other.ids)} markers of {other.dictionary} with"
+            f" ids {listed}; {own}"
+        )
+
+
+def _consistent_markers(p_SQ: Array, corners: Array, tolerance: float) -> NDArray[np.bool_]:
+    """(N,) markers with all corners (N, 4, 2) where the homography that most agree on has them."""
+    if len(p_SQ) == 1:
+        return np.ones(1, dtype=bool)
+    cv2.setRNGSeed(0)
+    _, fits = cv2.findHomography(p_SQ.reshape(-1, 2), corners.reshape(-1, 2), cv2.RANSAC, tolerance)
+    if fits is None:
+        return np.zeros(len(p_SQ), dtype=bool)
+    return np.asarray(fits.reshape(-1, 4).all(axis=1))
+
+
+def _fit_sheet(p_SQ: Array, corners: Array, markers: int, pixel: float) -> tuple[Array, float]:
+    """Homography and bend that put corners (N, 2) where they were seen; corners that are half
+    hidden, and were found beside their place, hardly count."""
+    min_lens_markers = 6  # Markers from which on the distortion is fitted.
+    max_distortion = 0.3  # Relative shift of an image corner from the centre.
+    max_cost_ratio = 0.5  # The distortion is used if it lowers the cost below this fraction.
+    corner_sd = 0.5  # Pixels.
+    H, _ = cv2.findHomography(p_SQ, corners, 0)
+    if H is None:
+        raise InvalidInputError("the visible part of the board does not determine its pose")
+
+    def off(x: Array) -> Array:
+        return (_project(_homography(x), float(x[8:].sum()), p_SQ) - corners).ravel()
+
+    def fit(start: Array, limit: Array) -> Any:
+        return least_squares(
+            *(off, start),
+            bounds=(-limit, limit),
+            x_scale="jac",
+            loss="soft_l1",
+            f_scale=corner_sd * pixel,
+        )
+
+    plain = fit((H / H[2, 2]).ravel()[:8], np.full(8, np.inf))
+    if markers >= min_lens_markers:
+        bent = fit(np.append(plain.x, 0.0), np.append(np.full(8, np.inf), max_distortion))
+        if bent.cost < max_cost_ratio * plain.cost:
+            return _homography(bent.x), float(bent.x[8])
+    return _homography(plain.x), 0.0
+
+
+def _homography(x: Array) -> Array:
+    return np.append(x[:8], 1.0).reshape(3, 3)
+
+
+def _project(H: Array, distortion: float, p_SQ: Array) -> Array:
+    q = np.column_stack([p_SQ, np.ones(len(p_SQ))]) @ H.T
+    ahead = q[:, 2:] > 1e-3 * np.abs(q[:, 2]).max()
+    flat = np.where(ahead, q[:, :2] / np.where(ahead, q[:, 2:], 1.0), 1e3)
+    bent: Array = flat * (1.0 + distortion * (flat**2).sum(axis=1, keepdims=True))
+    return bent
+
+
+@dataclass(frozen=True, eq=False)
+class BoardObservation:
+    """What one frame shows of the board.
+
+    Attributes:
+        picture: the top view; None if there is none.
+        reason: why there is none, or what is doubtful about it; "" if all is well.
+    """
+
+    picture: BoardPicture | None
+    reason: str
+
+
+def board_observations(
+    source: FrameSource,
+    rectifier: BoardRectifier,
+    *,
+    period: float = 1.0,
+    stop: threading.Event | None = None,
+) -> Iterator[BoardObservation]:
+    """Observes the board, again and again.
+
+    Args:
+        source: of a live camera the newest frame is taken each time; of files each one in turn.
+            The caller closes it.
+        rectifier: makes the views.
+        period: least time from one observation to the next [s]; files are read without pauses.
+        stop: ends the observations, also while one is waited for.
+
+    Yields:
+        An observation a frame, also where the frame does not show the board, cannot be read or the
+        camera is away: then `reason` says so, and the next observation may find it again.
+    """
+    stop = stop or threading.Event()
+    while not stop.is_set():
+        started = time.monotonic()
+        try:
+            frame = source.read()
+            if frame is None:
+                return
+            picture = rectifier.picture(frame.image)
+            yield BoardObservation(picture, picture.note)
+        except (CameraLost, InvalidInputError) as error:
+            yield BoardObservation(None, str(error))
+        if source.live:
+            stop.wait(max(0.0, period - (time.monotonic() - started)))

@@ -1,0 +1,233 @@
+"""Actions on a live session: snapshots, recordings and placement checks."""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+
+from burg_drake.cameras.frame_processing import FrameProcessor
+from burg_drake.cameras.live_session import LiveSession, Picture
+from burg_drake.cameras.placement.document import PlacementCheck
+from burg_drake.cameras.recording import Recording, RecordingFiles
+from burg_drake.cameras.snapshot import (
+    Snapshot,
+    describe_scene,
+    describe_snapshot,
+    next_free_path,
+    save_snapshot,
+)
+from burg_drake.core import BurgError, InvalidInputError
+
+
+class ViewActions:
+    """Acts on a live session; every method may be called from any thread.
+
+    Args:
+        live: the session.
+        folder: where snapshots and recordings are put that are not given a path.
+        plain: recordings also get the pictures without overlay.
+    """
+
+    def __init__(self, live: LiveSession, folder: str | Path = ".", *, plain: bool = False) -> None:
+        self.live, self.folder = live, Path(folder)
+        self.recording: Recording | None = None
+        """The one that is being written."""
+        self.checking = False
+        """A placement check is at work."""
+        self._plain = plain
+        self._lock = threading.RLock()
+        self._check: threading.Thread | None = None
+        live.on_frame(self._record)
+        live.keep_awake(lambda: self.recording is not None)
+
+    @property
+    def processor(self) -> FrameProcessor:
+        """What looks at the frames."""
+        return self.live.processor
+
+    def snapshot(self, folder: str | Path | None = None, picture: Picture | None = None) -> Path:
+        """Saves a picture.
+
+        Args:
+            folder: new folder to make; `SCENE_snapshot_001` and so on if not given.
+            picture: the newest if not given.
+
+        Raises:
+            InvalidInputError: there is no picture yet, or the folder cannot be written.
+        """
+        picture = picture or self._newest()
+        if picture is None:
+            raise InvalidInputError("there is no picture yet")
+        located = picture.located
+        document = describe_snapshot(
+            self.processor.scene,
+            self.processor.intrinsics,
+            located.estimate,
+            source=located.frame.name,
+            taken=_now(),
+            time=located.frame.time,
+            X_SC_drawn=located.X_SC,
+            placement=picture.placement,
+        )
+        snapshot = Snapshot(
+            document=document,
+            image=located.frame.image,
+            overlay=picture.overlay,
+            depth=located.frame.depth,
+        )
+        with self._lock:  # two at once must not choose the same number
+            place = Path(folder) if folder is not None else self._free_path("snapshot")
+            save_snapshot(snapshot, place)
+        self.live.events.add(f"snapshot {place}")
+        return place
+
+    def start_recording(self, path: str | Path | None = None) -> Path:
+        """Records all frames from now on.
+
+        Args:
+            path: of the video; `SCENE_recording_001.mp4` and so on if not given.
+
+        Raises:
+            InvalidInputError: it cannot be written, files of that name exist, a recording is being
+                written already, or no frame comes any more.
+        """
+        default_rate = 30.0  # Frames per second.
+        min_rate = 1.0  # Frames per second.
+        max_rate = 240.0  # Some files state 90000 frames per second, which no codec takes.
+        with self._lock:
+            if self.recording is not None:
+                raise InvalidInputError(f"{self.recording.path} is being recorded; stop that first")
+            if self.live.is_over:
+                raise InvalidInputError(
+                    f"{self.live.source.name} has no more frames to record; take a snapshot to"
+                    " keep the picture that is shown"
+                )
+            if path is None:
+                path = self._free_path("recording", ".mp4", taken=self._is_recorded)
+            rate = self.live.source.fps or default_rate
+            self.recording = Recording(
+                path,
+                self.processor.intrinsics,
+                describe_scene(self.processor.scene),
+                source=self.live.source.name,
+                started=_now(),
+                frames_per_second=min(max(rate, min_rate), max_rate),
+                plain=self._plain,
+            )
+            self.live.request_pictures()
+            self.live.events.add(f"recording {path}")
+            return self.recording.path
+
+    def stop_recording(self) -> Path | None:
+        """Finishes the recording; None if there was none, or nothing in it.
+
+        Raises:
+            InvalidInputError: it could not be written whole.
+        """
+        with self._lock:
+            recording, self.recording = self.recording, None
+            if recording is None:
+                return None
+            path = recording.close()
+        if path is None:
+            frozen = " while the picture was frozen" if self.live.settings.frozen else ""
+            self.live.events.add(
+                f"{recording.path}: nothing was recorded, because no new frame arrived{frozen}",
+                bad=True,
+            )
+        else:
+            seconds = recording.frames / recording.frames_per_second
+            self.live.events.add(f"recorded {path}, {seconds:.1f} s")
+        return path
+
+    def start_check(self) -> None:
+        """Measures in a thread of its own how the objects of the newest picture stand.
+
+        Raises:
+            InvalidInputError: there is no picture with a pose, or a check is at work.
+        """
+        picture = self._newest()
+        if picture is None or not picture.located.estimate.valid:
+            raise InvalidInputError("a placement check needs a picture in which the board is found")
+        with self._lock:
+            if self.checking:
+                raise InvalidInputError("a placement check is already running")
+            self.checking = True
+            self._check = threading.Thread(
+                target=self._measure, args=(picture,), name="placement check", daemon=True
+            )
+            self._check.start()
+
+    def wait_for_check(self, seconds: float | None = None) -> None:
+        """Until the placement check that is at work, if any, is done."""
+        if self._check is not None:
+            self._check.join(seconds)
+
+    def _newest(self) -> Picture | None:
+        """The newest picture; of a session that idled, the next one."""
+        picture_timeout = 5.0  # Seconds to wait for the first picture of an idle session.
+        stale = self.live.request_pictures()
+        return self.live.next_picture(stale, picture_timeout) if stale else self.live.picture
+
+    def _measure(self, picture: Picture) -> None:
+        try:
+            check = self.processor.check(picture.located)
+        except BurgError as error:
+            self.live.events.add(f"placement check: {error}", bad=True)
+        else:
+            self.live.placement = check
+            self.live.events.add(f"placement: {placement_summary(check)}")
+        finally:
+            self.checking = False
+
+    def _record(self, picture: Picture) -> None:
+        with self._lock:
+            if self.recording is None:
+                return
+            located = picture.located
+            try:
+                self.recording.add(
+                    picture.overlay, located.estimate, located.frame.time, located.frame.image
+                )
+            except Exception as error:  # whatever it is, the view goes on
+                self.live.events.add(f"recording ended: {error}", bad=True)
+                self._finish_on_close()
+
+    def _finish_on_close(self) -> None:
+        """Finishes a recording that cannot go on; whoever reads the events learns where it is."""
+        try:
+            self.stop_recording()
+        except Exception as error:
+            self.live.events.add(str(error), bad=True)
+
+    def _is_recorded(self, path: Path) -> bool:
+        return RecordingFiles(path, self._plain).existing() is not None
+
+    def _free_path(
+        self, what: str, suffix: str = "", *, taken: Callable[[Path], bool] = Path.exists
+    ) -> Path:
+        return next_free_path(
+            self.folder, f"{self.processor.scene.name}_{what}", suffix, taken=taken
+        )
+
+
+def placement_summary(check: PlacementCheck) -> str:
+    """How many objects were measured, are doubtful and were not seen; or why none could be."""
+    if not check.instances:
+        return check.reason
+    counts = Counter(placed.status for placed in check.instances.values())
+    words = [f"{counts['measured']} of {len(check.instances)} objects measured"]
+    words += [f"{counts['uncertain']} uncertain"] if counts["uncertain"] else []
+    words += [f"{counts['not_seen']} not seen"] if counts["not_seen"] else []
+    if check.extra:
+        words += (
+            ["1 extra object"] if len(check.extra) == 1 else [f"{len(check.extra)} extra objects"]
+        )
+    return ", ".join(words) + (f"; {check.reason}" if check.reason else "")
+
+
+def _now() -> str:
+    return datetime.now().astimezone().isoformat(timespec="seconds")

@@ -1,0 +1,96 @@
+"""The base class of commands, and the command that changes the board."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+from burg_drake.compose.scene_checker import Surroundings
+from burg_drake.compose.state import State
+from burg_drake.core import InvalidInputError, UnknownNameError, suggest_names
+from burg_drake.printout import PAPERS
+from burg_drake.scene import Board
+
+MAX_COORDINATE = 100.0
+"""Metres; largest coordinate of an object and largest side of a board."""
+
+
+class Command(Protocol):
+    """A step that a user takes: a small frozen dataclass."""
+
+    @property
+    def label(self) -> str:
+        """What it does, for a button that undoes it: `move mug`."""
+
+    def apply(self, state: State, surroundings: Surroundings) -> State:
+        """The state after it, with what it changed selected.
+
+        Raises:
+            BurgError: it cannot be done; one clear line says why.
+        """
+
+
+def command_label(verb: str, names: tuple[str, ...]) -> str:
+    """A label that names what it is about, unless that is much."""
+    if not 0 < len(names) <= 2:
+        return f"{verb} {len(names)} objects"
+    return f"{verb} {' and '.join(names)}"
+
+
+def require_number(value: float, what: str, lower: float, upper: float, unit: str) -> float:
+    """A number from a field.
+
+    Raises:
+        InvalidInputError: it is none, not finite, or outside of the range.
+    """
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not lower <= number <= upper:
+        given = f"{value:g}" if isinstance(value, float | int) else repr(value)
+        raise InvalidInputError(
+            f"{what} is {given}; give a number from {lower:g} to {upper:g} {unit}".rstrip()
+        )
+    return number
+
+
+BOARD_SIZES = {name: size for name, size in PAPERS.items() if name.startswith("A")}
+"""Short and long side in metres by name of the paper, A4 to A0."""
+
+
+@dataclass(frozen=True)
+class SetBoard:
+    """Replaces the board; objects stay where they are in its frame."""
+
+    board: Board
+
+    label = "change board"
+
+    def apply(self, state: State, surroundings: Surroundings) -> State:
+        _ = self.board.layout  # refuses markers that do not fit
+        return replace(state, document=replace(state.document, board=self.board))
+
+
+def board_size(name: str, *, upright: bool = False) -> tuple[float, float]:
+    """Extents along x and y of a board of paper size [m], across unless `upright`.
+
+    Raises:
+        UnknownNameError: no size of that name.
+    """
+    if name not in BOARD_SIZES:
+        raise UnknownNameError(
+            f"board size {name!r} does not exist; {suggest_names(name, BOARD_SIZES)}"
+        )
+    short, long = BOARD_SIZES[name]
+    return (short, long) if upright else (long, short)
+
+
+def board_size_name(size: tuple[float, float]) -> str | None:
+    """The name of a board's size, either way up; None if it is one's own."""
+    sides = sorted(size)
+    for name, paper in BOARD_SIZES.items():
+        if all(abs(a - b) < 1e-6 for a, b in zip(sides, paper, strict=True)):
+            return name
+    return None

@@ -1,0 +1,427 @@
+"""Applies commands to a scene, keeps the history and the selection, and publishes views."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from burg_drake.compose.commands import Command, command_label
+from burg_drake.compose.moving_commands import MoveObjects
+from burg_drake.compose.opening import OpenedScene
+from burg_drake.compose.scene_checker import SceneChecker, Surroundings
+from burg_drake.compose.scene_storage import SceneStorage
+from burg_drake.compose.session_view import SessionView, instance_statuses
+from burg_drake.compose.state import (
+    History,
+    HistoryStep,
+    State,
+    StepAmendment,
+    require_instance_names,
+)
+from burg_drake.core import BurgError, InvalidInputError, make_pose, rot_z
+from burg_drake.scene import SceneIssue
+from burg_drake.station import StationLike, as_station
+
+
+class DragOwner(Protocol):
+    """What a drag needs of the session that it belongs to."""
+
+    @property
+    def view(self) -> SessionView:
+        """What one sees."""
+
+    def holds(self, drag: Drag) -> bool:
+        """Whether a drag is the one that goes on."""
+
+    def preview(self, drag: Drag, move: MoveObjects) -> SessionView:
+        """Shows what is dragged elsewhere."""
+
+    def drop(self, drag: Drag) -> SessionView:
+        """Makes a drag a step."""
+
+    def put_back(self, drag: Drag) -> SessionView:
+        """Ends a drag without a step."""
+
+
+class Drag:
+    """What `ComposeSession.drag` gives.
+
+    `move` may be called from several threads, and faster than a scene is checked: then only the
+    newest poses are, and older calls come back with what is known by then.
+
+    Attributes:
+        names: instances that are held.
+    """
+
+    def __init__(self, session: DragOwner, names: tuple[str, ...], start: SessionView) -> None:
+        self.names = names
+        self._session = session
+        self._start = {name: start.X_SO(name) for name in names}
+        self._X_SO: dict[str, ArrayLike] = dict(self._start)
+        self._changes_height = False
+        self._asked = self._checked = 0
+        self._newest = threading.Lock()
+        self._checking = threading.Lock()
+
+    @property
+    def is_over(self) -> bool:
+        """It was ended or cancelled, or something else changed the scene."""
+        return not self._session.holds(self)
+
+    def move(self, X_SO: Mapping[str, ArrayLike], *, changes_height: bool = False) -> SessionView:
+        """Holds instances at poses.
+
+        Args:
+            X_SO: (4, 4) by name of all instances that are held, or of some.
+            changes_height: Heights change even while objects are kept upright.
+
+        Returns:
+            The scene with them there, and the status of all instances.
+
+        Raises:
+            InvalidInputError: a pose is none, an instance is not held, or the drag is over.
+        """
+        for name in X_SO:
+            if name not in self._start:
+                raise InvalidInputError(
+                    f"{name!r} is not part of this drag; start a drag that includes it"
+                )
+        with self._newest:
+            self._X_SO, self._changes_height = {**self._X_SO, **X_SO}, changes_height
+            self._asked += 1
+            number = self._asked
+        with self._checking:
+            with self._newest:
+                if number <= self._checked:  # newer poses were checked while this call waited
+                    return self._session.view
+                self._checked, move = self._asked, MoveObjects(self._X_SO, self._changes_height)
+            return self._session.preview(self, move)
+
+    def move_by(self, offset: tuple[float, float, float], yaw: float = 0.0) -> SessionView:
+        """Holds all instances away from where they were taken, as one.
+
+        Args:
+            offset: along x, y and z of the scene [m].
+            yaw: turned about the vertical through the middle of their origins [rad].
+        """
+        middle = np.mean([X[:3, 3] for X in self._start.values()], axis=0)
+        X = make_pose(rot_z(yaw), middle + offset) @ make_pose(p_AB=-middle)
+        return self.move({name: X @ X_SO for name, X_SO in self._start.items()})
+
+    def end(self) -> SessionView:
+        """Lets the instances go: one step, or none if they did not move."""
+        return self._session.drop(self)
+
+    def cancel(self) -> SessionView:
+        """Puts the instances back where they were taken."""
+        return self._session.put_back(self)
+
+
+Callback = Callable[[SessionView], None]
+
+
+class Editor:
+    """What of a session needs neither other files nor other processes; see `ComposeSession`.
+
+    Args:
+        opened: the scene.
+        station: where it stands.
+    """
+
+    def __init__(self, opened: OpenedScene, station: StationLike) -> None:
+        self.station = as_station(station)
+        self._lock = threading.RLock()
+        self._depth = 0
+        self._callbacks: list[Callback] = []
+        self._last_reported = 0
+        self._checker = SceneChecker(self.station)
+        self._amending = StepAmendment()
+        self._planar = True
+        self._serial = self._revision = 0
+        self._notices: tuple[str, ...] = ()
+        self._dismissed: set[str] = set()
+        self._check_problem: str | None = None
+        self._history: History
+        self._storage: SceneStorage
+        self._state: State
+        self._drag: Drag | None
+        self._view: SessionView
+        with self._exclusive():
+            self._begin(opened)
+
+    @property
+    def view(self) -> SessionView:
+        """What there is to see now."""
+        return self._view
+
+    def on_change(self, callback: Callback) -> Callable[[], None]:
+        """Calls `callback` with each new view, in the thread that caused it; of views that come
+        together only with the last. With several threads they may come out of order: see
+        `SessionView.serial`.
+
+        Returns:
+            What ends that.
+        """
+        with self._lock:
+            self._callbacks.append(callback)
+
+        def unsubscribe() -> None:
+            with self._lock:
+                if callback in self._callbacks:
+                    self._callbacks.remove(callback)
+
+        return unsubscribe
+
+    def do(self, command: Command, *, field: str = "") -> SessionView:
+        """Takes a step; none if the command changes nothing.
+
+        Args:
+            command: to do.
+            field: that the user is typing in: the step takes the place of the last one if that is
+                of the same field and recent, and neither was anything selected since.
+
+        Raises:
+            BurgError: it cannot be taken; one clear line says why.
+        """
+        with self._exclusive():
+            self._update_surroundings()
+            selected = replace(self._history.state, selection=self._state.selection)
+            state = command.apply(selected, self._surroundings)
+            self._drag = None
+            return self._edit(command.label, state, field)
+
+    def undo(self) -> SessionView:
+        """Takes the last step back, and selects what it had changed.
+
+        Raises:
+            InvalidInputError: there is none.
+        """
+        return self._go_to_step(lambda: self._history.undo())
+
+    def redo(self) -> SessionView:
+        """Takes the step again that was undone last.
+
+        Raises:
+            InvalidInputError: there is none.
+        """
+        return self._go_to_step(lambda: self._history.redo())
+
+    def select(self, names: Iterable[str]) -> SessionView:
+        """Selects instances, and no others; this is no step.
+
+        Raises:
+            UnknownNameError: one is not there.
+        """
+        with self._exclusive():
+            self._amending.end()
+            return self._show(self._state.select(names))
+
+    def restrict_movement(self, planar: bool) -> SessionView:
+        """Whether what is moved from now on keeps its tilt, and its height unless it is raised."""
+        with self._exclusive():
+            self._planar = planar
+            return self._publish()
+
+    def notify(self, notice: str) -> SessionView:
+        """Adds a line to what the user should know."""
+        with self._exclusive():
+            if notice not in self._notices:
+                self._notices += (notice,)
+            return self._publish()
+
+    def dismiss(self, notice: str) -> SessionView:
+        """The user has read a notice."""
+        with self._exclusive():
+            self._notices = tuple(n for n in self._notices if n != notice)
+            self._dismissed.add(notice)
+            return self._publish()
+
+    def drag(self, names: Iterable[str]) -> Drag:
+        """Takes instances in the hand; they are selected. A drag that is not over yet is put back.
+
+        Raises:
+            InvalidInputError: no instance is given.
+            UnknownNameError: one is not there.
+        """
+        with self._exclusive():
+            held = require_instance_names(names, self._history.state)
+            self._drag = None
+            self._show(self._history.state.select(held))
+            self._drag = Drag(self, held, self._view)
+            self._publish()
+            return self._drag
+
+    def holds(self, drag: Drag) -> bool:
+        """Whether a drag is not over."""
+        return self._drag is drag
+
+    def preview(self, drag: Drag, move: MoveObjects) -> SessionView:
+        """Shows what is dragged elsewhere; see `Drag.move`.
+
+        Raises:
+            InvalidInputError: a pose is none, or the drag is over.
+        """
+        with self._exclusive():
+            self._require(drag)
+            return self._show(move.apply(self._history.state, self._surroundings))
+
+    def drop(self, drag: Drag) -> SessionView:
+        """Makes a drag a step; see `Drag.end`."""
+        with self._exclusive():
+            self._require(drag)
+            self._drag = None
+            state = replace(self._state, library=self._history.state.library)
+            return self._edit(command_label("move", drag.names), state)
+
+    def put_back(self, drag: Drag) -> SessionView:
+        """Ends a drag without a step; see `Drag.cancel`."""
+        with self._exclusive():
+            if not self.holds(drag):
+                return self._view
+            self._drag = None
+            return self._show(self._history.state.select(drag.names))
+
+    def _begin(self, opened: OpenedScene) -> None:
+        """Another scene, with its own history."""
+        self._drag = None
+        self._history, self._storage = opened.history, opened.storage
+        self._notices = opened.notices
+        self._dismissed.clear()
+        self._state = self._history.state
+        self._revision += 1
+        self._publish()
+
+    def _update_surroundings(self) -> None:
+        """Called before each step: has anything around the session changed?"""
+
+    def _with_background(self, view: SessionView) -> SessionView:
+        """A view with what else there is to say."""
+        return view
+
+    @property
+    def _surroundings(self) -> Surroundings:
+        return Surroundings(self.station, self._planar, self._storage.place, self._checker)
+
+    @property
+    def _changed(self) -> bool:
+        """There are changes that are in no file."""
+        if self._storage.saved is None:
+            return self._history.position > 0
+        return self._history.state.document != self._storage.saved
+
+    @contextlib.contextmanager
+    def _exclusive(self) -> Iterator[None]:
+        """Keeps other threads out; then tells of the new view, when nothing is locked any more."""
+        view: SessionView | None = None
+        try:
+            with self._lock:
+                self._depth += 1
+                try:
+                    yield
+                finally:
+                    self._depth -= 1
+                    if self._depth == 0 and self._serial != self._last_reported:
+                        view, self._last_reported = self._view, self._serial
+                        callbacks = tuple(self._callbacks)
+        finally:
+            if view is not None:
+                for callback in callbacks:
+                    try:
+                        callback(view)
+                    except Exception:  # what listens must not undo what was done
+                        logging.getLogger(__name__).exception("a listener of a session failed")
+
+    def _edit(self, label: str, state: State, field: str = "") -> SessionView:
+        """Takes a step after which the scene is not any more the one that was sampled."""
+        document = state.document
+        if document != self._history.state.document and document.origin is not None:
+            state = replace(state, document=replace(document, origin=None))
+        if self._amending.allows(field, self._history):
+            label = self._history.undo_label or label
+            self._history.undo()
+            self._storage.record_position(self._history)
+            self._revision += 1
+        step = HistoryStep(label, state)
+        self._amending.begin(field, step)
+        return self._add_step(step)
+
+    def _add_step(self, step: HistoryStep) -> SessionView:
+        before = self._history.state
+        if step.state.document == before.document and step.state.library is before.library:
+            return self._show(step.state)
+        self._history.add(step)
+        self._storage.record_step(self._history)
+        self._revision += 1
+        return self._show(step.state)
+
+    def _go_to_step(self, there: Callable[[], State]) -> SessionView:
+        with self._exclusive():
+            state = there()
+            self._drag = None
+            self._amending.end()
+            self._storage.record_position(self._history)
+            self._revision += 1
+            return self._show(state)
+
+    def _show(self, state: State) -> SessionView:
+        self._state = state
+        return self._publish()
+
+    def _issues(self) -> tuple[SceneIssue, ...] | None:
+        try:
+            issues = self._checker.issues(self._state, self._storage.place)
+        except BurgError as error:
+            self._check_problem = f"the scene cannot be checked: {error}"
+            return None
+        self._check_problem = None
+        return issues
+
+    def _gaps(self) -> dict[str, float]:
+        try:
+            return self._checker.gaps(self._state, self._storage.place)
+        except BurgError:
+            return {}  # `_issues` tells
+
+    def _publish(self) -> SessionView:
+        self._serial += 1
+        issues = self._issues()
+        self._view = self._with_background(
+            SessionView(
+                serial=self._serial,
+                revision=self._revision,
+                state=self._state,
+                issues=issues or (),
+                status=instance_statuses(self._state, issues),
+                undo_label=self._history.undo_label,
+                redo_label=self._history.redo_label,
+                saved=self._history.state.document == self._storage.saved,
+                changed=self._changed,
+                path=self._storage.path,
+                planar=self._planar,
+                gaps=self._gaps(),
+                dragging=self._drag.names if self._drag else (),
+                notices=self._all_notices(),
+            )
+        )
+        return self._view
+
+    def _all_notices(self) -> tuple[str, ...]:
+        journal = self._storage.problem
+        problems = (
+            self._check_problem,
+            journal and f"{journal}; until then changes are kept in memory only",
+        )
+        return self._notices + tuple(t for t in problems if t and t not in self._dismissed)
+
+    def _require(self, drag: Drag) -> None:
+        if self._drag is not drag:
+            raise InvalidInputError(
+                "the scene was changed during the drag, which ended it; drag again"
+            )

@@ -1,0 +1,462 @@
+"""The journal of a session: every step is written to disk, so that a killed session can be recovered."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from burg_drake.compose.state import History, HistoryStep, State, instance_name
+from burg_drake.core import (
+    BurgError,
+    InvalidInputError,
+    Limits,
+    Pose,
+    atomic_write,
+    dump_document,
+    parse_document,
+    parse_json,
+    read_bytes,
+)
+from burg_drake.objects import ObjectLibrary, load_library
+from burg_drake.scene import Instance, SceneDocument
+
+JOURNAL_VERSION = 1  # Version of the journal's format.
+DAMAGE_ERRORS = (BurgError, ValueError, KeyError, TypeError, AttributeError, OverflowError)
+"""Exceptions that a damaged line raises."""
+JOURNAL_LINE_LIMITS = Limits(size=1 << 26, values=1_000_000, depth=8)
+"""Limits of one line; the deepest holds a list of instances with lists of numbers."""
+
+
+class JournalWriter:
+    """Makes the lines of one journal; the numbers of instances count within it."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[Instance, int] = {}
+        self._head = ""
+        self._library = ""
+
+    def begin(self, origin: str) -> str:
+        """The first line.
+
+        Args:
+            origin: what the session was opened with, where that was no file of its own.
+        """
+        return _json_line({"journal": JOURNAL_VERSION, "origin": origin})
+
+    def step(self, step: HistoryStep, position: int) -> str:
+        """A step that was taken, and its number in the history."""
+        values: dict[str, Any] = {"step": step.label, "at": position}
+        values["selection"] = list(step.state.selection)
+        library = str(step.state.library.root)
+        if library != self._library:
+            values["library"] = self._library = library
+        return _json_line(values | self._document(step.state.document))
+
+    def at(self, position: int) -> str:
+        """Where among the steps the session is."""
+        return _json_line({"at": position})
+
+    def saved(self, document: SceneDocument | None, known: str | None) -> str:
+        """What the scene's file holds.
+
+        Args:
+            document: the scene in it; None if there is no file.
+            known: its fingerprint.
+        """
+        values = {} if document is None else self._document(document)
+        return _json_line({"saved": document is not None, "known": known} | values)
+
+    def _document(self, document: SceneDocument) -> dict[str, Any]:
+        values: dict[str, Any] = {}
+        head = dump_document(replace(document, instances=(), background=()))
+        if head != self._head:
+            values["head"] = self._head = head
+        placed = (*document.instances, *document.background)
+        new = [i for i in dict.fromkeys(placed) if i not in self._numbers]
+        if new:
+            values["from"] = len(self._numbers)
+            values["new"] = [_write_instance(instance) for instance in new]
+        for instance in new:
+            self._numbers[instance] = len(self._numbers)
+        values["instances"] = [self._numbers[i] for i in document.instances]
+        if document.background:
+            values["background"] = [self._numbers[i] for i in document.background]
+        return values
+
+
+class JournalReader:
+    """Takes the lines of one journal, in their order.
+
+    Attributes:
+        origin: what the session was opened with, where that was no file of its own.
+        history: of the session, as soon as there is one.
+        saved: what the scene's file holds; None if there is none.
+        known: fingerprint of that file.
+    """
+
+    def __init__(self, libraries: dict[str, ObjectLibrary]) -> None:
+        """Args:
+        libraries: by their folders.
+        """
+        self.origin = ""
+        self.history: History | None = None
+        self.saved: SceneDocument | None = None
+        self.known: str | None = None
+        self._libraries = libraries
+        self._library: ObjectLibrary | None = None
+        self._instances: dict[int, Instance] = {}
+        self._next: int | None = 0
+        self._positions: list[int] = []
+        self._head: SceneDocument | None = None
+        self._damaged = False
+        self._whole_line = True
+
+    def take(self, line: str) -> bool:
+        """Takes what can be read of the next line.
+
+        An instance that cannot be read is left out, of this line and of later ones.
+
+        Returns:
+            Whether that is all of the line.
+        """
+        self._whole_line = True
+        try:
+            self._take(parse_json(line, "journal", JOURNAL_LINE_LIMITS))
+        except DAMAGE_ERRORS:
+            self._whole_line = False
+            self._next = None  # the number of instances in the line is unknown
+        self._damaged |= not self._whole_line
+        return self._whole_line
+
+    def _take(self, values: dict[str, Any]) -> None:
+        if "journal" in values:
+            if values["journal"] != JOURNAL_VERSION:
+                raise ValueError(f"version {values['journal']!r}")
+            self.origin = _read_text(values["origin"])
+        elif "step" in values:
+            self._step(values)
+        elif "at" in values:
+            self._go_to(_read_integer(values["at"]))
+        elif "saved" in values:
+            saved = self._document(values) if values["saved"] else None
+            known = values["known"]
+            if not isinstance(known, str | None):
+                raise TypeError("known")
+            self.saved, self.known = saved, known
+        else:
+            raise ValueError("unknown line")
+
+    def _step(self, values: dict[str, Any]) -> None:
+        library = self._libraries[values["library"]] if "library" in values else self._library
+        if library is None:
+            raise ValueError("no library")
+        state = State(self._document(values), library)
+        label, there = _read_text(values["step"]), state.instances
+        state = state.select(name for name in values["selection"] if name in there)
+        last = self._positions[self.history.position] if self.history else -1
+        position = _read_integer(values.get("at", last + 1))
+        self._library = library
+        if self.history is None:
+            self.history = History(state)
+            self._positions = [position]
+            return
+        if position <= self._positions[0]:
+            raise ValueError(f"step {position} of a history that begins later")
+        self._go_to(position - 1)
+        self.history.add(HistoryStep(label, state))
+        self._positions[self.history.position :] = [position]
+
+    def _go_to(self, position: int) -> None:
+        """Goes to a step by its number; to the one before it that was read if it was not."""
+        if self.history is None or position < self._positions[0]:
+            raise ValueError(f"no step {position}")
+        self.history.go_to(sum(known <= position for known in self._positions) - 1)
+
+    def _document(self, values: dict[str, Any]) -> SceneDocument:
+        head = self._head
+        if "head" in values:
+            head = parse_document(values["head"], SceneDocument, "journal")
+        if head is None:
+            raise ValueError("no head")
+        new, written = {}, values.get("new", [])
+        if written:
+            first = values.get("from", self._next)
+            new = self._read_instances(written, _read_integer(first))
+        instances = self._instances | new
+        document = replace(
+            head,
+            instances=self._known(values["instances"], instances),
+            background=self._known(values.get("background", []), instances),
+        )
+        placed = (*document.instances, *document.background)
+        if len({instance_name(instance) for instance in placed}) < len(placed):
+            raise ValueError("a name appears twice")
+        self._head, self._instances = head, instances
+        if written and self._next is not None:
+            self._next += len(written)
+        return document
+
+    def _read_instances(self, written: list[Any], first: int) -> dict[int, Instance]:
+        """Instances by their numbers."""
+        found = {}
+        for number, values in enumerate(written, first):
+            try:
+                found[number] = _read_instance(values)
+            except DAMAGE_ERRORS:
+                self._whole_line = False
+        return found
+
+    def _known(self, numbers: list[Any], instances: dict[int, Instance]) -> tuple[Instance, ...]:
+        """The instances of these numbers, without those that could not be read."""
+        missing = [number for number in map(_read_integer, numbers) if number not in instances]
+        if missing and self._whole_line and not self._damaged:
+            raise KeyError(missing[0])
+        return tuple(instances[number] for number in numbers if number in instances)
+
+
+def library_roots(lines: list[str]) -> list[str]:
+    """Folders of the libraries that lines name, in their order; damaged lines are left out."""
+    roots: dict[str, None] = {}
+    for line in lines:
+        if '"library"' not in line:
+            continue
+        try:
+            values = parse_json(line, "journal", JOURNAL_LINE_LIMITS)
+        except BurgError:
+            continue
+        if isinstance(values, dict) and isinstance(values.get("library"), str):
+            roots[values["library"]] = None
+    return list(roots)
+
+
+def _json_line(values: dict[str, Any]) -> str:
+    return json.dumps(values, separators=(",", ":"), allow_nan=False) + "\n"
+
+
+def _write_instance(instance: Instance) -> list[Any]:
+    X = instance.X_SO
+    return [instance.name, instance.object, X.translation, X.rpy_deg, X.quaternion_wxyz]
+
+
+def _read_instance(values: list[Any]) -> Instance:
+    name, object, translation, rpy_deg, quaternion = values
+    X_SO = Pose(
+        _read_floats(translation, 3),  # type: ignore[arg-type]
+        None if rpy_deg is None else _read_floats(rpy_deg, 3),  # type: ignore[arg-type]
+        None if quaternion is None else _read_floats(quaternion, 4),  # type: ignore[arg-type]
+    )
+    return Instance(name=str(name), object=str(object), X_SO=X_SO)
+
+
+def _read_floats(values: list[Any], count: int) -> tuple[float, ...]:
+    numbers = tuple(map(float, values))
+    if len(numbers) != count or not all(map(math.isfinite, numbers)):
+        raise ValueError(f"{values!r} in place of {count} numbers")
+    return numbers
+
+
+def _read_text(value: Any) -> str:
+    value.encode()  # a half of a surrogate pair could not be shown
+    return str(value)
+
+
+def _read_integer(value: Any) -> int:
+    if not isinstance(value, int) or isinstance(value, bool):
+        raise TypeError(f"{value!r} in place of a whole number")
+    return value
+
+
+class LibraryMissing(InvalidInputError):
+    """A journal needs a library that is not where it was."""
+
+
+@dataclass(frozen=True)
+class RecoveredSession:
+    """What a journal holds.
+
+    Attributes:
+        history: of the session.
+        saved: what the scene's file held; None if there was none.
+        known: fingerprint of that file.
+        origin: what the session was opened with, where that was no file of its own.
+        damage: what of the journal could not be read; empty if all of it was.
+    """
+
+    history: History | None = None
+    saved: SceneDocument | None = None
+    known: str | None = None
+    origin: str = ""
+    damage: str = ""
+
+
+def journal_path(scene: Path) -> Path:
+    """The journal beside a scene's file."""
+    return scene.with_name(f".{scene.name}.journal")
+
+
+class SessionJournal:
+    """Writes steps as they are taken.
+
+    A journal is begun with the first step. If it cannot be written, all of it is tried again with
+    the next one.
+
+    Attributes:
+        path: of the file.
+        origin: what the session was opened with, where that was no file of its own.
+        problem: why the last steps are not on the disk; None if they are.
+    """
+
+    def __init__(self, path: Path, origin: str = "") -> None:
+        self.path = path
+        self.origin = origin
+        self.problem: str | None = None
+        self._writer: JournalWriter | None = None
+
+    def step(self, history: History, saved: SceneDocument | None, known: str | None) -> None:
+        """The history has one more step, and is there; the rest is as in `JournalWriter.saved`."""
+        position = history.position
+        self._record(lambda w: w.step(history.steps[position], position), history, saved, known)
+
+    def at(self, history: History, saved: SceneDocument | None, known: str | None) -> None:
+        """The history is at another step."""
+        self._record(lambda w: w.at(history.position), history, saved, known)
+
+    def rewrite(self, history: History, saved: SceneDocument | None, known: str | None) -> None:
+        """Writes all of it anew."""
+        writer = JournalWriter()
+        lines = [writer.begin(self.origin)]
+        lines += [writer.step(step, position) for position, step in enumerate(history.steps)]
+        lines += [writer.at(history.position), writer.saved(saved, known)]
+        try:
+            atomic_write(self.path, "".join(lines))
+        except InvalidInputError as error:
+            self._writer, self.problem = None, str(error)
+        else:
+            self._writer, self.problem = writer, None
+
+    def remove(self) -> None:
+        """Takes it off the disk: all that it has is in the scene's file, or is not wanted."""
+        self._writer = None
+        with contextlib.suppress(OSError):
+            self.path.unlink(missing_ok=True)
+
+    def _record(
+        self,
+        line: Callable[[JournalWriter], str],
+        history: History,
+        saved: SceneDocument | None,
+        known: str | None,
+    ) -> None:
+        if self._writer is None:
+            self.rewrite(history, saved, known)
+            return
+        try:
+            _append_line(self.path, line(self._writer).encode())
+        except OSError as error:
+            self._writer = None
+            self.problem = f"cannot write {self.path}: {error.strerror or error}"
+
+
+def recover_journal(path: Path) -> RecoveredSession | None:
+    """Reads a journal that a session left.
+
+    A last line that was not written to its end is left out. Of a journal that is damaged, all that
+    can be read is recovered; see `set_journal_aside`.
+
+    Returns:
+        What it holds; None if there is none.
+
+    Raises:
+        LibraryMissing: the library of its last steps is not there.
+    """
+    max_size = 1 << 30  # Bytes; a step takes some hundred.
+    if not path.exists():
+        return None
+    try:
+        text = read_bytes(path, max_size).decode("utf-8", errors="replace")
+    except InvalidInputError as error:
+        return RecoveredSession(damage=str(error))
+    whole, _, _ = text.rpartition("\n")
+    lines = whole.split("\n") if whole else []
+    try:
+        reader = JournalReader(_load_libraries(lines))
+    except BurgError as error:
+        raise LibraryMissing(
+            f"{error}; the last session of this scene used it, and its steps are in {path}:"
+            " restore the library, or delete that file"
+        ) from error
+    damaged = [number for number, line in enumerate(lines, 1) if not reader.take(line)]
+    return RecoveredSession(
+        reader.history,
+        reader.saved,
+        reader.known,
+        reader.origin,
+        _describe_damage(damaged, len(lines)),
+    )
+
+
+def set_journal_aside(path: Path) -> Path:
+    """Renames a damaged journal, so that no other one takes its place.
+
+    Returns:
+        Where it is; `path` itself where nothing can be renamed, and so nothing be written.
+    """
+    number = 1
+    while (aside := path.with_name(f"{path.name}.damaged_{number}")).exists():
+        number += 1
+    try:
+        os.replace(path, aside)
+    except OSError:
+        return path
+    return aside
+
+
+def _describe_damage(damaged: list[int], count: int) -> str:
+    if not count:
+        return "it has no complete line"
+    if not damaged:
+        return ""
+    lines = f"line {damaged[0]}"
+    if len(damaged) > 1:
+        lines = f"lines {', '.join(map(str, damaged[:-1]))} and {damaged[-1]}"
+    if len(damaged) > 5:
+        lines = f"{len(damaged)} lines, the first of them {damaged[0]},"
+    return f"{lines} of {count} cannot be read"
+
+
+def _load_libraries(lines: list[str]) -> dict[str, ObjectLibrary]:
+    """Libraries by their folders; the one that came next stands for one that is gone.
+
+    Raises:
+        BurgError: the last one cannot be loaded.
+    """
+    found: dict[str, ObjectLibrary] = {}
+    later: ObjectLibrary | None = None
+    for root in reversed(library_roots(lines)):
+        try:
+            later = load_library(root)
+        except BurgError:
+            if later is None:
+                raise
+        found[root] = later
+    return found
+
+
+def _append_line(path: Path, line: bytes) -> None:
+    """Appends a line, or nothing."""
+    with path.open("r+b") as stream:
+        end = stream.seek(0, os.SEEK_END)
+        try:
+            stream.write(line)
+            stream.flush()
+            os.fsync(stream.fileno())
+        except OSError:
+            with contextlib.suppress(OSError):
+                os.truncate(path, end)
+            raise

@@ -1,0 +1,266 @@
+"""The files of a session's scene: the document, its lock and its journal."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+from dataclasses import replace
+from pathlib import Path
+
+from burg_drake.compose.journal import SessionJournal, journal_path
+from burg_drake.compose.state import History
+from burg_drake.core import (
+    BurgError,
+    InvalidInputError,
+    atomic_write,
+    builtin_names,
+    document_text,
+    portable_reference,
+    require_name,
+    shorten_text,
+    try_lock,
+)
+from burg_drake.objects import ObjectLibrary, load_library
+from burg_drake.scene import SceneDocument
+
+
+class FileChanged(InvalidInputError):
+    """A file is not as the session left it; writing it would lose what somebody else wrote."""
+
+
+class UnsavedChanges(InvalidInputError):
+    """Going on would lose changes that are not in any file."""
+
+
+def file_fingerprint(path: Path) -> str | None:
+    """A hash of what a file holds; None if it is not there.
+
+    Raises:
+        InvalidInputError: it is there and cannot be read.
+    """
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise InvalidInputError(f"cannot read {path}: {error.strerror or error}") from error
+
+
+def scene_path(name: str, folder: Path) -> Path:
+    """The file of a scene by its name, in a folder and nowhere else.
+
+    Args:
+        name: `breakfast` or `breakfast.yaml`.
+        folder: that was opened.
+
+    Raises:
+        FieldError: it is not a name: it would lead elsewhere, or hide the file.
+        InvalidInputError: there is a link of that name, which leads elsewhere.
+    """
+    stem = name.removesuffix(".yaml").removesuffix(".yml")
+    require_name(stem)
+    path = folder / f"{stem}.yaml"
+    if path.is_symlink() and not path.resolve().is_relative_to(folder.resolve()):
+        raise InvalidInputError(f"{path} is a link to another folder; choose another name")
+    return path
+
+
+def write_scene(
+    document: SceneDocument, library: ObjectLibrary, path: Path, *, known: str | None, force: bool
+) -> tuple[SceneDocument, str]:
+    """Writes a scene file so that its library is found from there.
+
+    Args:
+        document: the scene.
+        library: its library.
+        path: the file.
+        known: `file_fingerprint` that the file should have.
+        force: writes it all the same.
+
+    Returns:
+        The document as it was written, and the file's fingerprint.
+
+    Raises:
+        FileChanged: the file has another fingerprint.
+        InvalidInputError: it cannot be written; then it is as it was.
+    """
+    found = file_fingerprint(path)
+    if found not in (known, None) and not force:
+        what = "exists already" if known is None else "was changed by another program"
+        raise FileChanged(
+            f"{path} {what}; overwrite it, save under another name, or load it to see what it holds"
+        )
+    written = replace(document, library=library_reference(document, library, path.parent))
+    text = document_text(written)
+    atomic_write(path, text)
+    return written, hashlib.sha256(text.encode()).hexdigest()
+
+
+def library_reference(document: SceneDocument, library: ObjectLibrary, folder: Path) -> str:
+    """How a scene file in `folder` refers to its library: as the document does if that leads there,
+    else by package:// or the relative path."""
+    if document.library in builtin_names("models"):
+        return document.library
+    try:
+        if load_library(document.library, folder).root.resolve() == library.root.resolve():
+            return document.library
+    except (BurgError, OSError):
+        pass
+    return portable_reference(library.root, folder)
+
+
+class SceneInUse(InvalidInputError):
+    """A scene is open in another session.
+
+    Attributes:
+        address: of its page; empty if it has not told.
+    """
+
+    def __init__(self, message: str, address: str) -> None:
+        super().__init__(message)
+        self.address = address
+
+
+class SceneLock:
+    """A lock that its holder's end releases, however that comes about.
+
+    Where nothing can be written there is no lock, and nothing that it would protect.
+    """
+
+    def __init__(self, scene: Path, address: str = "") -> None:
+        """Takes the lock.
+
+        Args:
+            scene: the scene's file, which need not be there.
+            address: of the session's page.
+
+        Raises:
+            SceneInUse: another session has it.
+        """
+        self.path = scene.with_name(f".{scene.name}.lock")
+        self._file = _lock_file(self.path, scene)
+        self.announce(address)
+
+    def announce(self, address: str) -> None:
+        """Says where the session's page is."""
+        if self._file is not None:
+            with contextlib.suppress(OSError):  # a full disk
+                os.ftruncate(self._file, 0)
+                os.pwrite(self._file, address.encode(), 0)
+
+    def release(self) -> None:
+        """Lets others open the scene."""
+        if self._file is not None:
+            with contextlib.suppress(OSError):
+                self.path.unlink(missing_ok=True)
+            os.close(self._file)
+            self._file = None
+
+
+def _lock_file(path: Path, scene: Path) -> int | None:
+    """The descriptor of the locked file."""
+    while True:
+        try:
+            file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+        except OSError:
+            return None
+        try:
+            locked = try_lock(file)
+        except OSError:  # a file system without locks
+            return file
+        if not locked:
+            address = os.pread(file, 200, 0).decode(errors="replace")
+            os.close(file)
+            where = f" at {shorten_text(address, 200)}" if address else ""
+            raise SceneInUse(
+                f"{scene} is already open{where}; use it there, or close it first", address
+            )
+        with contextlib.suppress(OSError):
+            if os.path.samestat(os.fstat(file), os.stat(path)):
+                return file
+        os.close(file)  # its last holder has removed it meanwhile
+
+
+class SceneStorage:
+    """The files of one scene.
+
+    Attributes:
+        place: where the scene's file is, or would be if it had one.
+        path: the scene's file; None if it has none.
+        known: `scene_file.fingerprint` that the file should have.
+        saved: what it holds.
+    """
+
+    def __init__(
+        self,
+        place: Path,
+        lock: SceneLock,
+        *,
+        path: Path | None = None,
+        known: str | None = None,
+        saved: SceneDocument | None = None,
+        origin: str = "",
+    ) -> None:
+        self.place, self.path, self.known, self.saved = place, path, known, saved
+        self._lock = lock
+        self._journal = SessionJournal(journal_path(place), origin)
+
+    @property
+    def problem(self) -> str | None:
+        """Why steps are not in the journal; None if they are."""
+        return self._journal.problem
+
+    def announce(self, address: str) -> None:
+        """Says where the session's page is, for those who find the scene in use."""
+        self._lock.announce(address)
+
+    def record_step(self, history: History) -> None:
+        """The history has one more step, and is there."""
+        self._journal.step(history, self.saved, self.known)
+
+    def record_position(self, history: History) -> None:
+        """The history is at another step."""
+        self._journal.at(history, self.saved, self.known)
+
+    def record_all(self, history: History) -> None:
+        """The history is another one."""
+        self._journal.rewrite(history, self.saved, self.known)
+
+    def save(self, history: History, name: str | None, folder: Path, *, overwrite: bool) -> None:
+        """Writes the scene; the history gets its name. See `ComposeSession.save`."""
+        state = history.state
+        place = self.place if name is None else scene_path(name, folder)
+        elsewhere = place != self.place
+        lock = SceneLock(place) if elsewhere else self._lock
+        try:
+            known = None if elsewhere or self.path is None else self.known
+            document = state.document
+            if elsewhere or self.path is None:
+                document = replace(document, name=place.stem)
+            written, fingerprint = write_scene(
+                document, state.library, place, known=known, force=overwrite
+            )
+        except BaseException:
+            if elsewhere:
+                lock.release()
+            raise
+        if elsewhere:
+            self._journal.remove()
+            self._lock.release()
+            self._lock, self.place = lock, place
+            self._journal = SessionJournal(journal_path(place))
+        history.rename(written.name, written.library, state.library)
+        self.path, self.known, self.saved = place, fingerprint, written
+        self._journal.origin = ""
+        self.record_all(history)
+
+    def close(self, *, keep: bool) -> None:
+        """Lets others open the scene.
+
+        Args:
+            keep: the journal, as there is something in it that is in no file.
+        """
+        if not keep:
+            self._journal.remove()
+        self._lock.release()

@@ -1,0 +1,303 @@
+"""The state of a session (scene, library and selection) and the history of its states."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from burg_drake.core import Array, InvalidInputError, Pose, UnknownNameError, suggest_names
+from burg_drake.objects import ObjectEntry, ObjectLibrary
+from burg_drake.scene import Instance, Scene, SceneDocument
+
+
+@dataclass(frozen=True)
+class State:
+    """A scene and what of it is selected; commands make new ones of it.
+
+    Attributes:
+        document: the scene.
+        library: that the instances refer to.
+        selection: names of selected instances, in the order in which they were selected.
+    """
+
+    document: SceneDocument
+    library: ObjectLibrary
+    selection: tuple[str, ...] = ()
+
+    @property
+    def instances(self) -> dict[str, Instance]:
+        """All instances by name: the free ones first, then the background."""
+        placed = (*self.document.instances, *self.document.background)
+        return {instance_name(instance): instance for instance in placed}
+
+    def instance(self, name: str) -> Instance:
+        """An instance, free or fixed.
+
+        Raises:
+            UnknownNameError: there is none of that name.
+        """
+        known = self.instances
+        if name not in known:
+            raise UnknownNameError(
+                f"scene {self.document.name!r} has no instance {name!r}; {suggest_names(name, known)}"
+            )
+        return known[name]
+
+    def entry(self, name: str) -> ObjectEntry:
+        """The library's entry of an instance."""
+        return self.library.entry(self.instance(name).object)
+
+    def X_SO(self, name: str) -> Array:
+        """(4, 4) pose of an instance in the scene frame."""
+        return self.instance(name).X_SO.matrix()
+
+    def scene(self, path: Path) -> Scene:
+        """The scene, as if it were read from `path`."""
+        return Scene(self.document, self.library, path)
+
+    def select(self, names: Iterable[str]) -> State:
+        """The same with other instances selected.
+
+        Raises:
+            UnknownNameError: one of them is not there.
+        """
+        selection = tuple(dict.fromkeys(names))
+        for name in selection:
+            self.instance(name)
+        return replace(self, selection=selection)
+
+    def changed(self, change: Callable[[Instance], Instance | None]) -> State:
+        """The same with each instance replaced, or taken away where `change` gives None."""
+        document = replace(
+            self.document,
+            instances=_map_instances(self.document.instances, change),
+            background=_map_instances(self.document.background, change),
+        )
+        there = {instance_name(i) for i in (*document.instances, *document.background)}
+        return replace(
+            self, document=document, selection=tuple(n for n in self.selection if n in there)
+        )
+
+    def moved(self, X_SO: Mapping[str, Array]) -> State:
+        """The same with instances at other poses (4, 4); rounded as `Pose.readable` has it.
+
+        Raises:
+            UnknownNameError: one of them is not there.
+        """
+        # Entries of matrices that differ by less are equal; the instance keeps its digits.
+        pose_tolerance = 1e-9
+        for name in X_SO:
+            self.instance(name)
+
+        def place(instance: Instance) -> Instance:
+            X = X_SO.get(instance_name(instance))
+            if X is None or np.abs(X - instance.X_SO.matrix()).max() < pose_tolerance:
+                return instance
+            return replace(instance, X_SO=Pose.readable(X))
+
+        return self.changed(place)
+
+    def added(self, new: Iterable[Instance], *, fixed: Collection[str] = ()) -> State:
+        """The same with more instances, selected; those named in `fixed` are background."""
+        new = tuple(new)
+        document = self.document
+        document = replace(
+            document,
+            instances=(*document.instances, *(i for i in new if instance_name(i) not in fixed)),
+            background=(*document.background, *(i for i in new if instance_name(i) in fixed)),
+        )
+        return replace(self, document=document, selection=tuple(map(instance_name, new)))
+
+
+def instance_name(instance: Instance) -> str:
+    """What an instance goes by."""
+    return instance.name or instance.object
+
+
+def rename_instance(instance: Instance, name: str) -> Instance:
+    """The same instance by another name, which is not written where it is the object's."""
+    return replace(instance, name="" if name == instance.object else name)
+
+
+def unused_name(wanted: str, taken: Collection[str]) -> str:
+    """`wanted`, or with the first number behind it that makes it unused: mug, mug_2, mug_3."""
+    if wanted not in taken:
+        return wanted
+    number = 2
+    while f"{wanted}_{number}" in taken:
+        number += 1
+    return f"{wanted}_{number}"
+
+
+def require_instance_names(names: Iterable[str], state: State, least: int = 1) -> tuple[str, ...]:
+    """Names that a command was given, each once.
+
+    Raises:
+        InvalidInputError: fewer than `least`.
+        UnknownNameError: one is not there.
+    """
+    names = tuple(dict.fromkeys(names))
+    for name in names:
+        state.instance(name)
+    if len(names) < least:
+        what = "nothing is selected" if not names else f"only {names[0]!r} is selected"
+        if len(names) > 1:
+            what = f"only {len(names)} objects are selected"
+        raise InvalidInputError(f"{what}; select {least} or more objects")
+    return names
+
+
+def _map_instances(
+    instances: tuple[Instance, ...], change: Callable[[Instance], Instance | None]
+) -> tuple[Instance, ...]:
+    return tuple(new for new in map(change, instances) if new is not None)
+
+
+@dataclass(frozen=True)
+class HistoryStep:
+    """A state, and what led to it.
+
+    Attributes:
+        label: of the command.
+        state: after it.
+    """
+
+    label: str
+    state: State
+
+
+class History:
+    """States from the first to the last, and where among them the session is.
+
+    States share all instances that a step leaves alone, so that a step takes little memory.
+    """
+
+    def __init__(self, first: State) -> None:
+        self.steps = [HistoryStep("", first)]
+        self.position = 0
+
+    @property
+    def state(self) -> State:
+        """The present state."""
+        return self.steps[self.position].state
+
+    @property
+    def undo_label(self) -> str | None:
+        """Of the step that `undo` takes back; None at the beginning."""
+        return self.steps[self.position].label if self.position else None
+
+    @property
+    def redo_label(self) -> str | None:
+        """Of the step that `redo` takes again; None at the end."""
+        return self.steps[self.position + 1].label if self._can_redo else None
+
+    def add(self, step: HistoryStep) -> None:
+        """Adds a step behind the present one; what was undone is gone."""
+        self.steps[self.position + 1 :] = [step]
+        self.position += 1
+
+    def undo(self) -> State:
+        """The state before the present step, with what that step changed selected.
+
+        Raises:
+            InvalidInputError: there is none.
+        """
+        if not self.position:
+            raise InvalidInputError("there is nothing to undo")
+        self.position -= 1
+        return _select_changes(self.state, self.steps[self.position + 1].state)
+
+    def redo(self) -> State:
+        """The state after the step that was undone last.
+
+        Raises:
+            InvalidInputError: there is none.
+        """
+        if not self._can_redo:
+            raise InvalidInputError("there is nothing to redo")
+        self.position += 1
+        return self.state
+
+    def go_to(self, position: int) -> None:
+        """Goes to a step by its number, the first state being 0.
+
+        Raises:
+            IndexError: there is none.
+        """
+        if not 0 <= position < len(self.steps):
+            raise IndexError(f"step {position} of {len(self.steps)}")
+        self.position = position
+
+    def rename(self, name: str, reference: str, library: ObjectLibrary) -> None:
+        """Gives the scene of every step another name, and a library another reference."""
+
+        def renamed(state: State) -> State:
+            document = replace(state.document, name=name)
+            if state.library.root == library.root:
+                document = replace(document, library=reference)
+            return state if document == state.document else replace(state, document=document)
+
+        self.steps = [HistoryStep(step.label, renamed(step.state)) for step in self.steps]
+
+    def replace_library(self, library: ObjectLibrary) -> None:
+        """Puts what a library's folder holds now in place of what it held before."""
+        self.steps = [
+            HistoryStep(s.label, replace(s.state, library=library))
+            if s.state.library.root == library.root
+            else s
+            for s in self.steps
+        ]
+
+    @property
+    def _can_redo(self) -> bool:
+        return self.position + 1 < len(self.steps)
+
+
+def _select_changes(state: State, other: State) -> State:
+    """`state` with those instances selected that are not the same in `other`."""
+    there = {instance_name(i): i for i in (*other.document.instances, *other.document.background)}
+    fixed = set(state.document.background), set(other.document.background)
+    changed = [
+        name
+        for name, instance in state.instances.items()
+        if there.get(name) != instance or (instance in fixed[0]) != (instance in fixed[1])
+    ]
+    return replace(state, selection=tuple(changed))
+
+
+AMEND_PERIOD = 3.0
+"""Seconds after a step in which a further one may replace it."""
+
+
+class StepAmendment:
+    """The last step, as long as a further one may take its place: a number that is typed digit by
+    digit is one step."""
+
+    def __init__(self) -> None:
+        self._field = ""
+        self._step: HistoryStep | None = None
+        self._end = 0.0
+
+    def allows(self, field: str, history: History) -> bool:
+        """Whether the last step is of the same field, recent, and nothing has happened since."""
+        return (
+            bool(field)
+            and field == self._field
+            and history.steps[-1] is self._step
+            and history.position == len(history.steps) - 1
+            and time.monotonic() < self._end
+        )
+
+    def begin(self, field: str, step: HistoryStep) -> None:
+        """A step of a field is taken; of none if that is empty."""
+        self._field = field
+        self._step = step
+        self._end = time.monotonic() + AMEND_PERIOD
+
+    def end(self) -> None:
+        """What comes next is a step of its own."""
+        self._field = ""

@@ -1,0 +1,79 @@
+"""Colours for categories, and the conversion between image levels and linear light.
+
+The first seven colours are those of Okabe and Ito, "Color Universal Design" (2008), which
+colour-blind people can tell apart.
+
+Lenses, pixels and motion mix light, not levels: a blurred edge has the shape of its blur only in
+linear light. In levels it is shifted towards black by a tenth of a pixel and more.
+"""
+
+from __future__ import annotations
+
+import colorsys
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Rgb = tuple[float, float, float]
+Rgba = tuple[float, float, float, float]
+
+CATEGORY_COLORS: tuple[Rgba, ...] = (
+    (0.0, 0.45, 0.70, 1.0),
+    (0.90, 0.62, 0.0, 1.0),
+    (0.0, 0.62, 0.45, 1.0),
+    (0.80, 0.47, 0.65, 1.0),
+    (0.34, 0.71, 0.91, 1.0),
+    (0.84, 0.37, 0.0, 1.0),
+    (0.94, 0.89, 0.26, 1.0),
+)
+"""For names without an order, the most frequent first. More hues cannot be told apart."""
+
+
+def distinct_colors(count: int) -> list[Rgb]:
+    """Any number of colours (red, green, blue in [0, 1]), all different."""
+    # Golden angle as a share of a turn: each new hue falls into the largest gap.
+    hue_step = 0.381966
+    first_hue = 0.56
+    # Lightness and saturation, in turn: few hues can be told apart.
+    tones = ((0.56, 0.60), (0.42, 0.62), (0.68, 0.55), (0.50, 0.42))
+    return [
+        colorsys.hls_to_rgb((first_hue + i * hue_step) % 1.0, *tones[i % len(tones)])
+        for i in range(count)
+    ]
+
+
+def _decode_srgb_levels() -> NDArray[np.float32]:
+    """Linear light of each 8-bit level, 1 at full scale, by the curve of sRGB (IEC 61966-2-1)."""
+    level = np.arange(256) / 255.0
+    light = np.where(level <= 0.04045, level / 12.92, ((level + 0.055) / 1.055) ** 2.4)
+    return light.astype(np.float32)
+
+
+_LINEAR_LIGHT = _decode_srgb_levels()
+"""Linear light (0 to 1) of each 8-bit level."""
+
+
+def srgb_to_linear(image: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """(...) linear light [0 to 1] of levels (...), as if their camera encoded them as sRGB.
+
+    That cameras encode otherwise moves all edges alike towards black or white, which whoever fits
+    edges must allow for.
+    """
+    return np.asarray(_LINEAR_LIGHT.take(image))
+
+
+def linear_to_srgb(light: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
+    """(...) levels of linear light (...) [0 to 1] in sRGB, the inverse of `srgb_to_linear`."""
+    bright = 1.055 * np.maximum(light, 0.0031308) ** (1.0 / 2.4) - 0.055
+    level = np.where(light <= 0.0031308, 12.92 * light, bright)
+    return np.asarray(np.rint(255.0 * np.clip(level, 0.0, 1.0)), dtype=np.uint8)
+
+
+def linear_levels(light: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """(H, W) levels that rise with the light, the brightest 255, for what reads the cells of
+    markers: in the levels of a photo a blurred edge is moved towards black, so that small black
+    cells get lost."""
+    return np.asarray(
+        np.rint(light * (255.0 / max(float(light.max()), 1.0 / 255.0))), dtype=np.uint8
+    )

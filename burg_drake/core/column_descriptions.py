@@ -1,0 +1,299 @@
+"""Units and descriptions of all columns of tables and grasp sets, and the metadata of CSV files.
+
+The metadata file beside a CSV file follows the W3C's Metadata Vocabulary for Tabular Data (CSV on
+the Web).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from burg_drake.core.columns import (
+    DIMENSIONLESS,
+    TEXT_UNIT,
+    Column,
+    InstancesField,
+    JointsField,
+    MarginsField,
+    NumberField,
+    StagesField,
+    TextField,
+    VerdictField,
+)
+from burg_drake.core.verdict import RecordedFields
+
+
+def _verdict_columns(kind: type[VerdictField]) -> dict[str, Column]:
+    """Columns of the fields of a verdict that are of a kind."""
+    of_kind = (one for one in RecordedFields.verdict if isinstance(one, kind))
+    return {name: meaning for one in of_kind for name, meaning in one.meanings().items()}
+
+
+COLUMN_GROUPS: Mapping[str, Mapping[str, Column]] = {
+    "Grasps": {
+        "id": Column(TEXT_UNIT, "the grasp; in results and reach tables INSTANCE-GRASP"),
+        "instance": Column(TEXT_UNIT, "the object's name in the scene"),
+        "object": Column(TEXT_UNIT, "the object's name in its library"),
+        "width": Column("m", "distance of the contacts along the closing direction"),
+        "score": Column(
+            DIMENSIONLESS,
+            "quality of the grasp, higher is better; what it measures depends on its source",
+        ),
+        "x": Column("m", "origin of the grasp frame G in the object frame O"),
+        "y": Column("m", "origin of the grasp frame G in the object frame O"),
+        "z": Column("m", "origin of the grasp frame G in the object frame O"),
+        "qw": Column(DIMENSIONLESS, "rotation of G in O as a unit quaternion: real part"),
+        "qx": Column(DIMENSIONLESS, "rotation of G in O as a unit quaternion: x"),
+        "qy": Column(DIMENSIONLESS, "rotation of G in O as a unit quaternion: y"),
+        "qz": Column(DIMENSIONLESS, "rotation of G in O as a unit quaternion: z"),
+        "X_OG": Column(
+            "m",
+            "pose of G in O with all digits; in tables the upper three rows of the matrix",
+        ),
+    },
+    "Verdicts": {**_verdict_columns(TextField), **_verdict_columns(NumberField)},
+    "Margins and cost": {
+        **_verdict_columns(MarginsField),
+        "friction": Column(
+            DIMENSIONLESS,
+            "friction coefficient of the target; empty in results of `evaluate`, which takes the"
+            " library's",
+        ),
+        "mass": Column(
+            "kg", "mass of the target; empty in results of `evaluate`, which takes the library's"
+        ),
+        "cpu": Column("s", "CPU time of all stages"),
+        **_verdict_columns(StagesField),
+    },
+    "Origin of a row": {
+        "seed": Column(
+            DIMENSIONLESS, "seed of the sampling; in robustness tables that of the perturbations"
+        ),
+        "engine": Column(TEXT_UNIT, "engine preset; marked if its settings were changed"),
+        "run": Column(
+            TEXT_UNIT, "short hash of everything that determines the results; hash in run.yaml"
+        ),
+        "scene": Column(TEXT_UNIT, "path of the scene, or the name of a built-in one"),
+        "scene_content": Column(TEXT_UNIT, "content hash of the scene with its objects"),
+        "station": Column(TEXT_UNIT, "path of the station, or the name of a built-in one"),
+        "station_content": Column(TEXT_UNIT, "content hash of the station with its models"),
+        "mode": Column(TEXT_UNIT, "how each grasp was judged: hand, reach or arm"),
+        "engine_settings": Column(TEXT_UNIT, "settings of the engine as NAME=VALUE, SI units"),
+        "trial_settings": Column(
+            TEXT_UNIT, "settings of the trial's phases as NAME=VALUE, SI units"
+        ),
+        "versions": Column(TEXT_UNIT, "versions of software and machine as NAME=VALUE"),
+    },
+    "Robustness": {
+        "friction_min": Column(
+            DIMENSIONLESS,
+            (
+                "smallest friction coefficient with which the grasp lifts; 0 if it lifts with"
+                " all that were tried"
+            ),
+        ),
+        "repeats": Column(DIMENSIONLESS, "number of perturbed repeats"),
+        "lifted": Column(DIMENSIONLESS, "number of perturbed repeats that lifted"),
+        "success": Column(DIMENSIONLESS, "share of the perturbed repeats that lifted"),
+        "success_low": Column(DIMENSIONLESS, "lower end of Wilson's 95 % interval of that share"),
+        "success_high": Column(DIMENSIONLESS, "upper end of Wilson's 95 % interval of that share"),
+        "failed": Column(TEXT_UNIT, "tests that could not be simulated"),
+        "settings": Column(TEXT_UNIT, "settings of the tests as NAME=VALUE, SI units"),
+    },
+    "Analytic quality": {
+        "force_closure": Column(
+            DIMENSIONLESS, "1 if the line between the contacts lies within both friction cones"
+        ),
+        "friction_needed": Column(DIMENSIONLESS, "smallest friction coefficient for force closure"),
+        "antipodal_angle": Column(
+            "rad", "largest angle between closing direction and inward normal"
+        ),
+        "slide": Column(
+            "m", "distance that the object slides in the hand until it is held; inf if it never is"
+        ),
+        "epsilon": Column(DIMENSIONLESS, "radius of the largest ball within the wrench space"),
+        "volume": Column(DIMENSIONLESS, "volume of the wrench space"),
+        "load_margin": Column(
+            "weights",
+            "force that the grip withstands in the worst direction; below 1 the object's"
+            " weight may turn it in the hand, though it need not drop",
+        ),
+        "gravity_margin": Column(
+            "weights",
+            "force that the grip withstands along gravity; below 1 the object begins to turn"
+            " in the hand, though it need not drop",
+        ),
+        "contact_offset": Column(
+            "m", "distance of the centre of mass from the line between the contacts"
+        ),
+        "nearest": Column(TEXT_UNIT, "the body that the open hand is nearest to or overlaps"),
+        "screened": Column(TEXT_UNIT, "clear, or the collision of the open hand"),
+        "collides_with": Column(TEXT_UNIT, "the body that the open hand collides with"),
+    },
+    "From other projects": {
+        "pregrasp_width": Column("m", "distance between the pads at the pregrasp"),
+        "object_in_gripper": Column(
+            DIMENSIONLESS, "label: 1 if the grasp holds its object, 0 if not"
+        ),
+        "label": Column(
+            DIMENSIONLESS, "of VGN and GIGA: 1 if the grasp holds its object, 0 if not"
+        ),
+        "scene_id": Column(TEXT_UNIT, "of VGN and GIGA: the scene of a grasp"),
+        "height": Column("m", "of GraspNet-1Billion: height of the fingers"),
+        "depth": Column("m", "of GraspNet-1Billion: how far the fingers reach beyond the centre"),
+        "object_id": Column(DIMENSIONLESS, "of GraspNet-1Billion: number of the object"),
+        "name": Column(TEXT_UNIT, "of Isaac Sim: the grasp's name in its file"),
+    },
+}
+"""All columns with fixed names, by subject."""
+
+COLUMN_FAMILIES: Mapping[str, Column] = {
+    **_verdict_columns(InstancesField),
+    **_verdict_columns(JointsField),
+    "tug_AXIS_g": Column(
+        "g",
+        "acceleration along an axis of G that the grip withstands; inf if it withstood all"
+        " that were tried",
+    ),
+    "tug_AXIS_N": Column("N", "the same as a force on the centre of mass"),
+    "shake_AXIS_g": Column(
+        "g", ("amplitude of an oscillation along an axis of G that the grip withstands")
+    ),
+    "n_OUTCOME": Column(DIMENSIONLESS, "number of perturbed repeats with this outcome"),
+}
+"""Columns with a variable part in their name, written in capitals."""
+
+_COLUMNS = {name: column for group in COLUMN_GROUPS.values() for name, column in group.items()}
+"""All columns with fixed names."""
+_COLUMN_PATTERNS = tuple(
+    (
+        re.compile(
+            re.sub(
+                "[A-Z]{2,}",
+                lambda part: {
+                    "NAME": ".+",
+                    "NUMBER": r"\d+",
+                    "AXIS": "[+-]?[xyz]",
+                    "OUTCOME": "[a-z_]+",
+                }[part[0]],
+                name,
+            )
+        ),
+        column,
+    )
+    for name, column in COLUMN_FAMILIES.items()
+)
+"""Patterns of the names of `COLUMN_FAMILIES`."""
+INPUT_PREFIX = "given_"
+"""Prefix of the columns of results that came with the grasps."""
+
+
+def describe_column(name: str) -> Column | None:
+    """What a column is; None of one that others have made up."""
+    if name in _COLUMNS:
+        return _COLUMNS[name]
+    for pattern, column in _COLUMN_PATTERNS:
+        if pattern.fullmatch(name):
+            return column
+    if name.startswith(INPUT_PREFIX):
+        theirs = describe_column(name.removeprefix(INPUT_PREFIX)) or Column(
+            TEXT_UNIT, "not known here"
+        )
+        return replace(theirs, description=f"came with the grasps: {theirs.description}")
+    return None
+
+
+def column_metadata(name: str) -> dict[str, str]:
+    """Unit and description of a column, as Parquet keeps them; nothing of one that others made."""
+    column = describe_column(name)
+    return {} if column is None else {"unit": column.unit, "description": column.description}
+
+
+def display_unit(name: str) -> tuple[str, float]:
+    """The unit in which people read a column, empty if it has none, and the factor to it."""
+    column = describe_column(name)
+    return ("", 1.0) if column is None else column.shown
+
+
+def column_title(name: str) -> str:
+    """What people call a column in a line or the head of a table."""
+    column = describe_column(name)
+    return (column and column.title) or name.replace("_", " ")
+
+
+def column_axis_label(name: str) -> str:
+    """What people call a column at an axis."""
+    column = describe_column(name)
+    return (column and column.axis) or column_title(name)
+
+
+def format_column_value(name: str, value: float, digits: int | None = None) -> str:
+    """A value of a column with its unit for people, such as `12.3 mm` or `2.0°`; `-` if there is
+    none.
+
+    Args:
+        name: of the column.
+        value: in the unit of the column.
+        digits: decimals, if not those that the column declares.
+    """
+    if math.isnan(value):
+        return "-"
+    column = describe_column(name) or Column(DIMENSIONLESS, "")
+    unit, factor = column.shown
+    number = f"{value * factor:.{column.digits if digits is None else digits}f}"
+    return f"{number}{unit}" if unit == "°" else f"{number} {unit}".rstrip()
+
+
+def format_column_values(values: Mapping[str, float], names: Iterable[str]) -> str:
+    """Those of some columns that have a value, as a line for a terminal that may not know the sign
+    of degrees, such as `slip 1.2 mm, tilt 2.0 deg`."""
+    return ", ".join(
+        f"{column_title(name)} {format_column_value(name, values[name]).replace('°', ' deg')}"
+        for name in names
+        if math.isfinite(values.get(name, math.nan))
+    )
+
+
+def metadata_path(path: Path) -> Path:
+    """The file beside a CSV file."""
+    return path.with_name(path.name + "-metadata.json")
+
+
+def csv_metadata(
+    name: str,
+    columns: Mapping[str, tuple[str, Column | None]],
+    notes: Sequence[Mapping[str, Any]] = (),
+) -> dict[str, Any]:
+    """JSON values that describe a CSV file.
+
+    Args:
+        name: of the file.
+        columns: the standard's datatype and the meaning of each column, by its title. The standard
+            restricts the names of columns, so that those of the file are among the titles as they
+            are, and their signs encoded in the names.
+        notes: JSON values about the whole table.
+    """
+    described = []
+    for title, (datatype, column) in columns.items():
+        entry = {
+            "name": quote(title, safe="").replace("-", "%2D").replace("~", "%7E"),
+            "titles": title,
+            "datatype": datatype,
+        }
+        if column is not None:
+            entry["dc:description"] = column.description
+            if column.unit:
+                entry["schema:unitText"] = column.unit
+        described.append(entry)
+    return {
+        "@context": ["http://www.w3.org/ns/csvw", {"@language": "en"}],
+        "url": name,
+        "tableSchema": {"columns": described},
+        **({"notes": list(notes)} if notes else {}),
+    }

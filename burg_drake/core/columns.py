@@ -1,0 +1,408 @@
+"""Columns of tables, and the kinds of fields from which a verdict's columns are written and read."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Final, Literal
+
+from burg_drake.core.errors import quote_value
+from burg_drake.core.outcomes import Least, Mode, Stage, mode_includes
+
+TEXT_UNIT: Final = ""
+"""Unit of a column that is not a number."""
+DIMENSIONLESS: Final = "1"
+"""Unit of ratios, counts and labels."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """Meaning of a column, and how people read its numbers.
+
+    Attributes:
+        unit: `TEXT_UNIT`, `DIMENSIONLESS`, or a unit such as m, rad, N, s; `g` is the standard gravity of
+            9.81 m/s2, and `weights` are those of the object.
+        description: what its values are, in which frame.
+        own_unit: for people, where it is not the usual one of its unit, and the factor to it.
+        title: what people call it in a line or the head of a table; its name if empty.
+        axis: what they call it at an axis, where there is room for more; the title if empty.
+        digits: decimals of its numbers in the unit for people.
+    """
+
+    unit: str
+    description: str
+    own_unit: tuple[str, float] | None = None
+    title: str = ""
+    axis: str = ""
+    digits: int = 1
+
+    @property
+    def shown(self) -> tuple[str, float]:
+        """The unit in which people read it, empty if there is none, and the factor to it."""
+        # Unit for people and factor by SI unit.
+        display_units = {
+            "m": ("mm", 1e3),
+            "rad": ("°", 180 / math.pi),
+            "m2": ("mm²", 1e6),
+            "N": ("N", 1.0),
+            "s": ("s", 1.0),
+        }
+        return self.own_unit or display_units.get(self.unit, ("", 1.0))
+
+
+FIELD_KIND: Final = "kind"
+"""Key in the metadata of a dataclass field."""
+VerdictPart = Literal["decided", "measured", "posture", "cost"]
+"""Parts of a row that fields of a verdict lie in, from left to right; other columns stand between
+them."""
+
+
+@dataclass(frozen=True)
+class TableShape:
+    """What decides which columns a table has.
+
+    Attributes:
+        mode: of the run.
+        instances: names of the scene's free objects.
+        joints: number of the arm's joints; 0 where no arm is asked.
+        approach: whether the approach of the hand alone is simulated.
+    """
+
+    mode: Mode
+    instances: Sequence[str] = ()
+    joints: int = 0
+    approach: bool = False
+
+    def has(self, least: Least) -> bool:
+        """Whether the table has what is found out from a mode on."""
+        return mode_includes(self.mode, least, approach=self.approach)
+
+
+@dataclass(frozen=True, kw_only=True)
+class VerdictField(ABC):
+    """A field of a verdict: what it means and how it is written.
+
+    Attributes:
+        name: of the field.
+        column: unit and meaning of its columns.
+        mode: the first mode whose tables have it.
+        part: of a row, in which its columns lie.
+    """
+
+    name: str = ""
+    column: Column
+    mode: Least = "hand"
+    part: VerdictPart = "measured"
+
+    @property
+    def is_text(self) -> bool:
+        """Whether its cells are texts; else they are numbers."""
+        return False
+
+    @abstractmethod
+    def columns(self, shape: TableShape) -> dict[str, Any]:
+        """Names of its columns, with the key under which its values have their cells."""
+
+    def cell(self, value: Any, key: Any) -> Any:
+        """The cell of a value in one of its columns; None if it has none."""
+        return value.get(key)
+
+    def from_row(self, row: Mapping[str, Any]) -> Any:
+        """The value that a row tells; an empty one if it tells nothing."""
+        raise NotImplementedError(f"{self.name} cannot be read from rows")
+
+    def to_json(self, value: Any) -> Any:
+        """The value in a journal; a number that is not finite is null."""
+        return {key: _finite_or_none(number) for key, number in value.items()}
+
+    def from_json(self, data: Any) -> Any:
+        """The value that a journal has.
+
+        Raises:
+            ValueError, TypeError, AttributeError: it was not written by `to_json`.
+        """
+        return {key: _number_or_nan(number) for key, number in data.items()}
+
+    def joined(self, values: Sequence[Any]) -> Any:
+        """What several stages found together, in their order."""
+        return {key: float(number) for value in values for key, number in value.items()}
+
+    def compared(self, value: Any) -> dict[str, float | str]:
+        """What a replay has to find again to the bit, by its name for people."""
+        return {}
+
+    @abstractmethod
+    def meanings(self) -> dict[str, Column]:
+        """Its columns; what differs in their names is in capitals."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TextField(VerdictField):
+    """A text in a column of the field's own name. Of several stages the last one counts.
+
+    Attributes:
+        of: its type: any text, or the members of an enumeration.
+        replayed: whether a replay has to find the same text again.
+    """
+
+    of: type[str] = str
+    replayed: bool = True
+
+    @property
+    def is_text(self) -> bool:
+        return True
+
+    def columns(self, shape: TableShape) -> dict[str, Any]:
+        return {self.name: None}
+
+    def cell(self, value: Any, key: Any) -> Any:
+        return str(value)
+
+    def from_row(self, row: Mapping[str, Any]) -> Any:
+        return row.get(self.name, "")
+
+    def to_json(self, value: Any) -> Any:
+        return str(value)
+
+    def from_json(self, data: Any) -> Any:
+        if not isinstance(data, str):
+            raise TypeError(f"{quote_value(data)} is not a text")
+        return self.of(data)
+
+    def joined(self, values: Sequence[Any]) -> Any:
+        return values[-1]
+
+    def compared(self, value: Any) -> dict[str, float | str]:
+        return {self.name: str(value)} if self.replayed else {}
+
+    def meanings(self) -> dict[str, Column]:
+        return {self.name: self.column}
+
+
+@dataclass(frozen=True, kw_only=True)
+class NumberField(VerdictField):
+    """A number in a column of the field's own name; None where there is none.
+
+    It follows from what else was found, so that a replay need not compare it. Of several stages
+    the last one that has a number counts.
+    """
+
+    def columns(self, shape: TableShape) -> dict[str, Any]:
+        return {self.name: None}
+
+    def cell(self, value: Any, key: Any) -> Any:
+        return value
+
+    def from_row(self, row: Mapping[str, Any]) -> Any:
+        number = float(row.get(self.name, math.nan))
+        return number if math.isfinite(number) else None
+
+    def to_json(self, value: Any) -> Any:
+        return value
+
+    def from_json(self, data: Any) -> Any:
+        return None if data is None else _require_number(data)
+
+    def joined(self, values: Sequence[Any]) -> Any:
+        return next((value for value in reversed(values) if value is not None), None)
+
+    def meanings(self) -> dict[str, Column]:
+        return {self.name: self.column}
+
+
+@dataclass(frozen=True, kw_only=True)
+class MarginsField(VerdictField):
+    """Numbers by the names of margins, each in a column of its own.
+
+    A later stage does not unsay what an earlier one has measured.
+    """
+
+    of: type[Any]
+
+    def columns(self, shape: TableShape) -> dict[str, Any]:
+        return {f.name: f.name for f in fields(self.of) if shape.has(f.metadata["mode"])}
+
+    def from_row(self, row: Mapping[str, Any]) -> Any:
+        return {f.name: row[f.name] for f in fields(self.of) if f.name in row}
+
+    def joined(self, values: Sequence[Any]) -> Any:
+        found: dict[str, float] = {}
+        for name, number in ((k, v) for margins in values for k, v in margins.items()):
+            if name not in found or not math.isnan(number):
+                found[name] = float(number)
+        return found
+
+    def compared(self, value: Any) -> dict[str, float | str]:
+        return {f.name: value[f.name] for f in fields(self.of) if f.name in value}
+
+    def meanings(self) -> dict[str, Column]:
+        return {f.name: f.metadata["column"] for f in fields(self.of)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class InstancesField(VerdictField):
+    """Numbers by instance of the scene; a column's name is a prefix and the instance's."""
+
+    prefix: str
+
+    def columns(self, shape: TableShape) -> dict[str, Any]:
+        return {self.prefix + name: name for name in shape.instances}
+
+    def from_row(self, row: Mapping[str, Any]) -> Any:
+        cells = {k: float(v) for k, v in row.items() if k.startswith(self.prefix)}
+        return {k.removeprefix(self.prefix): v for k, v in cells.items() if math.isfinite(v)}
+
+    def compared(self, value: Any) -> dict[str, float | str]:
+        return {self.prefix.replace("_", " ") + name: number for name, number in value.items()}
+
+    def meanings(self) -> dict[str, Column]:
+        return {self.prefix + "NAME": self.column}
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointsField(VerdictField):
+    """A number for each joint of the arm; a column's name is a prefix and the number, from 1.
+
+    Of several stages the first one counts that has some.
+    """
+
+    prefix: str
+
+    def columns(self, shape: TableShape) -> dict[str, Any]:
+        return {f"{self.prefix}{k + 1}": k for k in range(shape.joints)}
+
+    def cell(self, value: Any, key: Any) -> Any:
+        return value[key] if len(value) > key else None
+
+    def to_json(self, value: Any) -> Any:
+        return list(value)
+
+    def from_json(self, data: Any) -> Any:
+        return tuple(map(_require_number, data))
+
+    def joined(self, values: Sequence[Any]) -> Any:
+        return next(filter(None, values), ())
+
+    def meanings(self) -> dict[str, Column]:
+        return {self.prefix + "NUMBER": self.column}
+
+
+@dataclass(frozen=True, kw_only=True)
+class StagesField(VerdictField):
+    """Times by stage, each in a column of its own.
+
+    Attributes:
+        times: column of each stage, what it means, and the first mode whose tables have it.
+    """
+
+    times: Mapping[Stage, tuple[str, str, Mode]]
+
+    def columns(self, shape: TableShape) -> dict[str, Any]:
+        return {n: stage for stage, (n, _, mode) in self.times.items() if shape.has(mode)}
+
+    def to_json(self, value: Any) -> Any:
+        return {stage.value: round(seconds, 6) for stage, seconds in value.items()}
+
+    def from_json(self, data: Any) -> Any:
+        return {Stage(stage): _require_number(seconds) for stage, seconds in data.items()}
+
+    def meanings(self) -> dict[str, Column]:
+        return {name: Column(self.column.unit, says) for name, says, _ in self.times.values()}
+
+
+def margin_field(
+    unit: str,
+    meaning: str,
+    *,
+    mode: Least = "hand",
+    stage: Stage = Stage.EXECUTED,
+    smaller_is_better: bool = False,
+    own_unit: tuple[str, float] | None = None,
+    title: str = "",
+    axis: str = "",
+    digits: int = 1,
+) -> Any:
+    """A margin: NaN where it was not measured.
+
+    Args:
+        unit, meaning, own_unit, title, axis, digits: see `Column`.
+        mode: the first mode in which it is measured.
+        stage: the last one that measures it; `EXECUTED` of what a trial measures.
+        smaller_is_better: whether a grasp is the better the smaller it is.
+    """
+    metadata = {
+        "column": Column(unit, meaning, own_unit, title, axis, digits),
+        "mode": mode,
+        "stage": stage,
+        "smaller_is_better": smaller_is_better,
+    }
+    return field(default=math.nan, metadata=metadata)
+
+
+def text_metadata(
+    meaning: str,
+    *,
+    of: type[str] = str,
+    mode: Least = "hand",
+    part: VerdictPart = "decided",
+    replayed: bool = True,
+) -> dict[str, VerdictField]:
+    """Metadata of a text; see `TextField`."""
+    column = Column(TEXT_UNIT, meaning)
+    return {FIELD_KIND: TextField(column=column, mode=mode, part=part, of=of, replayed=replayed)}
+
+
+def number_metadata(
+    unit: str, meaning: str, *, part: VerdictPart = "decided"
+) -> dict[str, VerdictField]:
+    """Metadata of a number; see `NumberField`."""
+    return {FIELD_KIND: NumberField(column=Column(unit, meaning), part=part)}
+
+
+def margins_metadata(of: type[Any]) -> dict[str, VerdictField]:
+    """Metadata of numbers by the names of margins that a dataclass declares."""
+    return {FIELD_KIND: MarginsField(column=Column(TEXT_UNIT, "continuous slack"), of=of)}
+
+
+def instances_metadata(
+    prefix: str, unit: str, meaning: str, *, mode: Least = "hand"
+) -> dict[str, VerdictField]:
+    """Metadata of numbers by instance; see `InstancesField`."""
+    return {FIELD_KIND: InstancesField(column=Column(unit, meaning), prefix=prefix, mode=mode)}
+
+
+def joints_metadata(prefix: str, unit: str, meaning: str) -> dict[str, VerdictField]:
+    """Metadata of a number for each joint; see `JointsField`."""
+    return {FIELD_KIND: JointsField(column=Column(unit, meaning), prefix=prefix, part="posture")}
+
+
+def stages_metadata(times: Mapping[Stage, tuple[str, str, Mode]]) -> dict[str, VerdictField]:
+    """Metadata of times by stage; see `StagesField`."""
+    return {
+        FIELD_KIND: StagesField(column=Column("s", "CPU time of a stage"), times=times, part="cost")
+    }
+
+
+def verdict_fields(record: type[Any]) -> tuple[VerdictField, ...]:
+    """The fields of a record that have a kind, in the order of their declaration."""
+    return tuple(
+        replace(one.metadata[FIELD_KIND], name=one.name)
+        for one in fields(record)
+        if FIELD_KIND in one.metadata
+    )
+
+
+def _finite_or_none(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _number_or_nan(value: object) -> float:
+    return math.nan if value is None else _require_number(value)
+
+
+def _require_number(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise TypeError(f"{quote_value(value)} is not a number")
+    return float(value)

@@ -1,0 +1,399 @@
+"""Reading files within bounds, writing them atomically, and locking them.
+
+Reading a file always ends, uses memory in proportion to its `Limits`, and neither waits for
+another process nor drains a device. Only `read_pipe` waits for what another process writes.
+
+The system releases a lock when the file is closed or its process ends.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import errno
+import fcntl
+import io
+import lzma
+import os
+import re
+import secrets
+import stat
+import struct
+import tempfile
+import tokenize
+import warnings
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from burg_drake.core.errors import DocumentError, InvalidInputError, shorten_text
+
+READ_ERRORS = (
+    ArithmeticError,
+    AttributeError,
+    EOFError,
+    LookupError,
+    MemoryError,
+    RuntimeError,
+    SyntaxError,
+    TypeError,
+    ValueError,
+    lzma.LZMAError,
+    struct.error,
+    tokenize.TokenError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""Errors besides OSError that numpy and h5py raise for damaged or foreign files."""
+
+
+@contextmanager
+def suppress_numpy_warnings() -> Iterator[None]:
+    """Numpy warns of headers that it has to repair, and of numbers that overflow."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
+@contextmanager
+def report_read_errors(path: str | Path, kind: str) -> Iterator[None]:
+    """Makes one line that names the file of every error that reading it ends with.
+
+    Args:
+        path: the file.
+        kind: what it should be, such as `a .npy file of numbers`.
+
+    Raises:
+        InvalidInputError: in place of what is raised within; one that names the file stays.
+    """
+    try:
+        with suppress_numpy_warnings():
+            yield
+    except InvalidInputError as error:
+        if str(path) in str(error):
+            raise
+        raise InvalidInputError(f"{path}: {error}") from error
+    except OSError as error:
+        raise InvalidInputError(
+            f"cannot read {path}: {error.strerror or short_message(error)}"
+        ) from error
+    except READ_ERRORS as error:
+        raise InvalidInputError(f"{path} is not {kind}: {short_message(error)}") from error
+
+
+def short_message(error: Exception) -> str:
+    """What an error says, in one line that is not too long."""
+    max_length = 200  # Characters; numpy repeats whole headers.
+    text = str(error).partition("\n")[0] or type(error).__name__
+    return text if len(text) <= max_length else f"{text[:max_length]}..."
+
+
+UNFINISHED_FILE = re.compile(r"\..+\.[0-9a-f]{16}")
+"""Names of files that `atomic_write` has not renamed yet."""
+
+
+def open_regular(path: str | Path) -> BinaryIO:
+    """Opens a file for reading bytes; a folder, device or pipe is refused, as it may never end.
+
+    Raises:
+        InvalidInputError: it is not there, cannot be read, or is not a file.
+    """
+    try:
+        mode = os.stat(path).st_mode
+        if stat.S_ISREG(mode):
+            return open(path, "rb", opener=_open_nonblocking)
+    except (OSError, ValueError) as error:
+        why = error.strerror if isinstance(error, OSError) else "it is not a valid path"  # with NUL
+        raise InvalidInputError(f"cannot read {shorten_text(str(path), 500)}: {why}") from error
+    if stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode):
+        raise InvalidInputError(f"cannot read {path}: it is a pipe; save it to a file first")
+    kind = "a folder" if stat.S_ISDIR(mode) else "a device"
+    raise InvalidInputError(f"cannot read {path}: it is {kind}; expected a file")
+
+
+def _open_nonblocking(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NONBLOCK)  # should it have become a pipe meanwhile
+
+
+def atomic_write(path: str | Path, content: str | bytes) -> None:
+    """Writes `content` beside `path` and renames it into place; parent folders are made.
+
+    A file that is replaced keeps its permissions, and a link to it stays one.
+
+    Args:
+        path: file to write or replace.
+        content: text (stored as UTF-8) or bytes.
+
+    Raises:
+        InvalidInputError: the place cannot be written to.
+    """
+    atomic_write_all({Path(path): content})
+
+
+def atomic_write_all(contents: Mapping[Path, str | bytes]) -> None:
+    """Writes several files, and renames them into place only when all of them are on the disk; see
+    `atomic_write`.
+
+    Args:
+        contents: text (stored as UTF-8) or bytes by file.
+
+    Raises:
+        InvalidInputError: one of the places cannot be written to; then none is replaced, unless it
+            is the renaming that fails.
+    """
+    written: dict[Path, Path] = {}
+    path = Path()
+    try:
+        for path, content in contents.items():
+            _require_regular_file(path)
+            target = Path(os.path.realpath(path))
+            target.parent.mkdir(parents=True, exist_ok=True)
+            temporary = target.with_name(f".{target.name}.{secrets.token_hex(8)}")
+            with temporary.open("xb") as stream:  # with the permissions that the umask leaves
+                written[target] = temporary
+                copy_permissions(target, stream.fileno())
+                stream.write(content.encode() if isinstance(content, str) else content)
+                stream.flush()
+                os.fsync(stream.fileno())
+        for path, temporary in written.items():
+            os.replace(temporary, path)
+    except OSError as error:
+        raise InvalidInputError(
+            f"cannot write {path}: {error.strerror or error}; choose a writable place"
+        ) from error
+    finally:
+        for temporary in written.values():
+            temporary.unlink(missing_ok=True)
+
+
+def copy_permissions(path: Path, file: int) -> None:
+    """Gives an open file the permissions of the one that it is to replace, if there is one."""
+    with contextlib.suppress(FileNotFoundError):
+        os.fchmod(file, stat.S_IMODE(path.stat().st_mode))
+
+
+def remove_unfinished(folder: Path) -> None:
+    """Removes what `atomic_write` leaves in a folder when its process is killed."""
+    for path in folder.iterdir():
+        if UNFINISHED_FILE.fullmatch(path.name) and path.is_file():
+            path.unlink(missing_ok=True)
+
+
+def ensure_writable_folder(path: str | Path) -> Path:
+    """Makes `path` a folder that can be written to, before any work is spent on its contents.
+
+    Raises:
+        InvalidInputError: `path` is a file, or nothing can be written there.
+    """
+    path = Path(path)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path):
+            pass
+    except OSError as error:
+        why = "it is a file" if path.is_file() else error.strerror or error
+        raise InvalidInputError(
+            f"cannot write to folder {path}: {why}; choose a writable place"
+        ) from error
+    return path
+
+
+def require_writable(path: str | Path) -> None:
+    """Finds out whether a file can be written, before any work is spent on it; makes none.
+
+    Raises:
+        InvalidInputError: `path` is a folder or a device, or nothing can be written where it is to
+            be.
+    """
+    path = Path(path)
+    try:
+        _require_regular_file(path)
+        with tempfile.TemporaryFile(dir=next(p for p in path.absolute().parents if p.exists())):
+            pass
+    except OSError as error:
+        raise InvalidInputError(
+            f"cannot write {path}: {error.strerror or error}; choose a writable place"
+        ) from error
+
+
+def _require_regular_file(path: Path) -> None:
+    """Refuses what is there and is not a file: a folder, or a device that a file would replace."""
+    if path.is_dir():
+        raise IsADirectoryError(errno.EISDIR, "it is a folder, not a file")
+    if path.exists() and not path.is_file():
+        raise FileExistsError(errno.EEXIST, "it is a pipe or a device, not a file")
+
+
+MIB = 1 << 20  # Bytes in a mebibyte.
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a document may have at most.
+
+    Attributes:
+        size: bytes of its text.
+        values: scalars, lists and mappings, those behind an alias once for each time it is used.
+        depth: of lists and mappings in one another.
+    """
+
+    size: int
+    values: int
+    depth: int = 64
+
+
+class FileLimits:
+    """File limits."""
+
+    # Files of people and of this project. Each value takes 0.4 kB of memory.
+    document = Limits(size=16 * MIB, values=1_000_000)
+    # Grasps and plans. 100,000 grasps take 21 to 37 MB and 2,200,000 values.
+    grasp_file = Limits(size=512 * MIB, values=10_000_000)
+    # Tables. The results of 100,000 grasps have 130 MB and 6,000,000 cells.
+    table = Limits(size=1024 * MIB, values=50_000_000)
+    image_bytes = 512 * MIB  # Bytes of an image file.
+
+
+def read_text(path: str | Path, limits: Limits = FileLimits.document) -> str:
+    """The text of a document.
+
+    Raises:
+        DocumentError: it cannot be read, is too large, or no text.
+    """
+    try:
+        return read_bytes(path, limits.size).decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise DocumentError(f"cannot read {path}: it is not a text file") from error
+    except InvalidInputError as error:
+        raise DocumentError(str(error)) from error
+
+
+def read_bytes(path: str | Path, size: int) -> bytes:
+    """The content of a regular file; pipes and devices, which may never end, are refused.
+
+    Args:
+        path: the file.
+        size: bytes that it may have.
+
+    Raises:
+        InvalidInputError: it cannot be read, or is too large.
+    """
+    with open_regular(path) as stream:
+        try:
+            data = stream.read(size + 1)
+        except OSError as error:
+            raise InvalidInputError(f"cannot read {path}: {error.strerror or error}") from error
+    if len(data) > size:
+        raise InvalidInputError(
+            f"cannot read {path}: it is larger than {size // MIB} MiB; is it the right file?"
+        )
+    return data
+
+
+def read_pipe(pipe: int | str, size: int = FileLimits.grasp_file.size) -> bytes:
+    """All that comes through a pipe, until whoever writes to it ends.
+
+    Args:
+        pipe: its path, or the number of a file descriptor, which stays open.
+        size: bytes that it may have.
+
+    Raises:
+        InvalidInputError: it cannot be read, or more comes.
+    """
+    name = "the standard input" if pipe == 0 else str(pipe)
+    try:
+        with open(pipe, "rb", closefd=isinstance(pipe, str)) as stream:
+            data = stream.read(size + 1)
+    except OSError as error:
+        raise InvalidInputError(f"cannot read {name}: {error.strerror or error}") from error
+    if len(data) > size:
+        raise InvalidInputError(
+            f"cannot read {name}: more than {size // MIB} MiB arrived; save it to a file first"
+        )
+    return data
+
+
+def read_rows(path: str | Path, limits: Limits = FileLimits.table) -> list[tuple[int, list[str]]]:
+    """The cells of a CSV file, row by row, each with the line that it ends on; no empty rows.
+
+    Raises:
+        DocumentError: it cannot be read, is beyond the limits, or no CSV: a quote is never closed,
+            for example; the message names file and line.
+    """
+    text = read_text(path, limits).removeprefix("\ufeff")
+    if text.count(",") > limits.values:
+        raise DocumentError(f"cannot read {path}: more than {limits.values:,} cells")
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    try:
+        return [(reader.line_num, row) for row in reader if row]
+    except csv.Error as error:
+        raise DocumentError(f"{path}:{reader.line_num}: not valid CSV: {error}") from error
+
+
+def try_lock(file: int, *, shared: bool = False) -> bool:
+    """Locks an open file, if no other process has it.
+
+    Args:
+        file: descriptor.
+        shared: others may share it; else it is for this process alone.
+
+    Raises:
+        OSError: its file system has no locks.
+    """
+    kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
+    try:
+        fcntl.flock(file, kind | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+def missing_locks_error(path: Path, error: OSError) -> InvalidInputError:
+    """The error about a file or folder on a file system that has no locks.
+
+    Args:
+        path: the file or folder.
+        error: of `try_lock`.
+    """
+    return InvalidInputError(
+        f"{path} is on a file system without file locks ({error.strerror}), where two"
+        " programs could overwrite each other's data; choose a folder on another file"
+        " system"
+    )
+
+
+class FolderLock:
+    """A folder that one process at a time writes, locked itself: no file is left in it."""
+
+    def __init__(self, folder: Path) -> None:
+        """Locks a folder that is there.
+
+        Raises:
+            InvalidInputError: another process is writing it, it cannot be opened, or its file
+                system has no locks.
+        """
+        try:
+            file = os.open(folder, os.O_RDONLY)
+        except OSError as error:
+            raise InvalidInputError(f"cannot open {folder}: {error.strerror}") from error
+        try:
+            if try_lock(file):
+                self._file: int | None = file
+                return
+        except OSError as error:
+            os.close(file)
+            raise missing_locks_error(folder, error).about("folder") from error
+        os.close(file)
+        raise InvalidInputError(
+            f"{folder} is being written by another process; wait for it, or choose another folder"
+        ).about("folder")
+
+    def release(self) -> None:
+        """Lets others write; a second time does nothing."""
+        if self._file is not None:
+            os.close(self._file)
+            self._file = None

@@ -1,0 +1,246 @@
+"""Evaluation modes, the stages of the cascade, and the outcomes of a grasp, simulated and real."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Literal, get_args
+
+Mode = Literal["hand", "reach", "arm"]
+"""`hand`: the hand alone executes the grasp in simulation. `reach`: the same, of grasps that the
+arm can execute. `arm`: of those, too, but the whole arm executes them."""
+MODES: tuple[Mode, ...] = get_args(Mode)
+"""Evaluation modes; each asks more than the one before."""
+
+
+Least = Mode | Literal["approach"]
+"""The least mode that finds something out; `approach`: the whole arm, or the hand alone where its
+approach is simulated."""
+
+
+def mode_includes(mode: Mode, least: Least, *, approach: bool = False) -> bool:
+    """Whether a mode asks at least as much as another one.
+
+    Args:
+        mode: that is asked about.
+        least: the other one.
+        approach: whether the approach of the hand alone is simulated.
+    """
+    if least == "approach":
+        return approach or mode == "arm"
+    return MODES.index(mode) >= MODES.index(least)
+
+
+class Stage(StrEnum):
+    """Stages of the cascade in order. A grasp's stage is the one that decided its outcome."""
+
+    CLEAR = "clear"
+    REACHABLE = "reachable"
+    PLANNED = "planned"
+    EXECUTED = "executed"
+
+
+Among = Literal["all", "clear", "reachable", "executed"]
+"""Which judged grasps count, by how far they came: all, those at which the hand is clear, those of
+them that the arm can be at, or those that were tried in simulation."""
+DECIDED_STAGES: dict[Among, tuple[Stage, ...]] = {
+    "all": tuple(Stage),
+    "clear": (Stage.REACHABLE, Stage.PLANNED, Stage.EXECUTED),
+    "reachable": (Stage.PLANNED, Stage.EXECUTED),
+    "executed": (Stage.EXECUTED,),
+}
+"""Stages that decided the grasps of a subset."""
+
+
+class Outcome(StrEnum):
+    """Why a grasp ended. `LIFTED` alone is success.
+
+    Attributes:
+        meaning: what it says of the grasp, in a few words.
+    """
+
+    _value_: str
+    meaning: str
+
+    def __new__(cls, value: str, meaning: str = "") -> Outcome:
+        """A member by its value, which is stored, and its meaning."""
+        outcome = str.__new__(cls, value)
+        outcome._value_, outcome.meaning = value, meaning
+        return outcome
+
+    COLLISION_TARGET = "collision_target", ("at the grasp the open hand overlaps the object itself")
+    COLLISION_TABLE = "collision_table", "at the grasp the open hand overlaps the table"
+    COLLISION_CLUTTER = "collision_clutter", "at the grasp the open hand overlaps another object"
+    COLLISION_BACKGROUND = (
+        "collision_background",
+        "at the grasp the open hand overlaps something fixed",
+    )
+    HAND_COLLISION_APPROACH = (
+        "hand_collision_approach",
+        "on the straight approach the open hand hits something",
+    )
+    HAND_COLLISION_RETREAT = (
+        "hand_collision_retreat",
+        "on the straight retreat the hand or the object in it hits something",
+    )
+    HAND_COLLISION_LIFT = (
+        "hand_collision_lift",
+        "on the lift the hand or the object in it hits something",
+    )
+    NO_IK = "no_ik", "no arm configuration reaches the grasp, even without joint limits"
+    JOINT_LIMIT = (
+        "joint_limit",
+        ("all arm configurations that reach the grasp are beyond a joint limit"),
+    )
+    ARM_COLLISION = (
+        "arm_collision",
+        ("the arm collides in every configuration that was found within the joint limits"),
+    )
+    APPROACH_LINE = (
+        "approach_line",
+        "the arm reaches pregrasp and grasp, but cannot follow the straight line between them",
+    )
+    RETREAT_LINE = "retreat_line", "the arm cannot follow the straight retreat"
+    LIFT_LINE = "lift_line", "the arm cannot follow the lift"
+    NO_PATH = "no_path", "no path from the home posture to the pregrasp was found"
+    NO_CONTACT = "no_contact", "the fingers closed without touching the object"
+    ONE_FINGER = "one_finger", "the fingers stopped with only one of them at the object"
+    CLOSED_EMPTY = (
+        "closed_empty",
+        ("the object was touched, but slipped away while the fingers closed"),
+    )
+    SLIPPED = "slipped", "both fingers held the object, and lost it during the lift"
+    BLOCKED = "blocked", "during the motion the hand or the arm hit something fixed"
+    DROPPED = "dropped", "the object was lifted, and lost while it was held"
+    LIFTED = "lifted", "both fingers hold the object to the end, and nothing else was moved"
+    LIFTED_DISTURBED = (
+        "lifted_disturbed",
+        "the object is held to the end, but another one was moved",
+    )
+    LIFTED_TURNED = (
+        "lifted_turned",
+        "the object is held to the end, but turned or slid in the hand beyond the limits",
+    )
+    SIMULATION_FAILED = (
+        "simulation_failed",
+        "the trial could not be simulated; the results have the reason",
+    )
+    REACHABLE = (
+        "reachable",
+        ("the arm can execute the grasp; it was not simulated, as the mode did not ask for that"),
+    )
+
+    @property
+    def held(self) -> bool:
+        """The target was lifted and is held, however it lies in the hand, and whatever happened to
+        the others."""
+        return self in (Outcome.LIFTED, Outcome.LIFTED_DISTURBED, Outcome.LIFTED_TURNED)
+
+    @property
+    def stage(self) -> Stage:
+        """The stage that decides this outcome."""
+        # The hand cannot approach or leave, or the arm cannot reach.
+        reach_outcomes = (
+            Outcome.HAND_COLLISION_APPROACH,
+            Outcome.HAND_COLLISION_RETREAT,
+            Outcome.HAND_COLLISION_LIFT,
+            Outcome.NO_IK,
+            Outcome.JOINT_LIMIT,
+            Outcome.ARM_COLLISION,
+        )
+        # The arm cannot move there, straight in, back and up.
+        plan_outcomes = (
+            Outcome.APPROACH_LINE,
+            Outcome.RETREAT_LINE,
+            Outcome.LIFT_LINE,
+            Outcome.NO_PATH,
+            Outcome.REACHABLE,
+        )
+        if self.value.startswith("collision_"):
+            return Stage.CLEAR
+        if self in reach_outcomes:
+            return Stage.REACHABLE
+        if self in plan_outcomes:
+            return Stage.PLANNED
+        return Stage.EXECUTED
+
+
+UNTRIED_OUTCOMES = ("", Outcome.REACHABLE.value)
+"""Texts in a column of outcomes that say nothing about a trial."""
+
+
+class RealOutcome(StrEnum):
+    """How a trial on the robot ended.
+
+    The words are the simulator's, as far as a person or a robot can see what they mean, and those
+    for what only reality has.
+
+    Those that an operator tells apart at a glance come first: messages begin with them.
+    """
+
+    LIFTED = "lifted"
+    LIFTED_DISTURBED = "lifted_disturbed"
+    LIFTED_TURNED = "lifted_turned"
+    SLIPPED = "slipped"
+    DROPPED = "dropped"
+    CLOSED_EMPTY = "closed_empty"
+    HAND_COLLISION_APPROACH = "hand_collision_approach"
+    PROTECTIVE_STOP = "protective_stop"
+    """The robot stopped itself on its way: an execution that failed."""
+    NOT_ATTEMPTED = "not_attempted"
+    """Nobody tried; tells nothing of the grasp."""
+    PERCEPTION_FAILED = "perception_failed"
+    """The scene was not seen well enough to try; tells nothing of the grasp."""
+    ONE_FINGER = "one_finger"
+    NO_CONTACT = "no_contact"
+    BLOCKED = "blocked"
+    COLLISION_TARGET = "collision_target"
+    COLLISION_TABLE = "collision_table"
+    COLLISION_CLUTTER = "collision_clutter"
+    COLLISION_BACKGROUND = "collision_background"
+    HAND_COLLISION_RETREAT = "hand_collision_retreat"
+    HAND_COLLISION_LIFT = "hand_collision_lift"
+    NO_IK = "no_ik"
+    JOINT_LIMIT = "joint_limit"
+    ARM_COLLISION = "arm_collision"
+    APPROACH_LINE = "approach_line"
+    RETREAT_LINE = "retreat_line"
+    LIFT_LINE = "lift_line"
+    NO_PATH = "no_path"
+
+    @property
+    def of_arm(self) -> bool:
+        """Whether only an arm ends a trial so: a run of the hand alone cannot predict it."""
+        arm_outcomes = (
+            *(
+                "no_ik",
+                "joint_limit",
+                "arm_collision",
+                "approach_line",
+                "retreat_line",
+                "lift_line",
+            ),
+            *("no_path", "protective_stop"),
+        )
+        return self.value in arm_outcomes
+
+    @property
+    def attempted(self) -> bool:
+        """Whether it tells anything of the grasp."""
+        return self not in (RealOutcome.NOT_ATTEMPTED, RealOutcome.PERCEPTION_FAILED)
+
+    @property
+    def held(self) -> bool:
+        """The target was lifted and is held, however it lies in the hand, and whatever happened to
+        the others."""
+        return self.value in (one.value for one in Outcome if one.held)
+
+
+def outcome_label(outcome: str) -> str:
+    """An outcome, simulated or real, as buttons, pages and tables call it."""
+    # Labels that are not the value with spaces.
+    labels = {
+        "lifted_disturbed": "lifted, others moved",
+        "lifted_turned": "lifted, turned",
+        "hand_collision_approach": "hit on the approach",
+    }
+    return labels.get(outcome) or outcome.replace("_", " ")

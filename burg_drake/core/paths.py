@@ -1,0 +1,484 @@
+"""Installed data, packages of models, and the names and references by which files refer to files.
+
+`package://NAME/...` and `model://NAME/...` are looked up where ROS and Drake find packages, without
+importing either of them. References in documents are never absolute paths: these would reveal the
+machine that wrote them, and be wrong on any other.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import json
+import os
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from burg_drake.core.errors import (
+    FieldError,
+    InvalidInputError,
+    UnknownNameError,
+    did_you_mean,
+    quote_value,
+    suggest_names,
+)
+from burg_drake.core.files import FileLimits, read_bytes
+
+MESH_FILE = "mesh.obj"
+
+
+MAX_NAME_BYTES = 100
+"""UTF-8 bytes of a name. File systems allow 255 with prefix and suffix."""
+
+
+def require_name(name: str, *place: str | int) -> None:
+    """Refuses what would lead to another folder, or hide a file.
+
+    Args:
+        name: to check.
+        place: of the name in its document, see `FieldError`.
+
+    Raises:
+        FieldError: it is not a name.
+    """
+    if not re.compile(r"(?!\.)[\w.-]+").fullmatch(name) or len(name.encode()) > MAX_NAME_BYTES:
+        raise FieldError(
+            f"name {quote_value(name)} cannot be used in paths; give letters, digits, '_', '-' and '.',"
+            f" no '.' in front, at most {MAX_NAME_BYTES} bytes",
+            *place,
+        )
+
+
+def require_names(names: Iterable[str], key: str) -> None:
+    """The same of all keys of a mapping that a document has under `key`."""
+    for name in names:
+        require_name(name, key, name)
+
+
+def make_name(text: str) -> str:
+    """A name made of any text: `my scene (2)` becomes `my_scene_2`, and nothing `unnamed`."""
+    name = re.compile(r"[^\w.-]+").sub("_", text).lstrip(".").strip("_")
+    return name.encode()[:MAX_NAME_BYTES].decode(errors="ignore") or "unnamed"
+
+
+PACKAGE_REFERENCE = re.compile(r"(?:package|model)://([^/]*)/*(.*)", re.DOTALL)
+"""Drake treats both schemes alike."""
+
+
+@dataclass(frozen=True, eq=False)
+class Packages:
+    """Where packages are looked for.
+
+    Attributes:
+        stated: folders by the names of packages, as a document states them.
+        document: that document, for messages; None where there is none.
+        key: of it that states them.
+    """
+
+    stated: Mapping[str, Path] = field(default_factory=dict)
+    document: Path | None = None
+    key: str = "packages"
+
+    def find(self, name: str, near: Path | None = None) -> Path:
+        """The folder of a package.
+
+        Args:
+            name: of the package.
+            near: folder of the file that names it; the working directory if None.
+
+        Raises:
+            UnknownNameError: it is nowhere; the message tells what was searched.
+        """
+        if name in self.stated:
+            return self.stated[name]
+        near = (near or Path()).resolve()
+        for folder in _package_folders(name, near):
+            return folder
+        raise UnknownNameError(self._not_found(name, near))
+
+    def _not_found(self, name: str, near: Path) -> str:
+        places = [f"{near} and the folders above it"]
+        for variable in ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"):
+            paths = _folders_in_variable(variable)
+            places.append(f"{variable} ({':'.join(map(str, paths)) if paths else 'not set'})")
+        if name == "drake_models":
+            cached = drake_models_folder()
+            places.append(f"Drake's cache ({cached})" if cached else "the installed Drake")
+        meant = did_you_mean(name, self.stated)
+        stating = "add the folder that it is in to ROS_PACKAGE_PATH"
+        if self.document is not None:
+            stating = f"name its folder by {self.key}: {{{name}: FOLDER}} in {self.document}"
+        fetching = (
+            "; or let Drake download it once, with PackageMap().GetPath('drake_models')"
+            if name == "drake_models"
+            else ""
+        )
+        return (
+            f"package {name!r} is not found in {', '.join(places)};"
+            f"{f' {meant} If not,' if meant else ''} {stating}{fetching}"
+        )
+
+
+NO_PACKAGES = Packages()
+"""For files that no document states packages for."""
+
+
+def package_file(reference: str, near: Path | None, packages: Packages) -> Path:
+    """The file or folder of `package://NAME/...`, which exists.
+
+    Raises:
+        UnknownNameError: there is no such package, or nothing of that name in it.
+    """
+    parts = PACKAGE_REFERENCE.fullmatch(reference)
+    if parts is None or not parts[1]:
+        raise UnknownNameError(f"{reference} has no package name; write package://NAME/FILE")
+    try:
+        folder = packages.find(parts[1], near)
+    except UnknownNameError as error:
+        raise UnknownNameError(f"{reference}: {error}") from error
+    path = folder / parts[2]
+    if not os.path.exists(path):
+        raise UnknownNameError(f"{reference} does not exist: {parts[1]!r} is {folder}")
+    return path
+
+
+def drake_models_folder() -> Path | None:
+    """Where the installed Drake keeps its `drake_models` once it has downloaded them, whether it
+    has or not; None without Drake. As in its `package_map.cc` and `find_cache.cc`."""
+    share = _drake_share_folder()
+    if share is None:
+        return None
+    try:
+        manifest = json.loads(
+            read_bytes(share / "multibody/parsing/drake_models.json", FileLimits.document.size)
+        )
+        prefix = hashlib.sha256(manifest["strip_prefix"].encode()).hexdigest()
+        folder = f"{manifest['sha256']}-{prefix}"
+    except (InvalidInputError, ValueError, KeyError, TypeError, AttributeError):
+        return None
+    if "TEST_TMPDIR" in os.environ:
+        cache = Path(os.environ["TEST_TMPDIR"]) / ".cache"
+    elif "XDG_CACHE_HOME" in os.environ:
+        cache = Path(os.environ["XDG_CACHE_HOME"])
+    else:
+        cache = Path(os.path.expanduser("~")) / ".cache"
+    return cache / "drake/package_map" / folder
+
+
+def _package_folders(name: str, near: Path) -> Iterator[Path]:
+    """Folders of a package, the one to take first."""
+    for folder in (near, *near.parents):
+        for place in (folder, folder / name):
+            if _manifest_name(place) == name:
+                yield place
+    for path in _folders_in_variable("ROS_PACKAGE_PATH"):
+        yield from _search_tree(name, path, set())
+    for path in _folders_in_variable("AMENT_PREFIX_PATH"):
+        if os.path.isdir(path / "share" / name):
+            yield path / "share" / name
+    own = {"drake": _drake_share_folder, "drake_models": drake_models_folder}.get(
+        name, lambda: None
+    )()
+    if own is not None and own.is_dir():
+        yield own
+
+
+def _search_tree(name: str, folder: Path, seen: set[str]) -> Iterator[Path]:
+    """Packages of a name in a folder and in those in it; there are none in packages and in hidden
+    folders."""
+    # Files by which ROS and Drake skip a folder.
+    ignore_files = ("AMENT_IGNORE", "CATKIN_IGNORE", "COLCON_IGNORE")
+    real = os.path.realpath(folder)
+    if real in seen or any(os.path.exists(folder / mark) for mark in ignore_files):
+        return
+    seen.add(real)
+    if os.path.exists(folder / "package.xml"):
+        if _manifest_name(folder) == name:
+            yield folder
+        return
+    try:
+        inner = sorted(entry.name for entry in os.scandir(folder) if entry.is_dir())
+    except OSError:
+        return
+    for part in inner:
+        if not part.startswith("."):
+            yield from _search_tree(name, folder / part, seen)
+
+
+def _manifest_name(folder: Path) -> str:
+    """The name of the package whose manifest is in a folder; empty if none is."""
+    manifest = folder / "package.xml"
+    if not os.path.isfile(manifest):
+        return ""
+    try:
+        text = read_bytes(manifest, FileLimits.document.size).decode(errors="replace")
+    except InvalidInputError:
+        return ""
+    found = re.compile(r"<name>\s*([^<]*?)\s*</name>").search(
+        re.compile(r"<!--.*?-->", re.DOTALL).sub("", text)
+    )
+    return found[1] if found else ""
+
+
+def _folders_in_variable(variable: str) -> list[Path]:
+    """The folders in an environment variable."""
+    return [Path(part) for part in os.environ.get(variable, "").split(os.pathsep) if part]
+
+
+def _drake_share_folder() -> Path | None:
+    """The resources of the installed Drake, found without importing it."""
+    found = importlib.util.find_spec("pydrake")
+    share = Path(found.origin).parent / "share/drake" if found and found.origin else None
+    return share if share is not None and share.is_dir() else None
+
+
+PACKAGE_URI = "package://burg_drake/"  # References to installed data begin with this.
+
+
+@cache
+def data_root() -> Path:
+    """Folder that holds `models/`, `scenes/` and `stations/`.
+
+    Raises:
+        InvalidInputError: the installation is incomplete.
+    """
+    package = Path(__file__).resolve().parents[1]
+    for root in (package / "_data", package.parent):
+        if (root / "models").is_dir() and (root / "scenes").is_dir():
+            return root
+    raise InvalidInputError(
+        f"there are no folders models/ and scenes/ in {package} or next to it; reinstall burg_drake"
+    )
+
+
+def resolve_reference(
+    reference: str | Path,
+    kind: str | None = None,
+    base: Path | None = None,
+    packages: Packages = NO_PACKAGES,
+) -> Path:
+    """Path of a document, model or library folder.
+
+    Args:
+        reference: `package://burg_drake/...`; `package://NAME/...` of another package; or, with
+            `kind`, the bare name of something that the package installs; or a path, relative to
+            `base` (or to the working directory).
+        kind: `scenes`, `stations` or `models/hands` (bare names stand for `NAME.yaml`), or
+            `models` (bare names stand for a folder).
+        base: folder of the document that holds the reference.
+        packages: what a document says of other packages.
+
+    Returns:
+        An existing path.
+
+    Raises:
+        UnknownNameError: nothing is there; the message lists the built-in names of this kind, or
+            where the package was looked for.
+        InvalidInputError: it is a pipe.
+    """
+    # What a message calls one entry of each kind.
+    words = {"scenes": "scene", "stations": "station", "models": "library", "models/hands": "hand"}
+    text = str(reference)
+    if text.startswith(PACKAGE_URI):
+        path = data_root() / text.removeprefix(PACKAGE_URI)
+        if not path.exists():
+            raise UnknownNameError(f"{text} does not exist in {data_root()}")
+        return path
+    if PACKAGE_REFERENCE.fullmatch(text):
+        return package_file(text, base, packages)
+    path = expand_home(text)
+    if kind is not None and path.name == text and not path.suffix:
+        builtin = data_root() / kind / (text if kind == "models" else f"{text}.yaml")
+        if os.path.exists(builtin):
+            return builtin
+    located = path if base is None else base / path
+    if os.path.exists(located):  # also tells of names that are too long, and of links in a circle
+        if located.is_fifo():  # what is named so is read more than once, and in its folder
+            raise InvalidInputError(f"cannot read {text}: it is a pipe; save it to a file first")
+        return located.resolve()
+    where = f" (relative to {base})" if base is not None and not path.is_absolute() else ""
+    known = f"; {suggest_names(path.stem, builtin_names(kind))}" if kind else ""
+    what = f"{words[kind]} " if kind and base is None else ""  # documents name the entry
+    raise UnknownNameError(f"{what}{text} does not exist{where}{known}")
+
+
+def expand_home(text: str) -> Path:
+    """A path whose leading `~` or `~user` stands for a home folder.
+
+    Raises:
+        UnknownNameError: there is no such user.
+    """
+    try:
+        return Path(text).expanduser()
+    except RuntimeError as error:
+        user = Path(text).parts[0]
+        raise UnknownNameError(
+            f"{text}: user {user!r} has no home folder here; write the whole path"
+        ) from error
+
+
+def builtin_names(kind: str) -> list[str]:
+    """Bare names that `resolve_reference` knows for a kind."""
+    folder = data_root() / kind
+    if kind == "models":
+        return sorted(p.name for p in folder.iterdir() if (p / "library.yaml").exists())
+    return sorted(p.stem for p in folder.glob("*.yaml"))
+
+
+def portable_reference(path: Path, folder: Path) -> str:
+    """How a document in `folder` refers to a file or folder: package:// for what the package
+    ships, else the relative path."""
+    installed_folders = ("models", "scenes", "stations")  # Folders that the package installs.
+    path = path.resolve()
+    for name in installed_folders:
+        shipped = data_root() / name
+        if path.is_relative_to(shipped):
+            return f"{PACKAGE_URI}{name}/{path.relative_to(shipped).as_posix()}"
+    return os.path.relpath(path, folder.resolve())
+
+
+def shareable_reference(path: Path, folder: Path) -> str:
+    """The same, for a document that may go elsewhere and does not depend on what it refers to.
+
+    Of a path that shares no folder with `folder`, but for those above people's homes, only the end
+    is told: the name, with that of its folder if that is nobody's home.
+    """
+    reference, path, home = portable_reference(path, folder), path.resolve(), Path.home()
+    shared = Path(os.path.commonpath([path, folder.resolve()]))
+    if reference.startswith(PACKAGE_URI) or shared not in home.parents:
+        return reference
+    private = path.parent.parent in home.parents
+    return path.name if private else f"{path.parent.name}/{path.name}"
+
+
+def with_shareable_references(values: Any, folder: Path) -> Any:
+    """JSON values whose absolute paths, under `KEYS`, are those of `shareable_reference`."""
+    return _map_paths(
+        values,
+        lambda text: shareable_reference(Path(text), folder) if os.path.isabs(text) else text,
+    )
+
+
+def with_resolved_references(values: Any, folder: Path) -> Any:
+    """The same values with absolute paths in place of references to what is there; others stay.
+
+    Args:
+        values: of a document in `folder`.
+        folder: the folder.
+    """
+    return _map_paths(values, lambda text: _resolve_if_present(text, folder))
+
+
+def is_resolved(reference: str, *kinds: str) -> bool:
+    """Whether `with_resolved_references` has found something, or it is built in; what it has not
+    is relative to a folder that the file has left, not to the working directory.
+
+    Args:
+        reference: from a provenance.
+        kinds: of what may be built in, as `resources.builtin_names` has them.
+    """
+    if os.path.isabs(reference) or reference.startswith(PACKAGE_URI):
+        return True
+    return any(reference in builtin_names(kind) for kind in kinds)
+
+
+def _resolve_if_present(text: str, folder: Path) -> str:
+    try:
+        return str(resolve_reference(text, base=folder.resolve())) if text else text
+    except (UnknownNameError, OSError, ValueError, RuntimeError):
+        return text
+
+
+def _map_paths(values: Any, change: Any) -> Any:
+    # Keys of a provenance whose values are paths.
+    path_keys = frozenset({"scene", "library", "station", "run", "document", "file"})
+    if isinstance(values, Mapping):
+        return {
+            key: change(value)
+            if key in path_keys and isinstance(value, str)
+            else _map_paths(value, change)
+            for key, value in values.items()
+        }
+    if isinstance(values, list):
+        return [_map_paths(value, change) for value in values]
+    return values
+
+
+def referenced_files(model: Path, packages: Packages) -> list[Path]:
+    """The files that a model names, and those that the models that it includes name, as far as they
+    are there.
+
+    Args:
+        model: an SDF or URDF file.
+        packages: where packages are looked for.
+    """
+    return [
+        file for file in dict.fromkeys(_walk_references(model, packages, {model})) if file.is_file()
+    ]
+
+
+def referenced_packages(model: Path, packages: Packages) -> dict[str, Path]:
+    """Folders by name of the packages that a model and those that it includes name.
+
+    Raises:
+        UnknownNameError: one of them is nowhere; the message names the file and what was searched.
+    """
+    if not may_reference_packages(model):
+        return {}  # as most, of which some name many files
+    found: dict[str, Path] = {}
+    for file in (
+        model,
+        *(f for f in referenced_files(model, packages) if f.suffix in (".sdf", ".urdf")),
+    ):
+        for reference in _read_references(file):
+            parts = PACKAGE_REFERENCE.fullmatch(reference)
+            if parts is None or parts[1] in (*found, "burg_drake"):
+                continue
+            try:
+                found[parts[1]] = packages.find(parts[1], file.parent)
+            except UnknownNameError as error:
+                raise UnknownNameError(f"{file} refers to {reference}: {error}") from error
+    return found
+
+
+def may_reference_packages(model: Path) -> bool:
+    """Whether a model may name files of packages, or other models."""
+    # Every model that names packages or other models has one of these.
+    marks = (b"package://", b"model://", b"<include")
+    text = read_bytes(model, FileLimits.document.size)
+    return any(mark in text for mark in marks)
+
+
+def _walk_references(model: Path, packages: Packages, seen: set[Path]) -> Iterator[Path]:
+    """The files that are named, each followed by those that it names itself."""
+    for reference in _read_references(model):
+        try:
+            path = resolve_reference(reference, base=model.parent, packages=packages)
+        except UnknownNameError:
+            continue
+        # An included model may be named by its folder, in which a model.config names its files.
+        inside = sorted(file for file in path.glob("*") if file.suffix in (".config", ".sdf"))
+        for file in inside if path.is_dir() else [path]:
+            yield file
+            if file.suffix in (".sdf", ".urdf") and file not in seen:
+                seen.add(file)
+                yield from _walk_references(file, packages, seen)
+
+
+def _read_references(model: Path) -> list[str]:
+    """What stands for files in a model, each once."""
+    text = re.compile(r"<!--.*?-->", re.DOTALL).sub(
+        "", read_bytes(model, FileLimits.document.size).decode(errors="replace")
+    )
+    return list(
+        dict.fromkeys(
+            uri or name
+            for uri, name in re.compile(
+                r"""<uri>\s*([^<]+?)\s*</uri>|filename=["']([^"']+)["']"""
+            ).findall(text)
+        )
+    )

@@ -1,0 +1,267 @@
+"""Progress of a job: events for programs, a bar for terminals, occasional lines for log files."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
+from types import TracebackType
+from typing import Any
+
+from burg_drake.core.number_text import format_number
+from burg_drake.core.outcomes import Outcome
+
+STARTING_PHASE = "starting"
+"""Phase in which workers are set up; takes seconds at best."""
+
+Clock = Callable[[], float]
+"""Gives the time [s], from any origin."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """State of a job.
+
+    Attributes:
+        phase: what is being done, such as `sampling` or `judging`.
+        done, total: results, of how many; the total is 0 as long as it is not known.
+        before: how many of `done` were there before the clock was started.
+        elapsed: time since then [s].
+        outcomes: number of grasps by outcome.
+        counted_outcome: the outcome that is worth telling.
+        unit: what is counted.
+        left: expected time left [s], where more is known of it than `done` and `total` say.
+        note: what else is worth a word.
+    """
+
+    phase: str
+    done: float = 0
+    total: float = 0
+    before: float = 0
+    elapsed: float = 0.0
+    outcomes: Counter[Outcome] | None = None
+    counted_outcome: Outcome = Outcome.LIFTED
+    unit: str = "grasps"
+    left: float | None = None
+    note: str = ""
+
+    @property
+    def rate(self) -> float:
+        """Results a second; 0 as long as it is not known."""
+        return (self.done - self.before) / self.elapsed if self.elapsed > 0.0 else 0.0
+
+    @property
+    def remaining(self) -> float | None:
+        """Expected time left [s]; None as long as nothing is known."""
+        if self.left is not None:
+            return self.left
+        known = self.total > 0 and self.rate > 0.0
+        return (self.total - self.done) / self.rate if known else None
+
+
+Listener = Callable[[Progress], None]
+"""Called with the progress each time it changes."""
+
+
+class ProgressMeter:
+    """Counts results and makes events of them."""
+
+    def __init__(
+        self,
+        show: Listener,
+        event: Progress,
+        phase: str | None = None,
+        *,
+        work: float | None = None,
+        clock: Clock = time.monotonic,
+    ) -> None:
+        """Shows a first event.
+
+        Args:
+            show: gets the events.
+            event: before any result of this job; `done` is what was known before.
+            phase: from the first result on, which starts the clock, as setting up takes its own
+                time; what that result cost is not known then, and does not count. If None, the
+                clock starts now.
+            work: of all results to come, in any unit, if they do not cost alike.
+            clock: the time.
+        """
+        self._show, self._clock = show, clock
+        self._phase = event.phase if phase is None else phase
+        self._event = replace(event, before=event.done)
+        self._started = clock() if phase is None else None
+        self._work, self._worked = work, 0.0
+        show(self._event)
+
+    def step(
+        self, count: float = 1, *, work: float = 0.0, outcome: Outcome | None = None, note: str = ""
+    ) -> None:
+        """Takes results.
+
+        Args:
+            count: how many.
+            work: what they cost, in the unit of all `work`.
+            outcome: of a grasp.
+            note: see `Progress`.
+        """
+        if self._started is None:
+            self._work = None if self._work is None else self._work - work
+            self._begin(count, outcome, note)
+            return
+        self._worked += work
+        elapsed, left = self._clock() - self._started, self._event.left
+        if self._work is None:
+            left = None
+        elif self._worked > 0.0:
+            left = (self._work / self._worked - 1.0) * elapsed
+        self._event = replace(self._event, elapsed=elapsed, left=left)
+        self._take(count, outcome, note)
+
+    def skip(self, count: float = 1, *, note: str = "") -> None:
+        """Takes results that cost nothing: the pace is that of the others, from now on."""
+        self._begin(count, None, note)
+
+    def expect(self, total: float) -> None:
+        """Says how many results there are in all, where that has become known better."""
+        self._event = replace(self._event, total=total)
+
+    def _begin(self, count: float, outcome: Outcome | None, note: str) -> None:
+        self._started = self._clock()
+        self._event = replace(self._event, before=self._event.done + count, elapsed=0.0)
+        self._take(count, outcome, note)
+
+    def _take(self, count: float, outcome: Outcome | None, note: str) -> None:
+        done, outcomes = self._event.done + count, self._event.outcomes
+        if outcome is not None and outcomes is not None:
+            outcomes[outcome] += 1
+        self._event = replace(self._event, phase=self._phase, done=done, note=note)
+        self._show(self._event)
+
+
+class Reporter(AbstractContextManager["Reporter"]):
+    """Shows progress on standard error, or passes it to a function."""
+
+    def __init__(self, progress: bool | Listener, *, clock: Clock = time.monotonic) -> None:
+        """True shows it, False keeps quiet, a function gets every event."""
+        self._close: Callable[[], None] = lambda: None
+        if callable(progress):
+            self._show: Listener = progress
+        elif not progress:
+            self._show = lambda event: None
+        elif sys.stderr.isatty():
+            bar = _ProgressBar()
+            self._show, self._close = bar.show, bar.close
+        else:
+            self._show = _LogLines(clock).show
+
+    def show(self, event: Progress) -> None:
+        """Takes an event."""
+        self._show(event)
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._close()
+
+
+class _ProgressBar:
+    """A bar with counts, rate and time left."""
+
+    def __init__(self) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress as RichProgress, TextColumn, TimeElapsedColumn
+
+        self._bar: Any = RichProgress(
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=24),
+            TextColumn("{task.fields[count]}"),
+            TextColumn("{task.fields[pace]}"),
+            TimeElapsedColumn(),
+            TextColumn("[dim]{task.fields[found]}"),
+            console=Console(stderr=True),
+        )
+        self._task = self._bar.add_task("starting", total=None, count="", pace="", found="")
+        self._bar.start()
+
+    def show(self, event: Progress) -> None:
+        self._bar.update(
+            self._task,
+            description=event.phase,
+            completed=event.done,
+            total=event.total or None,
+            count=_count_text(event),
+            pace=_rate_text(event),
+            found=_outcome_text(event),
+        )
+
+    def close(self) -> None:
+        self._bar.stop()
+
+
+class _LogLines:
+    """A line at each change of phase, as soon as the time left is known, every half minute from
+    then on, and at the end; about what ends within seconds none but that it is starting."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._begun = self._last = clock()
+        self._phase = ""
+        self._forecast = self._any_shown = False
+
+    def show(self, event: Progress) -> None:
+        line_interval = 30.0  # Seconds between lines in a log file.
+        min_elapsed = 5.0  # Seconds after which the remaining time is shown.
+        now = self._clock()
+        known = event.remaining is not None and (
+            event.left is not None or event.elapsed >= min_elapsed
+        )
+        new = event.phase != self._phase
+        starting = new and event.phase == STARTING_PHASE and event.done < event.total
+        if not (self._any_shown or known or starting or now - self._begun >= min_elapsed):
+            return
+        shown_forecast = self._forecast and not new
+        finished = 0 < event.total == event.done
+        if new or finished or (known and not shown_forecast) or now - self._last >= line_interval:
+            self._phase, self._last = event.phase, now
+            self._any_shown = self._any_shown or not starting
+            self._forecast = shown_forecast or known
+            parts = (event.phase, _count_text(event), _rate_text(event), _outcome_text(event))
+            print("  ".join(part for part in parts if part), file=sys.stderr, flush=True)
+
+
+def _count_text(event: Progress) -> str:
+    if not event.total:
+        return f"{_number_text(event.done)} {event.unit}" if event.done else ""
+    return f"{_number_text(event.done)}/{_number_text(event.total)} {event.unit}"
+
+
+def _number_text(value: float) -> str:
+    return f"{value:,}" if isinstance(value, int) else f"{value:.1f}"
+
+
+def _rate_text(event: Progress) -> str:
+    if event.remaining is None:
+        return ""
+    left = math.ceil(event.remaining)
+    clock = f"{left // 3600}:{left // 60 % 60:02d}:{left % 60:02d} left"
+    if event.rate <= 0.0:
+        return clock
+    slow = event.rate < 1.0
+    rate = f"{format_number(60.0 * event.rate)}/min" if slow else f"{format_number(event.rate)}/s"
+    return f"{rate}  {clock}"
+
+
+def _outcome_text(event: Progress) -> str:
+    """What was found so far, in short: a terminal has no room for all outcomes."""
+    if not event.outcomes:
+        return event.note
+    failed = event.outcomes[Outcome.SIMULATION_FAILED]
+    found = f"{event.outcomes[event.counted_outcome]:,} {event.counted_outcome}"
+    return found + (f", {failed} failed" if failed else "")

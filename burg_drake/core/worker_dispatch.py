@@ -1,0 +1,518 @@
+"""The dispatcher thread of a pool: gives tasks to workers, receives results, handles crashes."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import logging
+import os
+import pickle
+import signal
+import subprocess
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection, Pipe, wait
+from typing import Any
+
+from burg_drake.core.errors import TaskCancelled, WorkerDied
+from burg_drake.core.worker import (
+    TIME_LIMIT_SIGNALS,
+    InterruptTask,
+    OpenSession,
+    ProgressMessage,
+    Session,
+    SessionOpened,
+    Task,
+    TaskCall,
+    TaskCalls,
+    TaskDone,
+    TimeLimit,
+    WorkerEnding,
+    WorkerFuture,
+    WorkerMessage,
+)
+from burg_drake.core.worker_processes import exit_cause, start_worker, was_ended_from_outside
+
+
+@dataclass(eq=False)
+class PendingTask:
+    """A task that has no result yet.
+
+    Attributes:
+        number: names it.
+        task: what to do.
+        future: what will become of it.
+        tries: workers that it may still end.
+        started: whether its future says that it runs.
+        cancelled: whether nobody waits for it any more, although it was started.
+        work: function and arguments, pickled when it is first sent.
+    """
+
+    number: int
+    task: Task[Any]
+    future: WorkerFuture[Any]
+    tries: int
+    started: bool = False
+    cancelled: bool = False
+    work: bytes | None = None
+
+    def call(self) -> TaskCall:
+        """What a worker is sent.
+
+        Raises:
+            Exception: it cannot be pickled.
+        """
+        task = self.task
+        if self.work is None:
+            self.work = pickle.dumps((task.function, task.args, dict(task.kwargs)))
+        return TaskCall(self.number, self.work, task.session_key, task.limit)
+
+
+Batch = deque[PendingTask]
+"""Tasks of one session that go to a worker together."""
+
+
+@dataclass(eq=False)
+class Worker:
+    """A place for a process, which is started when there is work, and again when it has died.
+
+    Attributes:
+        number: of the worker in its pool.
+        kept: sessions that it keeps at most.
+        own_group: whether the process leads a group of processes, so that what it starts ends
+            with it.
+        process, connection: the process and our end of the pipe, if there is one.
+        sessions: keys of those that it has built; used last comes last.
+        opening: what it builds.
+        tasks: what it is at, and has waiting.
+        suspect: a task that ended the process before this one, to be tried again alone.
+        own: work for this worker alone.
+        reason: why the process is about to end, in its words.
+        is_fresh: whether the process was given nothing yet.
+    """
+
+    number: int
+    kept: int
+    own_group: bool
+    process: subprocess.Popen[bytes] | None = None
+    connection: Connection | None = None
+    sessions: dict[str, None] = field(default_factory=dict)
+    opening: Session | None = None
+    tasks: Batch = field(default_factory=deque)
+    suspect: PendingTask | None = None
+    own: deque[Batch] = field(default_factory=deque)
+    reason: str = ""
+    is_fresh: bool = True
+
+    @property
+    def busy(self) -> bool:
+        """Whether it has something to do."""
+        return bool(self.tasks)
+
+    def started(self) -> list[PendingTask]:
+        """Tasks that were given to this worker, in the order in which it does them."""
+        suspect = [] if self.suspect is None else [self.suspect]
+        return [*self.tasks, *suspect, *itertools.chain.from_iterable(self.own)]
+
+    def start(self) -> None:
+        """Starts the process if there is none.
+
+        Raises:
+            OSError: it cannot be started.
+        """
+        worker_module = "burg_drake.core.worker"
+        if self.process is None:
+            self.process, self.connection = start_worker(worker_module, self.own_group)
+
+    def give(self, batch: Batch, calls: tuple[TaskCall, ...]) -> bool:
+        """Sends it tasks; it has to be started and idle.
+
+        Returns:
+            False if the process has died while it was idle: the tasks are not to blame.
+        """
+        assert self.connection is not None
+        session, opening = batch[0].task.session, None
+        if session is not None:
+            if session.key in self.sessions:
+                self.sessions[session.key] = self.sessions.pop(session.key)
+            else:
+                self.opening, opening = session, self._opening(session)
+        self.tasks = batch
+        try:
+            self.connection.send(TaskCalls(calls, opening))
+        except OSError:
+            return self.is_fresh  # if it is, its pipe's end tells the pool
+        finally:
+            self.is_fresh = False
+        return True
+
+    def _opening(self, session: Session) -> OpenSession:
+        drop = tuple(self.sessions)[: max(0, len(self.sessions) + 1 - self.kept)]
+        for key in drop:
+            del self.sessions[key]
+        return OpenSession(session.key, session.pickled, drop, session.limit)
+
+    def send(self, message: object) -> None:
+        """Tells it something."""
+        assert self.connection is not None
+        with contextlib.suppress(OSError):  # it has died; its pipe's end tells the pool
+            self.connection.send(message)
+
+    def kill(self) -> None:
+        """Ends the process and what it has started."""
+        if self.process is None or self.process.poll() is not None:
+            return
+        if self.own_group:
+            with contextlib.suppress(ProcessLookupError):  # it leads none yet
+                os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.kill()
+
+    def exit_error(self) -> tuple[WorkerDied, bool]:
+        """Why the process has ended, and whether it took too long; waits for its end."""
+        assert self.process is not None
+        overdue = -self.process.wait() in TIME_LIMIT_SIGNALS
+        cause = exit_cause(self.process, self.reason)
+        limit = (
+            self.opening.limit if self.opening else self.tasks[0].task.limit if self.tasks else None
+        )
+        if overdue and limit is not None:
+            cause = _time_limit_message(limit, -self.process.wait())
+        return WorkerDied(cause, was_ended_from_outside(self.process)), overdue
+
+    def forget(self) -> Batch:
+        """Lets go of the process, which has ended; returns what it was at."""
+        assert self.process is not None and self.connection is not None
+        self.process.wait()
+        self.connection.close()
+        self.process = self.connection = self.opening = None
+        self.sessions.clear()
+        self.reason, self.is_fresh = "", True
+        tasks, self.tasks = self.tasks, deque()
+        return tasks
+
+
+def _time_limit_message(limit: TimeLimit, number: int) -> str:
+    if number == signal.SIGALRM:
+        return f"took longer than {limit.wall:g} s"
+    return f"took longer than {limit.cpu:g} s of CPU time"
+
+
+class SharedQueue:
+    """Work of any session, by session."""
+
+    def __init__(self) -> None:
+        self._batches: dict[str | None, deque[Batch]] = {}
+
+    def put(self, batch: Batch) -> None:
+        """Adds work at the end."""
+        self._batches.setdefault(batch[0].task.session_key, deque()).append(batch)
+
+    def take(self, sessions: Iterable[str]) -> Batch | None:
+        """Takes the oldest work of one of these sessions, the first that has any."""
+        for key in sessions:
+            if key in self._batches:
+                return self._take(key)
+        return None
+
+    def take_oldest(self) -> Batch | None:
+        """Takes the oldest work of all."""
+        if not self._batches:
+            return None
+        return self._take(min(self._batches, key=lambda key: self._batches[key][0][0].number))
+
+    def clear(self) -> list[Batch]:
+        """Takes all."""
+        batches = list(self)
+        self._batches.clear()
+        return batches
+
+    def __iter__(self) -> Iterator[Batch]:
+        return itertools.chain.from_iterable(self._batches.values())
+
+    def __bool__(self) -> bool:
+        return bool(self._batches)
+
+    def _take(self, key: str | None) -> Batch:
+        batch = self._batches[key].popleft()
+        if not self._batches[key]:
+            del self._batches[key]
+        return batch
+
+
+_log = logging.getLogger("burg_drake")
+
+
+class WorkerTraceback(Exception):
+    """The cause of an error that comes from a worker: where it was raised there."""
+
+
+class Dispatcher:
+    """Open work and the workers that do it.
+
+    What begins with an underscore belongs to its thread.
+
+    Attributes:
+        workers: places for processes.
+    """
+
+    def __init__(self, workers: list[Worker]) -> None:
+        self.workers = workers
+        self._shared = SharedQueue()
+        self._lock = threading.Lock()
+        self._asked: deque[Callable[[], None]] = deque()
+        self._alarm, self._bell = Pipe(duplex=False)
+        self._signalled = self._closed = self._killed = self._ended = False
+        self._thread = threading.Thread(target=self._run, name="worker-pool", daemon=True)
+        self._thread.start()
+
+    def put(self, batch: Batch, worker: int | None) -> None:
+        """Adds work, for one worker alone or for any."""
+        with self._lock:
+            if self._ended:
+                raise RuntimeError("cannot schedule new futures: the pool has ended")
+            if worker is None:
+                self._shared.put(batch)
+            else:
+                self.workers[worker].own.append(batch)
+        self._ring()
+
+    def end_task(self, future: object, force: bool) -> None:
+        """Ends a task that runs; see `WorkerFuture.interrupt` and `terminate`."""
+        with self._lock:
+            self._asked.append(lambda: self._end_task(future, force))
+        self._ring()
+
+    def cancel_waiting(self) -> None:
+        """Gives up what no worker has."""
+        with self._lock:
+            batches = [*self._shared, *(batch for worker in self.workers for batch in worker.own)]
+        for task in itertools.chain.from_iterable(batches):
+            task.future.cancel()
+
+    def close(self) -> None:
+        """Ends the processes when all work is done."""
+        self._closed = True
+        self._ring()
+
+    def kill(self) -> None:
+        """Ends the processes at once."""
+        self._killed = True
+        for worker in self.workers:
+            worker.kill()
+        self._ring()
+
+    def join(self, timeout: float | None = None) -> None:
+        """Waits until all is ended; nothing in the dispatcher's own thread."""
+        if threading.current_thread() is not self._thread:
+            self._thread.join(timeout)
+
+    def _ring(self) -> None:
+        with self._lock:
+            if self._signalled:
+                return
+            self._signalled = True
+            with suppress(OSError):  # the thread has ended
+                self._bell.send_bytes(b"!")
+
+    def _run(self) -> None:
+        try:
+            while not self._killed:
+                self._hand_out()
+                if self._closed and not self._any_left():
+                    break
+                self._listen()
+        finally:
+            self._end()
+
+    def _listen(self) -> None:
+        by_connection = {w.connection: w for w in self.workers if w.connection is not None}
+        for ready in wait([self._alarm, *by_connection]):
+            if ready is not self._alarm:
+                self._receive(by_connection[ready])  # type: ignore[index]
+                continue
+            with self._lock:
+                self._alarm.recv_bytes()
+                self._signalled = False
+                asked, self._asked = self._asked, deque()
+            for request in asked:
+                request()
+
+    def _any_left(self) -> bool:
+        with self._lock:
+            return bool(self._shared) or any(worker.started() for worker in self.workers)
+
+    def _hand_out(self) -> None:
+        """Gives idle workers something to do: first what is theirs, then the oldest work."""
+        for take in (self._take_own, self._take_any):
+            for worker in sorted(self.workers, key=lambda worker: worker.process is None):
+                while not worker.busy and (batch := take(worker)):
+                    self._give(worker, batch)
+
+    def _take_own(self, worker: Worker) -> Batch | None:
+        if worker.suspect is not None:
+            suspect, worker.suspect = worker.suspect, None
+            return deque([suspect])
+        with self._lock:
+            if worker.own:
+                return worker.own.popleft()
+            return self._shared.take(reversed(worker.sessions))
+
+    def _take_any(self, worker: Worker) -> Batch | None:
+        with self._lock:
+            return self._shared.take_oldest()
+
+    def _give(self, worker: Worker, batch: Batch) -> None:
+        calls = [(task, call) for task in batch if (call := _begin_task(task)) is not None]
+        if not calls:
+            return
+        tasks: Batch = deque(task for task, _ in calls)
+        try:
+            worker.start()
+            while not worker.give(tasks, tuple(call for _, call in calls)):
+                worker.kill()
+                worker.forget()
+                worker.start()
+        except OSError as error:
+            for task in tasks:
+                task.future.set_exception(error)
+
+    def _receive(self, worker: Worker) -> None:
+        assert worker.connection is not None
+        try:
+            data = worker.connection.recv_bytes()
+        except (EOFError, OSError):
+            self._died(worker)
+            return
+        try:
+            message: WorkerMessage = pickle.loads(data)
+        except Exception as error:  # a result whose class is not what it was
+            if worker.tasks:
+                worker.tasks.popleft().future.set_exception(error)
+            return
+        task = worker.tasks[0] if worker.tasks else None
+        if isinstance(message, WorkerEnding):
+            worker.reason = message.reason
+        elif isinstance(message, SessionOpened):
+            self._opened(worker, message)
+        elif task is None or task.number != message.number:
+            pass
+        elif isinstance(message, ProgressMessage):
+            _report_task_progress(task, message.message)
+        else:
+            _set_task_result(worker.tasks.popleft(), message)
+
+    def _opened(self, worker: Worker, message: SessionOpened) -> None:
+        session, worker.opening = worker.opening, None
+        assert session is not None
+        if message.error is None:
+            session.false_starts = 0
+            worker.sessions[session.key] = None
+            return
+        session.error = _with_worker_traceback(message.error, message.where)
+        tasks, worker.tasks = worker.tasks, deque()
+        for task in tasks:
+            task.future.set_exception(session.error)
+
+    def _died(self, worker: Worker) -> None:
+        """The task that a worker was at when it died is suspect, the rest of its work is kept."""
+        if self._killed:  # it is cleaned up at the end
+            return
+        (error, overdue), session = worker.exit_error(), worker.opening
+        tasks = worker.forget()
+        cancelled = bool(tasks) and tasks[0].cancelled
+        if session is not None and not cancelled:
+            session.false_starts += 1
+            if session.false_starts >= session.attempts:
+                session.error = error
+        suspect = tasks.popleft() if tasks and (session is None or cancelled) else None
+        if tasks:
+            worker.own.appendleft(tasks)
+        if suspect is None:
+            return
+        if suspect.cancelled:
+            suspect.future.set_exception(TaskCancelled("this task was cancelled"))
+        elif suspect.tries > 1 and not overdue:
+            suspect.tries -= 1
+            worker.suspect = suspect
+        else:
+            suspect.future.set_exception(error)
+
+    def _end_task(self, future: object, force: bool) -> None:
+        for worker in self.workers:
+            for task in worker.started():
+                if task.future is not future:
+                    continue
+                task.cancelled = True
+                if not (worker.tasks and task is worker.tasks[0]):
+                    continue  # it is not begun
+                if force:
+                    worker.kill()
+                else:
+                    worker.send(InterruptTask(task.number))
+
+    def _end(self) -> None:
+        """Lets idle workers end by themselves, ends the others, and all work that is left."""
+        shutdown_timeout = 5.0  # Seconds for an idle worker to end by itself.
+        left: list[PendingTask] = []
+        for worker in self.workers:
+            if worker.process is not None and not (worker.busy or self._killed):
+                worker.send(None)
+            else:
+                worker.kill()
+            left += worker.started()
+            worker.tasks, worker.suspect, worker.own = deque(), None, deque()
+        for worker in self.workers:
+            if worker.process is not None:
+                with suppress(subprocess.TimeoutExpired):
+                    worker.process.wait(shutdown_timeout)
+                worker.kill()
+                worker.forget()
+        with self._lock:
+            left += itertools.chain.from_iterable(self._shared.clear())
+            self._ended = True
+            self._alarm.close()
+            self._bell.close()
+        for task in left:
+            if task.started or task.future.set_running_or_notify_cancel():
+                task.future.set_exception(TaskCancelled("the worker processes were stopped"))
+
+
+def _begin_task(task: PendingTask) -> Any:
+    """What a worker is sent of a task; None if that is not to be done, as its future says then."""
+    if not task.started and not task.future.set_running_or_notify_cancel():
+        return None
+    task.started = True
+    session = task.task.session
+    if task.cancelled:
+        task.future.set_exception(TaskCancelled("this task was cancelled"))
+    elif session is not None and session.error is not None:
+        task.future.set_exception(session.error)
+    else:
+        try:
+            return task.call()
+        except Exception as error:  # it cannot be pickled
+            task.future.set_exception(error)
+    return None
+
+
+def _report_task_progress(task: PendingTask, message: Any) -> None:
+    if task.task.on_progress is not None and not task.cancelled:
+        try:
+            task.task.on_progress(message)
+        except Exception:
+            _log.exception("the callback for the progress of a task failed")
+
+
+def _set_task_result(task: PendingTask, message: TaskDone) -> None:
+    if message.error is None:
+        task.future.set_result(message.result)
+    else:
+        task.future.set_exception(_with_worker_traceback(message.error, message.where))
+
+
+def _with_worker_traceback(error: BaseException, where: str) -> BaseException:
+    error.__cause__ = WorkerTraceback(f"in a worker process:\n{where}")
+    return error

@@ -1,0 +1,333 @@
+"""A pool of worker processes for evaluating grasps, building libraries and rendering images.
+
+`WorkerPool` is an executor like those of `concurrent.futures`: `submit` returns a future, `map`
+returns results in order, and the `with` block ends the processes::
+
+    from burg_drake.core import WorkerPool
+    from my_images import render  # def render(number: int) -> Image
+
+    with WorkerPool() as pool:
+        for number, image in enumerate(pool.map(render, range(100))):
+            image.save(f"{number:03d}.png")
+
+Workers are fresh interpreters connected by a pipe. They are never forked, which Drake does not
+survive, and do not import the program's main module, so that scripts and notebooks need no guard.
+Functions must therefore be defined in a module that can be imported.
+
+**Sessions.** What is expensive to build (a scene with its renderer, a judge) is built once in each
+worker and passed to every task of the session as first argument. A worker keeps the last few
+sessions, and stays with a session while that has tasks::
+
+    scene = Session("kitchen", partial(SceneRenderer, "kitchen.yaml"))
+    futures = [pool.submit_task(Task(render_view, (X_WC,), session=scene)) for X_WC in poses]
+
+**Progress.** A task may call `report_progress(message)`; `Task.on_progress` is called with each
+message, in a thread of the pool. Outside a worker it does nothing.
+
+**Crashes, hangs, memory.** A worker that dies (a crash inside Drake, a `TimeLimit`, the system when
+memory runs out) takes no other task with it. Its task is retried alone in a fresh process; if that
+dies too, the future raises `WorkerDied`, which gives the cause and whether it came from outside. A
+task that exceeded its time limit is not retried. A session whose building ends its worker fails
+after `Session.attempts`.
+
+**Ending.** Leaving the `with` block waits for running tasks. Leaving it by an exception such as
+Ctrl-C ends the workers at once (`kill_workers`). Workers ignore keyboard interrupts and end when
+their parent does, even if that is killed. `WorkerFuture.interrupt` ends one task at its next
+progress report, `WorkerFuture.terminate` at once.
+
+`map_unordered` runs work in this process if there is one worker, `Prefetcher` computes results
+ahead, and `start_worker` starts a process for other uses, such as a node of a cluster.
+"""
+
+from __future__ import annotations
+
+import itertools
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import Executor, Future, as_completed
+from types import TracebackType
+from typing import Any, Generic, TypeVar
+
+from burg_drake.core.errors import InvalidInputError
+from burg_drake.core.worker import Task, WorkerFuture
+from burg_drake.core.worker_dispatch import Dispatcher, PendingTask, Worker
+from burg_drake.core.worker_processes import worker_count
+
+T = TypeVar("T")
+
+
+class WorkerPool(Executor):
+    """Worker processes that do tasks, in any order; each is started when there is work for it."""
+
+    def __init__(
+        self,
+        workers: int | None = None,
+        *,
+        retries: int = 1,
+        kept_sessions: int = 2,
+        own_group: bool = False,
+    ) -> None:
+        """Starts nothing yet.
+
+        Args:
+            workers: number of processes at most; as many as there are processors if None.
+            retries: how often a task is tried again whose worker dies.
+            kept_sessions: how many sessions a worker keeps; more would take memory.
+            own_group: whether each worker leads a group of processes, so that what it starts ends
+                with it; then what a terminal sends to the program's group does not reach it.
+
+        Raises:
+            InvalidInputError: workers is below 1.
+        """
+        self.workers = worker_count(workers)
+        self._retries = retries
+        self._places = [Worker(k, max(1, kept_sessions), own_group) for k in range(self.workers)]
+        self._numbers = itertools.count()
+        self._lock = threading.Lock()
+        self._dispatcher: Dispatcher | None = None
+        self._closed = False
+
+    def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> WorkerFuture[T]:
+        """Has a function called in a worker; see `concurrent.futures.Executor.submit`.
+
+        Raises:
+            RuntimeError: the pool was shut down.
+        """
+        return self.submit_task(Task(fn, args, kwargs))
+
+    def submit_task(self, task: Task[T]) -> WorkerFuture[T]:
+        """Has a task done, with all that `Task` can say about it.
+
+        Raises:
+            RuntimeError: the pool was shut down.
+        """
+        return self.submit_tasks([task])[0]
+
+    def submit_tasks(
+        self, tasks: Sequence[Task[T]], worker: int | None = None
+    ) -> list[WorkerFuture[T]]:
+        """Has tasks done by one worker, one after the other: they travel together.
+
+        Args:
+            tasks: of the same session.
+            worker: number of the worker in the pool; any if None.
+
+        Raises:
+            RuntimeError: the pool was shut down.
+            InvalidInputError: the tasks are of several sessions.
+        """
+        if len({task.session for task in tasks}) > 1:
+            raise InvalidInputError("tasks that are sent together must belong to the same session")
+        with self._lock:
+            if self._closed:
+                raise RuntimeError("cannot schedule new futures after shutdown")
+            if self._dispatcher is None:
+                self._dispatcher = Dispatcher(self._places)
+            dispatcher = self._dispatcher
+            pending = deque(self._pending(task, dispatcher) for task in tasks)
+            if pending:
+                dispatcher.put(pending, worker)
+        return [task.future for task in pending]
+
+    def map(
+        self,
+        fn: Callable[..., T],
+        *iterables: Iterable[Any],
+        timeout: float | None = None,
+        chunksize: int = 1,
+    ) -> Iterator[T]:
+        """Results of a function in the order of its arguments; see `Executor.map`.
+
+        Args:
+            fn: the function.
+            iterables: of its arguments.
+            timeout: from now until each result [s].
+            chunksize: so many calls travel together; 1 is best for those of more than some
+                milliseconds.
+        """
+        tasks = [Task(fn, args) for args in zip(*iterables, strict=False)]
+        starts = range(0, len(tasks), max(1, chunksize))
+        chunks = [self.submit_tasks(tasks[k : k + starts.step]) for k in starts]
+        end = None if timeout is None else time.monotonic() + timeout
+        return _iterate_results(deque(itertools.chain.from_iterable(chunks)), end)
+
+    def sessions(self, worker: int) -> tuple[str, ...]:
+        """Keys of the sessions that a worker has built; used last comes last."""
+        return tuple(self._places[worker].sessions.copy())
+
+    @property
+    def processes(self) -> list[int]:
+        """Identifiers of the processes that there are."""
+        found = [place.process for place in self._places]
+        return [process.pid for process in found if process is not None]
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Takes no more tasks, and ends the workers when all are done.
+
+        Args:
+            wait: until then.
+            cancel_futures: whether tasks that no worker has are given up.
+        """
+        with self._lock:
+            self._closed = True
+            dispatcher = self._dispatcher
+        if dispatcher is None:
+            return
+        if cancel_futures:
+            dispatcher.cancel_waiting()
+        dispatcher.close()
+        if wait:
+            dispatcher.join()
+
+    def kill_workers(self, timeout: float | None = None) -> None:
+        """Ends the workers at once; tasks that are not done raise `TaskCancelled`.
+
+        Args:
+            timeout: how long to wait until they have ended [s].
+        """
+        with self._lock:
+            self._closed = True
+            dispatcher = self._dispatcher
+        if dispatcher is not None:
+            dispatcher.kill()
+            dispatcher.join(timeout)
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if error is None:
+            self.shutdown()
+        else:
+            self.kill_workers()
+
+    def _pending(self, task: Task[T], dispatcher: Dispatcher) -> PendingTask:
+        retries = self._retries if task.retries is None else task.retries
+        future = WorkerFuture[T](dispatcher.end_task)
+        return PendingTask(next(self._numbers), task, future, 1 + retries)
+
+
+def _iterate_results(futures: deque[WorkerFuture[T]], end: float | None) -> Iterator[T]:
+    try:
+        while futures:
+            left = None if end is None else end - time.monotonic()
+            yield futures.popleft().result(left)
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+PrefetchedWork = TypeVar("PrefetchedWork")
+PrefetchedResult = TypeVar("PrefetchedResult")
+
+
+class Prefetcher(Generic[PrefetchedWork, PrefetchedResult]):
+    """Results of work in its order, a few of them ahead."""
+
+    def __init__(
+        self,
+        pool: WorkerPool,
+        work: Iterable[PrefetchedWork],
+        task: Callable[[PrefetchedWork], Task[PrefetchedResult]],
+    ) -> None:
+        """Begins nothing yet.
+
+        Args:
+            pool: whose workers do it; it is ended by who has made it.
+            work: asked for as needed.
+            task: what is to be done about a piece of work.
+        """
+        self._pool, self._work, self._task = pool, iter(work), task
+        self._ahead: deque[tuple[PrefetchedWork, WorkerFuture[PrefetchedResult]]] = deque()
+
+    def ready(self) -> bool:
+        """Whether `take` returns at once."""
+        self._fill()
+        return not self._ahead or self._ahead[0][1].done()
+
+    def take(self) -> tuple[PrefetchedWork, PrefetchedResult | BaseException] | None:
+        """The next work and its result, or the error; None when there is no more. Waits for it."""
+        self._fill()
+        if not self._ahead:
+            return None
+        work, future = self._ahead.popleft()
+        error = future.exception()
+        self._fill()
+        return work, future.result() if error is None else error
+
+    def _fill(self) -> None:
+        per_worker = 2  # Results per worker that are ready or being computed.
+        while len(self._ahead) < per_worker * self._pool.workers:
+            for work in self._work:
+                self._ahead.append((work, self._pool.submit_task(self._task(work))))
+                break
+            else:
+                return
+
+
+Work = TypeVar("Work")
+Result = TypeVar("Result")
+
+
+def map_unordered(
+    function: Callable[[Work], Result],
+    work: Sequence[Work],
+    workers: int,
+    check: Callable[[Work], object] | None = None,
+) -> Generator[tuple[Work, Result | BaseException], None, None]:
+    """Results of a function as they come; one that fails does not end the others.
+
+    Args:
+        function: importable where there are several workers.
+        work: its arguments, begun in this order.
+        workers: number of processes; with one, or one piece of work, this process does it. What
+            ends its worker is not tried again.
+        check: is called with each argument before the function is with any. What it raises is the
+            outcome of that argument.
+
+    Yields:
+        The argument, and the result or the error. Closing the iterator ends the workers, with the
+        processes that they have started.
+    """
+    count = min(workers, len(work))
+    pool = WorkerPool(count, retries=0, own_group=True) if count > 1 else None
+    try:
+        if check is not None:
+            failed = set()
+            for place, item, outcome in _completed_work(check, work, pool):
+                if isinstance(outcome, BaseException):
+                    failed.add(place)
+                    yield item, outcome
+            work = [item for place, item in enumerate(work) if place not in failed]
+        for _, item, outcome in _completed_work(function, work, pool):
+            yield item, outcome
+    finally:
+        if pool is not None:
+            pool.kill_workers()
+
+
+def _completed_work(
+    function: Callable[[Work], Result], work: Sequence[Work], pool: WorkerPool | None
+) -> Iterator[tuple[int, Work, Result | BaseException]]:
+    """Place, argument and outcome of each piece of work as they come."""
+    if pool is None:
+        for place, item in enumerate(work):
+            yield place, item, _run_item(function, item)
+        return
+    places: dict[Future[Result], int] = {
+        pool.submit(function, item): place for place, item in enumerate(work)
+    }
+    for future in as_completed(places):
+        error, place = future.exception(), places[future]
+        yield place, work[place], future.result() if error is None else error
+
+
+def _run_item(function: Callable[[Work], Result], item: Work) -> Result | BaseException:
+    try:
+        return function(item)
+    except Exception as error:
+        return error

@@ -1,0 +1,263 @@
+"""Appearance of one scene as plain data, and the ranges that appearances are drawn from."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal, get_args
+
+from burg_drake.core import (
+    MAX_DOCUMENT_SEED,
+    FieldError,
+    InvalidInputError,
+    Pose,
+    Ranges,
+    Vector3,
+    parse_document,
+    plain_data,
+    require_ascending,
+    require_ranges,
+)
+
+Pattern = Literal["wood", "cloth", "stone", "plain"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class AppearanceSettings:
+    """Ranges from which the looks of scenes are drawn.
+
+    Pairs are the smallest and the largest value.
+
+    Attributes:
+        lights: number of lights, besides a weak one at the camera; the usual lights if null.
+        light_elevation_deg: elevation of the first light above the table [degrees]; the others come
+            from anywhere above.
+        temperature: colour temperature of the lights [K]; white if null.
+        shadows: probability that the first light casts shadows, which doubles the rendering time.
+        room: probability that a room is seen behind the table instead of an even grey.
+        room_light: probability that the room, if there is one, lights the scene from all around.
+        table: patterns of the table, each with the same probability; its own colour if empty.
+        board: probability that the printed board is seen.
+        exposure: exposure of the image [stops]; 0 if null.
+        white_balance: largest deviation of the gains of red and blue from 1.
+        gamma: exponent of the image; 1 if null.
+        blur: standard deviation of blur [pixels]; none if null.
+        electrons: electrons that a white pixel collects; fewer give more noise, null gives none.
+        color_gain: largest change of the channels of each object's colour, as a share.
+        distractors: number of other things on the table, without labels; fewer if there is no room.
+        distractor_library: object library of these things: a folder, or the name of a built-in one.
+        distractors_on_board: whether these things may stand on the board.
+
+    Raises:
+        FieldError: a value is out of its range, or a range falls.
+    """
+
+    WRITTEN_WHOLE: ClassVar[bool] = True
+
+    RANGES: ClassVar[Ranges] = {
+        "shadows": (0.0, 1.0),
+        "room": (0.0, 1.0),
+        "room_light": (0.0, 1.0),
+        "board": (0.0, 1.0),
+        "white_balance": (0.0, 0.5),
+        "color_gain": (0.0, 0.9),
+        "lights": (1, 4),
+        "light_elevation_deg": (5.0, 90.0),
+        "temperature": (1000.0, 20_000.0),
+        "exposure": (-5.0, 5.0),
+        "gamma": (0.2, 5.0),
+        "blur": (0.0, 20.0),
+        "electrons": (50.0, 1e6),
+        "distractors": (0, 50),
+    }
+
+    lights: tuple[int, int] | None = (1, 3)
+    light_elevation_deg: tuple[float, float] = (35.0, 85.0)
+    temperature: tuple[float, float] | None = (3200.0, 7500.0)
+    shadows: float = 0.5
+    room: float = 0.9
+    room_light: float = 0.3
+    table: tuple[Pattern, ...] = get_args(Pattern)
+    board: float = 0.5
+    exposure: tuple[float, float] | None = (-0.7, 0.3)
+    white_balance: float = 0.06
+    gamma: tuple[float, float] | None = (0.9, 1.1)
+    blur: tuple[float, float] | None = (0.0, 0.8)
+    electrons: tuple[float, float] | None = (1500.0, 20_000.0)
+    color_gain: float = 0.1
+    distractors: tuple[int, int] = (0, 4)
+    distractor_library: str = "clutter"
+    distractors_on_board: bool = False
+
+    def __post_init__(self) -> None:
+        require_ranges(self)
+        for name in self.RANGES:
+            if isinstance(pair := getattr(self, name), tuple):
+                require_ascending(pair, name)
+
+
+WHITE_LIGHT: Vector3 = (1.0, 1.0, 1.0)  # Red, green and blue of white light.
+MAX_GAIN = 1e4
+"""Maximum irradiance, gain or component of a colour; with 1 a white surface is white."""
+
+
+def _require_gains(values: Vector3, name: str) -> None:
+    if not all(0.0 <= value <= MAX_GAIN for value in values):
+        raise FieldError(f"{name} is {list(values)}; each must be from 0 to {MAX_GAIN:g}", name)
+
+
+def _require_seed(seed: int | None, name: str) -> None:
+    if seed is not None and not 0 <= seed <= MAX_DOCUMENT_SEED:
+        raise FieldError(f"{name} is {seed}; give a seed from 0 to {MAX_DOCUMENT_SEED}", name)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DirectedLight:
+    """A light far away.
+
+    Attributes:
+        direction: that it shines in.
+        frame: of the direction: the world, or that of the camera, with which the light goes.
+        irradiance: of a surface that faces it: with 1, a white one is white in the image.
+        color: red, green, blue, linear.
+        shadows: whether it casts them with Drake's renderer; with Blender those of the world do.
+    """
+
+    RANGES: ClassVar[Ranges] = {"irradiance": (0.0, MAX_GAIN)}
+
+    direction: Vector3
+    frame: Literal["world", "camera"] = "world"
+    irradiance: float
+    color: Vector3 = WHITE_LIGHT
+    shadows: bool = False
+
+    def __post_init__(self) -> None:
+        _require_gains(self.color, "color")
+        if not any(self.direction) or not any(self.color):
+            raise InvalidInputError(
+                "a light needs a direction and a colour that are not zero; given are direction"
+                f" {list(self.direction)} and color {list(self.color)}"
+            )
+        require_ranges(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TableSurface:
+    """The pattern on a table.
+
+    Attributes:
+        pattern: its kind.
+        seed: of all that is random about it.
+    """
+
+    pattern: Pattern
+    seed: int
+
+    def __post_init__(self) -> None:
+        _require_seed(self.seed, "seed")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Photometry:
+    """How a camera makes a picture of the light that falls on it.
+
+    Attributes:
+        exposure: [stops].
+        white_balance: gains of red, green, blue, linear.
+        gamma: exponent that is left in the picture: light to the power of 1 / gamma.
+        blur: standard deviation [pixels].
+        electrons: that a white pixel collects; no noise if None.
+    """
+
+    RANGES: ClassVar[Ranges] = {
+        "exposure": (-20.0, 20.0),
+        "gamma": (0.05, 20.0),
+        "blur": (0.0, 100.0),
+        "electrons": (1.0, 1e12),
+    }
+    """Allowed values of a camera, far beyond those that looks are sampled from."""
+
+    exposure: float = 0.0
+    white_balance: Vector3 = WHITE_LIGHT
+    gamma: float = 1.0
+    blur: float = 0.0
+    electrons: float | None = None
+
+    def __post_init__(self) -> None:
+        require_ranges(self)
+        _require_gains(self.white_balance, "white_balance")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Distractor:
+    """A thing on the table that has no label.
+
+    Attributes:
+        object: name in the library of distractors.
+        X_SO: its pose in the scene frame.
+    """
+
+    object: str
+    X_SO: Pose
+
+
+@dataclass(frozen=True, kw_only=True)
+class Appearance:
+    """How a scene looks. Without anything it looks as simulated cameras always see it.
+
+    Attributes:
+        lights: the usual ones if there are none.
+        room: seed of the room behind the table; an even grey if None.
+        room_light: irradiance of the table by the room's picture, as of lights; none if 0.
+        table: its pattern; its own colour if None.
+        board: whether the printed board is seen.
+        photometry: of the image.
+        object_gains: of red, green and blue of each instance, linear, in the order of labels;
+            nothing is changed if empty.
+        library: that distractors are from: a built-in name, or a folder.
+        distractors: on the table.
+    """
+
+    RANGES: ClassVar[Ranges] = {"room_light": (0.0, MAX_GAIN)}
+
+    version: int = 1
+    lights: tuple[DirectedLight, ...] = ()
+    room: int | None = None
+    room_light: float = 0.0
+    table: TableSurface | None = None
+    board: bool = True
+    photometry: Photometry = Photometry()
+    object_gains: tuple[Vector3, ...] = ()
+    library: str = "household"
+    distractors: tuple[Distractor, ...] = ()
+
+    def __post_init__(self) -> None:
+        _require_seed(self.room, "room")
+        require_ranges(self)
+        if self.room_light and self.room is None:
+            raise FieldError(
+                f"room_light is {self.room_light:g}, but there is no room; give a room, or"
+                " room_light 0",
+                "room_light",
+            )
+        for gains in self.object_gains:
+            _require_gains(gains, "object_gains")
+
+    def plain(self) -> dict[str, Any]:
+        """As dicts, lists, numbers and texts, for JSON and YAML; `read_appearance` reads it."""
+        found: dict[str, Any] = plain_data(self)
+        return found
+
+
+def read_appearance(data: Mapping[str, Any], name: str = "appearance") -> Appearance:
+    """An appearance from plain data.
+
+    Args:
+        data: as `Appearance.plain` gives it.
+        name: stands for the place that it is from in messages.
+
+    Raises:
+        DocumentError: it does not fit; the message names the key.
+    """
+    return parse_document(json.dumps(data), Appearance, name)

@@ -1,5 +1,0 @@
-"""How a scene looks: lights, table, surroundings, distractors, colours; all from a seed."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

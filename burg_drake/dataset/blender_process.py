@@ -1,0 +1,221 @@
+"""Finds Blender and renders with it in a process of its own."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from threading import RLock
+from typing import IO, Any, Literal, get_args
+
+import cv2
+import numpy as np
+
+from burg_drake.cameras import Intrinsics
+from burg_drake.core import Array, Bytes, MissingDependencyError, SimulationError
+from burg_drake.dataset.blender_scene import BlenderScene
+
+RendererName = Literal["drake", "blender"]
+RENDERERS: tuple[RendererName, ...] = get_args(RendererName)
+"""Names of the renderers of colour images."""
+BLENDER_ENVIRONMENT_VARIABLE = "BURG_DRAKE_BLENDER"
+"""Environment variable with the path of Blender, or of a Python that has bpy."""
+BLENDER_INSTALL_ADVICE = (
+    "pip install 'burg-drake[blender]' with Python 3.11 or 3.13, or set"
+    f" {BLENDER_ENVIRONMENT_VARIABLE} to a Blender, or to a Python that has the package bpy"
+)
+"""Ending of the messages about a missing Blender."""
+
+
+def blender_command() -> list[str]:
+    """The command line of the process that renders.
+
+    Raises:
+        MissingDependencyError: there is no Blender, or `BURG_DRAKE_BLENDER` names none.
+    """
+    # The program that runs in the Blender process.
+    worker_program = Path(__file__).with_name("blender_worker.py")
+    given = os.environ.get(BLENDER_ENVIRONMENT_VARIABLE)
+    if not given:
+        if importlib.util.find_spec("bpy") is None:
+            raise MissingDependencyError(
+                f"the renderer blender is not installed: {BLENDER_INSTALL_ADVICE}"
+            )
+        return [sys.executable, "-P", str(worker_program)]
+    found = shutil.which(given)
+    if found is None:
+        raise MissingDependencyError(
+            f"{BLENDER_ENVIRONMENT_VARIABLE} is {given!r}, which is not an executable: {BLENDER_INSTALL_ADVICE}"
+        )
+    told = subprocess.run([found, "--version"], capture_output=True, text=True, check=False)
+    if told.stdout.startswith("Blender"):
+        quiet = ["--background", "--factory-startup", "--python-exit-code", "1"]
+        return [found, *quiet, "--python", str(worker_program)]
+    return [found, "-P", str(worker_program)]
+
+
+class Blender:
+    """A process that renders scenes, one after the other; it ends when this one does.
+
+    It uses as many threads as `OMP_NUM_THREADS` says, or as there are processors; images are the
+    same with any number.
+
+    Attributes:
+        version: of Blender.
+
+    Args:
+        command: that starts it.
+
+    Raises:
+        MissingDependencyError: it has no bpy.
+        SimulationError: it ended at once.
+    """
+
+    def __init__(self, command: list[str]) -> None:
+        # Settings of this Python that another Python must not inherit.
+        python_variables = ("PYTHONPATH", "PYTHONHOME")
+        self._log: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115
+        foreign = python_variables if os.environ.get(BLENDER_ENVIRONMENT_VARIABLE) else ()
+        self._process = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._log,
+            env={name: value for name, value in os.environ.items() if name not in foreign},
+        )
+        self._lock = RLock()
+        self._shown: BlenderScene | None = None
+        self._program = command[0]
+        self.version = str(self._answer("starting")["version"])
+
+    @property
+    def alive(self) -> bool:
+        """It runs."""
+        return self._process.poll() is None
+
+    def image(
+        self,
+        scene: BlenderScene,
+        poses: Mapping[str, Array],
+        intrinsics: Intrinsics,
+        X_WC: Array,
+        clip: tuple[float, float],
+    ) -> Bytes:
+        """What a pinhole camera sees.
+
+        Args:
+            scene: kept from one call to the next as long as it is the same object.
+            poses: `X_WB` (4, 4) of the bodies.
+            intrinsics: of the camera.
+            X_WC: (4, 4) its optical frame in the world.
+            clip: depths that what is seen is between [m].
+
+        Returns:
+            (H, W, 4) sRGB, and the share of each pixel that anything is in, which colours are not
+            multiplied by.
+
+        Raises:
+            SimulationError: Blender failed, or ended; the message has its last lines.
+        """
+        with self._lock, tempfile.TemporaryDirectory(prefix="burg_drake-") as name:
+            folder = Path(name)
+            if self._shown is not scene:
+                self._shown = None
+                scene.write(folder, _thread_count())
+                self._ask("loading a scene", do="load", folder=name)
+                self._shown = scene
+            path = folder / "view.png"
+            self._ask(
+                "rendering",
+                do="render",
+                width=intrinsics.width,
+                height=intrinsics.height,
+                focal=intrinsics.focal,
+                center=intrinsics.center,
+                X_WC=X_WC.tolist(),
+                clip=clip,
+                poses={body: X_WB.tolist() for body, X_WB in poses.items()},
+                output=str(path),
+            )
+            image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        if image is None or image.shape != (intrinsics.height, intrinsics.width, 4):
+            raise SimulationError(f"Blender wrote no image; {self._last_words()}")
+        return np.ascontiguousarray(image[..., [2, 1, 0, 3]])
+
+    def close(self) -> None:
+        """Ends the process."""
+        self._process.kill()
+        self._process.communicate()
+        self._log.close()
+
+    def _ask(self, when: str, **task: Any) -> None:
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(json.dumps(task).encode() + b"\n")
+            self._process.stdin.flush()
+        except BrokenPipeError:
+            pass  # it has ended, which the answer tells
+        try:
+            error = self._answer(when).get("error")
+        except BaseException:
+            self._process.kill()  # an answer that nobody waits for must not be taken for the next
+            raise
+        if error is not None:
+            raise SimulationError(f"Blender failed while {when}: {error}")
+
+    def _answer(self, when: str) -> dict[str, Any]:
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        while line.endswith(b"\n") and not line.startswith(b"{"):  # what Blender says of itself
+            line = self._process.stdout.readline()
+        if not line.endswith(b"\n"):
+            code = self._process.wait()
+            how = f"by {signal.Signals(-code).name}" if code < 0 else f"with code {code}"
+            raise SimulationError(f"Blender ended {how} while {when}; {self._last_words()}")
+        found: dict[str, Any] = json.loads(line)
+        if "missing" in found:
+            self.close()
+            raise MissingDependencyError(
+                f"{self._program} has no Blender ({found['missing']}): {BLENDER_INSTALL_ADVICE}"
+            )
+        return found
+
+    def _last_words(self) -> str:
+        max_lines = 5  # Lines of Blender's output that the message repeats.
+        self._log.seek(0)
+        lines = self._log.read().decode(errors="replace").split("\n")
+        said = [line.strip() for line in lines if line.strip()][-max_lines:]
+        return f"its last lines: {' | '.join(said)}" if said else "it printed nothing"
+
+
+def running_blender() -> Blender:
+    """The process that this one renders with, started when it is first needed, or has ended.
+
+    Raises:
+        MissingDependencyError: there is no Blender.
+        SimulationError: it ended at once.
+    """
+    command = tuple(blender_command())
+    found = _start_blender(command)
+    if not found.alive:
+        _start_blender.cache_clear()
+        found = _start_blender(command)
+    return found
+
+
+@lru_cache(maxsize=1)
+def _start_blender(command: tuple[str, ...]) -> Blender:
+    return Blender(list(command))
+
+
+def _thread_count() -> int:
+    given = os.environ.get("OMP_NUM_THREADS", "")
+    return int(given) if given.isdecimal() else 0

@@ -1,0 +1,363 @@
+"""The card of a data set: a README with counts, histograms and example pictures."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from burg_drake.core import (
+    Array,
+    Indices,
+    InvalidInputError,
+    UnknownNameError,
+    atomic_write_all,
+    software_versions,
+    suggest_names,
+)
+from burg_drake.dataset.export_common import Samples
+from burg_drake.dataset.reader import Dataset
+from burg_drake.dataset.sample import Sample
+from burg_drake.dataset.sample_sheet import evenly_spaced_indices, sheet_png
+from burg_drake.visualization import Child, element
+
+
+@dataclass(eq=False)
+class DatasetCounts:
+    """Counts and distributions of a data set.
+
+    Attributes:
+        scenes: numbers of its scenes.
+        views: samples by what their camera was made from.
+        sizes: samples by width and height of their images.
+        images: samples by what images they have.
+        instances: by object, in all samples, visible or not.
+        visible: the same, of those that are visible.
+        outcomes: of grasps.
+        distances: of each visible instance, from the camera to the origin of its frame [m].
+        visibilities: of each instance.
+        elevations: of each view, by which its optical axis points down [rad].
+        objects: of each view, visible instances.
+    """
+
+    scenes: set[int] = field(default_factory=set)
+    views: Counter[str] = field(default_factory=Counter)
+    sizes: Counter[tuple[int, int]] = field(default_factory=Counter)
+    images: Counter[str] = field(default_factory=Counter)
+    instances: Counter[str] = field(default_factory=Counter)
+    visible: Counter[str] = field(default_factory=Counter)
+    outcomes: Counter[str] = field(default_factory=Counter)
+    distances: list[float] = field(default_factory=list)
+    visibilities: list[float] = field(default_factory=list)
+    elevations: list[float] = field(default_factory=list)
+    objects: list[int] = field(default_factory=list)
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return self.views.total()
+
+    def add(self, sample: Sample, parts: Collection[str]) -> None:
+        """Counts a sample that has such images, read or not."""
+        view = sample.view
+        self.scenes.add(sample.scene)
+        self.views[view.camera] += 1
+        self.sizes[view.intrinsics.width, view.intrinsics.height] += 1
+        for name in ("color", "depth", "labels", "normals"):
+            self.images[name] += name in parts
+        self.images["depth of a sensor"] += "sensor_depth" in parts
+        self.elevations.append(camera_elevation(view.X_SC))
+        seen = [label for label in sample.instances if label.visible_pixels]
+        self.objects.append(len(seen))
+        self.instances.update(label.object for label in sample.instances)
+        self.visible.update(label.object for label in seen)
+        self.visibilities += [label.visibility for label in sample.instances]
+        self.distances += [float(np.linalg.norm(label.X_CO[:3, 3])) for label in seen]
+        if sample.grasps is not None:
+            self.outcomes.update(str(outcome) for outcome in sample.grasps.outcome)
+
+
+def count_dataset(samples: Samples) -> DatasetCounts:
+    """Counts all samples; images of a data set on disk are not decoded for that."""
+    counted = DatasetCounts()
+    if isinstance(samples, Dataset):
+        for index in range(len(samples)):
+            counted.add(samples.read(index, ("grasps",)), samples.parts(index))
+        return counted
+    for sample in samples:
+        there = {name for name, image in vars(sample.images).items() if image is not None}
+        if sample.sensor_depth is not None:
+            there.add("sensor_depth")
+        counted.add(sample, there)
+    return counted
+
+
+def camera_elevation(X_SC: Array) -> float:
+    """By how much the optical axis of a camera points down [rad]: pi / 2 from straight above."""
+    return float(np.arcsin(np.clip(-X_SC[2, 2], -1.0, 1.0)))
+
+
+CHART_TEXT_COLOR = "#5b656e"  # Colour of the axis and its labels.
+
+
+def histogram(
+    values: Sequence[float], title: str, unit: str, *, limits: tuple[float, float] | None = None
+) -> str:
+    """How values are distributed.
+
+    Args:
+        values: in the unit to show.
+        title: above the bars.
+        unit: below them.
+        limits: of the axis; those of the values if None.
+
+    Returns:
+        An SVG document.
+    """
+    data = np.asarray(values, dtype=float)
+    edges = _bin_edges(data, limits)
+    counts = np.histogram(data, edges)[0]
+    labels = _axis_ticks(float(edges[0]), float(edges[-1]))
+    places = [(x - edges[0]) / (edges[-1] - edges[0]) for x in labels]
+    return _bar_chart(counts, title, unit, list(zip(places, labels, strict=True)))
+
+
+def bars_of_counts(values: Sequence[int], title: str, unit: str) -> str:
+    """How often each whole number occurs: a bar for each from 0 to the largest.
+
+    Returns:
+        An SVG document.
+    """
+    counts = np.bincount(np.asarray(values, dtype=int), minlength=2)
+    step = 1 + (len(counts) - 1) // 12
+    ticks = [((k + 0.5) / len(counts), float(k)) for k in range(0, len(counts), step)]
+    return _bar_chart(counts, title, unit, ticks)
+
+
+def _bin_edges(data: Array, limits: tuple[float, float] | None) -> Array:
+    bin_count = 20  # Bars of the histogram.
+    if limits is not None:
+        lower, upper = limits
+    elif data.size:
+        lower, upper = float(data.min()), float(data.max())
+    else:
+        lower, upper = 0.0, 1.0
+    if upper - lower < 1e-9:
+        lower, upper = lower - 0.5, upper + 0.5
+    return np.linspace(lower, upper, bin_count + 1)
+
+
+def _axis_ticks(lower: float, upper: float, most: int = 6) -> list[float]:
+    """Round numbers between two limits."""
+    axis_steps = (1.0, 2.0, 2.5, 5.0, 10.0)  # Steps of an axis, times powers of ten.
+    power = 10.0 ** np.floor(np.log10((upper - lower) / most))
+    step = next(n * power for n in axis_steps if (upper - lower) / (n * power) <= most)
+    first, last = int(np.ceil(lower / step - 1e-9)), int(np.floor(upper / step + 1e-9))
+    return [float(k * step) for k in range(first, last + 1)]
+
+
+def _bar_chart(counts: Indices, title: str, unit: str, ticks: list[tuple[float, float]]) -> str:
+    """Bars, with ticks at shares of the axis."""
+    width = 360  # Pixels.
+    height = 200  # Pixels.
+    left = 46  # Pixels between the bars and the left edge.
+    right = 14  # Pixels between the bars and the right edge.
+    top = 30  # Pixels above the bars.
+    bottom = 40  # Pixels below the bars.
+    paper_color = "#ffffff"  # Background of the chart.
+    title_color = "#1d2328"  # Colour of the title.
+    bar_color = "#31688e"  # Colour of the bars.
+    inner, tall = width - left - right, height - top - bottom
+    most = max(1, int(counts.max(initial=0)))
+    parts: list[Child] = [element("rect", width=width, height=height, fill=paper_color)]
+    parts.append(_chart_text(left, 18, title, size=13, color=title_color, weight="bold"))
+    for k, count in enumerate(counts.tolist()):
+        high = tall * count / most
+        x = left + inner * k / len(counts)
+        box = {"x": round(x + 0.5, 2), "y": round(top + tall - high, 2)}
+        size = {"width": round(inner / len(counts) - 1.0, 2), "height": round(high, 2)}
+        parts.append(element("rect", **box, **size, fill=bar_color))
+    base = top + tall
+    ends = {"x1": left, "x2": left + inner, "y1": base, "y2": base}
+    parts.append(element("line", **ends, stroke=CHART_TEXT_COLOR))
+    for share, value in ticks:
+        parts.append(_chart_text(left + inner * share, base + 15, f"{value:g}", anchor="middle"))
+    parts.append(_chart_text(left + inner / 2, height - 8, unit, anchor="middle"))
+    parts.append(_chart_text(left - 6, top + 8, f"{most:,}", anchor="end"))
+    parts.append(_chart_text(left - 6, base, "0", anchor="end"))
+    return str(
+        element(
+            "svg",
+            *parts,
+            xmlns="http://www.w3.org/2000/svg",
+            width=width,
+            height=height,
+            viewBox=f"0 0 {width} {height}",
+            font_family="system-ui, sans-serif",
+        )
+    )
+
+
+def _chart_text(
+    x: float,
+    y: float,
+    text: str,
+    *,
+    size: int = 11,
+    color: str = CHART_TEXT_COLOR,
+    anchor: str = "start",
+    weight: str | None = None,
+) -> Child:
+    return element(
+        "text",
+        text,
+        x=round(x, 2),
+        y=round(y, 2),
+        fill=color,
+        font_size=size,
+        font_weight=weight,
+        text_anchor=anchor,
+    )
+
+
+CARD_FILE = "README.md"  # File name of the card in the folder of a data set.
+CARD_MARKER = "<!-- Card of a data set, written by burg_drake. -->"
+"""First line of a card that burg_drake wrote and may replace."""
+
+
+def write_card(
+    samples: Samples,
+    folder: str | Path,
+    *,
+    description: str = "",
+    facts: Mapping[str, str] | None = None,
+    licences: Mapping[str, str] | None = None,
+) -> None:
+    """Writes the card of a data set: `README.md`, and the folder `card` with its pictures.
+
+    An earlier card is replaced.
+
+    Args:
+        samples: the data set.
+        folder: for the card.
+        description: a paragraph of what the data set is for.
+        facts: how it was made, such as its seed, by name.
+        licences: of the meshes, by object; libraries of objects have none.
+
+    Raises:
+        InvalidInputError: there are no samples, there is another README.md, or the place cannot be
+            written to.
+        UnknownNameError: a licence is of no object of the data set.
+    """
+    example_count = 4  # Samples that the card shows.
+    folder = Path(folder)
+    _require_own_card(folder / CARD_FILE)
+    for name in licences or {}:
+        if name not in samples.objects:
+            raise UnknownNameError(
+                f"a licence is given for object {name!r}, which is not in the data set;"
+                f" {suggest_names(name, samples.objects)}"
+            )
+    if not len(samples):
+        raise InvalidInputError(f"cannot write {folder / CARD_FILE}: the data set has no samples")
+    counted = count_dataset(samples)
+    chosen = [samples[k] for k in evenly_spaced_indices(len(samples), example_count)]
+    charts = _chart_files(counted)
+    pictures: dict[str, str | bytes] = {**charts, "examples.png": sheet_png(chosen, 1)}
+    made = {**(facts or {}), **software_versions(with_platform=False)}
+    text = "\n\n".join(
+        [
+            CARD_MARKER,
+            f"# {samples.name}",
+            *([description] if description else []),
+            _summary_table(counted),
+            "![images of some samples](card/examples.png)",
+            "## Objects",
+            _object_table(samples, counted, licences or {}),
+            "## Distributions",
+            "\n".join(f"![{Path(name).stem}](card/{name})" for name in charts),
+            *(["## Grasps", _count_table("outcome", counted.outcomes)] if counted.outcomes else []),
+            "## How it was made",
+            _markdown_table(("", ""), list(made.items())),
+        ]
+    )
+    contents = {folder / "card" / name: picture for name, picture in pictures.items()}
+    atomic_write_all({**contents, folder / CARD_FILE: text + "\n"})
+
+
+def _require_own_card(path: Path) -> None:
+    """Refuses to replace a file of somebody else."""
+    if not path.exists():
+        return
+    try:
+        own = path.read_text(encoding="utf-8").startswith(CARD_MARKER)
+    except (OSError, UnicodeDecodeError):
+        own = False
+    if not own:
+        raise InvalidInputError(
+            f"{path} exists already and is not the card of a data set; move it away"
+        )
+
+
+def _chart_files(counted: DatasetCounts) -> dict[str, str]:
+    """Pictures by the names of their files."""
+    degrees = np.rad2deg(counted.elevations).tolist()
+    percent = [100.0 * share for share in counted.visibilities]
+    return {
+        "distance.svg": histogram(
+            counted.distances, "Distance of visible objects", "from the camera [m]"
+        ),
+        "elevation.svg": histogram(
+            degrees, "Elevation of views", "by which the camera looks down [°]"
+        ),
+        "visibility.svg": histogram(
+            percent, "Visibility of objects", "share of the silhouette [%]", limits=(0.0, 100.0)
+        ),
+        "objects.svg": bars_of_counts(counted.objects, "Objects in images", "visible objects"),
+    }
+
+
+def _summary_table(counted: DatasetCounts) -> str:
+    sizes = [f"{wide} x {tall} ({n:,})" for (wide, tall), n in sorted(counted.sizes.items())]
+    views = [f"{name} ({n:,})" for name, n in sorted(counted.views.items())]
+    images = [f"{name} ({n:,})" for name, n in counted.images.items() if n]
+    instances, visible = counted.instances.total(), counted.visible.total()
+    rows = [
+        ("scenes", f"{len(counted.scenes):,}"),
+        ("samples", f"{counted.samples:,}"),
+        ("views (samples)", ", ".join(views)),
+        ("images (samples)", ", ".join(images)),
+        ("size [pixel] (samples)", ", ".join(sizes)),
+        ("instances in samples", f"{instances:,}, {visible:,} of them visible"),
+        ("grasps in samples", f"{counted.outcomes.total():,}"),
+    ]
+    return _markdown_table(("", ""), rows)
+
+
+def _object_table(samples: Samples, counted: DatasetCounts, licences: Mapping[str, str]) -> str:
+    """Objects with their counts, and where their meshes are from."""
+    rows = []
+    for number, name in enumerate(samples.objects, start=1):
+        source = samples.library.entry(name).source
+        counts = f"{counted.instances[name]:,}", f"{counted.visible[name]:,}"
+        origin = source.file or "made by code", source.sha256[:12]
+        rows.append((str(number), name, *counts, *origin, licences.get(name, "not stated")))
+    header = ("id", "object", "instances", "visible", "mesh", "sha256", "licence of the mesh")
+    return f"Object library `{samples.library.name}`.\n\n{_markdown_table(header, rows)}"
+
+
+def _count_table(name: str, counts: Counter[str]) -> str:
+    rows = [(key or "clear, or not judged", f"{n:,}") for key, n in counts.most_common()]
+    return _markdown_table((name, "number"), rows)
+
+
+def _markdown_table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
+    lines = [header, ("---",) * len(header), *rows]
+    return "\n".join(f"| {' | '.join(map(_escape_cell, line))} |" for line in lines)
+
+
+def _escape_cell(text: str) -> str:
+    return text.replace("|", "\\|").replace("\n", " ")

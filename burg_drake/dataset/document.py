@@ -1,0 +1,247 @@
+"""The document of a data set (`dataset.yaml`) and the index of its shards (`index.json`)."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from burg_drake.core import (
+    DocumentError,
+    InvalidInputError,
+    Limits,
+    Reader,
+    atomic_write,
+    load_json,
+    load_yaml_node,
+    plain_data,
+    quote_value,
+    require_name,
+    save_document,
+)
+from burg_drake.dataset.sample_files import PlainFields
+from burg_drake.dataset.shards import SHARD_FOLDER, ShardEntry, shard_entry
+
+DATASET_FILE = "dataset.yaml"  # File name of the document.
+RECIPE_KEY = "recipe"  # Key of the recipe in the document.
+
+
+@dataclass(frozen=True, kw_only=True)
+class DatasetDocument:
+    """What a data set holds and how it was made (`dataset.yaml`).
+
+    Attributes:
+        name: name of the data set.
+        objects: names of the objects in the order of their ids, which count from 1.
+        library: object library: its folder, relative to the data set, or the name of a built-in
+            one.
+        station: station: its file, relative to the data set, or the name of a built-in one; empty
+            without one.
+        library_content: hash of the library.
+        station_content: hash of the station.
+        distractors_content: hash of the library of distractors; empty without one.
+        versions: versions of the software.
+        recipe: how the samples were generated, as in a data set recipe; left out if they were not.
+    """
+
+    version: int = 1
+    name: str
+    objects: tuple[str, ...]
+    library: str
+    station: str = ""
+    library_content: str = ""
+    station_content: str = ""
+    distractors_content: str = ""
+    versions: dict[str, str] = field(default_factory=dict)
+    recipe: Mapping[str, Any] | None = None
+
+    def __post_init__(self) -> None:
+        require_name(self.name, "name")
+
+    def differences(self, other: DatasetDocument) -> list[str]:
+        """What two differ in, in words; `other` is here, this is there. Of a library or a station
+        its content counts, not where it is, and of the versions those in `DECIDING_VERSIONS`; the
+        name does not count."""
+        max_shown = 6  # Differences in a message.
+        mine, theirs = _deciding_values(self), _deciding_values(other)
+        found = [
+            f"{name} is {_format_value(mine.get(name))} there, {_format_value(theirs.get(name))} here"
+            for name in dict.fromkeys([*mine, *theirs])
+            if mine.get(name) != theirs.get(name)
+        ]
+        if len(found) > max_shown:
+            found[max_shown:] = [f"{len(found) - max_shown} others"]
+        return found
+
+
+def load_dataset_document(path: str | Path) -> DatasetDocument:
+    """Reads `dataset.yaml`.
+
+    Raises:
+        DocumentError: it is missing, of another version, or a key or value does not fit; the
+            message names file, line and key.
+    """
+    root = load_yaml_node(path)
+    reader = Reader(str(path))
+    if not isinstance(root, yaml.MappingNode):
+        raise reader.fail(root, "", "expected the keys of a data set ('key: value' lines)")
+    reader.check_version(root, DatasetDocument)
+    recipe = [node for key, node in root.value if key.value == RECIPE_KEY]
+    root.value = [(key, node) for key, node in root.value if key.value != RECIPE_KEY]
+    if len(recipe) > 1:
+        raise reader.fail(recipe[1], "", f"key {quote_value(RECIPE_KEY)} is given twice")
+    document: DatasetDocument = reader.read(root, DatasetDocument, "")
+    if not recipe:
+        return document
+    plain = _plain_node(recipe[0], reader, RECIPE_KEY)
+    if not isinstance(plain, dict | None):
+        raise reader.fail(recipe[0], RECIPE_KEY, "expected keys with values ('key: value' lines)")
+    return dataclasses.replace(document, recipe=plain)
+
+
+def save_dataset_document(document: DatasetDocument, path: str | Path) -> None:
+    """Writes `dataset.yaml`, whole or not at all."""
+    # Comment at the top of the file.
+    header = "What the samples of this data set are of, and what they were made with."
+    recipe = None if document.recipe is None else plain_data(dict(document.recipe))
+    save_document(dataclasses.replace(document, recipe=recipe), path, header)
+
+
+def _deciding_values(document: DatasetDocument) -> dict[str, Any]:
+    """Values that decide about samples, by their name for messages."""
+    # Software whose versions decide about samples.
+    deciding_packages = ("burg_drake", "drake", "numpy", "scipy", "embreex", "opencv", "blender")
+    values: dict[str, Any] = {
+        "objects": list(document.objects),
+        "the content of the library": document.library_content,
+        "the content of the station": document.station_content,
+        "the content of the library of distractors": document.distractors_content,
+    }
+    values |= {name: document.versions.get(name, "unknown") for name in deciding_packages}
+    return values | _flatten(plain_data(document.recipe), RECIPE_KEY)
+
+
+def _flatten(value: Any, name: str) -> dict[str, Any]:
+    """The values of nested mappings by their names with dots."""
+    if not isinstance(value, Mapping):
+        return {name: value}
+    return {
+        long: item
+        for key, inner in value.items()
+        for long, item in _flatten(inner, f"{name}.{key}").items()
+    }
+
+
+def _format_value(value: Any) -> str:
+    return "none" if value is None or value == "" else quote_value(value).strip("'")
+
+
+def _plain_node(node: yaml.Node, reader: Reader, where: str) -> Any:
+    """A node of any structure as dicts, lists and scalars."""
+    if isinstance(node, yaml.MappingNode):
+        return {
+            name: _plain_node(value, reader, f"{where}.{name}")
+            for name, (_, value) in reader.entries(node, where).items()
+        }
+    if isinstance(node, yaml.SequenceNode):
+        return [_plain_node(item, reader, f"{where}[{i}]") for i, item in enumerate(node.value)]
+    kind = node.tag.rpartition(":")[2]
+    if kind == "null":
+        return None
+    kinds: dict[str, type] = {"bool": bool, "int": int, "float": float}
+    return reader.read(node, kinds.get(kind, str), where)
+
+
+SHARD_INDEX_FILE = "index.json"  # File name of the index.
+WIDS_VERSION = 1  # Version of the index format of WebDataset.
+SHARD_NAME = re.compile(r"(\d{6,12})\.tar", re.ASCII)
+"""Pattern of the file names of shards."""
+
+
+def shard_numbers(folder: Path) -> list[int]:
+    """Scenes whose shards lie in a data set, in their order."""
+    shards = folder / SHARD_FOLDER
+    names = [path.name for path in shards.iterdir()] if shards.is_dir() else []
+    matches = filter(None, map(SHARD_NAME.fullmatch, names))
+    return sorted(int(match[1]) for match in matches)
+
+
+def write_index(folder: str | Path, known: Mapping[str, ShardEntry] | None = None) -> None:
+    """Writes the index of the shards that are there.
+
+    Args:
+        folder: of the data set.
+        known: lines of shards by url that need not be made anew, as `write_shard` has just
+            returned them; all others are read whole for their check sums.
+
+    Raises:
+        InvalidInputError: it is no data set, a shard is damaged, or the index cannot be written.
+    """
+    folder, known = Path(folder), known or {}
+    document = load_dataset_document(folder / DATASET_FILE)
+    urls = {f"{SHARD_FOLDER}/{number:06d}.tar" for number in shard_numbers(folder)}
+    entries = [
+        known[url] if url in known else shard_entry(folder / url)
+        for url in sorted(urls, key=_scene_number)
+    ]
+    values = {
+        "wids_version": WIDS_VERSION,
+        "name": document.name,
+        "shardlist": [asdict(entry) for entry in entries],
+    }
+    atomic_write(folder / SHARD_INDEX_FILE, json.dumps(values, indent=1) + "\n")
+
+
+def read_index(folder: Path) -> list[ShardEntry]:
+    """The lines of an index.
+
+    Raises:
+        DocumentError: it is damaged, or of another version.
+        InvalidInputError: it is missing.
+    """
+    # Bytes and values; a shard takes 150 bytes and 6 values.
+    limits = Limits(size=256 << 20, values=10_000_000)
+    entry_keys = ("url", "nsamples", "filesize", "md5sum")  # Keys of the entry of a shard.
+    path = folder / SHARD_INDEX_FILE
+    if not path.exists():
+        raise InvalidInputError(
+            f"{folder} has no {SHARD_INDEX_FILE}, so the data set is not finished; run the command that makes"
+            " it again, or call burg_drake.dataset.write_index on the folder to use the"
+            " samples that are there"
+        )
+    fields = PlainFields(load_json(path, limits), ("wids_version", "name", "shardlist"), str(path))
+    fields.whole("wids_version", WIDS_VERSION, WIDS_VERSION)
+    entries = [
+        ShardEntry(
+            line.text("url"),
+            line.whole("nsamples"),
+            line.whole("filesize"),
+            line.text("md5sum"),
+        )
+        for line in fields.each("shardlist", entry_keys)
+    ]
+    urls = [entry.url for entry in entries]
+    for url in urls:
+        place, _, name = url.rpartition("/")
+        if place != SHARD_FOLDER or not SHARD_NAME.fullmatch(name):
+            raise DocumentError(
+                f"{path}: shardlist: url is {url!r}; expected a value such as {SHARD_FOLDER}/000012.tar"
+            )
+    if urls != sorted(set(urls), key=_scene_number):
+        raise DocumentError(f"{path}: shardlist: shards are repeated or not in ascending order")
+    return entries
+
+
+def scene_of(entry: ShardEntry) -> int:
+    """Number of the scene that a line of the index is of."""
+    return _scene_number(entry.url)
+
+
+def _scene_number(url: str) -> int:
+    return int(Path(url).stem)

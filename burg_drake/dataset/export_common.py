@@ -1,0 +1,210 @@
+"""Parts that all exports share: the samples, checks of them, the new folder and image files."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from itertools import groupby
+from pathlib import Path
+from typing import Protocol
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import (
+    Bytes,
+    InvalidInputError,
+    Single,
+    UnknownNameError,
+    ensure_writable_folder,
+    suggest_names,
+)
+from burg_drake.dataset.sample import InstanceLabel, Sample
+from burg_drake.dataset.sample_encoding import encode_png
+from burg_drake.objects import ObjectLibrary
+
+
+class Samples(Protocol):
+    """A data set as a sequence of samples, all views of a scene one after the other."""
+
+    @property
+    def name(self) -> str:
+        """Of the data set."""
+
+    @property
+    def objects(self) -> tuple[str, ...]:
+        """Names of the library's objects, in the order of their numbers in other formats."""
+
+    @property
+    def library(self) -> ObjectLibrary:
+        """Where these objects are."""
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, index: int, /) -> Sample: ...
+
+    def __iter__(self) -> Iterator[Sample]: ...
+
+
+def group_by_scene(samples: Iterable[Sample]) -> Iterator[tuple[int, Iterator[Sample]]]:
+    """Scenes with their samples, one sample in memory at a time.
+
+    Raises:
+        InvalidInputError: the samples of a scene do not follow each other.
+    """
+    seen: set[int] = set()
+    for number, views in groupby(samples, key=lambda sample: sample.scene):
+        if number in seen:
+            raise InvalidInputError(
+                f"the samples of scene {number} are not next to each other; sort samples by scene"
+            )
+        seen.add(number)
+        yield number, views
+
+
+def require_images(sample: Sample, format: str, *names: str) -> None:
+    """Refuses a sample without images that a format is made of.
+
+    Args:
+        sample: of the data set.
+        format: its name, for the message.
+        names: of attributes of `Images`.
+
+    Raises:
+        InvalidInputError: one of them is missing.
+    """
+    for name in names:
+        if getattr(sample.images, name) is None:
+            raise InvalidInputError(
+                f"sample {sample.key} has no {name} image, which {format} needs; generate a data"
+                f" set with {name}"
+            )
+
+
+def require_pinhole(sample: Sample, format: str) -> None:
+    """Refuses a camera whose lens bends straight lines, for a format that has nothing but K.
+
+    Raises:
+        InvalidInputError: there is distortion.
+    """
+    if not sample.view.intrinsics.is_pinhole:
+        raise InvalidInputError(
+            f"camera {sample.view.camera} of sample {sample.key} has lens distortion, which"
+            f" {format} cannot store; generate the data set with a camera without distortion"
+        )
+
+
+def exported_depth(sample: Sample, format: str, *, sensor: bool) -> Single:
+    """(H, W) depth to write [m].
+
+    Args:
+        sample: of the data set.
+        format: its name, for the message.
+        sensor: that of the simulated sensor, and not the exact one.
+
+    Raises:
+        InvalidInputError: there is none.
+    """
+    if not sensor:
+        require_images(sample, format, "depth")
+    depth = sample.sensor_depth if sensor else sample.images.depth
+    if depth is None:
+        raise InvalidInputError(
+            f"sample {sample.key} has no depth of a simulated sensor; write the exact depth, or"
+            " generate the data set with a sensor"
+        )
+    return depth
+
+
+def describe_lost_depth(sample: Sample, format: str, *, sensor: bool) -> set[str]:
+    """What is lost of the depth by a format that has one depth image of a view, in a sentence.
+
+    Args:
+        sample, format, sensor: as for `exported_depth`.
+    """
+    if sensor and sample.images.depth is not None:
+        return {f"{format} stores one depth image per view: the exact depth is left out."}
+    if not sensor and sample.sensor_depth is not None:
+        return {f"{format} stores one depth image per view: the depth of the sensor is left out."}
+    return set()
+
+
+def object_index(objects: Sequence[str], sample: Sample, label: InstanceLabel) -> int:
+    """The position of an instance's object in the data set's list.
+
+    Raises:
+        UnknownNameError: it is not there.
+    """
+    if label.object not in objects:
+        raise UnknownNameError(
+            f"object {label.object!r} of sample {sample.key} is not an object of the data set;"
+            f" {suggest_names(label.object, objects)}"
+        )
+    return objects.index(label.object)
+
+
+@contextmanager
+def new_folder(folder: str | Path) -> Iterator[Path]:
+    """A folder to write into, which takes its place when the block ends without an error.
+
+    Args:
+        folder: new or empty.
+
+    Yields:
+        The folder beside it.
+
+    Raises:
+        InvalidInputError: it is a file, or there is something in it, or its place cannot be written
+            to, or the disk is full; then nothing is left of what was written.
+    """
+    path = Path(os.path.realpath(folder))
+    if os.path.lexists(path):
+        if not path.is_dir():
+            raise InvalidInputError(f"{folder} is a file; give a folder for the export")
+        if any(path.iterdir()):
+            raise InvalidInputError(f"{folder} is not empty; choose another folder for the export")
+    ensure_writable_folder(path.parent)
+    fresh = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
+    try:
+        fresh.mkdir()
+        yield fresh
+        os.replace(fresh, path)
+    except OSError as error:
+        raise InvalidInputError(
+            f"cannot write {path}: {error.strerror or error}; choose a writable place with room"
+        ) from error
+    finally:
+        shutil.rmtree(fresh, ignore_errors=True)
+
+
+def encode_color_image(image: Bytes, suffix: str) -> bytes:
+    """Colours (H, W, 3) as `.jpg` or `.png`."""
+    if suffix == ".png":
+        return encode_png(image)
+    _, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 95])
+    return bytes(data)
+
+
+def depth_in_units(depth: Single, unit: float, key: str) -> NDArray[np.uint16]:
+    """Depth as whole numbers.
+
+    Args:
+        depth: (H, W) [m], 0 where there is none.
+        unit: what 1 stands for [m].
+        key: of the sample, for the message.
+
+    Raises:
+        InvalidInputError: a depth is beyond the largest number.
+    """
+    max_number = np.iinfo(np.uint16).max  # Largest number of a pixel in a depth image.
+    numbers = np.rint(depth / unit)
+    if numbers.max(initial=0.0) > max_number:
+        raise InvalidInputError(
+            f"sample {key} has depths up to {depth.max():.3g} m, but 16-bit images with a unit of"
+            f" {1e3 * unit:g} mm end at {max_number * unit:.3g} m; give a larger unit"
+        ).about("depth_unit")
+    return np.asarray(numbers, dtype=np.uint16)

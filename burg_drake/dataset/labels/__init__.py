@@ -1,5 +1,0 @@
-"""What is known of objects and grasps in a view, and clouds and grids made of depth."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

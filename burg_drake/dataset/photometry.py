@@ -1,0 +1,95 @@
+"""Camera response: exposure, white balance, blur and noise, applied to a rendered image."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import Bytes, InvalidInputError, Single
+from burg_drake.dataset.appearance import Appearance
+
+LINEAR_LEVELS = 1 << 14
+"""Levels of linear light in the encoding table; the first sRGB steps span 5 of them."""
+
+
+def linear_from_srgb(values: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Linear light of sRGB values, both from 0 to 1."""
+    low = values <= 0.04045
+    return np.where(low, values / 12.92, ((np.maximum(values, 0.0) + 0.055) / 1.055) ** 2.4)
+
+
+def srgb_from_linear(values: NDArray[np.floating]) -> NDArray[np.floating]:
+    """sRGB values of linear light, both from 0 to 1."""
+    low = values <= 0.0031308
+    return np.where(low, values * 12.92, 1.055 * np.maximum(values, 0.0) ** (1 / 2.4) - 0.055)
+
+
+def apply_photometry(
+    color: Bytes,
+    labels: NDArray[np.integer] | None,
+    appearance: Appearance,
+    rng: np.random.Generator,
+) -> Bytes:
+    """What a camera makes of a rendered image.
+
+    The light is multiplied by the gains of objects, exposure and white balance, spread by the blur
+    and counted in electrons: their number varies with its square root, and by the sensor's own
+    noise.
+
+    Args:
+        color: (H, W, 3) rendered.
+        labels: (H, W) numbers of instances, from 1; only needed where objects have gains.
+        appearance: what is to be done.
+        rng: draws the noise.
+
+    Returns:
+        (H, W, 3) sRGB.
+
+    Raises:
+        InvalidInputError: the labels are missing, of another size, or of more instances than there
+            are gains for.
+    """
+    read_noise = 3.0  # Electrons; standard deviation of an unlit pixel of a usual CMOS sensor.
+    light = _LINEAR_OF_SRGB[color]
+    if appearance.object_gains:
+        light *= _pixel_gains(labels, color.shape[:2], appearance)
+    made = appearance.photometry
+    light *= np.float32(2.0**made.exposure) * np.array(made.white_balance, np.float32)
+    if made.blur > 0.0:
+        light = cv2.GaussianBlur(light, (0, 0), made.blur, borderType=cv2.BORDER_REPLICATE)
+    if made.electrons is not None:
+        spread = np.sqrt(light / made.electrons + (read_noise / made.electrons) ** 2)
+        light += spread * rng.standard_normal(light.shape, dtype=np.float32)
+    steps = np.clip(light * np.float32(LINEAR_LEVELS - 1) + np.float32(0.5), 0, LINEAR_LEVELS - 1)
+    encoded: Bytes = _srgb_encoding_table(made.gamma)[steps.astype(np.uint16)]
+    return encoded
+
+
+def _pixel_gains(
+    labels: NDArray[np.integer] | None, shape: tuple[int, ...], appearance: Appearance
+) -> Single:
+    """(H, W, 3) gain of each pixel."""
+    if labels is None or labels.shape != shape:
+        given = "none" if labels is None else f"{labels.shape[1]} x {labels.shape[0]}"
+        raise InvalidInputError(
+            f"gains of objects need the label image, with {shape[1]} x {shape[0]} pixels; given:"
+            f" {given}"
+        )
+    gains = np.array([(1.0, 1.0, 1.0), *appearance.object_gains], np.float32)
+    if (most := int(labels.max(initial=0))) >= len(gains):
+        raise InvalidInputError(
+            f"label {most} has no gain; the appearance is for a scene of {len(gains) - 1} objects"
+        )
+    of_pixels: Single = gains[labels]
+    return of_pixels
+
+
+def _srgb_encoding_table(gamma: float) -> Bytes:
+    """(LEVELS,) sRGB of linear light."""
+    light = np.linspace(0.0, 1.0, LINEAR_LEVELS) ** (1.0 / gamma)
+    return np.asarray(srgb_from_linear(light) * 255.0 + 0.5, dtype=np.uint8)
+
+
+_LINEAR_OF_SRGB: Single = linear_from_srgb(np.arange(256) / 255.0).astype(np.float32)
+"""Linear light of each of the 256 values of a channel."""

@@ -1,0 +1,444 @@
+"""Exact depth, labels, normals and silhouettes by rays through the centres of pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.cameras import NEAR_DISTANCE, FieldOfView, Intrinsics
+from burg_drake.core import Array, Indices, Single, inverse, transform_points
+from burg_drake.dataset.sample import SURROUNDINGS_LABEL, Images
+from burg_drake.dataset.views import View
+from burg_drake.geometry import RayCaster
+
+PixelBox = tuple[int, int, int, int]
+"""A rectangle: left, top, right, bottom, the last two not within; it may leave the image."""
+
+
+def normalized_coordinates(intrinsics: Intrinsics) -> tuple[Single, Single]:
+    """x / z and y / z of the rays through the pixels' centres: (1, W) and (H, 1) of a camera
+    without distortion, else (H, W) each."""
+    return _RayGrid.of(intrinsics).flat
+
+
+def unit_directions(intrinsics: Intrinsics, pixels: PixelBox) -> Single:
+    """(N, 3) unit vectors through the pixels of a rectangle, row by row; it may leave the image of
+    a camera without distortion."""
+    left, top, right, bottom = pixels
+    if not intrinsics.is_pinhole:
+        unit = _RayGrid.of(intrinsics).unit[top:bottom, left:right]
+        return np.ascontiguousarray(unit).reshape(-1, 3)
+    (fx, fy), (cx, cy) = intrinsics.focal, intrinsics.center
+    x = (np.arange(left, right, dtype=float) - cx) / fx
+    y = (np.arange(top, bottom, dtype=float) - cy) / fy
+    return _unit_vectors(x, y[:, None]).reshape(-1, 3)
+
+
+def pixels_around(
+    p_CQ: Array, faces: Indices, intrinsics: Intrinsics, *, beyond: bool = False
+) -> PixelBox | None:
+    """A rectangle of pixels that holds all that can show a surface before the camera.
+
+    Args:
+        p_CQ: (V, 3) its vertices in the camera's frame [m].
+        faces: (F, 3) its triangles.
+        intrinsics: of the camera.
+        beyond: whether it may leave the image by the image's size at each edge. A model of lens
+            distortion does not reach further than the image.
+
+    Returns:
+        None if there are none.
+    """
+    before = p_CQ[:, 2] >= NEAR_DISTANCE
+    if not before.all():
+        p_CQ = _clip_at_near_plane(p_CQ, faces, before)
+    if not len(p_CQ):
+        return None
+    flat = p_CQ[:, :2] / p_CQ[:, 2:]
+    lower, upper = flat.min(axis=0), flat.max(axis=0)
+    if not intrinsics.is_pinhole:
+        return _RayGrid.of(intrinsics).within(lower, upper)
+    size = np.array([intrinsics.width, intrinsics.height])
+    reach = size if beyond else 0
+    low = np.maximum(-reach, np.floor(lower * intrinsics.focal + intrinsics.center))
+    high = np.minimum(size + reach, np.ceil(upper * intrinsics.focal + intrinsics.center) + 1.0)
+    if (low >= high).any():
+        return None
+    return int(low[0]), int(low[1]), int(high[0]), int(high[1])
+
+
+def _clip_at_near_plane(p_CQ: Array, faces: Indices, before: np.ndarray) -> Array:
+    """The points that lie before the camera, and where edges come before it."""
+    edges = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    a, b = p_CQ[edges[before[edges[:, 0]] != before[edges[:, 1]]].T]
+    share = (NEAR_DISTANCE - a[:, 2:]) / (b[:, 2:] - a[:, 2:])
+    points: Array = np.concatenate([p_CQ[before], a + share * (b - a)])
+    return points
+
+
+def _unit_vectors(x: Array, y: Array) -> Single:
+    """(H, W, 3) unit vectors along (x, y, 1)."""
+    length = np.sqrt(x * x + y * y + 1.0)
+    unit = np.empty((*length.shape, 3), np.float32)
+    np.divide(x, length, out=unit[..., 0], casting="same_kind")
+    np.divide(y, length, out=unit[..., 1], casting="same_kind")
+    np.divide(1.0, length, out=unit[..., 2], casting="same_kind")
+    return unit
+
+
+class _RayGrid:
+    """The rays of a camera's pixels; those of lenses with distortion cost much to find."""
+
+    def __init__(self, intrinsics: Intrinsics) -> None:
+        flat = FieldOfView(intrinsics).directions[..., :2]
+        x, y = flat[..., 0], flat[..., 1]
+        if intrinsics.is_pinhole:
+            x, y = x[:1], y[:, :1]
+        self.flat = x.astype(np.float32), y.astype(np.float32)
+        self.unit = _unit_vectors(x, y)
+
+    @staticmethod
+    def of(intrinsics: Intrinsics) -> _RayGrid:
+        one = intrinsics
+        return _ray_grid(one.width, one.height, one.focal, one.center, one.distortion)
+
+    def within(self, lower: Array, upper: Array) -> PixelBox | None:
+        """The pixels that look between bounds of x / z and y / z."""
+        x, y = self.flat
+        inside = (x >= lower[0]) & (x <= upper[0]) & (y >= lower[1]) & (y <= upper[1])
+        rows, columns = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
+        if not len(rows):
+            return None
+        return int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1
+
+
+@lru_cache(maxsize=8)
+def _ray_grid(
+    width: int,
+    height: int,
+    focal: tuple[float, float],
+    center: tuple[float, float],
+    distortion: tuple[float, ...],
+) -> _RayGrid:
+    return _RayGrid(
+        Intrinsics(width=width, height=height, focal=focal, center=center, distortion=distortion)
+    )
+
+
+BOX_NORMALS = np.concatenate([-np.eye(3), np.eye(3)])
+"""(6, 3) outward normals of a box: lower x, y, z, then upper x, y, z."""
+SURFACE_TOLERANCE = 1e-9
+"""Metres; smaller lengths of a surface count as 0."""
+
+
+@dataclass(frozen=True, eq=False)
+class RayBox:
+    """A box, or a rectangle, along the axes of its frame.
+
+    Attributes:
+        lower, upper: (3,) its corners [m].
+    """
+
+    lower: Array
+    upper: Array
+
+    @classmethod
+    def of_surface(cls, vertices: Array, faces: Indices) -> RayBox | None:
+        """The box whose surface triangles are, however they divide it; None if it is another one.
+
+        Args:
+            vertices: (V, 3) [m].
+            faces: (F, 3).
+        """
+        area_tolerance = 1e-6  # Relative difference between the surface's area and that of a box.
+        lower, upper = vertices.min(axis=0), vertices.max(axis=0)
+        size = upper - lower
+        sides = np.minimum(np.abs(vertices - lower), np.abs(vertices - upper)) <= SURFACE_TOLERANCE
+        area = np.prod(np.sort(size)[1:])
+        if size.min() > SURFACE_TOLERANCE:
+            area = 2.0 * (size[0] * size[1] + size[1] * size[2] + size[2] * size[0])
+        a, b, c = vertices[faces].transpose(1, 0, 2)
+        found = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
+        if not sides.any(axis=1).all() or abs(found - area) > area_tolerance * area:
+            return None
+        return cls(lower, upper)
+
+    def nearness(self, intrinsics: Intrinsics, X_CB: Array) -> Single | None:
+        """(H, W) 1 / z [1/m] of where a camera's rays meet it, 0 where they do not; None if the
+        camera is within it or in one of its planes.
+
+        Of a plane n . p = d, d from the camera, a ray along (x, y, 1) meets 1 / z =
+        n . (x, y, 1) / d, which is linear in x and y. The ray enters where 1 / z is least among
+        the planes that the camera sees from outside, if that is before it leaves by another one.
+        """
+        enter: Single | None = None
+        leave: Single | None = None
+        distances = self._distances(X_CB)
+        if (distances >= 0.0).all() or (np.abs(distances) < SURFACE_TOLERANCE).any():
+            return None
+        for number, image in self._planes(intrinsics, X_CB):
+            if distances[number] > 0.0:
+                leave = image if leave is None else np.maximum(leave, image, out=leave)
+            else:
+                enter = image if enter is None else np.minimum(enter, image, out=enter)
+        assert enter is not None and leave is not None
+        enter[enter < np.maximum(leave, 0.0, out=leave)] = 0.0
+        return enter
+
+    def planes(self, intrinsics: Intrinsics, X_CB: Array) -> NDArray[np.int16]:
+        """(H, W) number in `BOX_NORMALS` of the plane by which rays enter; where none does, any."""
+        enter: Single | None = None
+        found = np.zeros((intrinsics.height, intrinsics.width), np.int16)
+        distances = self._distances(X_CB)
+        for number, image in self._planes(intrinsics, X_CB):
+            if distances[number] < 0.0:
+                if enter is None:
+                    enter = image
+                    found[:] = number
+                else:
+                    np.copyto(found, number, where=image < enter)
+                    np.minimum(enter, image, out=enter)
+        return found
+
+    def _distances(self, X_CB: Array) -> Array:
+        """(6,) of the camera to each plane, below 0 outside [m]."""
+        offsets: Array = np.concatenate([-self.lower, self.upper])
+        return offsets - BOX_NORMALS @ inverse(X_CB)[:3, 3]
+
+    def _planes(self, intrinsics: Intrinsics, X_CB: Array) -> Iterator[tuple[int, Single]]:
+        """The number of each plane, and (H, W) 1 / z of where rays meet it, below 0 behind the
+        camera."""
+        x, y = normalized_coordinates(intrinsics)
+        planes = BOX_NORMALS @ X_CB[:3, :3].T / self._distances(X_CB)[:, None]
+        for number, (a, b, c) in enumerate(planes.astype(np.float32)):
+            yield number, (a * x + c) + b * y
+
+
+NO_FACE = -1
+"""Face number of a ray that hits nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceHits:
+    """What the rays of a rectangle of pixels meet of one surface.
+
+    Attributes:
+        pixels: the rectangle.
+        unit: (N, 3) directions of the rays in the camera's frame, row by row.
+        face: (h, w) face that each meets, `NO_FACE` for none.
+        depth: (h, w) along the optical axis [m], infinite for none.
+    """
+
+    pixels: PixelBox
+    unit: Single
+    face: NDArray[np.int32]
+    depth: Single
+
+
+class RaySurface:
+    """Triangles of one label.
+
+    Attributes:
+        label: of the pixels that show it.
+        box: which box they make, if one.
+    """
+
+    def __init__(self, label: int, vertices: Array, faces: Indices) -> None:
+        """Takes the surface.
+
+        Args:
+            label: of the pixels that show it.
+            vertices: (V, 3) in the body's frame [m].
+            faces: (F, 3) with F >= 1.
+        """
+        self.label = label
+        self._vertices, self._faces = vertices, faces
+        self.box = RayBox.of_surface(vertices, faces)
+
+    def met(
+        self, intrinsics: Intrinsics, X_CB: Array, *, beyond: bool = False
+    ) -> SurfaceHits | None:
+        """What a camera's rays meet; None if there are no pixels that could show it.
+
+        Args:
+            intrinsics: of the camera.
+            X_CB: (4, 4) the body in the camera's frame.
+            beyond: whether rays beyond the image's edges count, see `pixels_around`.
+        """
+        p_CQ = transform_points(X_CB, self._vertices)
+        pixels = pixels_around(p_CQ, self._faces, intrinsics, beyond=beyond)
+        if pixels is None:
+            return None
+        unit = unit_directions(intrinsics, pixels)
+        R_BC = X_CB[:3, :3].T
+        face, distance = self._rays.seen_from(-R_BC @ X_CB[:3, 3], _rotate_vectors(unit, R_BC))
+        distance *= unit[:, 2]
+        distance[face == NO_FACE] = np.inf
+        shape = pixels[3] - pixels[1], pixels[2] - pixels[0]
+        return SurfaceHits(pixels, unit, face.reshape(shape), distance.reshape(shape))
+
+    def normals(self, met: SurfaceHits, X_CB: Array) -> Single:
+        """(h, w, 3) unit normals of the faces that are met, in the camera's frame, towards it;
+        those of pixels that meet nothing mean nothing."""
+        normals = self._normals @ X_CB[:3, :3].astype(np.float32).T
+        seen: Single = normals[met.face.ravel()]
+        seen[np.einsum("ij,ij->i", seen, met.unit) > 0.0] *= -1.0
+        return seen.reshape(*met.face.shape, 3)
+
+    @cached_property
+    def _rays(self) -> RayCaster:
+        return RayCaster(self._vertices, self._faces)
+
+    @cached_property
+    def _normals(self) -> Single:
+        """(F, 3) unit normals, zeros for a face without area."""
+        a, b, c = self._vertices[self._faces].transpose(1, 0, 2)
+        normals = np.cross(b - a, c - a)
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        unit = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0.0)
+        single: Single = unit.astype(np.float32)
+        return single
+
+
+def surfaces_of_body(label: int, parts: Sequence[tuple[Array, Indices]]) -> list[RaySurface]:
+    """The surfaces that stand for a body's shapes, as few as possible: one for an object, and for
+    what makes a box together, such as the two colours of a board.
+
+    Args:
+        label: of the body.
+        parts: vertices (V, 3) in the body's frame [m] and faces (F, 3) of each shape.
+    """
+    parts = [one for one in parts if len(one[1])]
+    if not parts:
+        return []
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in parts[:-1])])
+    whole = RaySurface(
+        label,
+        np.concatenate([vertices for vertices, _ in parts]),
+        np.concatenate([faces + start for (_, faces), start in zip(parts, starts, strict=True)]),
+    )
+    if label != SURROUNDINGS_LABEL or whole.box is not None:
+        return [whole]
+    return [RaySurface(label, vertices, faces) for vertices, faces in parts]
+
+
+def _rotate_vectors(unit: Single, R_BC: Array) -> Single:
+    """(N, 3) vectors turned; a matrix product of such a shape starts threads, and takes longer."""
+    import cv2
+
+    turned = cv2.transform(unit[:, None], R_BC.astype(np.float32))
+    return np.asarray(turned, np.float32).reshape(-1, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class Silhouette:
+    """All that a camera would see of an object if it were alone.
+
+    Attributes:
+        left, top: column and row of the image where `mask` begins; they may lie outside [pixels].
+        mask: (h, w) the smallest rectangle that holds it; empty if there is none.
+    """
+
+    left: int
+    top: int
+    mask: NDArray[np.bool_]
+
+    def within(self, width: int, height: int) -> NDArray[np.bool_]:
+        """(height, width) the part that lies in an image of that size."""
+        image = np.zeros((height, width), bool)
+        rows, columns = self.mask.shape
+        x, y = max(self.left, 0), max(self.top, 0)
+        right, bottom = min(self.left + columns, width), min(self.top + rows, height)
+        if x < right and y < bottom:
+            part = self.mask[y - self.top : bottom - self.top, x - self.left : right - self.left]
+            image[y:bottom, x:right] = part
+        return image
+
+
+class RayScene:
+    """Surfaces at their places in S, and rays at them.
+
+    Args:
+        surfaces: at most one of each label but for `SURROUNDINGS_LABEL`.
+        X_SB: (4, 4) frame of each; all in S if None.
+    """
+
+    def __init__(self, surfaces: Sequence[RaySurface], X_SB: Sequence[Array] | None = None) -> None:
+        poses = [np.eye(4)] * len(surfaces) if X_SB is None else X_SB
+        self._placed = list(zip(surfaces, poses, strict=True))
+        self._of_label = {one.label: (one, pose) for one, pose in self._placed}
+        self._last: tuple[View | None, dict[int, SurfaceHits | None]] = None, {}
+
+    def images(self, view: View, *, normals: bool = False) -> Images:
+        """Depth and labels of a view; its normals as well if asked for."""
+        depth, directions, meshes = self._boxes_seen(view, normals)
+        labels = np.full(depth.shape, SURROUNDINGS_LABEL, np.uint16)
+        self._last = view, {}
+        for surface, X_CB in meshes:
+            met = surface.met(view.intrinsics, X_CB)
+            self._last[1][surface.label] = met
+            if met is None:
+                continue
+            left, top, right, bottom = met.pixels
+            part = np.s_[top:bottom, left:right]
+            nearest = met.depth < depth[part]
+            depth[part][nearest] = met.depth[nearest]
+            labels[part][nearest] = surface.label
+            if directions is not None:
+                directions[part][nearest] = surface.normals(met, X_CB)[nearest]
+        near, far = view.depth_range
+        depth[(depth < near) | (depth > far)] = 0.0
+        return Images(depth=depth, labels=labels, normals=directions)
+
+    def silhouette(self, number: int, view: View) -> Silhouette:
+        """As `SceneRenderer.silhouette`."""
+        met = self._met_whole(number, view)
+        mask = np.zeros((0, 0), bool) if met is None else met.face != NO_FACE
+        rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+        if met is None or not len(rows):
+            return Silhouette(0, 0, np.zeros((0, 0), bool))
+        cut = mask[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+        left, top, _, _ = met.pixels
+        return Silhouette(left + int(columns[0]), top + int(rows[0]), cut)
+
+    def _boxes_seen(
+        self, view: View, normals: bool
+    ) -> tuple[Single, Single | None, list[tuple[RaySurface, Array]]]:
+        """Depth and normals of what is seen of boxes alone, and what rays have to be cast at."""
+        shape = view.intrinsics.height, view.intrinsics.width
+        nearness: Single = np.zeros(shape, np.float32)
+        plane, directions = np.zeros(shape, np.int16), [np.zeros((1, 3))]
+        meshes, X_CS = [], inverse(view.X_SC)
+        for surface, X_SB in self._placed:
+            X_CB, box, seen = X_CS @ X_SB, surface.box, None
+            if box is not None and surface.label == SURROUNDINGS_LABEL:
+                seen = box.nearness(view.intrinsics, X_CB)
+            if box is None or seen is None:
+                meshes.append((surface, X_CB))
+                continue
+            if normals:
+                planes = box.planes(view.intrinsics, X_CB)
+                np.copyto(plane, planes + sum(map(len, directions)), where=seen > nearness)
+                directions.append(BOX_NORMALS @ X_CB[:3, :3].T)
+            np.maximum(nearness, seen, out=nearness)
+        of_plane = np.concatenate(directions).astype(np.float32)
+        with np.errstate(divide="ignore"):
+            depth = np.divide(1.0, nearness, out=nearness)
+        return depth, np.take(of_plane, plane, axis=0) if normals else None, meshes
+
+    def _met_whole(self, number: int, view: View) -> SurfaceHits | None:
+        """What rays in the image and beyond it meet of an object; what the last image found of it
+        if that is all."""
+        last, found = self._last
+        known = found.get(number) if last is view else None
+        if known is not None:
+            left, top, right, bottom = known.pixels
+            width, height = view.intrinsics.width, view.intrinsics.height
+            if left > 0 and top > 0 and right < width and bottom < height:
+                return known
+        surface, X_SB = self._of_label[number]
+        return surface.met(view.intrinsics, inverse(view.X_SC) @ X_SB, beyond=True)

@@ -1,0 +1,201 @@
+"""Shows a sample in Meshcat: its scene, its depth as points, the camera and the grasps."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.geometry import Meshcat, Rgba
+from pydrake.math import RigidTransform
+from pydrake.perception import BaseField, Fields, PointCloud
+
+from burg_drake.cameras import Intrinsics
+from burg_drake.core import (
+    Array,
+    Bytes,
+    InvalidInputError,
+    Outcome,
+    Single,
+    rot_z,
+    transform_points,
+)
+from burg_drake.dataset.point_clouds import depth_cloud
+from burg_drake.dataset.sample import LabelledGrasps, Sample
+from burg_drake.scene import Scene
+from burg_drake.station import Station, StationDiagram
+from burg_drake.visualization import (
+    GRASPS_PATH,
+    LegendEntry,
+    aim_at,
+    draw_grasps,
+    grasp_group_entries,
+    group_by_outcome,
+    hex_color,
+    linear_light,
+    picture_mesh,
+    scene_points,
+    show_scene,
+)
+
+
+class SamplePaths:
+    """Sample paths."""
+
+    cloud = "/drake/cloud"  # Meshcat path of the exact depth.
+    sensor = "/drake/sensor"  # Meshcat path of the sensor's depth.
+    camera = "/drake/camera"  # Meshcat path of the camera and its image.
+
+
+VIEW_CAMERA_COLOR = "#b3471d"  # Colour of the camera's pyramid, in hexadecimal sRGB.
+
+
+def show_sample(
+    sample: Sample, scene: Scene, station: Station, meshcat: Meshcat
+) -> list[LegendEntry]:
+    """Shows a sample in Meshcat: models where the labels say they are, the points that the depth
+    image has, in the colours of the image, those of the sensor, the camera with its picture, and
+    the grasps by outcome. Distractors are among the points alone. The picture is drawn as that of a
+    camera without lens distortion.
+
+    Args:
+        sample: with those of its images that are to be seen.
+        scene: of the sample.
+        station: that it stands on; its arm is shown where the view has it.
+        meshcat: where to show it.
+
+    Returns:
+        A legend that switches what is shown.
+
+    Raises:
+        InvalidInputError: the view's posture is of another arm.
+    """
+    models_path = "/drake/visualizer"  # Meshcat path of the models.
+    names_path = "/drake/labels"  # Meshcat path of the models' names.
+    picture_depth = 0.15  # Metres from the camera at which its image is drawn.
+    models_color = "#9aa3ad"  # Colour of the models in the legend.
+    view = sample.view
+    X_WC = sample.X_WS @ view.X_SC
+    built = show_scene(scene, station, meshcat, robot="none" if view.posture is None else "arm")
+    if view.posture is not None:
+        _publish_posture(built, view.posture)
+    legend = [LegendEntry("models", models_color, (models_path, names_path))]
+    for path in (SamplePaths.cloud, SamplePaths.sensor, SamplePaths.camera, GRASPS_PATH):
+        meshcat.Delete(path)  # of a sample that was shown before
+    for depth, path in (
+        (sample.images.depth, SamplePaths.cloud),
+        (sample.sensor_depth, SamplePaths.sensor),
+    ):
+        if depth is not None:
+            legend.append(_draw_depth(meshcat, path, depth, sample, X_WC))
+    corners = picture_corners(view.intrinsics, picture_depth)
+    _draw_camera(meshcat, corners, sample.images.color, X_WC)
+    legend.append(LegendEntry("camera with its image", VIEW_CAMERA_COLOR, (SamplePaths.camera,)))
+    if sample.grasps is not None:
+        legend += _draw_grasps(meshcat, sample.grasps, X_WC)
+    seen = [scene_points(scene, station), transform_points(X_WC, corners), X_WC[None, :3, 3]]
+    aim_at(meshcat, np.vstack(seen), _viewing_direction(X_WC))
+    return legend
+
+
+def picture_corners(intrinsics: Intrinsics, depth: float) -> Array:
+    """(4, 3) corners of a pinhole camera's image at a depth [m], in the optical frame: around it
+    from its upper left."""
+    right, bottom = intrinsics.width - 0.5, intrinsics.height - 0.5
+    corners = np.array([[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]])
+    rays = (corners - intrinsics.center) / intrinsics.focal
+    return depth * np.column_stack([rays, np.ones(4)])
+
+
+def _publish_posture(built: StationDiagram, posture: tuple[float, ...]) -> None:
+    """Shows the arm in a posture."""
+    if len(posture) != len(built.arm_joints):
+        raise InvalidInputError(
+            f"the view has joint positions of {len(posture)} joints; the arm of the station has"
+            f" {len(built.arm_joints)}"
+        )
+    context = built.diagram.CreateDefaultContext()
+    plant_context = built.plant.GetMyMutableContextFromRoot(context)
+    for joint, position in zip(built.arm_joints, posture, strict=True):
+        joint.set_angle(plant_context, position)
+    built.diagram.ForcedPublish(context)
+
+
+def _draw_depth(
+    meshcat: Meshcat, path: str, depth: Single, sample: Sample, X_WC: Array
+) -> LegendEntry:
+    """Points of a depth image, in the colours of the picture; the sensor's, which are hidden at
+    first, are tinted."""
+    max_points = 80_000  # Points of a cloud (3 MB of a page); larger images are thinned out.
+    # Point size by spacing of far points; three.js draws them 2.4 times too small.
+    size_factor = 3.5
+    near_share = 0.9  # Share of the points that are nearer than far ones.
+    # Name and colour of the cloud, and the share of this colour in its points.
+    exact_style = "depth", (0.19, 0.41, 0.56), 0.0
+    # The same for the cloud of the sensor.
+    sensor_style = "depth of the sensor", (0.84, 0.14, 0.62), 0.4
+    there = np.count_nonzero(depth)
+    step = max(1, int(np.ceil(np.sqrt(there / max_points))))
+    shown = np.zeros_like(depth)
+    shown[::step, ::step] = depth[::step, ::step]
+    intrinsics = sample.view.intrinsics
+    cloud = depth_cloud(shown, intrinsics, color=sample.images.color)
+    exact = path == SamplePaths.cloud
+    name, rgb, tint = exact_style if exact else sensor_style
+    colors = np.tile(rgb, (len(cloud), 1))
+    if cloud.color is not None:
+        colors = (1.0 - tint) * cloud.color / 255.0 + tint * colors
+    if len(cloud):
+        side = (
+            size_factor
+            * step
+            * float(np.quantile(cloud.points[:, 2], near_share))
+            / intrinsics.focal[0]
+        )
+        _draw_points(meshcat, path, cloud.points, colors, side)
+        meshcat.SetTransform(path, RigidTransform(X_WC))
+        meshcat.SetProperty(path, "visible", exact)
+    return LegendEntry(f"{name} ({there:,} points)", hex_color(rgb), (path,), shown=exact)
+
+
+def _draw_points(meshcat: Meshcat, path: str, points: Single, colors: Array, side: float) -> None:
+    """Draws points (N, 3) with colours (N, 3), sRGB in [0, 1], as squares of a side [m]. They are
+    nearer to the camera than they should be by as much as lets them be seen on a model's surface.
+    """
+    lift = 2e-3  # Metres towards the camera, so that points show on a model's surface.
+    cloud = PointCloud(len(points), Fields(int(BaseField.kXYZs) | int(BaseField.kRGBs)))
+    nearer = 1.0 - lift / np.linalg.norm(points, axis=1, keepdims=True)
+    cloud.mutable_xyzs()[:] = (nearer * points).T
+    cloud.mutable_rgbs()[:] = np.rint(255.0 * linear_light(colors)).T
+    meshcat.SetObject(path, cloud, side)
+    meshcat.SetProperty(f"{path}/<object>", "material.toneMapped", False)
+
+
+def _draw_camera(meshcat: Meshcat, corners: Array, color: Bytes | None, X_WC: Array) -> None:
+    """The pyramid over the image, with the picture on it."""
+    rgba = Rgba(*(int(VIEW_CAMERA_COLOR[k : k + 2], 16) / 255.0 for k in (1, 3, 5)))
+    outline = np.asfortranarray(np.vstack([corners, corners[:1]]).T)
+    meshcat.SetLine(f"{SamplePaths.camera}/image", outline, 2.0, rgba)
+    rays = np.zeros((3, 4), order="F"), np.asfortranarray(corners.T)
+    meshcat.SetLineSegments(f"{SamplePaths.camera}/rays", *rays, 2.0, rgba)
+    if color is not None:
+        meshcat.SetObject(f"{SamplePaths.camera}/picture", picture_mesh(color, corners))
+    meshcat.SetTransform(SamplePaths.camera, RigidTransform(X_WC))
+
+
+def _draw_grasps(meshcat: Meshcat, grasps: LabelledGrasps, X_WC: Array) -> list[LegendEntry]:
+    """Grasps by outcome; of those whose width is not known, as wide as the widest."""
+    groups = group_by_outcome([Outcome(text) if text else None for text in grasps.outcome.tolist()])
+    known = np.isfinite(grasps.width)
+    widest = float(grasps.width[known].max()) if known.any() else 0.08
+    draw_grasps(meshcat, X_WC @ grasps.X_CG, np.where(known, grasps.width, widest), groups)
+    return grasp_group_entries(groups)
+
+
+def _viewing_direction(X_WC: Array) -> Array:
+    """(3,) where the eye looks: from the camera's side, which is somewhere if it looks down."""
+    azimuth_offset_deg = 50.0  # Degrees about the vertical from the camera's direction.
+    downward_slope = 0.45  # Downward slope of the direction of view.
+    ahead = X_WC[:3, 2] * (1.0, 1.0, 0.0)
+    if np.linalg.norm(ahead) < 1e-3:
+        ahead = -X_WC[:3, 1] * (1.0, 1.0, 0.0)
+    level = rot_z(np.deg2rad(azimuth_offset_deg)) @ (ahead / np.linalg.norm(ahead))
+    forward: Array = level - np.array([0.0, 0.0, downward_slope])
+    return forward

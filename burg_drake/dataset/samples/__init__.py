@@ -1,5 +1,0 @@
-"""Samples, the shards that they are kept in, and the folder that holds them all."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

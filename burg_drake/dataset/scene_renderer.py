@@ -1,0 +1,477 @@
+"""Renders images of a scene from any place, and labels the instances in them.
+
+Drake or Blender renders the colours; `ray_casting` gives depth, labels and normals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from functools import cached_property, lru_cache, partial
+from typing import Any, Literal
+
+import cv2
+import numpy as np
+from pydrake.geometry import ClippingRange, ColorRenderCamera, QueryObject, RenderCameraCore
+from pydrake.math import RigidTransform
+from pydrake.multibody.tree import BodyIndex
+
+from burg_drake.cameras import FieldOfView, Intrinsics, camera_info, camera_intrinsics
+from burg_drake.core import (
+    Array,
+    Bytes,
+    InvalidInputError,
+    Single,
+    UnknownNameError,
+    inverse,
+    suggest_names,
+)
+from burg_drake.dataset.appearance import Appearance
+from burg_drake.dataset.appearance_rendering import apply_appearance, place_appearance
+from burg_drake.dataset.blender_process import RENDERERS, RendererName, running_blender
+from burg_drake.dataset.blender_scene import BlenderScene, make_blender_scene
+from burg_drake.dataset.photometry import apply_photometry
+from burg_drake.dataset.ray_casting import RayScene, RaySurface, Silhouette, surfaces_of_body
+from burg_drake.dataset.room import blend_over_background, fill_background
+from burg_drake.dataset.sample import (
+    SURROUNDINGS_LABEL,
+    Images,
+    InstanceLabel,
+    box_of_mask,
+    instance_numbers,
+)
+from burg_drake.dataset.views import View
+from burg_drake.scene import SceneLike, as_scene
+from burg_drake.station import (
+    RENDERER_NAME,
+    Station,
+    StationLike,
+    as_station,
+    build_station_diagram,
+    visible_surfaces,
+)
+
+CLIPPING_FACTOR = 0.5
+"""Ratio of nearest rendered to nearest measured depth; its inverse for the farthest."""
+
+
+Fill = Callable[[Bytes, Array, Intrinsics], Bytes]
+"""From colours (H, W, 3), camera's optical frame in the world and intrinsics to colours."""
+
+
+class DrakeColors:
+    """Renders colours from any place.
+
+    Args:
+        query: of the diagram's scene graph, in a context.
+        world: its world frame.
+        renderer: name of the render engine.
+        fill: puts what is behind everything into its images, if anything.
+    """
+
+    def __init__(
+        self, query: QueryObject, world: Any, renderer: str, fill: Fill | None = None
+    ) -> None:
+        self._query, self._world, self._renderer, self._fill = query, world, renderer, fill
+
+    def image(self, intrinsics: Intrinsics, X_WC: Array, depth_range: tuple[float, float]) -> Bytes:
+        """(H, W, 3) what a camera at `X_WC` sees. A lens with distortion is a pinhole camera that
+        sees all that it sees, with pixels as fine, looked up where its pixels look.
+
+        Raises:
+            InvalidInputError: it sees nearly to its sides.
+        """
+        if intrinsics.is_pinhole:
+            return self._pinhole(intrinsics, X_WC, depth_range)
+        wide, at = covering_pinhole(intrinsics)
+        image = self._pinhole(wide, X_WC, depth_range)
+        return np.asarray(cv2.remap(image, at, None, cv2.INTER_LINEAR), np.uint8)
+
+    def _pinhole(
+        self, intrinsics: Intrinsics, X_WC: Array, depth_range: tuple[float, float]
+    ) -> Bytes:
+        near, far = depth_range
+        core = RenderCameraCore(
+            self._renderer,
+            camera_info(intrinsics),
+            ClippingRange(CLIPPING_FACTOR * near, far / CLIPPING_FACTOR),
+            RigidTransform(),
+        )
+        camera = ColorRenderCamera(core, False)
+        image = self._query.RenderColorImage(camera, self._world, RigidTransform(X_WC))
+        colors = np.asarray(cv2.cvtColor(image.data, cv2.COLOR_RGBA2RGB), np.uint8)
+        return colors if self._fill is None else self._fill(colors, X_WC, intrinsics)
+
+
+@lru_cache(maxsize=8)
+def _covering_pinhole_of(key: tuple[Any, ...]) -> tuple[Intrinsics, Single]:
+    max_tangent = 4.0  # Tangent of the largest angle to the optical axis: 76 degrees.
+    width, height, focal, center, distortion = key
+    intrinsics = Intrinsics(
+        width=width, height=height, focal=focal, center=center, distortion=distortion
+    )
+    flat = FieldOfView(intrinsics).directions[..., :2]
+    low, high = flat.min(axis=(0, 1)), flat.max(axis=(0, 1))
+    if max(np.abs(low).max(), np.abs(high).max()) > max_tangent:
+        raise InvalidInputError(
+            f"the lens sees more than {np.degrees(np.arctan(max_tangent)):.0f} degrees from its axis;"
+            " colour images of this camera cannot be rendered"
+        )
+    start = np.floor(low * focal) - 1.0
+    size = (np.ceil(high * focal) + 1.0 - start).astype(int) + 1
+    wide = replace(
+        intrinsics,
+        width=int(size[0]),
+        height=int(size[1]),
+        center=(-start[0], -start[1]),
+        distortion=(),
+    )
+    return wide, (flat * focal - start).astype(np.float32)
+
+
+def covering_pinhole(intrinsics: Intrinsics) -> tuple[Intrinsics, Single]:
+    """A pinhole camera that sees all that one with distortion sees, and (H, W, 2) where the pixels
+    of that one are in its image."""
+    one = intrinsics
+    return _covering_pinhole_of((one.width, one.height, one.focal, one.center, one.distortion))
+
+
+class BlenderColors:
+    """Renders colours from any place.
+
+    Args:
+        scene: what there is.
+        poses: gives `X_WB` (4, 4) of its bodies, as they are now.
+        look: has what is behind everything.
+    """
+
+    def __init__(
+        self,
+        scene: BlenderScene,
+        poses: Callable[[], Mapping[str, Array]],
+        look: Appearance | None = None,
+    ) -> None:
+        self._scene, self._poses, self._look = scene, poses, look
+
+    def image(self, intrinsics: Intrinsics, X_WC: Array, depth_range: tuple[float, float]) -> Bytes:
+        """(H, W, 3) what a camera at `X_WC` sees; a lens with distortion as `DrakeColors` has it.
+
+        Raises:
+            InvalidInputError: it sees nearly to its sides.
+            MissingDependencyError: there is no Blender.
+            SimulationError: Blender failed.
+        """
+        if intrinsics.is_pinhole:
+            return self._pinhole(intrinsics, X_WC, depth_range)
+        import cv2
+
+        wide, at = covering_pinhole(intrinsics)
+        image = self._pinhole(wide, X_WC, depth_range)
+        return np.asarray(cv2.remap(image, at, None, cv2.INTER_LINEAR), np.uint8)
+
+    def _pinhole(
+        self, intrinsics: Intrinsics, X_WC: Array, depth_range: tuple[float, float]
+    ) -> Bytes:
+        near, far = depth_range
+        clip = (CLIPPING_FACTOR * near, far / CLIPPING_FACTOR)
+        image = running_blender().image(self._scene, self._poses(), intrinsics, X_WC, clip)
+        return blend_over_background(image, X_WC, intrinsics, self._look)
+
+
+ImageKind = Literal["color", "depth", "labels", "normals"]
+
+
+class SceneRenderer:
+    """Renders one scene on one station from many places.
+
+    Depth, labels and normals come from rays and are exact, and the same with any renderer; colours
+    come from Drake's renderer or Blender.
+
+    Attributes:
+        scene, station: what is rendered.
+        numbers: label of each instance, by name.
+    """
+
+    def __init__(
+        self,
+        scene: SceneLike,
+        station: StationLike,
+        *,
+        appearance: Appearance | None = None,
+        arm: bool = False,
+        colors: bool = True,
+        renderer: RendererName = "drake",
+    ) -> None:
+        """Builds the scene.
+
+        Args:
+            scene: what stands on the board.
+            station: what is around it.
+            appearance: how it looks; as simulated cameras see it if None.
+            arm: whether the station's arm is there.
+            colors: whether colours will be asked for; without them no system libraries are needed,
+                and all other images are the same.
+            renderer: of colours, `drake` or `blender`, which needs no system libraries.
+
+        Raises:
+            MissingDependencyError: a system library of Drake's renderer is missing.
+            UnknownNameError: there is no such renderer.
+            InvalidInputError: the station has no arm; and as `build_station_diagram`.
+        """
+        if renderer not in RENDERERS:
+            raise UnknownNameError(
+                f"renderer {renderer!r} does not exist; {suggest_names(renderer, RENDERERS)}"
+            ).about("renderer")
+        self.scene, self.station = as_scene(scene), as_station(station)
+        self.numbers = instance_numbers(self.scene)
+        self._appearance, self._in_blender = appearance, renderer == "blender"
+        self._built = build_station_diagram(
+            self.scene,
+            self.station,
+            robot="arm" if arm else "none",
+            # The board has markers in any case.
+            cameras=() if self._in_blender else colors or (),
+        )
+        self._renderer = RENDERER_NAME if colors else None
+        if appearance is not None and colors and not self._in_blender:
+            self._renderer = apply_appearance(self._built, appearance)
+        elif appearance is not None:
+            place_appearance(self._built, appearance)
+        self._context = self._built.diagram.CreateDefaultContext()
+        self._plant_context = self._built.plant.GetMyMutableContextFromRoot(self._context)
+        self._posture: tuple[float, ...] | None = None
+        self._rays: RayScene | None = None
+
+    def images(
+        self,
+        view: View,
+        kinds: Iterable[ImageKind] = ("color", "depth", "labels"),
+        *,
+        rng: np.random.Generator | None = None,
+    ) -> Images:
+        """What a camera sees.
+
+        Args:
+            view: the camera.
+            kinds: of images.
+            rng: draws the noise of colours, where the appearance has some.
+
+        Raises:
+            InvalidInputError: an image of another kind, or colours of a renderer without them.
+        """
+        known_kinds = ("color", "depth", "labels", "normals")  # Kinds of images.
+        kinds = tuple(kinds)
+        for kind in kinds:
+            if kind not in known_kinds:
+                raise InvalidInputError(
+                    f"image kind {kind!r} does not exist; {suggest_names(kind, known_kinds)}"
+                )
+        self._place_arm(view)
+        by_rays = Images()
+        if {"depth", "labels", "normals"} & {*kinds} or self._appearance is not None:
+            by_rays = self._ray_scene.images(view, normals="normals" in kinds)
+        color = None
+        if "color" in kinds:
+            X_WC = self.station.document.X_WS.matrix() @ view.X_SC
+            color = self._colors.image(view.intrinsics, X_WC, view.depth_range)
+            if self._appearance is not None:
+                color = apply_photometry(
+                    color, by_rays.labels, self._appearance, rng or np.random.default_rng(0)
+                )
+        return Images(
+            color,
+            by_rays.depth if "depth" in kinds else None,
+            by_rays.labels if "labels" in kinds else None,
+            by_rays.normals,
+        )
+
+    def silhouette(self, number: int, view: View) -> Silhouette:
+        """All that a camera would see of an object if it were alone.
+
+        Args:
+            number: its label.
+            view: the camera. Without lens distortion up to one image size beyond each edge of the
+                image counts, with it the image alone: the model of a lens does not reach further.
+        """
+        self._place_arm(view)
+        return self._ray_scene.silhouette(number, view)
+
+    @cached_property
+    def _colors(self) -> DrakeColors | BlenderColors:
+        if self._renderer is None:
+            raise InvalidInputError(
+                "this scene was built without colours, so colour images cannot be rendered"
+            )
+        if self._in_blender:
+            scene = make_blender_scene(self._built, self._appearance)
+            return BlenderColors(scene, self._poses, self._appearance)
+        scene_graph = self._built.scene_graph
+        context = scene_graph.GetMyContextFromRoot(self._context)
+        query = scene_graph.get_query_output_port().Eval(context)
+        fill = None
+        if self._appearance is not None:
+            fill = partial(fill_background, look=self._appearance)
+        return DrakeColors(query, scene_graph.world_frame_id(), self._renderer, fill)
+
+    def _place_arm(self, view: View) -> None:
+        joints = self._built.arm_joints
+        if bool(joints) != (view.posture is not None):
+            raise InvalidInputError(
+                "the view has no joint positions, but the scene has an arm; give them"
+                if joints
+                else "the view has joint positions, but the scene has no arm; leave them out"
+            )
+        if view.posture is None or view.posture == self._posture:
+            return
+        if len(view.posture) != len(joints):
+            raise InvalidInputError(
+                f"the view has joint positions of {len(view.posture)} joints; the arm has"
+                f" {len(joints)}"
+            )
+        for joint, position in zip(joints, view.posture, strict=True):
+            joint.set_angle(self._plant_context, position)
+        self._posture, self._rays = view.posture, None
+
+    @cached_property
+    def _seen(self) -> list[tuple[BodyIndex, RaySurface]]:
+        """The surfaces that rays meet, each in its body's frame."""
+        placed = {**self._built.free, **self._built.fixed}
+        owner = {placed[name]: number for name, number in self.numbers.items()}
+        found = []
+        surfaces = visible_surfaces(self._built.plant, self._built.scene_graph)
+        for body in dict.fromkeys(one.body for one in surfaces):
+            parts = [(one.vertices, one.faces) for one in surfaces if one.body == body]
+            label = owner.get(body, SURROUNDINGS_LABEL)
+            found += [(body, surface) for surface in surfaces_of_body(label, parts)]
+        return found
+
+    @property
+    def _ray_scene(self) -> RayScene:
+        if self._rays is None:
+            X_SW = inverse(self.station.document.X_WS.matrix())
+            poses = [X_SW @ self._X_WB(body) for body, _ in self._seen]
+            self._rays = RayScene([surface for _, surface in self._seen], poses)
+        return self._rays
+
+    def _poses(self) -> dict[str, Array]:
+        return {str(int(body)): self._X_WB(body) for body, _ in self._seen}
+
+    def _X_WB(self, body: BodyIndex) -> Array:
+        plant = self._built.plant
+        pose = plant.EvalBodyPoseInWorld(self._plant_context, plant.get_body(body))
+        X_WB: Array = pose.GetAsMatrix4()
+        return X_WB
+
+
+def render(
+    scene: SceneLike,
+    station: StationLike,
+    camera: str | View = "board",
+    kinds: Iterable[ImageKind] = ("color", "depth", "labels"),
+    *,
+    arm: bool = False,
+    renderer: RendererName = "drake",
+) -> Images:
+    """What a camera sees of a scene on a station.
+
+    Example::
+
+        images = burg.render("tabletop_six", "panda_tabletop", "board", ["depth", "labels"])
+        print(images.depth.max(), images.labels.max())
+
+    Args:
+        scene: what stands on the board.
+        station: what is around it.
+        camera: its name in the station, or any view.
+        kinds: of images: `color`, `depth`, `labels`, `normals`.
+        arm: whether the station's arm is there, in its home posture if the camera is a name.
+        renderer: of colours, `drake` or `blender`; all else is the same with both.
+
+    Returns:
+        Images whose pixels are the same ones; those that were not asked for are None.
+
+    Raises:
+        UnknownNameError: there is no such camera, scene, station or renderer.
+        MissingDependencyError: colours were asked for, and the renderer is not installed or lacks a
+            system library.
+        SimulationError: Blender failed.
+        InvalidInputError: there is no such kind of image, or the station has no arm.
+    """
+    scene, station = as_scene(scene), as_station(station)
+    kinds = tuple(kinds)
+    view = camera if isinstance(camera, View) else station_view(station, camera, arm=arm)
+    rendered = SceneRenderer(
+        scene,
+        station,
+        arm=view.posture is not None,
+        colors="color" in kinds,
+        renderer=renderer,
+    )
+    return rendered.images(view, kinds)
+
+
+def station_view(station: Station, camera: str, *, arm: bool = False) -> View:
+    """The view of a station's camera.
+
+    Args:
+        station: has the camera.
+        camera: its name.
+        arm: whether the arm is there, in its home posture.
+
+    Raises:
+        UnknownNameError: there is no such camera.
+        InvalidInputError: the station has no arm.
+    """
+    document = station.document
+    if arm and document.arm is None:
+        raise InvalidInputError(
+            f"station {station.name!r} has no arm to show in the view; give a station with an arm"
+        )
+    found = station.camera(camera)
+    return View(
+        camera=camera,
+        intrinsics=camera_intrinsics(found),
+        X_SC=inverse(document.X_WS.matrix()) @ found.X_WC.matrix(),
+        depth_range=found.depth_range,
+        posture=tuple(document.arm.home) if arm and document.arm is not None else None,
+    )
+
+
+def label_instances(
+    renderer: SceneRenderer, view: View, images: Images | None = None
+) -> tuple[InstanceLabel, ...]:
+    """Labels of all instances, in the order of their numbers.
+
+    Args:
+        renderer: of the scene.
+        view: the camera.
+        images: what it sees, with labels; looked at again if None.
+    """
+    labels = images.labels if images is not None else None
+    if labels is None:
+        labels = renderer.images(view, ("labels",)).labels
+        assert labels is not None
+    X_CS, height_width = inverse(view.X_SC), labels.shape
+    counts = np.bincount(labels.ravel(), minlength=len(renderer.numbers) + 1)
+    found = []
+    for name, number in renderer.numbers.items():
+        silhouette = renderer.silhouette(number, view)
+        amodal = silhouette.within(height_width[1], height_width[0])
+        visible = int(counts[number])
+        size = int(np.count_nonzero(silhouette.mask))
+        rows, columns = silhouette.mask.shape
+        found.append(
+            InstanceLabel(
+                name=name,
+                object=renderer.scene.instance(name).object,
+                number=number,
+                X_CO=X_CS @ renderer.scene.X_SO(name),
+                visible_pixels=visible,
+                silhouette_pixels=size,
+                visibility=visible / size if size else 0.0,
+                visible_box=box_of_mask(labels == number) if visible else None,
+                amodal_box=(silhouette.left, silhouette.top, columns, rows) if rows else None,
+                amodal=amodal,
+            )
+        )
+    return tuple(found)

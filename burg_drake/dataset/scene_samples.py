@@ -1,0 +1,367 @@
+"""Makes the samples of one scene, on this machine or for another one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from burg_drake.cameras import depth_noise, noisy_depth, sensor
+from burg_drake.core import InvalidInputError, SimulationError, rng_from
+from burg_drake.dataset.appearance import Appearance, read_appearance
+from burg_drake.dataset.appearance_sampling import distractor_boxes, draw_appearance
+from burg_drake.dataset.blender_process import running_blender
+from burg_drake.dataset.recipe import DatasetRecipe, resolve_library_path, run_folder
+from burg_drake.dataset.sample import Images, Sample
+from burg_drake.dataset.scene_grasps import SceneGrasps, grasps_of_run, label_grasps, sampled_grasps
+from burg_drake.dataset.scene_renderer import ImageKind, SceneRenderer, label_instances
+from burg_drake.dataset.shards import ShardEntry, shard_name, write_shard
+from burg_drake.dataset.view_sampler import ViewSampler
+from burg_drake.dataset.views import View
+from burg_drake.dataset.writer import write_scene
+from burg_drake.evaluation import Bundle, load_bundle, require_same_content
+from burg_drake.generation import SceneSampler
+from burg_drake.objects import ObjectLibrary, load_library
+from burg_drake.scene import Scene, SceneDocument, SceneRecipe, load_scene
+from burg_drake.station import Station, load_station
+
+
+class SceneSamples:
+    """Makes the samples of one scene.
+
+    Args:
+        scene: the scene.
+        number: of it in the data set.
+        station: what it stands on.
+        recipe: how samples are made.
+        folder: of the data set, which the recipe's references start from.
+        appearance: how it looks; drawn by the recipe if None.
+        grasps: on its objects; those that the recipe asks for if None.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        number: int,
+        station: Station,
+        recipe: DatasetRecipe,
+        folder: Path,
+        appearance: Appearance | None = None,
+        grasps: SceneGrasps | None = None,
+    ) -> None:
+        self._scene, self._number, self._folder = scene, number, folder
+        self._station, self._recipe, self._grasps = station, recipe, grasps
+        looks = recipe.looks
+        if appearance is None and looks is not None:
+            rng = rng_from("dataset looks", recipe.seed, number)
+            library = resolve_library_path(looks.distractor_library, folder)
+            settings = replace(looks, distractor_library=library)
+            drawn = draw_appearance(settings, scene, station, rng)
+            appearance = replace(drawn, library=looks.distractor_library)
+        self._stored = appearance
+        if appearance is not None:
+            library = resolve_library_path(appearance.library, folder)
+            appearance = replace(appearance, library=library)
+        self._appearance = appearance
+        self._renderers: dict[tuple[bool, bool], SceneRenderer] = {}
+
+    def __iter__(self) -> Iterator[Sample]:
+        """The samples, as they are made.
+
+        Raises:
+            InvalidInputError: a view of the scene cannot be found.
+        """
+        recipe, intrinsics, depth_range = self._recipe, None, None
+        if recipe.sensor:
+            device = sensor(recipe.sensor)
+            intrinsics, depth_range = device.depth_camera(recipe.size), device.depth_range
+        views = ViewSampler(
+            self._scene,
+            self._station,
+            recipe.viewpoints,
+            intrinsics=intrinsics,
+            depth_range=depth_range,
+            besides=() if self._appearance is None else distractor_boxes(self._appearance),
+        )
+        grasps = self._wanted_grasps() if self._grasps is None else self._grasps
+        for number in range(recipe.views):
+            view = views.sample(rng_from("dataset view", recipe.seed, self._number, number))
+            yield self.sample(number, view, grasps)
+
+    def sample(self, number: int, view: View, grasps: SceneGrasps | None = None) -> Sample:
+        """The sample of a view.
+
+        Args:
+            number: of the view; noise follows from it.
+            view: the camera.
+            grasps: on the scene's objects.
+        """
+        recipe, renderer = self._recipe, self._renderer(view, self._recipe.colors)
+        rng = rng_from("dataset image", recipe.seed, self._number, number)
+        kinds: list[ImageKind] = ["depth", "labels"]
+        if recipe.colors:
+            kinds.append("color")
+        if recipe.normals or recipe.sensor:
+            kinds.append("normals")
+        images = renderer.images(view, kinds, rng=rng)
+        return Sample(
+            scene=self._number,
+            number=number,
+            view=view,
+            X_WS=self._station.document.X_WS.matrix(),
+            images=images if recipe.normals else replace(images, normals=None),
+            sensor_depth=self._measured(view, images, rng) if recipe.sensor else None,
+            instances=label_instances(renderer, view, images),
+            grasps=None if grasps is None else label_grasps(grasps, self._scene, view.X_SC),
+            appearance={} if self._stored is None else self._stored.plain(),
+        )
+
+    def redrawn(self, view: View) -> Images:
+        """Depth and labels of a view, for checks."""
+        return self._renderer(view, colors=False).images(view, ("depth", "labels"))
+
+    def _renderer(self, view: View, colors: bool) -> SceneRenderer:
+        arm = view.posture is not None
+        if (arm, colors) not in self._renderers:
+            self._renderers[arm, colors] = SceneRenderer(
+                self._scene,
+                self._station,
+                appearance=self._appearance,
+                arm=arm,
+                colors=colors,
+                renderer=self._recipe.renderer,
+            )
+        return self._renderers[arm, colors]
+
+    def _measured(self, view: View, images: Images, rng: np.random.Generator) -> np.ndarray:
+        assert images.depth is not None
+        return noisy_depth(
+            images.depth,
+            depth_noise(self._recipe.sensor),
+            view.intrinsics,
+            rng,
+            normals=images.normals,
+            color=images.color,
+        )
+
+    def _wanted_grasps(self) -> SceneGrasps | None:
+        recipe = self._recipe
+        if recipe.run:
+            return grasps_of_run(run_folder(recipe, self._folder), self._scene)
+        if recipe.grasps_per_object:
+            return sampled_grasps(self._scene, self._station, recipe.grasps_per_object, recipe.seed)
+        return None
+
+
+def appearance_of(sample: Sample) -> Appearance | None:
+    """How a sample looks, from what is stored with it.
+
+    Raises:
+        DocumentError: it does not fit.
+    """
+    if not sample.appearance:
+        return None
+    return read_appearance(sample.appearance, f"appearance of {sample.key}")
+
+
+@dataclass(frozen=True)
+class DatasetInputs:
+    """What all scenes of a data set are made with.
+
+    Attributes:
+        recipe: of the data set.
+        folder: of the data set.
+        station: its file.
+        library: folder of the objects of sampled scenes; None for given ones.
+    """
+
+    recipe: DatasetRecipe
+    folder: Path
+    station: Path
+    library: Path | None
+
+
+@dataclass(frozen=True)
+class SceneWork:
+    """A scene to make samples of.
+
+    Attributes:
+        inputs: of the data set.
+        number: of the scene.
+        path: of its document; None if it is sampled.
+    """
+
+    inputs: DatasetInputs
+    number: int
+    path: Path | None
+
+
+def make_scene(work: SceneWork) -> ShardEntry:
+    """Writes a scene and its samples.
+
+    Raises:
+        SimulationError: no scene was accepted, or Drake ended by a failed condition.
+        Exception: what cannot be rendered is one failure.
+    """
+    inputs = work.inputs
+    with convert_drake_errors():
+        station = _load_station(inputs.station)
+        if work.path is not None:
+            scene = given_scene(work)
+        else:
+            scene = accepted_scene(_scene_sampler(inputs), work.number, inputs.folder)
+        samples = SceneSamples(scene, work.number, station, inputs.recipe, inputs.folder)
+        return write_scene(inputs.folder, work.number, scene, samples)
+
+
+def given_scene(
+    work: SceneWork, library: Callable[[str, Path | None], ObjectLibrary] = load_library
+) -> Scene:
+    """The scene of a document, as it was when the data set was begun.
+
+    Args:
+        work: with a path.
+        library: as in `load_scene`.
+
+    Raises:
+        InvalidInputError: it is another one by now.
+        UnknownNameError, DocumentError: as `load_scene`.
+    """
+    assert work.path is not None
+    scene = load_scene(work.path, library=library)
+    if scene.content != work.inputs.recipe.given[work.number]:
+        raise InvalidInputError(
+            f"{work.path} was changed while the data set was made; run the command again"
+        )
+    return scene
+
+
+def accepted_scene(sampler: SceneSampler, number: int, folder: Path) -> Scene:
+    """The sampled scene of a number.
+
+    Args:
+        sampler: of the recipe.
+        number: of the scene.
+        folder: of the data set.
+
+    Raises:
+        SimulationError: none was accepted.
+    """
+    sampled = sampler.sample(number, folder / "scenes")
+    if not sampled.accepted:
+        reasons = ", ".join(f"{count} x {reason}" for reason, count in sampled.refused.items())
+        raise SimulationError(f"no scene was accepted in {sampled.attempts} attempts ({reasons})")
+    return sampled.scene
+
+
+@contextmanager
+def convert_drake_errors() -> Iterator[None]:
+    """Around what Drake does: a failed condition of its own ends this alone.
+
+    Raises:
+        SimulationError: in the place of `SystemExit`.
+    """
+    try:
+        yield
+    except SystemExit as error:  # DRAKE_DEMAND ends this way
+        raise SimulationError(f"Drake failed: {error}") from error
+
+
+@lru_cache(maxsize=1)
+def _scene_sampler(inputs: DatasetInputs) -> SceneSampler:
+    assert inputs.recipe.sampled is not None and inputs.library is not None
+    return SceneSampler(
+        inputs.recipe.sampled, load_library(inputs.library), _load_station(inputs.station)
+    )
+
+
+@lru_cache(maxsize=1)
+def _load_station(path: Path) -> Station:
+    return load_station(path)
+
+
+@dataclass(frozen=True)
+class SampleTask:
+    """A scene to make samples of.
+
+    Attributes:
+        world: hashes of the bundle with station and library, without data.
+        recipe: of the data set, without what is of other scenes or needs files.
+        number: of the scene.
+        document: of it; None if it is sampled.
+        path: of the document on the machine of the data set; of the data set for a sampled scene.
+            Only messages have it.
+        grasps: on its objects; those that the recipe asks for if None.
+        blender: version of Blender, if that renders.
+    """
+
+    world: Bundle
+    recipe: DatasetRecipe
+    number: int
+    document: SceneDocument | None
+    path: Path
+    grasps: SceneGrasps | None
+    blender: str = ""
+
+
+@dataclass(frozen=True)
+class SampleTaskResult:
+    """What has become of it.
+
+    Attributes:
+        document: of the scene.
+        shard: bytes of its shard.
+        entry: the shard's line of the index.
+    """
+
+    document: SceneDocument
+    shard: bytes
+    entry: ShardEntry
+
+
+def run_sample_task(sent: SampleTask, folder: Path) -> SampleTaskResult:
+    """Makes the samples of a scene, on any machine.
+
+    Args:
+        sent: the scene.
+        folder: where its world is unpacked.
+
+    Raises:
+        Exception: as `work.make_scene`; or the world is not the one that was sent.
+    """
+    if sent.blender and (version := running_blender().version) != sent.blender:
+        raise InvalidInputError(
+            f"the worker has Blender {version}, but the data set is made with {sent.blender};"
+            " install that version"
+        )
+    with convert_drake_errors():
+        library, station = _load_world(sent.world, folder)
+        if sent.document is not None:
+            scene = Scene(sent.document, library, sent.path)
+        else:
+            assert sent.recipe.sampled is not None
+            sampler = _bundle_scene_sampler(sent.recipe.sampled, sent.world, folder)
+            scene = accepted_scene(sampler, sent.number, sent.path)
+        samples = SceneSamples(scene, sent.number, station, sent.recipe, folder, grasps=sent.grasps)
+        # beside the bundle, as that is where this machine has room, and old folders are removed
+        with TemporaryDirectory(dir=folder.parent, prefix=".samples.") as place:
+            path = Path(place) / shard_name(sent.number)
+            entry = write_shard(path, samples)
+            return SampleTaskResult(scene.document, path.read_bytes(), entry)
+
+
+@lru_cache(maxsize=1)
+def _load_world(world: Bundle, folder: Path) -> tuple[ObjectLibrary, Station]:
+    scene, station = load_bundle(folder)
+    require_same_content(world, scene, station)
+    return scene.library, station
+
+
+@lru_cache(maxsize=1)
+def _bundle_scene_sampler(recipe: SceneRecipe, world: Bundle, folder: Path) -> SceneSampler:
+    return SceneSampler(recipe, *_load_world(world, folder))

@@ -1,0 +1,351 @@
+"""Shards: the samples of a scene as one tar archive with reproducible bytes."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import os
+import secrets
+import tarfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from burg_drake.core import (
+    DocumentError,
+    InvalidInputError,
+    copy_permissions,
+    open_regular,
+    shorten_text,
+)
+from burg_drake.dataset.sample import Sample
+from burg_drake.dataset.sample_files import (
+    FILE_SUFFIXES,
+    SampleRecord,
+    encode_sample,
+    member_kind,
+    read_parts,
+    read_record,
+)
+
+TAR_BLOCK = 512  # Bytes of a block.
+TAR_END = bytes(2 * TAR_BLOCK)  # Blocks of zeros that end an archive.
+NAME_FIELD, SIZE_FIELD, CHECKSUM_FIELD, KIND_FIELD, PREFIX_FIELD = (
+    *(slice(0, 100), slice(124, 136), slice(148, 156), slice(156, 157), slice(345, 500)),
+)
+"""Fields of a header."""
+
+
+@dataclass(frozen=True)
+class MemberPlace:
+    """Where in an archive a member's content is [bytes]."""
+
+    start: int
+    size: int
+
+
+def tar_member(name: str, data: bytes) -> bytes:
+    """A member with header; time, owner and mode are always the same."""
+    info = tarfile.TarInfo(name)  # by default of 1970, of nobody, readable for all
+    info.size = len(data)
+    return info.tobuf(tarfile.USTAR_FORMAT) + data + bytes(-len(data) % TAR_BLOCK)
+
+
+def tar_members(path: Path) -> dict[str, MemberPlace]:
+    """The members of an archive by name, in their order.
+
+    Raises:
+        InvalidInputError: the archive is missing, cut off, damaged, has a member twice, or one that
+            is no plain file; the message names archive and member.
+    """
+    max_members = 1_000_000  # Members of an archive.
+    found: dict[str, MemberPlace] = {}
+    with open_regular(path) as stream:
+        size = os.fstat(stream.fileno()).st_size
+        at, last = 0, "its beginning"
+        while True:
+            header = os.pread(stream.fileno(), TAR_BLOCK, at)
+            if len(header) < TAR_BLOCK:
+                raise InvalidInputError(f"{path} is truncated after {last}")
+            if not any(header):
+                return found
+            name, place = _parse_header(header, at, f"{path}, after {last}")
+            if place.start + place.size > size:
+                raise InvalidInputError(f"{path} is truncated within {name}")
+            if name in found:
+                raise InvalidInputError(f"{path} contains {name} twice")
+            if len(found) == max_members:
+                raise InvalidInputError(f"{path} has more than {max_members:,} members")
+            found[name], last = place, name
+            at = place.start + place.size + -place.size % TAR_BLOCK
+
+
+def read_member(path: Path, place: MemberPlace) -> bytes:
+    """The content of a member. The file is opened for each, so that processes share none.
+
+    Raises:
+        InvalidInputError: it cannot be read, or ends before.
+    """
+    with open_regular(path) as stream:
+        try:
+            data = os.pread(stream.fileno(), place.size, place.start)
+        except OSError as error:
+            raise InvalidInputError(f"cannot read {path}: {error.strerror or error}") from error
+    if len(data) != place.size:
+        raise InvalidInputError(f"{path} is truncated")
+    return data
+
+
+def _parse_header(header: bytes, at: int, where: str) -> tuple[str, MemberPlace]:
+    """Name and place of the member whose header lies at this place."""
+    file_kinds = (b"0", b"\0")  # Kinds of members that are plain files.
+    blank = header[: CHECKSUM_FIELD.start] + b" " * 8 + header[CHECKSUM_FIELD.stop :]
+    try:
+        if sum(blank) != _read_octal(header[CHECKSUM_FIELD]):
+            raise InvalidInputError(f"{where}: the checksum of a header is wrong")
+        size = _read_octal(header[SIZE_FIELD])
+        name = header[NAME_FIELD].split(b"\0", 1)[0].decode("ascii")
+    except ValueError as error:
+        if isinstance(error, InvalidInputError):
+            raise
+        raise InvalidInputError(f"{where}: the header is not that of a tar archive") from error
+    if header[KIND_FIELD] not in file_kinds or any(header[PREFIX_FIELD]) or not name:
+        raise InvalidInputError(
+            f"{where}: {shorten_text(name)!r} is not a regular file with a name of at most 100"
+            " characters; only such files may be in a shard"
+        )
+    return name, MemberPlace(at + TAR_BLOCK, size)
+
+
+def _read_octal(field: bytes) -> int:
+    text = field.split(b"\0", 1)[0].strip()
+    if not text.isdigit():  # not a sign, as `int` takes
+        raise ValueError("no octal number")
+    return int(text, 8)
+
+
+SHARD_FOLDER = "shards"  # Folder of the shards in a data set.
+
+
+@dataclass(frozen=True)
+class ShardEntry:
+    """A line of the index.
+
+    Attributes:
+        url: of the shard, relative to the data set.
+        nsamples: in it.
+        filesize: bytes.
+        md5sum: of the file, as 32 hexadecimal digits.
+    """
+
+    url: str
+    nsamples: int
+    filesize: int
+    md5sum: str
+
+
+def shard_name(scene: int) -> str:
+    """Path of the shard of a scene, relative to the data set."""
+    return f"{SHARD_FOLDER}/{scene:06d}.tar"
+
+
+def write_shard(path: str | Path, samples: Iterable[Sample]) -> ShardEntry:
+    """Writes the samples of a scene beside `path`, one by one, and renames the file into place.
+
+    Several processes can write at once, each another shard. The same samples give the same bytes.
+
+    Args:
+        path: the file, named after the scene's number, as in `shards/000012.tar`.
+        samples: of that scene; they may be made as they are asked for.
+
+    Returns:
+        Its line of the index.
+
+    Raises:
+        InvalidInputError: the disk is full or cannot be written to; a sample is of another scene,
+            is there twice, or does not fit itself. Nothing stays of the shard then.
+    """
+    path = Path(path)
+    digest = hashlib.md5(usedforsecurity=False)
+    seen: set[str] = set()
+    size = 0
+    with _write_atomically(path) as stream:
+
+        def write(data: bytes) -> None:
+            nonlocal size
+            with _report_write_errors(path):
+                stream.write(data)
+            digest.update(data)
+            size += len(data)
+
+        for sample in samples:
+            if f"{sample.scene:06d}" != path.stem or sample.key in seen:
+                where = "there already" if sample.key in seen else "of another scene"
+                raise InvalidInputError(
+                    f"cannot write sample {sample.key} to {path}: it is {where}"
+                )
+            seen.add(sample.key)
+            for name, data in encode_sample(sample):
+                write(tar_member(name, data))
+        write(TAR_END)
+    return ShardEntry(f"{SHARD_FOLDER}/{path.name}", len(seen), size, digest.hexdigest())
+
+
+def write_made_shard(path: Path, data: bytes) -> None:
+    """Writes the bytes of a shard that was made elsewhere, as `write_shard` does.
+
+    Raises:
+        InvalidInputError: the disk is full or cannot be written to; nothing stays of it then.
+    """
+    with _write_atomically(path) as stream, _report_write_errors(path):
+        stream.write(data)
+
+
+def shard_entry(path: Path) -> ShardEntry:
+    """The line of the index of a shard that is there.
+
+    Raises:
+        InvalidInputError: it is damaged.
+    """
+    return ShardEntry(
+        f"{SHARD_FOLDER}/{path.name}", len(open_shard(path).keys), *size_and_md5(path)
+    )
+
+
+def size_and_md5(path: Path) -> tuple[int, str]:
+    """Size [bytes] and MD5 of a file.
+
+    Raises:
+        InvalidInputError: it cannot be read.
+    """
+    chunk_size = 1 << 20  # Bytes read at a time.
+    digest, size = hashlib.md5(usedforsecurity=False), 0
+    with open_regular(path) as stream:
+        try:
+            while data := stream.read(chunk_size):
+                digest.update(data)
+                size += len(data)
+        except OSError as error:
+            raise InvalidInputError(f"cannot read {path}: {error.strerror or error}") from error
+    return size, digest.hexdigest()
+
+
+class SampleShard:
+    """A shard that is read; it holds no open file.
+
+    Attributes:
+        path: of the file.
+        samples: by key, in the order of the archive: for each kind of its files where it is.
+        strangers: names of members that belong to no sample of the scene.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Reads the headers; see `open_shard`."""
+        self.path = path
+        self.samples: dict[str, dict[str, MemberPlace]] = {}
+        self.strangers: list[str] = []
+        for name, place in tar_members(path).items():
+            key_kind = member_kind(name)
+            if key_kind is None or key_kind[0].partition("_")[0] != path.stem:
+                self.strangers.append(name)
+                continue
+            key, kind = key_kind
+            self.samples.setdefault(key, {})[kind] = place
+
+    @property
+    def keys(self) -> list[str]:
+        """Of its samples, in their order."""
+        return list(self.samples)
+
+    def record(self, key: str) -> SampleRecord:
+        """The record of a sample.
+
+        Raises:
+            InvalidInputError: see `read_record`.
+        """
+        return read_record(key, self._reader(key), str(self.path))
+
+    def sample(self, record: SampleRecord, parts: Iterable[str]) -> Sample:
+        """The sample of a record, with the parts that are asked for.
+
+        Raises:
+            InvalidInputError: see `read_parts`.
+        """
+        return read_parts(record, parts, self._reader(record.sample.key), str(self.path))
+
+    def _reader(self, key: str) -> _MemberReader:
+        return _MemberReader(self.path, key, self.samples[key])
+
+
+def open_shard(path: Path) -> SampleShard:
+    """A shard for reading; its headers are read once while the file is the same.
+
+    Raises:
+        InvalidInputError: it is missing, cut off, damaged, has a member twice, or one that is no
+            plain file; the message names shard and member.
+    """
+    try:
+        state = os.stat(path)
+    except OSError as error:
+        raise InvalidInputError(f"cannot read shard {path}: {error.strerror or error}") from error
+    return _open_unchanged_shard(path, state.st_size, state.st_mtime_ns)
+
+
+@functools.lru_cache(maxsize=256)
+def _open_unchanged_shard(path: Path, size: int, changed: int) -> SampleShard:
+    """The shard as it was with this size and time of change."""
+    del size, changed
+    return SampleShard(path)
+
+
+@dataclass(frozen=True)
+class _MemberReader:
+    """Reads files of a sample by their kind."""
+
+    path: Path
+    key: str
+    places: dict[str, MemberPlace]
+
+    def __call__(self, kind: str, most: int) -> bytes:
+        name = f"{self.key}.{FILE_SUFFIXES[kind]}"
+        if kind not in self.places:
+            raise DocumentError(f"{self.path}: {name} is missing")
+        if self.places[kind].size > most:
+            raise DocumentError(f"{self.path}: {name} has more than the {most} bytes allowed")
+        return read_member(self.path, self.places[kind])
+
+
+@contextmanager
+def _write_atomically(path: Path) -> Iterator[BinaryIO]:
+    """A new file beside `path`, which takes its place when the block ends well."""
+    beside = path.with_name(f".{path.name}.{secrets.token_hex(8)}")  # as `UNFINISHED_FILE` has it
+    try:
+        with _report_write_errors(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            stream = beside.open("xb")
+        try:
+            copy_permissions(path, stream.fileno())
+            yield stream
+            with _report_write_errors(path):
+                stream.flush()
+                os.fsync(stream.fileno())
+        finally:
+            with suppress(OSError):  # what a full disk has not taken has been reported
+                stream.close()
+        with _report_write_errors(path):
+            os.replace(beside, path)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+@contextmanager
+def _report_write_errors(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise InvalidInputError(
+            f"cannot write {shorten_text(str(path), 500)}: {error.strerror or error}; all shards except"
+            " this one are kept: make room, and run the same command to continue"
+        ).about("folder") from error

@@ -1,0 +1,374 @@
+"""Samples camera views that show objects: on a sphere, near cameras of the station, on the wrist."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from burg_drake.cameras import FieldOfView, Intrinsics, camera_intrinsics
+from burg_drake.core import (
+    Array,
+    Booleans,
+    InvalidInputError,
+    UnknownNameError,
+    inverse,
+    make_pose,
+    suggest_names,
+    transform_points,
+)
+from burg_drake.dataset.views import (
+    DEFAULT_DEPTH_RANGE,
+    SPHERE_CAMERA,
+    WRIST_CAMERA,
+    View,
+    ViewpointSettings,
+    draw_camera_on_sphere,
+    jitter_camera,
+)
+from burg_drake.motion import (
+    ArmCollision,
+    ArmKinematics,
+    arm_solutions,
+    require_free_home,
+    solve_ik,
+)
+from burg_drake.objects import ObjectEntry
+from burg_drake.scene import Scene, SceneLike, as_scene
+from burg_drake.station import (
+    Hand,
+    Station,
+    StationLike,
+    as_station,
+    build_station_diagram,
+    obstacle_boxes,
+    table_box,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedBox:
+    """A box in the scene.
+
+    Attributes:
+        name: of what it is, or is around.
+        X_SB: (4, 4) pose of its middle.
+        half: (3,) half of its extents [m].
+    """
+
+    name: str
+    X_SB: Array
+    half: Array
+
+    def contains(self, p_SQ: Array) -> bool:
+        """Whether a point (3,) is in it."""
+        p_BQ = transform_points(inverse(self.X_SB), p_SQ[None])[0]
+        return bool((np.abs(p_BQ) < self.half).all())
+
+    def hides(self, p_SC: Array, p_SQ: Array) -> Booleans:
+        """(N,) whether it is between a point (3,) and points (N, 3): part of the line to them is in
+        the box, by the slabs between its three pairs of faces."""
+        tolerance = 1e-6  # Share of the line at its ends in which contact does not count.
+        X_BS = inverse(self.X_SB)
+        start = transform_points(X_BS, p_SC[None])
+        along = transform_points(X_BS, p_SQ) - start
+        along = np.where(np.abs(along) < 1e-12, 1e-12, along)
+        one, other = (-self.half - start) / along, (self.half - start) / along
+        enters = np.minimum(one, other).max(axis=1)
+        leaves = np.maximum(one, other).min(axis=1)
+        return np.asarray(
+            (enters < leaves - tolerance) & (leaves > tolerance) & (enters < 1.0 - tolerance)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ViewedScene:
+    """A scene on a station, as far as views have to do with it.
+
+    Attributes:
+        scene, station: the two.
+    """
+
+    scene: Scene
+    station: Station
+
+    @cached_property
+    def solids(self) -> tuple[PlacedBox, ...]:
+        """Table and obstacles."""
+        X_SW = inverse(self.station.document.X_WS.matrix())
+        boxes = {"table": table_box(self.station), **obstacle_boxes(self.station)}
+        return tuple(
+            PlacedBox(name, X_SW @ box.X_WB, np.array(box.size) / 2) for name, box in boxes.items()
+        )
+
+    @cached_property
+    def objects(self) -> tuple[PlacedBox, ...]:
+        """The boxes around all instances, along the axes of each: free ones, then background."""
+        return tuple(self._around(name) for name in (*self.scene.instances, *self.scene.background))
+
+    @cached_property
+    def p_SO(self) -> Array:
+        """(N, 3) centres of what there is to see [m]: free instances, or the background if there
+        are none."""
+        seen = self.objects[: len(self.scene.instances)] or self.objects
+        return np.array([box.X_SB[:3, 3] for box in seen]).reshape(-1, 3)
+
+    def _around(self, name: str) -> PlacedBox:
+        return box_around(name, self.scene.entry(name), self.scene.X_SO(name))
+
+
+def box_around(name: str, entry: ObjectEntry, X_SO: Array) -> PlacedBox:
+    """The box around an object of a library at a pose (4, 4), along its axes."""
+    lower, upper = np.array(entry.lower), np.array(entry.upper)
+    X_SB = X_SO.copy()
+    X_SB[:3, 3] = transform_points(X_SO, 0.5 * (lower + upper)[None])[0]
+    return PlacedBox(name, X_SB, 0.5 * (upper - lower))
+
+
+def default_X_HC(hand: Hand) -> Array:
+    """(4, 4) a camera beside a hand that looks along its fingers."""
+    # Metres in G: beside the hand, with the fingertips at the image's lower edge.
+    camera_position = (0.0, -0.07, -0.09)
+    return np.asarray(hand.X_HG.matrix() @ make_pose(p_AB=camera_position))
+
+
+class WristCamera:
+    """An arm with a camera on its hand, in one scene.
+
+    Attributes:
+        X_HC: (4, 4) optical frame in the hand's frame.
+    """
+
+    def __init__(self, scene: Scene, station: Station, X_HC: Array | None = None) -> None:
+        """Builds the arm among the scene's objects, which takes about a second.
+
+        Args:
+            scene: what the arm must not touch.
+            station: has the arm.
+            X_HC: (4, 4) optical frame in the hand's frame; the usual place if None.
+
+        Raises:
+            InvalidInputError: the station has no arm, or the arm collides at home.
+        """
+        arm = station.document.arm
+        if arm is None:
+            raise InvalidInputError(
+                f"a wrist camera needs an arm, but station {station.name!r} ({station.path}) has"
+                " none; view the scene from 'sphere' or a camera of the station"
+            )
+        built = build_station_diagram(scene, station, robot="arm", weld_objects=True)
+        self._collision = ArmCollision(built)
+        require_free_home(built, self._collision)
+        self._kinematics = ArmKinematics.of(built)
+        self._solutions = arm_solutions(self._kinematics, redundant=(16,), limit_margin=0.01)
+        self._home = np.array(arm.home)
+        self._X_AS = inverse(arm.X_WA.matrix()) @ station.document.X_WS.matrix()
+        self.X_HC = default_X_HC(station.hand) if X_HC is None else X_HC
+
+    def posture(self, X_SC: Array) -> Array | str:
+        """Joint positions (n,) that bring the camera to a pose (4, 4) while nothing collides, as
+        near to home as there are; or why there are none."""
+        max_postures = 12  # Postures checked for collisions, the nearest to home first.
+        X_AH = self._X_AS @ X_SC @ inverse(self.X_HC)
+        found = [
+            self._solutions.solve(X_AH[None], turn)[1] for turn in range(self._solutions.rounds)
+        ]
+        near, met = solve_ik(
+            self._kinematics,
+            np.broadcast_to(X_AH, (sum(map(len, found)), 4, 4)),
+            np.concatenate(found),
+            iterations=5,
+            tolerance=1e-9,
+        )
+        q = self._kinematics.wrapped_near(near[met], self._home)
+        if not len(q):
+            return "are out of the arm's reach"
+        far = np.abs(q - self._home).max(axis=1)
+        for one in q[np.argsort(far, kind="stable")[:max_postures]]:
+            if self._collision.is_free(one):
+                return np.asarray(one)
+        return "have the arm collide"
+
+
+class ViewSampler:
+    """Views of one scene on one station.
+
+    Attributes:
+        settings: how they are drawn.
+    """
+
+    def __init__(
+        self,
+        scene: SceneLike,
+        station: StationLike,
+        settings: ViewpointSettings | None = None,
+        *,
+        intrinsics: Intrinsics | None = None,
+        depth_range: tuple[float, float] | None = None,
+        besides: Sequence[PlacedBox] = (),
+    ) -> None:
+        """Checks that there are such cameras.
+
+        Args:
+            scene: that is looked at.
+            station: what it stands on; has cameras and arm.
+            settings: how views are drawn.
+            intrinsics: of all cameras; if None those of the station have their own, and those on
+                sphere and wrist have them from the first camera of the station.
+            depth_range: nearest and farthest depth [m]; that of the same camera, or `DEFAULT_DEPTH_RANGE`
+                with given intrinsics, if None.
+            besides: boxes in the scene frame around what belongs to neither: cameras on sphere and
+                wrist are not in them, and see past them. Those of the station stand where they do.
+
+        Raises:
+            UnknownNameError: the station has no such camera.
+            InvalidInputError: the scene is empty; no intrinsics are given and the station has no
+                camera to take them from; or a wrist is wanted of a station without an arm.
+        """
+        self.settings = settings or ViewpointSettings()
+        self._scene, self._station = as_scene(scene), as_station(station)
+        self._seen = ViewedScene(self._scene, self._station)
+        self._given, self._depth_range = intrinsics, depth_range
+        self._besides = tuple(besides)
+        self._fields: dict[Intrinsics, FieldOfView] = {}
+        require_cameras(self.settings, self._station)
+        known = self._station.document.cameras
+        if intrinsics is None and not known:
+            raise InvalidInputError(
+                f"station {self._station.name!r} ({self._station.path}) has no camera whose"
+                " intrinsics the views could use; give intrinsics"
+            )
+        if not len(self._seen.objects):
+            raise InvalidInputError(f"scene {self._scene.name!r} ({self._scene.path}) is empty")
+        if WRIST_CAMERA in self.settings.cameras:
+            _ = self._wrist
+
+    def sample(self, rng: np.random.Generator, camera: str | None = None) -> View:
+        """Draws a view.
+
+        Args:
+            rng: draws; the same one gives the same view.
+            camera: one of those in the settings; drawn if None.
+
+        Raises:
+            InvalidInputError: none of so many draws fulfils the rules; the message says which of
+                them how many of the draws broke.
+            UnknownNameError: the settings have no such camera.
+        """
+        cameras = self.settings.cameras
+        if camera is None:
+            camera = cameras[int(rng.integers(len(cameras)))]
+        elif camera not in cameras:
+            raise UnknownNameError(
+                f"views cannot be from camera {camera!r}; {suggest_names(camera, cameras)}"
+            )
+        refused: Counter[str] = Counter()
+        still = camera in self._station.document.cameras and not (
+            self.settings.position_jitter or self.settings.angle_jitter_deg
+        )
+        for _ in range(1 if still else self.settings.draws):
+            view = self._draw(camera, rng)
+            if isinstance(view, View):
+                return view
+            refused[view] += 1
+        why = "; ".join(f"{count} {reason}" for reason, count in refused.most_common())
+        raise InvalidInputError(
+            f"no view of scene {self._scene.name!r} ({self._scene.path}) was found: of"
+            f" {refused.total()} views from {camera!r}, {why}; move the camera or the objects, or"
+            " allow views from nearer"
+        )
+
+    def _draw(self, camera: str, rng: np.random.Generator) -> View | str:
+        """A view, or which rule it breaks."""
+        known = self._station.document.cameras
+        intrinsics, depth_range = self._optics(camera)
+        solids = self._seen.solids if camera in known else (*self._seen.solids, *self._besides)
+        if camera in known:
+            X_SW = inverse(self._station.document.X_WS.matrix())
+            X_SC = jitter_camera(X_SW @ known[camera].X_WC.matrix(), self.settings, rng)
+        else:
+            X_SC = draw_camera_on_sphere(self.settings, self._seen.p_SO.mean(axis=0), rng)
+        broken = self._broken_rule(X_SC, intrinsics, depth_range, solids)
+        if broken:
+            return broken
+        posture = self._wrist.posture(X_SC) if camera == WRIST_CAMERA else None
+        if isinstance(posture, str):
+            return posture
+        return View(
+            camera=camera,
+            intrinsics=intrinsics,
+            X_SC=X_SC,
+            depth_range=depth_range,
+            posture=None if posture is None else tuple(posture.tolist()),
+        )
+
+    def _optics(self, camera: str) -> tuple[Intrinsics, tuple[float, float]]:
+        """Intrinsics and range of depths of a camera."""
+        known = self._station.document.cameras
+        if self._given is not None:
+            return self._given, self._depth_range or DEFAULT_DEPTH_RANGE
+        document = known.get(camera) or next(iter(known.values()))
+        return camera_intrinsics(document), self._depth_range or document.depth_range
+
+    def _broken_rule(
+        self,
+        X_SC: Array,
+        intrinsics: Intrinsics,
+        depth_range: tuple[float, float],
+        solids: Sequence[PlacedBox],
+    ) -> str:
+        """Which rule of what is seen a camera breaks, in words; empty if none."""
+        p_SC = X_SC[:3, 3]
+        for box in (*solids, *self._seen.objects):
+            if box.contains(p_SC):
+                return f"have the camera in {box.name!r}"
+        wanted = max(1, int(np.ceil(self.settings.in_view * len(self._seen.p_SO) - 1e-9)))
+        if self._shown(X_SC, intrinsics, depth_range, solids) < wanted:
+            return f"show fewer than {wanted} of {len(self._seen.p_SO)} objects"
+        return ""
+
+    def _shown(
+        self,
+        X_SC: Array,
+        intrinsics: Intrinsics,
+        depth_range: tuple[float, float],
+        solids: Sequence[PlacedBox],
+    ) -> int:
+        """How many objects have their centres in the image and the range of depths, with none of
+        the solids before them."""
+        p_SO = self._seen.p_SO
+        p_CO = transform_points(inverse(X_SC), p_SO)
+        near, far = depth_range
+        seen = (p_CO[:, 2] >= near) & (p_CO[:, 2] <= far)
+        field = self._fields.setdefault(intrinsics, FieldOfView(intrinsics))
+        seen &= field.sees(p_CO)
+        pixel = np.full((len(p_CO), 2), -1.0)
+        pixel[seen] = intrinsics.project(p_CO[seen])
+        size = np.array((intrinsics.width, intrinsics.height))
+        seen &= ((pixel >= -0.5) & (pixel <= size - 0.5)).all(axis=1)
+        for box in solids:
+            seen &= ~box.hides(X_SC[:3, 3], p_SO)
+        return int(seen.sum())
+
+    @cached_property
+    def _wrist(self) -> WristCamera:
+        X_HC = self.settings.X_HC
+        return WristCamera(self._scene, self._station, None if X_HC is None else X_HC.matrix())
+
+
+def require_cameras(settings: ViewpointSettings, station: Station) -> None:
+    """Refuses cameras that a station does not have.
+
+    Raises:
+        UnknownNameError: there is no such camera.
+    """
+    known = (SPHERE_CAMERA, WRIST_CAMERA, *station.document.cameras)
+    for name in settings.cameras:
+        if name not in known:
+            raise UnknownNameError(
+                f"station {station.name!r} ({station.path}) has no camera {name!r};"
+                f" {suggest_names(name, known)}"
+            )

@@ -1,0 +1,320 @@
+"""The grasps that a run judges: grasp, instance of the scene, id; and selection of instances by name."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import (
+    Array,
+    GraspSet,
+    InvalidInputError,
+    UnknownNameError,
+    content_hash,
+    list_names,
+    quote_value,
+    suggest_names,
+)
+from burg_drake.scene import Scene
+
+INSTANCE_COLUMN = "instance"
+"""Column of a grasp file: the placed object that each grasp belongs to."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One grasp on one instance.
+
+    Attributes:
+        id: `INSTANCE-GRASP`, unique in a run.
+        instance: name of the placed object.
+        X_OG: (4, 4) grasp in the object frame.
+        friction: the target's coefficient, in place of the library's.
+        mass: of the target, in place of the library's [kg].
+        width: distance of the contacts [m]; NaN if unknown.
+        lift: length of the lift, in place of the motion's [m].
+    """
+
+    id: str
+    instance: str
+    X_OG: Array
+    friction: float | None = None
+    mass: float | None = None
+    width: float = math.nan
+    lift: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """N grasps on instances of a scene, grouped by instance.
+
+    Attributes:
+        grasps: the grasps in the frames of their objects.
+        instance: (N,) names of the placed objects.
+    """
+
+    grasps: GraspSet
+    instance: NDArray[np.str_]
+
+    def __len__(self) -> int:
+        return len(self.grasps)
+
+    def __iter__(self) -> Iterator[Candidate]:
+        grasps = zip(self.id, self.instance, self.grasps.X_OG, self.grasps.width, strict=True)
+        for id, instance, X_OG, width in grasps:
+            yield Candidate(id, str(instance), X_OG, width=float(width))
+
+    @cached_property
+    def id(self) -> list[str]:
+        """Identifiers in order: instance and grasp, joined by a hyphen."""
+        return [f"{i}-{g}" for i, g in zip(self.instance, self.grasps.id, strict=True)]
+
+    @cached_property
+    def content(self) -> str:
+        """Hash of poses, widths and instances."""
+        return content_hash(self.grasps.X_OG, self.grasps.width, self.id)
+
+    def save(self, path: Path) -> None:
+        """Writes a grasp file that `load`, and `GraspSet.load`, read back bit for bit."""
+        self.grasps.with_columns(instance=self.instance).save(path)
+
+    @classmethod
+    def load(cls, path: Path) -> Candidates:
+        """Reads a file written by `save`.
+
+        Raises:
+            InvalidInputError: the file is something else.
+        """
+        grasps = GraspSet.load(path)
+        if INSTANCE_COLUMN not in grasps.columns:
+            raise InvalidInputError(f"{path} does not say on which instance each grasp is")
+        columns = {
+            name: values for name, values in grasps.columns.items() if name != INSTANCE_COLUMN
+        }
+        return cls(dataclasses.replace(grasps, columns=columns), grasps.columns[INSTANCE_COLUMN])
+
+
+def given_candidates(scene: Scene, grasps: Mapping[str, GraspSet]) -> Candidates:
+    """Candidates from the user's own grasps.
+
+    Args:
+        scene: the scene.
+        grasps: grasps in the object frame by name of a free instance. Instances that are not
+            named get none; of equal grasps on an instance the first one is kept.
+
+    Raises:
+        UnknownNameError: no free instance goes by such a name.
+        InvalidInputError: a set holds grasps of another object.
+    """
+    require_instances(scene, grasps)
+    for name, grasp_set in grasps.items():
+        expected = scene.instance(name).object
+        others = set(grasp_set.object.tolist()) - {expected, ""}
+        if others:
+            raise InvalidInputError(
+                f"the grasps given for {name!r} are of object {min(others)!r}, but "
+                f"{name!r} is object {expected!r} in the scene"
+            )
+    return join_candidates(
+        {name: drop_equal_grasps(grasps[name]) for name in scene.instances if name in grasps}
+    )
+
+
+def require_instances(scene: Scene, names: Iterable[str], path: str = "") -> None:
+    """Refuses names that no free instance goes by.
+
+    Args:
+        scene: with the instances.
+        names: of the instances that grasps are given for.
+        path: of their file, for the message.
+
+    Raises:
+        UnknownNameError: there is no such instance.
+    """
+    for name in names:
+        if name not in scene.instances:
+            raise UnknownNameError(
+                f"{path}{': ' if path else ''}grasps are given for {quote_value(name)}, which is not a"
+                f" free instance of scene {scene.name!r}; {suggest_names(name, scene.instances)}"
+            )
+
+
+def join_candidates(by_instance: dict[str, GraspSet]) -> Candidates:
+    """Candidates from grasps by the name of their instance; provenances are kept by instance."""
+    if not by_instance:
+        return Candidates(GraspSet.create(np.empty((0, 4, 4)), object=""), np.empty(0, dtype=str))
+    names = [name for name, grasps in by_instance.items() for _ in range(len(grasps))]
+    grasps = GraspSet.concatenate(by_instance.values())
+    parts = dict(zip(by_instance, grasps.provenance["parts"], strict=True))
+    return Candidates(
+        dataclasses.replace(grasps, provenance={"parts": parts}), np.array(names, dtype=str)
+    )
+
+
+def drop_equal_grasps(grasps: GraspSet) -> GraspSet:
+    """The first one of equal grasps, in the order that there is."""
+    _, first = np.unique(grasps.id, return_index=True)
+    return grasps.select(np.sort(first))
+
+
+@dataclass(frozen=True)
+class InstanceNames:
+    """Names of a grasp file and the instances that are meant.
+
+    Attributes:
+        scene: has the instances.
+        path: the file, for messages.
+        given: names of the scene's objects or instances by the file's names; by the empty text for
+            whatever the file has.
+        is_file: whether it is a file, of which a user can say what its names mean.
+    """
+
+    scene: Scene
+    path: str
+    given: Mapping[str, str]
+    is_file: bool = True
+
+    def require_used(self, foreign: Collection[str]) -> None:
+        """Refuses names for what the file does not have.
+
+        Args:
+            foreign: names in the file.
+
+        Raises:
+            UnknownNameError: one of `given` is not among them.
+            InvalidInputError: one name is given for several.
+        """
+        names = [name for name in foreign if name]
+        for name in self.given:
+            if name and name not in names:
+                known = suggest_names(name, names) if names else "it names no objects"
+                raise UnknownNameError(f"{self.path} has no grasps of object {name!r}; {known}")
+        if "" in self.given and len(foreign) > 1:
+            raise InvalidInputError(
+                f"{self.path} has grasps of {len(foreign)} objects ({list_names(names)});"
+                " say which of them is which of the scene, as THEIRS=OURS"
+            ).about("objects")
+
+    def of_object(self, foreign: str) -> list[str]:
+        """The free instances that grasps of an object of the file are for.
+
+        Raises:
+            InvalidInputError: the file does not name the object, and nobody else does.
+            UnknownNameError: the scene has no such object.
+        """
+        meant = self.given.get(foreign, self.given.get(""))
+        if meant is not None:
+            return self.called(meant)
+        known = {instance.object for instance in self.scene.instances.values()}
+        if not foreign:
+            how = "" if self.is_file else " (GraspSet.create(..., object=NAME))"
+            raise InvalidInputError(
+                f"{self.path} does not name the object of its grasps; name it{how};"
+                f" scene {self.scene.name!r} has {list_names(sorted(known))}"
+            ).about("objects")
+        if foreign not in known:
+            how = (
+                f"say which of the scene's objects it is, {foreign}=NAME; " if self.is_file else ""
+            )
+            raise UnknownNameError(
+                f"{self.path} has grasps of object {foreign!r}, which is not in scene"
+                f" {self.scene.name!r}; {how}{suggest_names(foreign, known)}"
+            ).about("objects")
+        return self.called(foreign)
+
+    def called(self, name: str) -> list[str]:
+        """All free instances of an object, or else the one of that name.
+
+        Raises:
+            UnknownNameError: there are none.
+        """
+        return instances_by_name(self.scene, name)
+
+
+def instances_by_name(scene: Scene, name: str) -> list[str]:
+    """All free instances of an object, or else the one of that name.
+
+    Raises:
+        UnknownNameError: there are none.
+    """
+    instances = scene.instances
+    found = [key for key, instance in instances.items() if instance.object == name]
+    found = found or [key for key in instances if key == name]
+    if not found:
+        known = {*instances, *(instance.object for instance in instances.values())}
+        raise UnknownNameError(
+            f"scene {scene.name!r} has no free instance {name!r}; {suggest_names(name, known)}"
+        )
+    return found
+
+
+def chosen_instances(scene: Scene, only: Iterable[str] | None) -> tuple[str, ...]:
+    """The free instances that some names stand for, in the order of the scene; all if there are no
+    names.
+
+    Raises:
+        UnknownNameError: a name stands for none.
+    """
+    names = list(only or scene.instances)
+    chosen = {key for name in names for key in instances_by_name(scene, name)}
+    return tuple(key for key in scene.instances if key in chosen)
+
+
+def select_instances(
+    scene: Scene, by_instance: Mapping[str, GraspSet], only: Iterable[str] | None
+) -> Mapping[str, GraspSet]:
+    """The grasps on the instances that some names stand for; all if there are no names.
+
+    Raises:
+        UnknownNameError: a name stands for no instance of the scene.
+        InvalidInputError: there are no grasps on any of them.
+    """
+    names = list(only or ())
+    if not names:
+        return by_instance
+    chosen = chosen_instances(scene, names)
+    found = {name: by_instance[name] for name in chosen if len(by_instance.get(name, ()))}
+    if not found:
+        there = list_names([name for name, grasps in by_instance.items() if len(grasps)])
+        raise InvalidInputError(
+            f"there are no grasps of {list_names(names)}; there are some of {there}"
+        )
+    return found
+
+
+def rows_of_names(
+    only: Iterable[str] | None,
+    where: str,
+    objects: NDArray[np.str_],
+    instances: NDArray[np.str_] | None = None,
+) -> NDArray[np.bool_]:
+    """Which grasps are of objects or instances that go by some names, (N,); all without names.
+
+    Args:
+        only: the names.
+        where: the grasps are, for messages.
+        objects: (N,) object of each grasp.
+        instances: (N,) instance of each grasp, if it is known.
+
+    Raises:
+        UnknownNameError: no grasp is of that name.
+    """
+    names = list(only or ())
+    holders = [objects] if instances is None else [objects, instances]
+    if not names:
+        return np.ones(len(objects), dtype=bool)
+    known = {name for column in holders for name in column.tolist()}
+    for name in names:
+        if name not in known:
+            raise UnknownNameError(
+                f"{where} has no grasps of {name!r}; {suggest_names(name, known)}"
+            )
+    held: NDArray[np.bool_] = np.any([np.isin(column, names) for column in holders], axis=0)
+    return held

@@ -1,0 +1,316 @@
+"""Scene, station and all files that Drake reads of them as one zip, and a judge built from it."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+import pickle
+import zipfile
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any
+
+from burg_drake.core import (
+    NO_PACKAGES,
+    InvalidInputError,
+    Mode,
+    Packages,
+    dump_document,
+    load_document,
+    open_regular,
+    referenced_files,
+    referenced_packages,
+)
+from burg_drake.evaluation.cluster.unpacked_bundle import JudgeRecipe
+from burg_drake.evaluation.judge import Judge, StationJudge, StationJudgeFactory
+from burg_drake.objects import LIBRARY_FILE, find_companion_files, load_library, package_manifest
+from burg_drake.scene import Scene, SceneDocument
+from burg_drake.station import Engine, Hand, Station, StationDocument, world_content
+
+if TYPE_CHECKING:
+    from burg_drake.simulation import TrialSettings
+
+
+class BundleFiles:
+    """Bundle files."""
+
+    places = "places.json"  # Where the model files lie in the bundle.
+    scene = "scene.yaml"  # Scene document.
+    station = "station.yaml"  # Station document.
+    hand = "hand.yaml"  # Hand document.
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """A packed world.
+
+    Attributes:
+        name: SHA-256 of `data`.
+        data: a zip.
+        content: `world_content` of scene and station.
+        scene_content, station_content: their own, to say which of them differs.
+    """
+
+    name: str
+    data: bytes
+    content: str
+    scene_content: str
+    station_content: str
+
+
+def make_bundle(scene: Scene, station: Station, *, looks: bool = False) -> Bundle:
+    """Packs a scene and a station.
+
+    Args:
+        scene, station: the two.
+        looks: with materials and textures, for images; no grasp depends on them.
+
+    Raises:
+        MeshError: a texture is too large.
+        InvalidInputError: a file cannot be read.
+        UnknownNameError: a model names a package that is nowhere.
+    """
+    # No package name has a dot, so these folders do not collide with one.
+    library_folder = "library.d"
+    hand_folder = "hand.d"
+    arm_folder = "arm.d"
+    used = {i.object: None for i in (*scene.instances.values(), *scene.background.values())}
+    entries = {name: scene.library.entry(name) for name in used}
+    root = Path(os.path.abspath(scene.library.root))
+    own = [root / file for entry in entries.values() for file in entry.files]
+    models = [root / entry.sdf for entry in entries.values()]
+    packages = station.packages
+    library = _BundleTree.of(library_folder, root, models, own, packages)
+    hand = _BundleTree.of(hand_folder, station.hand_model, [station.hand_model], [], packages)
+    trees = [library, hand]
+    if station.arm_model is not None:
+        trees.append(
+            _BundleTree.of(arm_folder, station.arm_model, [station.arm_model], [], packages)
+        )
+    if looks:
+        trees = [tree.with_looks() for tree in trees]
+    folders = {name: folder for tree in trees for name, folder in tree.packages.items()}
+    places = {
+        "library": library.anchor,
+        "hand_model": hand.anchor,
+        "arm_model": trees[2].anchor if station.arm_model is not None else None,
+        "packages": sorted(folders),
+    }
+    contents = {f"{n}/package.xml": _manifest_bytes(n, folder) for n, folder in folders.items()}
+    contents |= {name: _read_bytes(path) for tree in trees for name, path in tree.files.items()}
+    objects = replace(scene.library.document, objects=entries)
+    contents |= {
+        BundleFiles.places: json.dumps(places, indent=1).encode(),
+        BundleFiles.scene: dump_document(replace(scene.document, origin=None, library="")).encode(),
+        BundleFiles.station: dump_document(replace(station.document, packages={})).encode(),
+        BundleFiles.hand: dump_document(station.hand).encode(),
+        f"{library.anchor}/{LIBRARY_FILE}": dump_document(objects).encode(),
+    }
+    data = _zip_contents(contents)
+    return Bundle(
+        name=hashlib.sha256(data).hexdigest(),
+        data=data,
+        content=world_content(scene, station),
+        scene_content=scene.content,
+        station_content=station.content,
+    )
+
+
+def load_bundle(folder: Path) -> tuple[Scene, Station]:
+    """Scene and station of a bundle that was unpacked into a folder."""
+    places = json.loads((folder / BundleFiles.places).read_text())
+    library = load_library(str(folder / places["library"] / LIBRARY_FILE))
+    scene = Scene(
+        load_document(folder / BundleFiles.scene, SceneDocument),
+        library,
+        folder / BundleFiles.scene,
+    )
+    packages = Packages({name: folder / name for name in places["packages"]})
+    arm = places["arm_model"]
+    station = Station(
+        load_document(folder / BundleFiles.station, StationDocument),
+        load_document(folder / BundleFiles.hand, Hand),
+        folder / places["hand_model"],
+        None if arm is None else folder / arm,
+        folder / BundleFiles.station,
+        folder / BundleFiles.hand,
+        packages,
+    )
+    return scene, station
+
+
+def require_same_content(bundle: Bundle, scene: Scene, station: Station) -> None:
+    """Refuses a world that is not the one that was packed.
+
+    Args:
+        bundle: its hashes; the data are not needed.
+        scene, station: unpacked.
+
+    Raises:
+        InvalidInputError: they differ; the message says which.
+    """
+    for kind, there, here in (
+        ("scene", bundle.scene_content, scene.content),
+        ("station", bundle.station_content, station.content),
+        ("files of the objects", bundle.content, world_content(scene, station)),
+    ):
+        if there != here:
+            raise InvalidInputError(
+                f"the {kind} of {scene.name!r} on {station.name!r} changed on the way to"
+                f" a worker: content {there[:12]} was sent, {here[:12]} arrived; either a"
+                " model names files by a path that exists only here (a link to another"
+                " folder or an absolute path), or the worker has another release of"
+                " burg_drake"
+            )
+
+
+@dataclass(frozen=True)
+class _BundleTree:
+    """Files whose relative places to each other are kept.
+
+    Attributes:
+        anchor: name in the bundle of what the tree is for.
+        files: by name in the bundle.
+        packages: folders of the packages that models in it name.
+    """
+
+    anchor: str
+    files: Mapping[str, Path]
+    packages: Mapping[str, Path]
+
+    @classmethod
+    def of(
+        cls,
+        top: str,
+        anchor: Path,
+        models: Iterable[Path],
+        others: Iterable[Path],
+        packages: Packages,
+    ) -> _BundleTree:
+        """The tree of some models.
+
+        Args:
+            top: folder in the bundle for what is in no package.
+            anchor: a file or folder.
+            models: with the files that they name.
+            others: more files.
+            packages: where packages are looked for.
+        """
+        models = [model for model in models if model.is_file()]
+        folders = {
+            n: f.resolve() for m in models for n, f in referenced_packages(m, packages).items()
+        }
+        sought = (packages, NO_PACKAGES)  # as the simulation finds them, and the content's hash
+        named = [file for model in models for p in sought for file in referenced_files(model, p)]
+        anchor = Path(os.path.abspath(anchor))
+        files = [Path(os.path.abspath(file)) for file in (*models, *others, *named)]
+        files = [file for file in dict.fromkeys(files) if file.is_file()]
+        outside = [file for file in files if _package_of(file, folders) is None]
+        around = anchor if anchor.is_dir() else anchor.parent
+        base = Path(os.path.commonpath([around, *(file.parent for file in outside)]))
+
+        def name(path: Path) -> str:
+            package = _package_of(path, folders)
+            if package is None:
+                return (PurePosixPath(top) / path.relative_to(base).as_posix()).as_posix()
+            inside = path.relative_to(folders[package])
+            return (PurePosixPath(package) / inside.as_posix()).as_posix()
+
+        return cls(name(anchor), {name(file): file for file in files}, folders)
+
+    def with_looks(self) -> _BundleTree:
+        """The same with the materials and textures that its meshes refer to."""
+        beside = {
+            (PurePosixPath(name).parent / file.relative_to(path.parent).as_posix()).as_posix(): file
+            for name, path in self.files.items()
+            for file in find_companion_files(path)
+        }
+        return replace(self, files=beside | dict(self.files))
+
+
+def _package_of(path: Path, folders: Mapping[str, Path]) -> str | None:
+    """The package that a file is in; of several, the innermost."""
+    inside = [name for name, folder in folders.items() if path.is_relative_to(folder)]
+    return max(inside, key=lambda name: len(folders[name].parts), default=None)
+
+
+def _manifest_bytes(name: str, folder: Path) -> bytes:
+    """By which a package is known wherever it is; one that has none gets one."""
+    manifest = folder / "package.xml"
+    return _read_bytes(manifest) if manifest.is_file() else package_manifest(name, "").encode()
+
+
+def _read_bytes(path: Path) -> bytes:
+    with open_regular(path) as stream:
+        return stream.read()
+
+
+def _zip_contents(contents: Mapping[str, bytes]) -> bytes:
+    entry_date = (1980, 1, 1, 0, 0, 0)  # Fixed, so that equal contents give equal bytes.
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive:
+        for name in sorted(contents):
+            info = zipfile.ZipInfo(name, entry_date)
+            info.compress_type, info.create_system = zipfile.ZIP_DEFLATED, 3
+            info.external_attr = 0o644 << 16
+            archive.writestr(info, contents[name])
+    return buffer.getvalue()
+
+
+@dataclass(frozen=True)
+class BundledJudgeFactory:
+    """A `StationJudgeFactory` whose scene and station are in an unpacked bundle.
+
+    Attributes:
+        bundle: its name and hashes, without data.
+        engine, mode, settings: as in `StationJudgeFactory`.
+        folder: where it is unpacked; the worker says so.
+    """
+
+    bundle: Bundle
+    engine: Engine
+    mode: Mode
+    settings: TrialSettings | None
+    folder: Path | None = None
+
+    def __call__(self) -> StationJudge:
+        assert self.folder is not None
+        scene, station = load_bundle(self.folder)
+        require_same_content(self.bundle, scene, station)
+        return StationJudgeFactory(scene, station, self.engine, self.mode, self.settings)()
+
+
+def make_recipe(make_judge: Callable[[], Judge]) -> tuple[JudgeRecipe, Bundle | None]:
+    """Recipe and bundle for a judge; where there is no `StationJudgeFactory`, no bundle is needed.
+
+    Raises:
+        BurgError: see `make_bundle`.
+    """
+    buffer = io.BytesIO()
+    packer = _Packer(buffer)
+    packer.dump(make_judge)
+    bundle = packer.bundle
+    return JudgeRecipe(buffer.getvalue(), bundle.name if bundle else ""), bundle
+
+
+class _Packer(pickle.Pickler):
+    """Puts a `BundledJudgeFactory` in the place of a `StationJudgeFactory`, wherever that is in
+    what it pickles.
+
+    Attributes:
+        bundle: scene and station of that factory.
+    """
+
+    def __init__(self, file: io.BytesIO) -> None:
+        super().__init__(file)
+        self.bundle: Bundle | None = None
+
+    def persistent_id(self, value: Any) -> BundledJudgeFactory | None:
+        if not isinstance(value, StationJudgeFactory):
+            return None
+        self.bundle = make_bundle(value.scene, value.station)
+        hashes = replace(self.bundle, data=b"")
+        return BundledJudgeFactory(hashes, value.engine, value.mode, value.settings)

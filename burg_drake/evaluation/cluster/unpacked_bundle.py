@@ -1,0 +1,150 @@
+"""Bundles on a worker's machine, and the recipe by which a child process builds a judge from one."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import io
+import os
+import pickle
+import secrets
+import shutil
+import time
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from burg_drake.core import InvalidInputError
+from burg_drake.evaluation.judge import Judge
+
+BUNDLES_FOLDER = "burg-drake-bundles"  # Folder of all unpacked bundles of a machine.
+
+
+def bundle_folder(place: Path, name: str) -> Path | None:
+    """Where a bundle is; None if it is not on this machine. It is kept for a day from now."""
+    folder = place / BUNDLES_FOLDER / name
+    if not folder.is_dir():
+        return None
+    with contextlib.suppress(OSError):  # another user's, who can read it nonetheless
+        os.utime(folder)
+    return folder
+
+
+def unpack(data: bytes, place: Path, name: str) -> Path:
+    """Unpacks a bundle, unless it is there.
+
+    Args:
+        data: the zip.
+        place: folder of this machine for what is of passing use.
+        name: SHA-256 of `data`.
+
+    Returns:
+        The folder.
+
+    Raises:
+        InvalidInputError: the data are others, or cannot be written, or something else is in
+            their place.
+    """
+    if hashlib.sha256(data).hexdigest() != name:
+        raise InvalidInputError(f"bundle {name[:12]} was damaged on the way")
+    every = place / BUNDLES_FOLDER
+    folder, unfinished = every / name, every / f".{name}.{secrets.token_hex(8)}"
+    try:
+        every.mkdir(mode=0o700, parents=True, exist_ok=True)
+        _remove_unused(every)
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            if _is_whole(folder, archive):
+                return folder
+            shutil.rmtree(folder, ignore_errors=True)  # what somebody has removed files of
+            archive.extractall(unfinished)
+            try:
+                unfinished.rename(folder)
+            except OSError:
+                if not _is_whole(folder, archive):  # otherwise another process was first
+                    raise
+    except OSError as error:
+        raise InvalidInputError(
+            f"cannot unpack the scene into {folder}: {error.strerror}; give Dask's"
+            " workers another local directory"
+        ) from error
+    finally:
+        shutil.rmtree(unfinished, ignore_errors=True)
+    return folder
+
+
+def _is_whole(folder: Path, archive: zipfile.ZipFile) -> bool:
+    """Whether a folder has the files of an archive, as they are there."""
+    try:
+        return all((folder / n).read_bytes() == archive.read(n) for n in archive.namelist())
+    except OSError:
+        return False
+
+
+def _remove_unused(every: Path) -> None:
+    """Removes old bundles, and what killed processes left."""
+    max_age = 86_400.0  # Seconds since the last use.
+    for path in every.iterdir():
+        with contextlib.suppress(OSError):
+            if time.time() - path.stat().st_mtime > max_age:
+                shutil.rmtree(path, ignore_errors=True)
+
+
+@dataclass(frozen=True)
+class PickledJudgeFactory:
+    """A factory that is unpickled where it is called.
+
+    Attributes:
+        make_judge: a factory, pickled.
+        folder: of the bundle, which what is pickled apart in the factory is told; None if it has
+            nothing of the kind.
+    """
+
+    make_judge: bytes
+    folder: Path | None = None
+
+    def __call__(self) -> Judge:
+        factory: Callable[[], Judge] = _Unpacker(self.make_judge, self.folder).load()
+        return factory()
+
+
+class _Unpacker(pickle.Unpickler):
+    """The counterpart of `bundled_judge._Packer`."""
+
+    def __init__(self, data: bytes, folder: Path | None) -> None:
+        super().__init__(io.BytesIO(data))
+        self._folder = folder
+
+    def persistent_load(self, value: Any) -> Any:
+        return replace(value, folder=self._folder)
+
+
+@dataclass(frozen=True)
+class JudgeRecipe:
+    """How to build a judge.
+
+    Attributes:
+        make_judge: a factory, pickled.
+        bundle: name of the bundle whose folder the factory is to be told; empty if it needs none.
+    """
+
+    make_judge: bytes
+    bundle: str = ""
+
+    @cached_property
+    def key(self) -> str:
+        """Names the judge."""
+        return hashlib.sha256(self.make_judge).hexdigest()
+
+    def load(self, place: Path) -> PickledJudgeFactory | None:
+        """The factory for this machine; None if the bundle is not here yet.
+
+        Args:
+            place: see `unpacked.unpack`.
+        """
+        if not self.bundle:
+            return PickledJudgeFactory(self.make_judge)
+        folder = bundle_folder(place, self.bundle)
+        return None if folder is None else PickledJudgeFactory(self.make_judge, folder)

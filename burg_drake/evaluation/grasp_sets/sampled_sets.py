@@ -1,0 +1,307 @@
+"""Grasp sets of several objects: sampled ones with their provenance, and analytic quality of any set."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import (
+    Array,
+    GraspSet,
+    InvalidInputError,
+    Listener,
+    MeshError,
+    Progress,
+    ProgressMeter,
+    Reporter,
+    Stage,
+    UnknownNameError,
+    suggest_names,
+)
+from burg_drake.evaluation.candidates import INSTANCE_COLUMN
+from burg_drake.evaluation.grasp_sets.input import object_files, set_documents
+from burg_drake.evaluation.grasp_sets.sampling import sample_library, sample_on_scene
+from burg_drake.evaluation.settings import SamplingSettings
+from burg_drake.geometry import Surface
+from burg_drake.grasping import (
+    CLEARANCE_VERSION,
+    DEFAULT_METRIC,
+    METRICS,
+    Payload,
+    check_metric,
+    grasp_quality,
+    jaws_of,
+    quality_provenance,
+    score_of,
+)
+from burg_drake.objects import ObjectLibrary
+from burg_drake.scene import Scene, SceneLike, as_scene
+from burg_drake.station import Station, StationLike, as_station
+
+
+def sample_grasps(
+    source: SceneLike | ObjectLibrary,
+    station: StationLike,
+    n: int,
+    *,
+    seed: int = 0,
+    settings: SamplingSettings | None = None,
+    only: Iterable[str] | None = None,
+) -> GraspSet:
+    """Samples antipodal grasps on the free objects of a scene, or on those of a library.
+
+    Example::
+
+        settings = burg.SamplingSettings(from_arm_side=True)
+        grasps = burg.sample_grasps("tabletop_six", "panda_tabletop", 200, settings=settings)
+        grasps.save("grasps.h5")
+
+    Args:
+        source: the scene, or the library, in which objects lie nowhere.
+        station: gives the hand and, in a scene, the place of the arm.
+        n: grasps for each instance or object; there are fewer where there are no more.
+        seed: of the random numbers. The grasps of an object follow from it, the object and, unless
+            they are sampled blind, what stands around it.
+        settings: how; the defaults if None.
+        only: names of objects, or of instances of the scene; all if None.
+
+    Returns:
+        The grasps in the frames of their objects, in a scene with the column `instance`.
+
+    Raises:
+        InvalidInputError: n is below 1, a setting does not fit, or there is nothing to sample on.
+        UnknownNameError: no such instance or object, or a mesh file is missing.
+    """
+    chosen = settings or SamplingSettings()
+    only = (only,) if isinstance(only, str) else only
+    station = as_station(station)
+    if isinstance(source, ObjectLibrary):
+        scene, library = None, source
+    else:
+        scene = as_scene(source)
+        library = scene.library
+    stream = (
+        sample_library(library, station, n, seed, chosen, only)
+        if scene is None
+        else sample_on_scene(scene, station, n, seed, chosen, only)
+    )
+    sampled = dict(stream)
+    if not sampled:
+        raise InvalidInputError(
+            f"{(scene or library).name!r} has no free objects to sample grasps on"
+        )
+    return sampled_set(sampled, library, scene, station, n, seed, chosen)
+
+
+def sampled_set(
+    sampled: Mapping[str, GraspSet],
+    library: ObjectLibrary,
+    scene: Scene | None,
+    station: Station,
+    n: int,
+    seed: int,
+    settings: SamplingSettings,
+) -> GraspSet:
+    """One set of all grasps.
+
+    Args:
+        sampled: grasps by name of the instance, or of the object where there is no scene; one or
+            more.
+        library: has the objects.
+        scene: where they stand, if anywhere; the set then has the column `instance`.
+        station, n, seed, settings: what `sample_on_scene` or `sample_library` was called with.
+
+    Returns:
+        The grasps, with all that it takes to sample them again: the documents and the content that
+        they had, `n`, `seed`, `settings`, versions, and under `parts` the provenance of each
+        object's grasps. Weights of faces are there by their hashes. `object_files` describes each
+        object as files of other projects do.
+    """
+    objects = sorted({name for grasps in sampled.values() for name in grasps.object.tolist()})
+    provenance: dict[str, Any] = {
+        **set_documents(library, scene, station, objects),
+        "object_files": object_files(library, objects),
+        "n": n,
+        "seed": seed,
+        "settings": _settings_data(settings),
+        "parts": {name: dict(grasps.provenance) for name, grasps in sampled.items()},
+    }
+    joined = dataclasses.replace(GraspSet.concatenate(sampled.values()), provenance=provenance)
+    if scene is None:
+        return joined
+    names = np.repeat(list(sampled), [len(grasps) for grasps in sampled.values()])
+    return joined.with_columns(**{INSTANCE_COLUMN: names})
+
+
+def _settings_data(settings: SamplingSettings) -> dict[str, Any]:
+    """The settings as JSON values; of the weights, whose objects have some."""
+    values = {field.name: getattr(settings, field.name) for field in dataclasses.fields(settings)}
+    return {**values, "standoffs": list(settings.standoffs), "weights": sorted(settings.weights)}
+
+
+SCENE_COLUMNS = ("clearance", "nearest", "screened", "collides_with")
+"""Columns that only a scene gives."""
+
+
+def scored_set(
+    grasps: GraspSet,
+    library: ObjectLibrary,
+    station: StationLike,
+    scene: SceneLike | None = None,
+    *,
+    friction: Mapping[str, float] | None = None,
+    by: str = DEFAULT_METRIC,
+    progress: bool | Listener = False,
+) -> GraspSet:
+    """Adds the metrics of `grasping.quality`, and in a scene the clearance of the open hand.
+
+    Example::
+
+        library, grasps = burg.load_library("household"), burg.GraspSet.load("grasps.h5")
+        scored = burg.grasps.scored_set(grasps, library, "panda_tabletop", by="epsilon")
+        best = scored.select(scored.score.argsort()[::-1][:10])
+
+    Args:
+        grasps: in the frames of their objects.
+        library: has the objects.
+        station: whose hand it is.
+        scene: where the objects stand. A grasp is on the instance that its column `instance` names,
+            or on the only one of its object.
+        friction: coefficients by object, in place of the library's; under "" for all others.
+        by: the metric that becomes the score, `grasping.quality.METRICS`.
+        progress: True shows it on standard error; a function gets the events.
+
+    Returns:
+        The same grasps in the same order; `provenance["quality"]` tells with what they were scored.
+        In a scene `gravity_margin` is known, and there are the `SCENE_COLUMNS`, which grasps from
+        elsewhere lose without one: `clearance` [m], negative where the hand overlaps something;
+        `suggest_names`, what it overlaps or is nearest to; `screened`, the outcome of the screen, `clear`
+        or one of `Outcome`; and `collides_with`, what decided it, "" if clear.
+
+    Raises:
+        UnknownNameError: an object, an instance or the metric does not exist.
+        InvalidInputError: an object has several instances and grasps do not say which one they are
+            on, or the metric needs a scene.
+        MeshError: the surface of an object cannot be used.
+    """
+    station = as_station(station)
+    scene = None if scene is None else as_scene(scene)
+    check_metric(by)
+    if by == "gravity_margin" and scene is None:
+        raise InvalidInputError("gravity_margin depends on where up is; give a scene")
+    objects = sorted(set(grasps.object.tolist()))
+    chosen = _friction_by_object(friction or {}, objects)
+    jaws = jaws_of(station.hand, station.hand_model, station.packages)
+    instance = None if scene is None else _instances(grasps, scene)
+    X_WO = None if scene is None or instance is None else _instance_poses(instance, scene, station)
+    columns: dict[str, Any] = {name: np.full(len(grasps), np.nan) for name in METRICS}
+    columns["force_closure"] = np.zeros(len(grasps), bool)
+    payloads = {}
+    with Reporter(progress) as reporter:
+        pace = ProgressMeter(reporter.show, Progress("scoring", total=len(grasps)))
+        for name in objects:
+            payload = Payload.of(library.entry(name), chosen.get(name, chosen.get("")))
+            payloads[name] = asdict(payload)
+            surface = _surface(library, name)
+            for some in _batches(grasps.object == name):
+                up = None if X_WO is None else X_WO[some, 2, :3]
+                quality = grasp_quality(grasps.X_OG[some], surface, payload, jaws, up=up)
+                for metric in METRICS:
+                    columns[metric][some] = getattr(quality, metric)
+                pace.step(len(some))
+        how: dict[str, Any] = {
+            "payloads": payloads,
+            **set_documents(library, scene, station, objects),
+        }
+        if scene is not None and instance is not None and X_WO is not None:
+            pace = ProgressMeter(reporter.show, Progress("clearance", total=len(grasps)))
+            columns |= _clearances(instance, X_WO @ grasps.X_OG, scene, station, pace)
+            how["clearance_version"] = CLEARANCE_VERSION
+    kept = {name: values for name, values in grasps.columns.items() if name not in SCENE_COLUMNS}
+    provenance = {**grasps.provenance, "quality": quality_provenance(jaws, by, **how)}
+    unscored = replace(grasps, columns=kept, provenance=provenance)
+    return unscored.with_columns(**columns, score=score_of(columns[by], by))
+
+
+def _batches(chosen: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
+    """Indices of the rows chosen (N,), so many at a time."""
+    batch_size = 2000  # Grasps that are scored at a time; the metrics do not depend on it.
+    rows = np.flatnonzero(chosen)
+    return [rows[k : k + batch_size] for k in range(0, len(rows), batch_size)]
+
+
+def _friction_by_object(given: Mapping[str, float], objects: list[str]) -> dict[str, float]:
+    """Coefficients by object, and under "" for all others."""
+    for name in given:
+        if name and name not in objects:
+            raise UnknownNameError(
+                f"friction is given for {name!r}, but there are no grasps of it; "
+                f"{suggest_names(name, objects)}"
+            )
+    return dict(given)
+
+
+def _surface(library: ObjectLibrary, name: str) -> Surface:
+    try:
+        return Surface.of(library.surface(name))
+    except MeshError as error:
+        raise MeshError(f"object {name!r}: {error}") from error
+
+
+def _instances(grasps: GraspSet, scene: Scene) -> NDArray[np.str_]:
+    """(N,) names of the instances that the grasps are on."""
+    if INSTANCE_COLUMN in grasps.columns:
+        names = grasps.column(INSTANCE_COLUMN)
+        for name in set(names.tolist()) - {""}:
+            if name not in scene.instances:
+                raise UnknownNameError(
+                    f"grasps are on instance {name!r}, which is not in scene {scene.name!r};"
+                    f" {suggest_names(name, scene.instances)}"
+                )
+    else:
+        names = np.full(len(grasps), "")
+    found = names.astype(object)
+    for object_name in sorted(set(grasps.object[names == ""].tolist())):
+        own = [name for name, i in scene.instances.items() if i.object == object_name]
+        if len(own) != 1:
+            raise InvalidInputError(
+                f"scene {scene.name!r} has {len(own)} instances of {object_name!r}; add a"
+                f" column {INSTANCE_COLUMN!r} that says on which one each grasp is"
+            )
+        found[(names == "") & (grasps.object == object_name)] = own[0]
+    return found.astype(str)
+
+
+def _instance_poses(instance: NDArray[np.str_], scene: Scene, station: Station) -> Array:
+    """(N, 4, 4) poses of instances (N,) in the world."""
+    X_WO = np.empty((len(instance), 4, 4))
+    for name in set(instance.tolist()):
+        X_WO[instance == name] = station.document.X_WS.matrix() @ scene.X_SO(name)
+    return X_WO
+
+
+def _clearances(
+    instance: NDArray[np.str_], X_WG: Array, scene: Scene, station: Station, pace: ProgressMeter
+) -> dict[str, Any]:
+    from burg_drake.grasping import HandClearance
+    from burg_drake.station import build_station_diagram
+
+    screen = HandClearance(build_station_diagram(scene, station, robot="hand"))
+    columns = {name: np.full(len(instance), "", dtype=object) for name in SCENE_COLUMNS}
+    for name in sorted(set(instance.tolist())):
+        for some in _batches(instance == name):
+            found = screen.measure(name, X_WG[some])
+            screened = np.where(found.clear, Stage.CLEAR.value, found.outcome)
+            values = (found.clearance, found.nearest, screened, found.blocker)
+            for column, value in zip(SCENE_COLUMNS, values, strict=True):
+                columns[column][some] = value
+            pace.step(len(some))
+    return {
+        name: values.astype(float if name == "clearance" else str)
+        for name, values in columns.items()
+    }

@@ -1,0 +1,500 @@
+"""Samples antipodal grasps on the objects of a scene or library, and explains a shortfall."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import (
+    Array,
+    GraspSet,
+    InvalidInputError,
+    UnknownNameError,
+    rng_from,
+    suggest_names,
+    transform_points,
+)
+from burg_drake.evaluation.candidates import (
+    Candidates,
+    chosen_instances,
+    drop_equal_grasps,
+    join_candidates,
+)
+from burg_drake.evaluation.settings import (
+    DEFAULT_APPROACH_ANGLE_DEG,
+    SLIPPERY_FRICTION_FACTOR,
+    SamplingSettings,
+)
+from burg_drake.grasping import ApproachCone, PairRejection, are_antipodal, grasp_contacts
+from burg_drake.objects import ObjectLibrary
+from burg_drake.scene import Scene
+from burg_drake.station import Station
+
+if TYPE_CHECKING:
+    import trimesh
+
+    from burg_drake.geometry import Surface
+    from burg_drake.grasping import Accept, ClearanceMode, HandClearance, Jaws
+
+
+def approach_cone_from_above(X_WO: Array, angle_deg: float) -> tuple[ApproachCone, ...]:
+    """The cone about straight down, in the object frame.
+
+    Args:
+        X_WO: (4, 4) where the object lies.
+        angle_deg: largest angle to straight down; nothing is forbidden from 180 on.
+    """
+    if angle_deg >= 180.0:
+        return ()
+    return (
+        ApproachCone(_direction_in_object(X_WO, (0.0, 0.0, -1.0)), float(np.deg2rad(angle_deg))),
+    )
+
+
+def approach_half_space_of_arm(
+    X_WO: Array, p_WM: Array, station: Station, name: str
+) -> ApproachCone:
+    """The half space of approaches that do not point back to the arm, in the object frame: those
+    that make no obtuse angle with the horizontal direction from the arm's base to the object.
+
+    Args:
+        X_WO: (4, 4) where the object lies.
+        p_WM: (3,) its middle [m].
+        station: has the arm.
+        name: of the instance, for messages.
+
+    Raises:
+        InvalidInputError: there is no arm, or the object is right above its base.
+    """
+    min_base_distance = 0.01  # Metres; an object closer to the base's vertical is on no side of it.
+    arm = station.document.arm
+    if arm is None:
+        raise InvalidInputError(
+            f"station {station.name!r} has no arm, so there is no side of the arm from"
+            " which the hand could approach"
+        )
+    x, y, _ = p_WM - arm.X_WA.matrix()[:3, 3]
+    if np.hypot(x, y) < min_base_distance:
+        raise InvalidInputError(
+            f"{name!r} is right above the base of the arm, so the hand cannot approach it"
+            " from the arm's side"
+        )
+    return ApproachCone(_direction_in_object(X_WO, (x, y, 0.0)), np.pi / 2)
+
+
+def _direction_in_object(
+    X_WO: Array, v_W: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """A direction of the world as a rounded unit vector in the object frame."""
+    direction_decimals = 6  # Rounded, so objects turned about the vertical share their grasps.
+    v_O = np.asarray(v_W) @ X_WO[:3, :3] / np.linalg.norm(v_W)
+    x, y, z = np.round(v_O, direction_decimals) + 0.0  # no negative zeros
+    return float(x), float(y), float(z)
+
+
+PAD_CONTACT = "pads"
+"""Counted as blocker where the pads do not meet the object antipodally."""
+
+
+class ClearTest:
+    """Keeps grasps of one object, see `grasping.antipodal_sampling.Accept`.
+
+    Args:
+        screen: of the open hand.
+        name: of the object in the screen.
+        X_WO: (4, 4) where it is in the screen's world.
+        surface: the object's.
+        jaws: the hand's.
+        friction: coefficient between object and pads.
+        settings: margin and mode of the screen.
+
+    Attributes:
+        blocked: number of grasps by the body that the open hand hits, the object itself among them,
+            and under `PAD_CONTACT`.
+    """
+
+    def __init__(
+        self,
+        screen: HandClearance,
+        name: str,
+        X_WO: Array,
+        surface: Surface,
+        jaws: Jaws,
+        friction: float,
+        settings: SamplingSettings,
+    ) -> None:
+        self._screen, self._name, self._X_WO = screen, name, X_WO
+        self._surface, self._jaws, self._friction = surface, jaws, friction
+        self._mode: ClearanceMode = "conservative" if settings.conservative else "exact"
+        self._margin = settings.margin
+        self.blocked: Counter[str] = Counter()
+
+    def __call__(self, X_OG: Array) -> NDArray[np.bool_]:
+        """Which of the grasps (N, 4, 4) to keep, (N,)."""
+        X_WG = self._X_WO @ X_OG
+        found = self._screen.measure(self._name, X_WG, mode=self._mode, margin=self._margin)
+        passed = found.clear
+        self.blocked.update(found.blocker[~passed].tolist())
+        clear = np.flatnonzero(passed)
+        contacts = grasp_contacts(self._surface, X_OG[clear], self._jaws)
+        passed[clear] = are_antipodal(contacts, X_OG[clear], self._friction)
+        self.blocked[PAD_CONTACT] += len(clear) - int(passed.sum())
+        return passed
+
+
+def sample_candidates(
+    scene: Scene,
+    station: Station,
+    n: int,
+    seed: int,
+    settings: SamplingSettings | None = None,
+    only: Iterable[str] | None = None,
+) -> Candidates:
+    """Samples antipodal grasps as candidates of a run; see `sample_on_scene`."""
+    stream = sample_on_scene(scene, station, n, seed, settings or SamplingSettings(), only)
+    return join_candidates(dict(stream))
+
+
+def sample_on_scene(
+    scene: Scene,
+    station: Station,
+    n: int,
+    seed: int,
+    settings: SamplingSettings,
+    only: Iterable[str] | None = None,
+) -> Iterator[tuple[str, GraspSet]]:
+    """Samples grasps on the instances of a scene, one after the other.
+
+    All instances of an object get the same grasps that lie on the same side and have the same
+    limits, if they are sampled blind.
+
+    Args:
+        scene: the scene.
+        station: gives the opening of the hand, its body, and the place of the arm.
+        n: grasps for each instance; there are fewer where there are (almost) no more, and
+            `sampling_shortfall.shortfall` says why.
+        seed: of the random numbers.
+        settings: how.
+        only: names of free instances, or of objects for all their instances; all if None.
+
+    Returns:
+        Names and grasps, in the frames of the objects.
+
+    Raises:
+        InvalidInputError: n is below 1, or a setting does not fit.
+        UnknownNameError: no such instance or object, or a mesh file is missing.
+    """
+    _check_count(n)
+    names = chosen_instances(scene, only)
+    objects = {instance.object for instance in scene.instances.values()}
+    _require_known_names(settings.weights, objects, "weights: the scene does not have object")
+    return _generate_on_scene(scene, station, n, seed, settings, names)
+
+
+def _generate_on_scene(
+    scene: Scene,
+    station: Station,
+    n: int,
+    seed: int,
+    settings: SamplingSettings,
+    names: tuple[str, ...],
+) -> Iterator[tuple[str, GraspSet]]:
+    draw = ObjectSampler(scene.library, station, n, seed, settings)
+    screen = None if settings.blind else _scene_screen(scene, station)
+    found: dict[tuple[str, tuple[ApproachCone, ...]], GraspSet] = {}
+    for name in names:
+        object, X_WO = scene.instance(name).object, _instance_pose(scene, station, name)
+        cones = _approach_cones(draw.surface(object), X_WO, station, name, settings)
+        if screen is not None:
+            yield name, draw.clear(object, cones, screen, name, X_WO)
+        else:
+            if (object, cones) not in found:
+                found[object, cones] = draw(object, cones)
+            yield name, found[object, cones]
+
+
+def sample_library(
+    library: ObjectLibrary,
+    station: Station,
+    n: int,
+    seed: int,
+    settings: SamplingSettings,
+    objects: Iterable[str] | None = None,
+) -> Iterator[tuple[str, GraspSet]]:
+    """Samples grasps on the objects of a library, one after the other, from all sides.
+
+    Args:
+        library: the library.
+        station: gives the opening of the hand and its body.
+        n, seed, settings: as for `sample_on_scene`.
+        objects: names in the library; all if None.
+
+    Returns:
+        Names and grasps, in the frames of the objects.
+
+    Raises:
+        InvalidInputError: n is below 1, or a setting does not fit, such as limits of the approach:
+            the objects of a library lie nowhere.
+        UnknownNameError: no such object, or a mesh file is missing.
+    """
+    _check_count(n)
+    if settings.approach_angle_deg is not None or settings.from_arm_side:
+        raise InvalidInputError(
+            f"the objects of library {library.name!r} are in no scene, so there is no"
+            " straight down and no side of the arm; give a scene to limit the approach"
+        )
+    where = f"library {library.name!r} has no object"
+    names = _require_known_names(objects, library.objects, where)
+    _require_known_names(settings.weights, library.objects, f"weights: {where}")
+    return _generate_on_library(library, station, n, seed, settings, names)
+
+
+def _generate_on_library(
+    library: ObjectLibrary,
+    station: Station,
+    n: int,
+    seed: int,
+    settings: SamplingSettings,
+    names: tuple[str, ...],
+) -> Iterator[tuple[str, GraspSet]]:
+    from burg_drake.grasping import hand_clearance_alone
+
+    draw = ObjectSampler(library, station, n, seed, settings)
+    for name in names:
+        if settings.blind:
+            yield name, draw(name, ())
+        else:
+            screen = hand_clearance_alone(library, name, station)
+            yield name, draw.clear(name, (), screen, name, np.eye(4))
+
+
+class ObjectSampler:
+    """Samples on objects of one library with the same settings."""
+
+    def __init__(
+        self,
+        library: ObjectLibrary,
+        station: Station,
+        n: int,
+        seed: int,
+        settings: SamplingSettings,
+    ) -> None:
+        self._library, self._station = library, station
+        self._n, self._seed, self._settings = n, seed, settings
+        self._pad = _pad_range(station)
+        self._surfaces: dict[str, trimesh.Trimesh] = {}
+
+    def surface(self, object: str) -> trimesh.Trimesh:
+        """The surface of an object, read once."""
+        if object not in self._surfaces:
+            self._surfaces[object] = self._library.surface(object)
+        return self._surfaces[object]
+
+    def __call__(
+        self, object: str, cones: tuple[ApproachCone, ...], accept: Accept | None = None
+    ) -> GraspSet:
+        """Grasps of an object."""
+        from burg_drake.grasping import AntipodalSettings, sample_antipodal
+
+        settings = self._settings
+        antipodal = AntipodalSettings(
+            friction=self._friction(object),
+            opening=self._station.hand.opening,
+            approaches=settings.approaches,
+            approach_cones=cones,
+            standoffs=settings.standoffs,
+            pad=self._pad,
+            diverse=settings.diverse,
+        )
+        grasps = sample_antipodal(
+            self.surface(object),
+            self._n,
+            rng_from("antipodal", self._seed, self._library.entry(object).build),
+            antipodal,
+            weights=settings.weights.get(object),
+            accept=accept,
+            object=object,
+        )
+        if settings.slippery:  # scores are shares of the sampler's friction: of the object's, then
+            score = 1.0 - SLIPPERY_FRICTION_FACTOR * (1.0 - grasps.score)
+            grasps = dataclasses.replace(grasps, score=score).select(score < 0.0)
+        return drop_equal_grasps(grasps)
+
+    def clear(
+        self,
+        object: str,
+        cones: tuple[ApproachCone, ...],
+        screen: HandClearance,
+        name: str,
+        X_WO: Array,
+    ) -> GraspSet:
+        """Grasps of an object, by this name and at this place (4, 4) in the screen, that the hand
+        can take; their provenance counts what `blocked` the others."""
+        test = self.clear_test(object, screen, name, X_WO)
+        grasps = self(object, cones, test)
+        notes = {"target": name, "blocked": dict(test.blocked), "margin": self._settings.margin}
+        return dataclasses.replace(grasps, provenance={**grasps.provenance, **notes})
+
+    def clear_test(self, object: str, screen: HandClearance, name: str, X_WO: Array) -> ClearTest:
+        """Tells which grasps of an object the hand can take; see `clear`."""
+        from burg_drake.geometry import Surface
+        from burg_drake.grasping import jaws_of
+
+        surface, friction = Surface.of(self.surface(object)), self._friction(object)
+        jaws = jaws_of(self._station.hand, self._station.hand_model, self._station.packages)
+        return ClearTest(screen, name, X_WO, surface, jaws, friction, self._settings)
+
+    def _friction(self, object: str) -> float:
+        given = self._settings.friction
+        friction = self._library.entry(object).friction if given is None else given
+        return friction * (SLIPPERY_FRICTION_FACTOR if self._settings.slippery else 1.0)
+
+
+def _check_count(n: int) -> None:
+    if n < 1:
+        raise InvalidInputError(f"grasps per object is {n}; give 1 or more")
+
+
+def _require_known_names(
+    names: Iterable[str] | None, known: Iterable[str], what: str
+) -> tuple[str, ...]:
+    """The names, each once; all known ones if None."""
+    chosen = tuple(dict.fromkeys(known if names is None else names))
+    for name in chosen:
+        if name not in known:
+            raise UnknownNameError(f"{what} {name!r}; {suggest_names(name, known)}")
+    return chosen
+
+
+def _instance_pose(scene: Scene, station: Station, instance: str) -> Array:
+    X_WO: Array = station.document.X_WS.matrix() @ scene.X_SO(instance)
+    return X_WO
+
+
+def _approach_cones(
+    surface: trimesh.Trimesh,
+    X_WO: Array,
+    station: Station,
+    instance: str,
+    settings: SamplingSettings,
+) -> tuple[ApproachCone, ...]:
+    """The limits of the approach to an instance; none where they hold every direction."""
+    angle = settings.approach_angle_deg
+    cones = approach_cone_from_above(X_WO, DEFAULT_APPROACH_ANGLE_DEG if angle is None else angle)
+    if settings.from_arm_side:
+        p_WM = transform_points(X_WO, surface.bounds).mean(axis=0)
+        cones += (approach_half_space_of_arm(X_WO, p_WM, station, instance),)
+    return cones
+
+
+def _pad_range(station: Station) -> tuple[float, float]:
+    """From where to where the pads of the hand reach along z of G [m]."""
+    from burg_drake.station import check_hand
+
+    hand, document = station.hand, station.hand_path
+    low, high = check_hand(hand, station.hand_model, document, station.packages).pad_bounds
+    return low[2], high[2]
+
+
+def _scene_screen(scene: Scene, station: Station) -> HandClearance:
+    from burg_drake.grasping import HandClearance
+    from burg_drake.station import build_station_diagram
+
+    return HandClearance(build_station_diagram(scene, station, robot="hand"))
+
+
+LINE_REJECTIONS = {
+    PairRejection.too_long: "are longer than the hand can open",
+    PairRejection.slanted: "meet the surface at an angle at which a friction of {friction:g} does not hold",
+    PairRejection.no_room: "leave no room for a finger",
+    PairRejection.no_approach: "allow no approach within the limits",
+}
+"""Why the sampler rejects lines through an object, in words."""
+SAMPLING_REMEDIES = {
+    PairRejection.too_long: "a hand that opens wider would help",
+    PairRejection.slanted: "more friction would help",
+    PairRejection.no_room: "a hand with thinner fingers would help",
+    PairRejection.no_approach: "wider limits of the approach would help",
+    PAD_CONTACT: "smaller pads would help",
+}
+"""What would help against each cause of a shortfall."""
+TARGET_WORDS = "the object itself"  # The target and the table in messages.
+TABLE_WORDS = "the table"
+
+
+def shortfall_note(name: str, asked: int, provenance: Mapping[str, Any], found: int) -> str:
+    """Why there are fewer grasps than asked, counted by the sampler; "" if there are not fewer.
+
+    Args:
+        name: of the instance or object.
+        asked: number of grasps.
+        provenance: what `sample_on_scene` or `sample_library` says of its grasps.
+        found: number of grasps.
+    """
+    if found >= asked:
+        return ""
+    text = f"{name}: only {found:,} of {asked:,} grasps were found"
+    lines, blocked = provenance.get("left_out", {}), provenance.get("blocked", {})
+    parts, causes = [], {}
+    tried = provenance.get("tried", 0)
+    if tried < max(asked, 10 * found) and lines:  # it is lines that are rare
+        parts.append(_describe_lines(provenance))
+        causes = dict(lines)
+    if sum(blocked.values()):
+        bodies = _name_blockers(blocked, provenance.get("target", name))
+        margin = provenance.get("margin", 0.0)
+        parts.append(f"of {tried:,} antipodal grasps tried, {_describe_bodies(bodies, margin)}")
+        causes = bodies if tried > found else causes
+    if not parts:
+        return text
+    return f"{text}: {'; '.join(parts)}; {_remedy(causes, provenance)}"
+
+
+def _name_blockers(blocked: Mapping[str, int], target: str) -> dict[str, int]:
+    """Counts by what people call a body, the most first."""
+    names = {target: TARGET_WORDS, "table": TABLE_WORDS}
+    counts = sorted(blocked.items(), key=lambda item: -item[1])
+    return {names.get(body, body): count for body, count in counts if count}
+
+
+def _describe_lines(provenance: Mapping[str, Any]) -> str:
+    left_out = sorted(provenance["left_out"].items(), key=lambda item: -item[1])
+    friction = provenance.get("friction", math.nan)
+    parts = [f"{n:,} {LINE_REJECTIONS[why].format(friction=friction)}" for why, n in left_out if n]
+    return f"of {provenance['rays']:,} lines through it {_join_parts(parts)}"
+
+
+def _describe_bodies(bodies: Mapping[str, int], margin: float) -> str:
+    max_bodies = 3  # Number of blocking bodies that are named.
+    hit = {body: n for body, n in bodies.items() if body != PAD_CONTACT}
+    parts = [f"{body} in {n:,}" for body, n in list(hit.items())[:max_bodies]]
+    rest = sum(list(hit.values())[max_bodies:])
+    parts += [f"others in {rest:,}"] if rest else []
+    meets = f"comes within {1e3 * margin:g} mm of" if margin else "hits"
+    text = f"the open hand {meets} {_join_parts(parts)}" if parts else ""
+    if bodies.get(PAD_CONTACT):
+        text += f"{', and ' if text else ''}its pads meet the object elsewhere in {bodies[PAD_CONTACT]:,}"
+    return text
+
+
+def _remedy(causes: Mapping[str, int], provenance: Mapping[str, Any]) -> str:
+    """What would help against the most frequent cause."""
+    cause = max(causes, key=causes.__getitem__)
+    if provenance.get("margin") and cause not in SAMPLING_REMEDIES:
+        return "a smaller margin would help"
+    known = {
+        **SAMPLING_REMEDIES,
+        TABLE_WORDS: "another pose of the object, or a hand with thinner fingers, would help",
+        TARGET_WORDS: "other directions of the approach, or a slimmer hand, would help",
+    }
+    return known.get(cause, f"more room around {cause} would help")
+
+
+def _join_parts(parts: list[str]) -> str:
+    return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)

@@ -1,0 +1,260 @@
+"""The journal of a run: one line of JSON for each judged grasp; and the lock of the folder's writer.
+
+A line is written by a single call, so a killed run leaves whole lines and at most one torn line at
+the end, which is cut off when the run goes on. The operating system drops a lock when its process
+ends.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from burg_drake.core import (
+    InvalidInputError,
+    RecordedFields,
+    Verdict,
+    missing_locks_error,
+    open_regular,
+    parse_json,
+    try_lock,
+)
+
+
+def acquire_lock(file: int, path: Path) -> None:
+    """Locks an open file, whose path is for messages; closes it if that fails.
+
+    Raises:
+        InvalidInputError: another process has it, or its file system has no locks.
+    """
+    attempts = 5
+    # Seconds; a check whether a folder is being written holds the lock briefly.
+    retry_interval = 0.02
+    try:
+        for k in range(attempts):
+            if try_lock(file):
+                return
+            time.sleep(retry_interval if k + 1 < attempts else 0.0)
+    except OSError as error:
+        os.close(file)
+        raise missing_locks_error(path.parent, error) from error
+    os.close(file)
+    raise folder_in_use_error(path.parent)
+
+
+def is_locked(path: Path) -> bool:
+    """Whether a process holds the lock of a file; none does where the file system has no locks."""
+    try:
+        file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    except OSError:
+        return False
+    try:
+        return not try_lock(file, shared=True)
+    except OSError:
+        return False
+    finally:
+        os.close(file)
+
+
+@contextmanager
+def hold_unchanged(path: Path, *, make: bool = False) -> Iterator[None]:
+    """Keeps others from writing the folder that a file stands for; they may read it.
+
+    Args:
+        path: the file. Where there is none nothing is locked; nor on a file system without locks,
+            where nothing writes.
+        make: make it if need be and possible.
+
+    Raises:
+        InvalidInputError: another process is writing it.
+    """
+    try:
+        file = _open_shared(path, os.O_CREAT if make else 0)
+    except OSError:
+        yield
+        return
+    try:
+        try:
+            shared = try_lock(file, shared=True)
+        except OSError:
+            shared = True
+        if not shared:
+            raise folder_in_use_error(path.parent)
+        yield
+    finally:
+        os.close(file)
+
+
+def _open_shared(path: Path, make: int) -> int:
+    try:
+        return os.open(path, os.O_RDONLY | os.O_NONBLOCK | make, 0o666)
+    except OSError:  # in a folder that cannot be written, for example
+        return os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+
+
+def folder_in_use_error(folder: Path) -> InvalidInputError:
+    """The error about a folder that another process has."""
+    return InvalidInputError(
+        f"{folder} is being written by another process; wait for it, or choose another folder"
+    )
+
+
+class WriterLock:
+    """A file that stands for its folder, locked."""
+
+    def __init__(self, path: Path) -> None:
+        """Makes the file if need be, and locks it.
+
+        Raises:
+            InvalidInputError: it cannot be written, another process has it, or its file system has
+                no locks.
+        """
+        try:
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        except OSError as error:
+            raise InvalidInputError(f"cannot write {path}: {error.strerror}") from error
+        acquire_lock(self._file, path)
+
+    def __enter__(self) -> WriterLock:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        os.close(self._file)
+
+
+JOURNAL_FILE = "journal.jsonl"
+ORIGINAL_FIELDS = frozenset(
+    {"outcome", "stage", "blocker", "reason", "margins", "q_grasp", "q_pregrasp", "cpu"}
+)
+"""Fields that all releases have written; others are empty in lines that lack them."""
+MAX_JOURNAL_LINE = 1 << 20
+"""Bytes; `encode_verdict` writes lines of some hundred."""
+
+
+class Journal:
+    """A journal opened for writing; one process at a time can hold it."""
+
+    def __init__(self, path: Path) -> None:
+        """Opens or creates the file and cuts off a torn last line.
+
+        Raises:
+            InvalidInputError: not writable, another process is writing it, or its file system has
+                no locks.
+        """
+        self._path = path
+        try:
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
+        except OSError as error:
+            raise InvalidInputError(f"cannot write {path}: {error.strerror}") from error
+        acquire_lock(self._file, path)
+        if not stat.S_ISREG(os.fstat(self._file).st_mode):
+            os.close(self._file)
+            raise InvalidInputError(f"cannot write {path}: it is not a file; choose another folder")
+        content = path.read_bytes()
+        whole = content.rfind(b"\n") + 1
+        if whole != len(content):  # otherwise the file keeps its date: table and report are newer
+            os.ftruncate(self._file, whole)
+
+    def append(self, id: str, verdict: Verdict) -> None:
+        """Adds a verdict.
+
+        Raises:
+            InvalidInputError: the line cannot be written, for example because the disk is full.
+        """
+        line = encode_verdict(id, verdict)
+        try:
+            written = os.write(self._file, line)
+            if written != len(line):
+                raise OSError(
+                    0, f"the disk is full: only {written} of {len(line)} bytes were written"
+                )
+        except OSError as error:
+            raise InvalidInputError(
+                f"cannot write {self._path}: {error.strerror}; what is in it is kept."
+                " Make room and run the same command to continue"
+            ) from error
+
+    def close(self) -> None:
+        """Closes the file and lets others write it."""
+        os.close(self._file)
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def read_journal(path: Path, begin: int = 0, end: int | None = None) -> dict[str, Verdict]:
+    """The last verdict about each grasp by id; lines that cannot be read count as not judged.
+
+    Args:
+        path: of the journal; one that does not exist has none.
+        begin, end: bytes to read, if not all; each at the end of a line.
+
+    Raises:
+        InvalidInputError: it is a folder, for example.
+    """
+    return {id: verdict for _, id, verdict in journal_lines(path, begin, end)}
+
+
+def journal_lines(
+    path: Path, begin: int = 0, end: int | None = None
+) -> Iterator[tuple[int, str, Verdict]]:
+    """The verdicts of a journal, in its order, one at a time; see `read_journal`.
+
+    Yields:
+        Where its line begins, the id of the grasp, and the verdict.
+    """
+    if not path.exists():
+        return
+    with open_regular(path) as stream:
+        place = stream.seek(begin)
+        for line in iter(lambda: stream.readline(MAX_JOURNAL_LINE), b""):
+            here, place = place, place + len(line)
+            if not line.endswith(b"\n"):  # torn, or too long: cut off when the run goes on
+                continue
+            if end is not None and place > end:
+                return
+            try:
+                id, verdict = decode_verdict(line)
+            except (ValueError, KeyError, TypeError, AttributeError):
+                continue
+            yield here, id, verdict
+
+
+def encode_verdict(id: str, verdict: Verdict) -> bytes:
+    """One line for one grasp; numbers that are not finite become null."""
+    record: dict[str, Any] = {"id": id}
+    record |= {one.name: one.to_json(getattr(verdict, one.name)) for one in RecordedFields.verdict}
+    if verdict.interrupted:
+        record["interrupted"] = True
+    return json.dumps(record, separators=(",", ":"), allow_nan=False).encode() + b"\n"
+
+
+def decode_verdict(line: bytes) -> tuple[str, Verdict]:
+    """Reads a line.
+
+    Raises:
+        ValueError, KeyError, TypeError, AttributeError: it was not written by `encode_verdict`.
+    """
+    record: dict[str, Any] = parse_json(line.decode(), "a line")
+    known = {
+        one.name: one.from_json(record[one.name])
+        for one in RecordedFields.verdict
+        if one.name in record or one.name in ORIGINAL_FIELDS
+    }
+    interrupted = record.get("interrupted", False) is True
+    return str(record["id"]), Verdict(**known, interrupted=interrupted)

@@ -1,0 +1,525 @@
+"""How one grasp is judged: stage by stage, until one of them decides.
+
+Each stage answers for one grasp with an outcome, or passes it on. The first stages are screens, which
+are asked about many grasps at once. A station has these stages, by the mode of the run: clearance of
+the open hand, feasibility for the arm, and a trial in simulation, of the hand alone or of the arm.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
+
+import numpy as np
+
+from burg_drake.core import (
+    MODES,
+    Array,
+    Findings,
+    InvalidInputError,
+    MarginNames,
+    Mode,
+    Outcome,
+    Stage,
+    Verdict,
+    merge_findings,
+    one_line,
+)
+from burg_drake.evaluation.candidates import Candidate
+from burg_drake.motion import Plan, Witness
+from burg_drake.scene import Scene
+from burg_drake.station import DRAKE_ENGINES, Engine, GraspMotion, Station
+
+if TYPE_CHECKING:
+    from burg_drake.evaluation.lift_room import LiftRoom
+    from burg_drake.grasping import HandClearance
+    from burg_drake.motion import ArmReach, Reach, ReachSettings
+    from burg_drake.simulation import TrialResult, TrialSettings
+
+
+def mode_for(station: Station, asked: Mode | None = None) -> Mode:
+    """The mode of a run.
+
+    Args:
+        station: where it takes place.
+        asked: what the user wants; None for `reach` where there is an arm, else `hand`.
+
+    Raises:
+        InvalidInputError: there is no such mode, or it needs an arm that the station lacks.
+    """
+    has_arm = station.document.arm is not None
+    if asked is None:
+        return "reach" if has_arm else "hand"
+    if asked not in MODES:
+        raise InvalidInputError(f"mode is {asked!r}; give {', '.join(MODES[:-1])} or {MODES[-1]}")
+    if asked != "hand" and not has_arm:
+        raise InvalidInputError(
+            f"mode {asked!r} needs an arm, which station {station.name!r} lacks; give mode 'hand'"
+        )
+    return asked
+
+
+def require_engine_for(engine: Engine, mode: Mode) -> None:
+    """Refuses an engine that cannot run the trials of a mode.
+
+    Raises:
+        InvalidInputError: it has no arm.
+        MissingDependencyError: it is not installed.
+    """
+    if engine.simulator == "drake":
+        return
+    if mode == "arm":
+        raise InvalidInputError(
+            f"mode arm needs an engine of Drake ({', '.join(DRAKE_ENGINES)}); with engine"
+            f" {engine.name} use mode reach, in which the hand alone executes what the"
+            " arm can reach"
+        ).about("mode")
+    from burg_drake.simulation import require_mujoco
+
+    require_mujoco()
+
+
+def require_scene_for(engine: Engine, scene: Scene, station: Station) -> None:
+    """Refuses objects and hands that an engine cannot have.
+
+    Raises:
+        InvalidInputError: an object has no convex pieces, or the hand's pads are not flat; see
+            `simulation.mujoco`.
+    """
+    if engine.simulator != "drake":
+        from burg_drake.simulation import MujocoTrial
+
+        _ = MujocoTrial(scene, station, engine=engine).complete_world
+
+
+@dataclass(frozen=True)
+class Decision(Findings):
+    """The answer of one stage.
+
+    Attributes:
+        outcome: how the grasp ends here; None passes it on to the next stage.
+        motion: the arm's motion, if later stages need it.
+    """
+
+    outcome: Outcome | None = None
+    motion: Witness | Plan | None = field(default=None, compare=False, repr=False, kw_only=True)
+
+
+class Screen(NamedTuple):
+    """A stage that is asked about many grasps at once; its answers do not depend on the batch.
+
+    Attributes:
+        stage: its name.
+        ask: gives an answer for each grasp.
+        batch: how many grasps to ask about at a time, so that more would hardly be cheaper each.
+    """
+
+    stage: Stage
+    ask: Callable[[Sequence[Candidate]], list[Decision]]
+    batch: int
+
+
+Decide = Callable[[Candidate, "Witness | Plan | None"], Decision]
+"""A stage that is asked about one grasp, with the motion that an earlier stage has found for it."""
+
+
+class Judge(Protocol):
+    """Stages in the order in which a grasp passes them; the last one always decides."""
+
+    @property
+    def screens(self) -> Sequence[Screen]:
+        """The first stages."""
+        ...
+
+    @property
+    def stages(self) -> Sequence[tuple[Stage, Decide]]:
+        """Name and function of each later stage."""
+        ...
+
+
+@dataclass(frozen=True)
+class ScreenAnswers:
+    """The answers of the first screens of a judge; all but the last one pass the grasp on.
+
+    Attributes:
+        decisions: the answers.
+        cpu: CPU time that they took by stage; an equal share, if grasps were screened together [s].
+    """
+
+    decisions: tuple[Decision, ...] = ()
+    cpu: Mapping[Stage, float] = field(default_factory=dict)
+
+    @property
+    def outcome(self) -> Outcome | None:
+        """How the grasp ends; None if it is passed on."""
+        return self.decisions[-1].outcome if self.decisions else None
+
+    def verdict(self) -> Verdict:
+        """The verdict, where the last answer decides."""
+        return _make_verdict(self.decisions, list(self.cpu)[-1], self.cpu)
+
+    def then(self, stage: Stage, decision: Decision, cpu: float) -> ScreenAnswers:
+        """With one more answer."""
+        return ScreenAnswers((*self.decisions, decision), {**self.cpu, stage: cpu})
+
+
+def screen_grasps(
+    judge: Judge, grasps: Sequence[tuple[Candidate, ScreenAnswers]]
+) -> list[ScreenAnswers]:
+    """Asks the next screen about many grasps at once.
+
+    Args:
+        judge: the stages.
+        grasps: with the answers of the screens before; the same ones for all grasps.
+
+    Returns:
+        All answers. Where an error comes up, each grasp is asked about alone, and the error is the
+        answer of those that have it.
+    """
+    if not grasps:
+        return []
+    screen = judge.screens[len(grasps[0][1].decisions)]
+    start = time.process_time()
+    try:
+        decisions = screen.ask([candidate for candidate, _ in grasps])
+    except Exception as error:
+        if len(grasps) > 1:
+            return [screened for grasp in grasps for screened in screen_grasps(judge, [grasp])]
+        decisions = [Decision(Outcome.SIMULATION_FAILED, reason=one_line(error))]
+    share = (time.process_time() - start) / len(grasps)
+    return [
+        before.then(screen.stage, decision, share)
+        for (_, before), decision in zip(grasps, decisions, strict=True)
+    ]
+
+
+def judge_grasp(
+    judge: Judge,
+    candidate: Candidate,
+    announce: Callable[[Stage], None] | None = None,
+    screened: ScreenAnswers | None = None,
+) -> Verdict:
+    """Sends a grasp through the stages.
+
+    Args:
+        judge: the stages.
+        candidate: the grasp.
+        announce: called with each stage before it begins.
+        screened: answers of screens that are known already.
+
+    Returns:
+        The verdict. An error inside a stage ends in `simulation_failed` with its message.
+    """
+    announce = announce or (lambda stage: None)
+    answers = screened or ScreenAnswers()
+    for screen in judge.screens[len(answers.decisions) :]:
+        if answers.outcome is None:
+            announce(screen.stage)
+            (answers,) = screen_grasps(judge, [(candidate, answers)])
+    for stage, decide in judge.stages:
+        if answers.outcome is not None:
+            break
+        announce(stage)
+        motion = next((d.motion for d in reversed(answers.decisions) if d.motion), None)
+        start = time.process_time()
+        try:
+            decision = decide(_set_lift(candidate, answers.decisions), motion)
+        except Exception as error:  # whatever Drake throws becomes this one grasp's outcome
+            decision = Decision(Outcome.SIMULATION_FAILED, reason=one_line(error))
+        answers = answers.then(stage, decision, time.process_time() - start)
+    if answers.outcome is None:
+        raise ValueError("the last stage of a judge has to decide")
+    return answers.verdict()
+
+
+def _set_lift(candidate: Candidate, decisions: Sequence[Decision]) -> Candidate:
+    """A grasp with the length of the lift for which an earlier stage has found room, unless it
+    comes with one."""
+    if candidate.lift is not None:
+        return candidate
+    found = [
+        d.margins[MarginNames.lift_height]
+        for d in decisions
+        if MarginNames.lift_height in d.margins
+    ]
+    return replace(candidate, lift=found[-1]) if found else candidate
+
+
+def _make_verdict(
+    decisions: Sequence[Decision], stage: Stage, cpu: Mapping[Stage, float]
+) -> Verdict:
+    last = decisions[-1].outcome
+    assert last is not None
+    failed = last is Outcome.SIMULATION_FAILED
+    decided = stage if failed else last.stage
+    return Verdict(last, decided, cpu=cpu, **merge_findings(decisions))
+
+
+def trial_decision(result: TrialResult) -> Decision:
+    """The answer of an executed trial, of the hand alone or of the arm."""
+    return Decision(result.outcome, **result.of_trial() | {"margins": result.margins.of_trial()})
+
+
+def trial_verdict(result: TrialResult) -> Verdict:
+    """The verdict of a trial that went through no other stage."""
+    return _make_verdict([trial_decision(result)], Stage.EXECUTED, {})
+
+
+def hand_screen(
+    clearance: HandClearance, X_WO: Mapping[str, Array], room: LiftRoom | None = None
+) -> Screen:
+    """The stage `clear`.
+
+    Args:
+        clearance: of the open hand in the scene.
+        X_WO: (4, 4) poses of the free instances by name.
+        room: says how far clear hands can lift, if no later stage does.
+    """
+
+    batch_size = 512  # A grasp takes about 0.025 ms in such a batch.
+
+    def ask(grasps: Sequence[Candidate]) -> list[Decision]:
+        places: dict[str, list[int]] = {}
+        for place, grasp in enumerate(grasps):
+            places.setdefault(grasp.instance, []).append(place)
+        decisions = [Decision()] * len(grasps)
+        for instance, chosen in places.items():
+            X_WG = grasps_in_world([grasps[k] for k in chosen], X_WO)
+            found = clearance.check_all(instance, X_WG)
+            lifts = np.full(len(chosen), np.nan)
+            clear = np.flatnonzero([answer.outcome is None for answer in found])
+            if room is not None and len(clear):
+                width = np.array([grasps[chosen[k]].width for k in clear])
+                lifts[clear] = room.length(instance, X_WG[clear], width)
+            for k, answer, lift in zip(chosen, found, lifts.tolist(), strict=True):
+                margins = {"overlap": answer.overlap, "clearance": answer.clearance}
+                if math.isfinite(lift):
+                    margins[MarginNames.lift_height] = lift
+                decisions[k] = Decision(answer.outcome, blocker=answer.blocker, margins=margins)
+        return decisions
+
+    return Screen(Stage.CLEAR, ask, batch_size)
+
+
+def arm_screen(reach: ArmReach, X_WO: Mapping[str, Array], *, motions: bool = False) -> Screen:
+    """The stages `reachable` and `planned`, which are asked about together.
+
+    Args:
+        reach: the arm in the scene.
+        X_WO: (4, 4) poses of the free instances by name.
+        motions: whether later stages need the motions that are found.
+    """
+
+    batch_size = 128  # As many as `ArmReach` judges together.
+
+    def ask(grasps: Sequence[Candidate]) -> list[Decision]:
+        found = reach.check_all(
+            [grasp.instance for grasp in grasps],
+            grasps_in_world(grasps, X_WO),
+            np.array([grasp.width for grasp in grasps]),
+        )
+        return [_reach_decision(answer, motions) for answer in found]
+
+    return Screen(Stage.REACHABLE, ask, batch_size)
+
+
+def grasps_in_world(grasps: Sequence[Candidate], X_WO: Mapping[str, Array]) -> Array:
+    """(N, 4, 4) grasps in the world.
+
+    One by one: products of stacked matrices may differ from single ones in the last bit.
+    """
+    return np.array([X_WO[grasp.instance] @ grasp.X_OG for grasp in grasps]).reshape(-1, 4, 4)
+
+
+def _reach_decision(answer: Reach, motions: bool) -> Decision:
+    margins = {
+        "arm_clearance": answer.clearance,
+        "joint_excess": answer.excess,
+        MarginNames.lift_height: answer.lift,
+    }
+    return Decision(
+        answer.outcome,
+        blocker=answer.blocker,
+        margins={name: float(v) for name, v in margins.items() if math.isfinite(v)},
+        q_grasp=_float_tuple(answer.q_grasp),
+        q_pregrasp=_float_tuple(answer.q_pregrasp),
+        motion=answer.witness if motions else None,
+    )
+
+
+def _float_tuple(q: Array | None) -> tuple[float, ...]:
+    return () if q is None else tuple(q.tolist())
+
+
+def hand_alone(scene: Scene, station: Station) -> tuple[HandClearance, dict[str, Array]]:
+    """What `hand_screen` takes, where there is no trial of the hand that has it."""
+    from burg_drake.grasping import HandClearance
+    from burg_drake.station import build_station_diagram
+
+    diagram = build_station_diagram(scene, station, robot="hand")
+    return HandClearance(diagram), {name: diagram.X_WO(name) for name in scene.instances}
+
+
+def arm_reach(
+    scene: Scene, station: Station, motion: GraspMotion, *, exact: bool = True
+) -> ArmReach:
+    """The arm in the scene.
+
+    Args:
+        scene, station: where.
+        motion: of the hand, as in a trial.
+        exact: see `ReachSettings`.
+    """
+    from burg_drake.motion import ArmReach
+
+    return ArmReach(scene, station, settings=arm_settings(motion, exact=exact))
+
+
+def arm_settings(motion: GraspMotion, *, exact: bool = True) -> ReachSettings:
+    """How the arm is asked before a trial; see `arm_reach`."""
+    from burg_drake.motion import ReachSettings
+
+    return ReachSettings(motion=motion, exact=exact)
+
+
+class StationJudge:
+    """Judges grasps on a station.
+
+    Attributes:
+        screens, stages: see `judge.Judge`.
+        plan: the one that the arm has executed last, if it has executed any.
+    """
+
+    def __init__(self, screens: list[Screen], stages: list[tuple[Stage, Decide]]) -> None:
+        self.screens = screens
+        self.stages = stages
+        self.plan: Plan | None = None
+
+
+class HandJudge(StationJudge):
+    """Has the hand alone execute grasps; in mode `reach` those that the arm can execute."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        station: Station,
+        *,
+        engine: Engine,
+        mode: Literal["hand", "reach"],
+        settings: TrialSettings,
+    ) -> None:
+        """Builds the diagrams that all grasps share; see `build_judge`."""
+        from burg_drake.simulation import hand_trial_of
+        from burg_drake.station import instance_pose
+
+        self._trial = hand_trial_of(scene, station, engine, settings=settings)
+        motion = self._trial.motion
+        X_WO = {name: instance_pose(scene, station, name) for name in scene.instances}
+        room = _lift_room(scene, station, motion) if mode == "hand" else None
+        screens = [hand_screen(self._trial.clearance, X_WO, room)]
+        if mode == "reach":
+            screens.append(arm_screen(arm_reach(scene, station, motion), X_WO))
+        super().__init__(screens, [(Stage.EXECUTED, self._execute)])
+
+    def _execute(self, grasp: Candidate, motion: Witness | Plan | None) -> Decision:
+        lift = self._trial.motion.lift_height if grasp.lift is None else grasp.lift
+        decision = trial_decision(
+            self._trial.run(
+                grasp.instance, grasp.X_OG, friction=grasp.friction, mass=grasp.mass, lift=lift
+            )
+        )
+        return replace(decision, margins={**decision.margins, MarginNames.lift_height: lift})
+
+
+class ArmJudge(StationJudge):
+    """Plans the arm's motions, and has the whole arm execute them."""
+
+    def __init__(
+        self, scene: Scene, station: Station, *, engine: Engine, settings: TrialSettings
+    ) -> None:
+        """Builds the diagrams that all grasps share; see `build_judge`."""
+        from burg_drake.motion import Planner
+        from burg_drake.simulation import ArmTrial
+
+        hand, X_WO = hand_alone(scene, station)
+        self._trial = ArmTrial(scene, station, engine=engine, settings=settings, clearance=hand)
+        reach = arm_reach(scene, station, self._trial.motion)
+        self._planner = Planner(reach)
+        super().__init__(
+            [hand_screen(hand, X_WO), arm_screen(reach, X_WO, motions=True)],
+            [(Stage.PLANNED, self._time), (Stage.EXECUTED, self._execute)],
+        )
+
+    def _time(self, grasp: Candidate, motion: Witness | Plan | None) -> Decision:
+        assert isinstance(motion, Witness)
+        plan = self._planner.time(grasp.instance, motion, grasp.width)
+        return Decision(margins={"duration": plan.duration}, motion=plan)
+
+    def _execute(self, grasp: Candidate, motion: Witness | Plan | None) -> Decision:
+        assert isinstance(motion, Plan)
+        self.plan = motion
+        return trial_decision(
+            self._trial.run(
+                grasp.instance, grasp.X_OG, motion, friction=grasp.friction, mass=grasp.mass
+            )
+        )
+
+
+def build_judge(
+    scene: Scene,
+    station: Station,
+    *,
+    engine: Engine,
+    mode: Mode,
+    settings: TrialSettings | None = None,
+) -> StationJudge:
+    """Builds the judge of a mode, and the diagrams that all grasps share.
+
+    Args:
+        scene, station: what to build.
+        engine: how the trial is stepped.
+        mode: what to ask; but for `hand` the station needs an arm.
+        settings: phases of the trial, if not the usual ones; where they have no motion, it is the
+            station's.
+
+    Raises:
+        InvalidInputError: the engine has no arm, or cannot have an object or the hand.
+        MissingDependencyError: it is not installed.
+    """
+    from burg_drake.simulation import TrialSettings
+
+    require_engine_for(engine, mode)
+    settings = TrialSettings() if settings is None else settings
+    if mode == "arm":
+        return ArmJudge(scene, station, engine=engine, settings=settings)
+    return HandJudge(scene, station, engine=engine, mode=mode, settings=settings)
+
+
+def _lift_room(scene: Scene, station: Station, motion: GraspMotion) -> LiftRoom | None:
+    """What says how far the hand can lift, where it may be less than asked for."""
+    from burg_drake.evaluation.lift_room import LiftRoom
+
+    return LiftRoom(scene, station, motion) if motion.shortest < motion.lift_height else None
+
+
+@dataclass(frozen=True)
+class StationJudgeFactory:
+    """What a worker process needs to build its `StationJudge`; see `build_judge`."""
+
+    scene: Scene
+    station: Station
+    engine: Engine
+    mode: Mode
+    settings: TrialSettings | None = None
+
+    def __call__(self) -> StationJudge:
+        return build_judge(
+            self.scene,
+            self.station,
+            engine=self.engine,
+            mode=self.mode,
+            settings=self.settings,
+        )

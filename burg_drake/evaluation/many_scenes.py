@@ -1,0 +1,474 @@
+"""Judges many scenes with the same workers: while one is judged, the next ones are prepared."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections import Counter
+from collections.abc import Generator, Iterable, Mapping, Sequence
+from contextlib import ExitStack, closing
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+
+from burg_drake.core import (
+    JUDGING_PACKAGES,
+    MAX_NAME_BYTES,
+    STARTING_PHASE,
+    BurgError,
+    FileLimits,
+    GraspSet,
+    InvalidInputError,
+    Listener,
+    Outcome,
+    Progress,
+    ProgressMeter,
+    Reporter,
+    UnknownNameError,
+    Verdict,
+    content_hash,
+    ensure_writable_folder,
+    read_bytes,
+    remove_unfinished,
+    resolve_reference,
+    software_versions,
+    suggest_names,
+)
+from burg_drake.evaluation.campaign_document import (
+    CampaignDocument,
+    Ledger,
+    SceneEntry,
+    SceneState,
+    campaign_hash,
+    require_same_campaign,
+)
+from burg_drake.evaluation.campaign_folder import (
+    CAMPAIGN_LOCK_FILE,
+    SCENES_FOLDER,
+    Campaign,
+    is_campaign,
+    load_campaign,
+    require_campaign_folder,
+    save_campaign,
+)
+from burg_drake.evaluation.candidates import INSTANCE_COLUMN
+from burg_drake.evaluation.executor import Executor, Job, JobFailed
+from burg_drake.evaluation.grasp_sets.mistake_search import campaign_hints
+from burg_drake.evaluation.journal import WriterLock
+from burg_drake.evaluation.judge import StationJudgeFactory
+from burg_drake.evaluation.report.pages import renew_report
+from burg_drake.evaluation.run_document import begin_session, input_of, input_reference
+from burg_drake.evaluation.run_preparation import (
+    Request,
+    current_command,
+    given_content,
+    given_correction,
+    require_scenes_judged,
+)
+from burg_drake.evaluation.scene_tasks import (
+    Preparer,
+    PrepareTask,
+    SceneJudging,
+    SceneOutputs,
+    SceneProcesses,
+    is_finished,
+)
+from burg_drake.evaluation.table_parts import require_arrow
+from burg_drake.objects import ObjectLibrary, load_library
+from burg_drake.scene import Scene, SceneLike, load_scene
+
+
+@dataclass(frozen=True, eq=False)
+class SceneList:
+    """What was given.
+
+    Attributes:
+        entries: a scene each, in order.
+        given: by name: the scene as loaded, or its file.
+        libraries: hash of all objects of each library, by folder.
+    """
+
+    entries: tuple[SceneEntry, ...]
+    given: Mapping[str, Scene | Path]
+    libraries: dict[str, str]
+
+
+def read_scenes(
+    references: Sequence[SceneLike], known: CampaignDocument | None = None
+) -> SceneList:
+    """Looks at all scenes before any work is spent on one.
+
+    Args:
+        references: scenes as loaded, or references for `load_scene`.
+        known: what a run has recorded of them: a file that has not changed since is not read again.
+
+    Raises:
+        InvalidInputError: there are none, two are the same, or some cannot be read; all are named.
+    """
+    max_problems = 5  # Scenes that cannot be read are named up to this number.
+    if not references:
+        raise InvalidInputError("no scenes are given; give one or more")
+    reader = _Reader(known)
+    entries: list[SceneEntry] = []
+    given: list[Scene | Path] = []
+    problems: list[str] = []
+    for reference in references:
+        try:
+            scene = (
+                reference
+                if isinstance(reference, Scene)
+                else resolve_reference(reference, "scenes")
+            )
+            entries.append(reader.entry(scene))
+            given.append(scene)
+        except BurgError as error:
+            problems.append(str(error))
+    if problems:
+        more = f"; and {len(problems) - max_problems} more" if len(problems) > max_problems else ""
+        raise InvalidInputError(
+            f"{len(problems)} of {len(references)} scenes cannot be read:"
+            f" {'; '.join(problems[:max_problems])}{more}"
+            if len(references) > 1
+            else problems[0]
+        )
+    _require_different(entries)
+    named = _distinct_names(entries)
+    names = [entry.name for entry in named]
+    return SceneList(tuple(named), dict(zip(names, given, strict=True)), reader.hashes)
+
+
+def require_used_names(entries: Iterable[SceneEntry], request: Request) -> None:
+    """Refuses names and grasps that are for none of the scenes.
+
+    Raises:
+        UnknownNameError: an object or instance is in no scene.
+    """
+    entries = list(entries)
+    known = {n for entry in entries for pair in entry.instances.items() for n in pair}
+    grasps = request.grasps
+    wanted = {"only": list(request.only)}
+    if isinstance(grasps, GraspSet):
+        by = grasps.columns.get(INSTANCE_COLUMN, grasps.object)
+        wanted["grasps"] = [name for name in dict.fromkeys(by.tolist()) if name]
+    elif isinstance(grasps, Mapping):
+        wanted["grasps"] = list(grasps)
+    for what, names in wanted.items():
+        for name in names:
+            if name not in known:
+                raise UnknownNameError(
+                    f"{what}: none of {len(entries)} scenes has {name!r}; {suggest_names(name, known)}"
+                )
+
+
+class _Reader:
+    """Reads scenes, and each library once."""
+
+    def __init__(self, known: CampaignDocument | None) -> None:
+        self._known = {} if known is None else {(e.path, e.file): e for e in known.scenes}
+        self._were = {} if known is None else known.libraries
+        self._libraries: dict[tuple[str, Path | None], ObjectLibrary] = {}
+        self.hashes: dict[str, str] = {}
+
+    def entry(self, scene: Scene | Path) -> SceneEntry:
+        """The entry of a scene, under its own name."""
+        if isinstance(scene, Scene):
+            return self._entry(scene, "")
+        path = input_reference(scene, "scenes")
+        file = hashlib.sha256(read_bytes(scene, FileLimits.document.size)).hexdigest()
+        known = self._known.get((path, file))
+        if known is not None and self._is_unchanged(known.library):
+            return known
+        return self._entry(load_scene(scene, library=self.library), file)
+
+    def library(self, reference: str, base: Path | None) -> ObjectLibrary:
+        """A library, loaded once."""
+        if (reference, base) not in self._libraries:
+            self._libraries[reference, base] = load_library(reference, base)
+        return self._libraries[reference, base]
+
+    def _entry(self, scene: Scene, file: str) -> SceneEntry:
+        root = str(scene.library.root.resolve())
+        if root not in self.hashes:
+            self.hashes[root] = content_hash(scene.library.content)
+        return SceneEntry(
+            name=scene.name,
+            path=input_reference(scene.path, "scenes"),
+            content=scene.content,
+            file=file,
+            library=root,
+            instances={name: i.object for name, i in scene.instances.items()},
+        )
+
+    def _is_unchanged(self, root: str) -> bool:
+        if root not in self.hashes:
+            try:
+                self.hashes[root] = content_hash(self.library(root, None).content)
+            except BurgError:
+                return False
+        return self._were.get(root) == self.hashes[root]
+
+
+def _require_different(entries: Sequence[SceneEntry]) -> None:
+    """Refuses a scene that is given twice: its grasps would count twice."""
+    seen: dict[str, SceneEntry] = {}
+    for entry in entries:
+        first = seen.setdefault(entry.content, entry)
+        if first is not entry:
+            raise InvalidInputError(
+                f"{first.path} and {entry.path} are the same scene; give it once"
+                if first.path != entry.path
+                else f"{entry.path} is given twice; give it once"
+            )
+
+
+def _distinct_names(entries: Sequence[SceneEntry]) -> list[SceneEntry]:
+    """Entries with names that differ, also where the case of letters does not count: the second
+    scene of a name gets `_2`."""
+    own = Counter(entry.name.casefold() for entry in entries)
+    taken = {name for name, count in own.items() if count == 1}
+    found = []
+    for entry in entries:
+        name, number = entry.name, 1
+        while own[entry.name.casefold()] > 1 and name.casefold() in taken:
+            number += 1
+            name = f"{entry.name[: MAX_NAME_BYTES - 8]}_{number}"
+        taken.add(name.casefold())
+        found.append(replace(entry, name=name))
+    return found
+
+
+def evaluate_scenes(
+    references: Sequence[SceneLike],
+    request: Request,
+    folder: Path,
+    executor: Executor,
+    progress: bool | Listener,
+) -> Campaign:
+    """Judges grasps of many scenes; see `evaluate`.
+
+    Args:
+        references: the scenes.
+        request: what is asked about each.
+        folder: of the run.
+        executor: who judges.
+        progress: see `evaluate`.
+    """
+    require_arrow("a run over many scenes")
+    require_campaign_folder(folder)
+    before = load_campaign(folder) if is_campaign(folder) else None
+    scenes = read_scenes(references, None if before is None else before.document)
+    require_used_names(scenes.entries, request)
+    document = _campaign_document(scenes, request)
+    if before is not None:
+        require_same_campaign(folder, before.document, document)
+    ensure_writable_folder(folder)
+    with Reporter(progress) as reporter, WriterLock(folder / CAMPAIGN_LOCK_FILE):
+        remove_unfinished(folder)
+        if is_campaign(folder):  # as it is now that nobody else has it
+            there = load_campaign(folder).document
+            require_same_campaign(folder, there, document)
+            document = replace(
+                there, table=document.table, scenes=document.scenes, libraries=document.libraries
+            )
+        campaign = Campaign(folder, document)
+        if before is None or document != before.document:
+            save_campaign(campaign)
+        call = _CampaignCall(campaign, scenes, request, executor, reporter)
+        judged = call.run()
+        if call.judged:
+            hints = campaign_hints(judged)
+            judged = save_campaign(replace(judged, document=replace(judged.document, hints=hints)))
+        renew_report(judged)
+        require_scenes_judged(judged)
+        return judged
+
+
+def _campaign_document(scenes: SceneList, request: Request) -> CampaignDocument:
+    arm = request.station.document.arm if request.mode != "hand" else None
+    document = CampaignDocument(
+        command=current_command(),
+        station=input_of(request.station, "stations"),
+        grasps=replace(
+            request.requested_of_all(),
+            content=given_content(request.grasps),
+            correction=given_correction(request.grasps),
+        ),
+        engine=request.engine,
+        trial=request.trial,
+        mode=request.mode,
+        arm=request.arm,
+        seed=request.settings.seed,
+        shard="" if request.shard is None else str(request.shard),
+        table=request.settings.table,
+        joints=0 if arm is None else len(arm.home),
+        scenes=scenes.entries,
+        libraries=scenes.libraries,
+        versions=software_versions({**JUDGING_PACKAGES, **request.engine.packages}),
+    )
+    return replace(document, hash=campaign_hash(document))
+
+
+@dataclass
+class _CampaignCall:
+    """One call of `evaluate` on many scenes."""
+
+    campaign: Campaign
+    scenes: SceneList
+    request: Request
+    executor: Executor
+    reporter: Reporter
+
+    def __post_init__(self) -> None:
+        self.folder = self.campaign.path
+        self.ledger = Ledger(self.folder)
+        self.judging: dict[str, SceneJudging] = {}
+        # a scene whose grasps are shared out knows its share
+        self.each = replace(self.request, shard=self.campaign.document.shard_of_grasps)
+        self.judged = 0
+        asked = self.request.settings.scene_reports
+        self.reports = self.campaign.document.has_few_scenes if asked is None else asked
+
+    def run(self) -> Campaign:
+        """Judges what is left."""
+        left = [name for name in self.campaign.names if not self._is_done(name)]
+        keeping = SceneOutputs(
+            self.folder,
+            tuple(self.campaign.places),
+            self.campaign.document.instances,
+            self.request.settings.table,
+            self.reports,
+        )
+        with ExitStack() as stack:
+            processes = stack.enter_context(
+                SceneProcesses(Preparer(self.each), keeping, self.executor.workers)
+            )
+            if left:
+                self._judge(left, processes)
+            processes.close()
+        return load_campaign(self.folder)
+
+    def _judge(self, left: list[str], processes: SceneProcesses) -> None:
+        document = self.campaign.document
+        self.expected = self.campaign.expected_by_scene
+        there = sum(n for name, n in self.expected.items() if name not in left)
+        found = self._found()
+        event = Progress(STARTING_PHASE, there, sum(self.expected.values()), outcomes=found)
+        self.pace = ProgressMeter(self.reporter.show, event, "judging")
+        session = begin_session(self.executor.workers, found.total())
+        sessions = document.stretches
+        save_campaign(
+            replace(self.campaign, document=replace(document, stretches=(*sessions, session)))
+        )
+        begun = time.monotonic()
+        try:
+            jobs = cast(Iterable[Job], self._jobs(left, processes))  # None only where it is polled
+            with closing(self.executor.judge(jobs, self._give_up)) as answers:
+                for job, candidate, verdict in answers:
+                    self._take(job, candidate.id, verdict, processes)
+        finally:
+            for judging in list(self.judging.values()):
+                judging.close()
+            seconds = round(time.monotonic() - begun, 3)
+            session = replace(session, judged=self.judged, seconds=seconds)
+            save_campaign(
+                replace(self.campaign, document=replace(document, stretches=(*sessions, session)))
+            )
+
+    def _jobs(
+        self, left: list[str], processes: SceneProcesses
+    ) -> Generator[Job | None, None, None]:
+        """Scenes that are prepared, one after the other; None while workers have others to judge
+        and the next one is not ready."""
+        processes.prepare(
+            PrepareTask(name, self.campaign.folder(name), self.scenes.given[name]) for name in left
+        )
+        while True:
+            if self.judging and not processes.ready():
+                yield None
+                continue
+            prepared = processes.prepared()
+            if prepared is None:
+                return
+            job = self._begin(*prepared, processes)
+            if job is not None:
+                yield job
+
+    def _begin(
+        self, item: PrepareTask, scene: Scene | BaseException | None, processes: SceneProcesses
+    ) -> Job | None:
+        """What is to be judged of a scene that is prepared, if anything."""
+        if scene is None:
+            self.ledger.note(SceneState(scene=item.name, state="empty"))
+            self._expect(item.name, 0)
+            return None
+        if isinstance(scene, BaseException):
+            self._fail(item.name, scene)
+            return None
+        judging = SceneJudging(item.name, item.folder, self.each, self.executor.workers)
+        self.ledger.note(judging.state("open"))
+        if not judging.left:
+            self._finish(judging, processes)
+            return None
+        judging.begin()
+        self._expect(item.name, judging.mine)
+        self.judging[item.name] = judging
+        if judging.known:
+            self.pace.skip(judging.known, note=self._note())
+        request = self.request
+        factory = StationJudgeFactory(
+            scene, request.station, request.engine, request.mode, request.phases
+        )
+        return Job(item.name, factory, judging.left)
+
+    def _take(self, job: Job, id: str, verdict: Verdict, processes: SceneProcesses) -> None:
+        judging = self.judging[job.key]
+        judging.take(id, verdict)
+        self.judged += 1
+        self.pace.step(outcome=verdict.outcome, note=self._note())
+        if judging.is_done:
+            del self.judging[job.key]
+            self._finish(judging, processes)
+        elif judging.is_part_due():
+            processes.take(job.key)
+
+    def _give_up(self, failed: JobFailed) -> None:
+        """A scene whose judge cannot be built, for example."""
+        self.judging.pop(failed.job.key).close()
+        self._fail(failed.job.key, failed.error)
+
+    def _finish(self, judging: SceneJudging, processes: SceneProcesses) -> None:
+        self.ledger.note(judging.state("done"))
+        processes.finish(judging.name)
+
+    def _fail(self, name: str, error: BaseException) -> None:
+        why = str(error) if isinstance(error, BurgError) else f"{type(error).__name__}: {error}"
+        self.ledger.note(SceneState(scene=name, state="failed", why=why))
+        self._expect(name, 0)
+
+    def _found(self) -> Counter[Outcome]:
+        """Grasps that were judged before, by outcome."""
+        if not (self.folder / SCENES_FOLDER).exists():
+            return Counter()
+        codes, texts = self.campaign.rows(["outcome"]).codes("outcome")
+        counts = np.bincount(codes, minlength=len(texts)).tolist()
+        return Counter({Outcome(text): n for text, n in zip(texts, counts, strict=True)})
+
+    def _expect(self, name: str, grasps: int) -> None:
+        self.expected[name] = grasps
+        self.pace.expect(sum(self.expected.values()))
+
+    def _note(self) -> str:
+        done = sum(s.state != "open" for s in self.ledger.states.values())
+        return f"{done:,} of {len(self.campaign.names):,} scenes"
+
+    def _is_done(self, name: str) -> bool:
+        """Whether nothing is left to do about a scene, from a glance at its folder."""
+        state = self.ledger.states.get(name)
+        if state is None or state.state != "done" or state.interrupted:
+            return False
+        if self.request.retry_failed and state.failed:
+            return False
+        folder = self.campaign.folder(name)
+        return is_finished(folder, state.size, self.request.settings.table, report=self.reports)

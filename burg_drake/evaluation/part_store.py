@@ -1,0 +1,508 @@
+"""The columnar store of a run: parts of its table beside its journals, read, written and counted."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from burg_drake.core import INSTANCE_PREFIXES, Outcome, open_regular, remove_unfinished
+from burg_drake.evaluation.journal import JOURNAL_FILE, read_journal
+from burg_drake.evaluation.run_folder import Run, load_run
+from burg_drake.evaluation.table_parts import (
+    CANDIDATE_COLUMN,
+    JournalSegment,
+    Part,
+    StoredRows,
+    arrow_table,
+    column_names,
+    empty_column,
+    line_end,
+    open_part,
+    read_part,
+    require_arrow,
+    segment_of,
+    valid_segments,
+    whole_lines,
+    write_part,
+)
+
+PARTS_FOLDER = "parts"
+
+
+@dataclass(frozen=True)
+class StoredRun:
+    """A run whose rows are wanted.
+
+    Attributes:
+        scene: name by which parts know it; empty where the run is alone.
+        folder: of the run.
+    """
+
+    scene: str
+    folder: Path
+
+    @property
+    def journal(self) -> Path:
+        """Its journal."""
+        return self.folder / JOURNAL_FILE
+
+
+@dataclass(eq=False)
+class PartIndex:
+    """The parts of a folder and what they are made of.
+
+    Attributes:
+        parts: those that are whole, by their numbers.
+        damaged: files that are not.
+    """
+
+    parts: list[Part] = field(default_factory=list)
+    damaged: list[Path] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, folder: Path) -> PartIndex:
+        """Reads the footers of the parts of a run."""
+        index = cls()
+        parts = folder / PARTS_FOLDER
+        for path in sorted(parts.glob("part-*.parquet")) if parts.is_dir() else ():
+            part = open_part(path)
+            if part is None:
+                index.damaged.append(path)
+            else:
+                index.parts.append(part)
+        return index
+
+    def drop(self, part: Part) -> None:
+        """Takes out a part that is damaged."""
+        self.parts = [other for other in self.parts if other is not part]
+        self.damaged.append(part.path)
+
+    def segments(self) -> dict[str, list[tuple[JournalSegment, Part, int]]]:
+        """By scene: segments, the parts that they are in, and where their rows begin there."""
+        found: dict[str, list[tuple[JournalSegment, Part, int]]] = defaultdict(list)
+        for part in self.parts:
+            row = 0
+            for segment in part.segments:
+                found[segment.scene].append((segment, part, row))
+                row += segment.rows
+        return found
+
+
+def read_rows(
+    folder: Path,
+    places: Sequence[StoredRun],
+    names: Sequence[str] | None,
+    instances: Sequence[str] = (),
+) -> StoredRows:
+    """Columns of the judged grasps of runs.
+
+    Args:
+        folder: that has the parts.
+        places: the runs, in the order of their rows.
+        names: of the columns; all if None. What a run does not have is null.
+        instances: names of the free objects of all runs, for which all have columns.
+
+    Raises:
+        MissingDependencyError: pyarrow is not installed.
+        BurgError: a run cannot be read.
+    """
+    index = PartIndex.of(folder)
+    while True:
+        found = _read_tables(index, places, names, instances)
+        if isinstance(found, StoredRows):
+            return found
+        index.drop(found)
+
+
+def segment_table(run: Run, begin: int, end: int) -> Any:
+    """The rows of a stretch of a run's journal, in the order of the candidates."""
+    verdicts = read_journal(run.path / JOURNAL_FILE, begin, end)
+    ids = run.candidates.id
+    places = [place for place, id in enumerate(ids) if id in verdicts]
+    part = run.with_verdicts({ids[place]: verdicts[ids[place]] for place in places})
+    return arrow_table({**part.results, CANDIDATE_COLUMN: np.array(places, dtype=np.int64)})
+
+
+def merge_tables(tables: Sequence[Any]) -> Any:
+    """Tables of one run as one: of each candidate the last row, in the order of the candidates."""
+    arrow = require_arrow("a columnar table")
+    table = arrow.concat_tables(tables, promote_options="permissive")
+    candidate = table.column(CANDIDATE_COLUMN).to_numpy()
+    order = np.lexsort((np.arange(len(candidate)), candidate))
+    last = np.append(candidate[order][1:] != candidate[order][:-1], True)
+    return table.take(order[last]) if len(order) else table
+
+
+def _read_tables(
+    index: PartIndex,
+    places: Sequence[StoredRun],
+    names: Sequence[str] | None,
+    instances: Sequence[str],
+) -> StoredRows | Part:
+    """The rows, or a part that is damaged."""
+    arrow = require_arrow("reading the results of many grasps")
+    segments = index.segments()
+    pieces: list[list[tuple[Part, int, int]]] = []
+    tails: list[Any | None] = []
+    for place in places:
+        mine = segments.get(place.scene, [])
+        found = valid_segments([segment for segment, _, _ in mine], place.journal)
+        where = {segment: (part, row, segment.rows) for segment, part, row in mine}
+        pieces.append([where[segment] for segment in found])
+        tail = _read_tail(place, found[-1].end if found else 0)
+        tails.append(None if tail is None else with_instances(tail, instances))
+    used = {part.path: part for piece in pieces for part, _, _ in piece}
+    if names is None:
+        names = _all_names(list(used.values()), tails)
+    wanted = [*dict.fromkeys([*names, CANDIDATE_COLUMN])]
+    tables: dict[Path, Any] = {}
+    for path, part in used.items():
+        table = read_part(part, wanted)
+        if table is None:
+            return part
+        tables[path] = table
+    runs: list[Any] = []
+    for piece, tail in zip(pieces, tails, strict=True):
+        if tail is None and len(piece) == 1:
+            runs.append(piece[0])
+            continue
+        slices = [tables[part.path].slice(row, rows) for part, row, rows in piece]
+        if tail is not None:
+            slices.append(_add_columns(tail, wanted))
+        runs.append(merge_tables(slices) if len(slices) > 1 else slices[0] if slices else None)
+    counts = np.array([_row_count(run) for run in runs], dtype=np.int64)
+    there = [table for table in _concatenate_runs(runs, tables) if table.num_rows]
+    empty = arrow.table({name: empty_column(name, 0) for name in wanted})
+    whole = arrow.concat_tables(there, promote_options="permissive") if there else empty
+    return StoredRows(whole.select(list(names)), counts)
+
+
+def _row_count(run: Any) -> int:
+    """Rows of a run: of a piece of a part, of a table, or none."""
+    return 0 if run is None else run[2] if isinstance(run, tuple) else run.num_rows
+
+
+def _concatenate_runs(runs: Sequence[Any], tables: Mapping[Path, Any]) -> Iterator[Any]:
+    """Tables of runs one after the other; pieces that follow on each other in a part as one."""
+    k = 0
+    while k < len(runs):
+        if isinstance(runs[k], tuple):
+            part, begin, rows = runs[k]
+            while (
+                k + 1 < len(runs)
+                and runs[k + 1] is not None
+                and isinstance(runs[k + 1], tuple)
+                and runs[k + 1][:2] == (part, begin + rows)
+            ):
+                k, rows = k + 1, rows + runs[k + 1][2]
+            yield tables[part.path].slice(begin, rows)
+        elif runs[k] is not None:
+            yield runs[k]
+        k += 1
+
+
+def _read_tail(place: StoredRun, begin: int) -> Any | None:
+    """Rows of what a journal has beyond its parts; None if it has nothing."""
+    end = whole_lines(place.journal)
+    return segment_table(load_run(place.folder), begin, end) if end > begin else None
+
+
+def _add_columns(table: Any, names: Sequence[str]) -> Any:
+    for name in names:
+        if name not in table.column_names:
+            table = table.append_column(name, empty_column(name, table.num_rows))
+    return table.select(list(names))
+
+
+def _all_names(parts: Sequence[Part], tails: Sequence[Any | None]) -> list[str]:
+    """Names of all columns, in the order of the tables."""
+    names: dict[str, None] = {}
+    for part in parts:
+        names |= dict.fromkeys(column_names(part))
+    for tail in tails:
+        names |= dict.fromkeys([] if tail is None else tail.column_names)
+    names.pop(CANDIDATE_COLUMN, None)
+    return list(names)
+
+
+def with_instances(table: Any, instances: Sequence[str]) -> Any:
+    """A table with columns for all instances, each kind where its first one is."""
+    if not instances:
+        return table
+    arrow = require_arrow("a columnar table")
+    columns: dict[str, Any] = {}
+    for name in table.column_names:
+        for prefix in INSTANCE_PREFIXES.values():
+            if name.startswith(prefix) and name.removeprefix(prefix) in instances:
+                for instance in instances:
+                    columns.setdefault(prefix + instance, None)
+        columns[name] = table.column(name)
+    rows = table.num_rows
+    return arrow.table({n: empty_column(n, rows) if c is None else c for n, c in columns.items()})
+
+
+PART_ROWS = 50_000
+"""Rows of a part: few enough to be made in a second or two, enough that parts are few."""
+BATCH_BYTES = 32 << 20
+"""Bytes of a journal whose rows are made at a time; a row has some hundred."""
+
+
+class PartWriter:
+    """Writes parts; one process at a time, the one that has the run."""
+
+    def __init__(self, folder: Path, places: Sequence[StoredRun], instances: Sequence[str]) -> None:
+        """Looks at what is there, and removes what is damaged or does not hold any more.
+
+        Args:
+            folder: of the run.
+            places: all runs whose rows are kept here.
+            instances: names of the free objects of all of them, so that all parts have the same
+                columns.
+        """
+        self._folder = folder / PARTS_FOLDER
+        self._instances = list(instances)
+        self._pending: list[tuple[Any, JournalSegment]] = []
+        self._places = {place.scene: place for place in places}
+        self._folder.mkdir(parents=True, exist_ok=True)
+        remove_unfinished(self._folder)
+        self._index = PartIndex.of(folder)
+        for path in self._index.damaged:
+            path.unlink(missing_ok=True)
+        self._ends: dict[str, int] = {}
+        self._number = max((part.number for part in self._index.parts), default=0)
+        self._remove_stale_segments()
+
+    def behind(self) -> list[str]:
+        """Scenes whose journals have more than the parts."""
+        return [
+            scene
+            for scene, place in self._places.items()
+            if place.journal.exists() and place.journal.stat().st_size > self._ends.get(scene, 0)
+        ]
+
+    def catch_up(self, scenes: Iterable[str] | None = None) -> None:
+        """Takes what the journals have beyond the parts; of all scenes if None."""
+        for scene in self.behind() if scenes is None else scenes:
+            self.take(scene)
+
+    def take(self, scene: str, run: Run | None = None) -> None:
+        """Takes what the journal of a scene has beyond the parts."""
+        place = self._places[scene]
+        begin, end = self._ends.get(scene, 0), whole_lines(place.journal)
+        if end > begin and run is None:
+            run = load_run(place.folder)
+        while begin < end:
+            assert run is not None
+            upto = min(end, line_end(place.journal, min(end, begin + BATCH_BYTES)))
+            table = segment_table(run, begin, upto)
+            segment = segment_of(scene, place.journal, begin, upto, table.num_rows)
+            self._pending.append((with_instances(table, self._instances), segment))
+            self._ends[scene] = begin = upto
+            if sum(segment.rows for _, segment in self._pending) >= PART_ROWS:
+                self.flush()
+
+    def flush(self) -> None:
+        """Writes what was taken."""
+        if self._pending:
+            arrow = require_arrow("a columnar table")
+            tables, segments = zip(*self._pending, strict=True)
+            table = arrow.concat_tables(tables, promote_options="permissive").combine_chunks()
+            self._write(table.unify_dictionaries(), segments)
+            self._pending.clear()
+
+    def close(self) -> None:
+        """Writes what is left; of grasps that were judged again only the last row stays."""
+        self.flush()
+        again = self._judged_again()
+        if again:
+            self._remove(
+                {
+                    segment
+                    for part in self._index.parts
+                    for segment in part.segments
+                    if segment.scene in again
+                }
+            )
+            for scene in again:
+                self._ends.pop(scene)
+            self.catch_up(again)
+            self.flush()
+
+    def _judged_again(self) -> list[str]:
+        """Scenes with several rows about a grasp."""
+        segments = self._index.segments()
+        several = [scene for scene, found in segments.items() if len(found) > 1]
+        twice = []
+        for scene in several:
+            places = [
+                self._candidates(part)[row : row + s.rows] for s, part, row in segments[scene]
+            ]
+            if len(np.unique(np.concatenate(places))) < sum(map(len, places)):
+                twice.append(scene)
+        return twice
+
+    def _candidates(self, part: Part) -> Any:
+        table = read_part(part, [CANDIDATE_COLUMN])
+        return np.empty(0) if table is None else table.column(CANDIDATE_COLUMN).to_numpy()
+
+    def _write(self, table: Any, segments: Sequence[JournalSegment]) -> None:
+        self._number += 1
+        self._index.parts.append(write_part(self._folder, self._number, table, segments))
+
+    def _remove_stale_segments(self) -> None:
+        stale: set[JournalSegment] = set()
+        for scene, found in self._index.segments().items():
+            place = self._places.get(scene)
+            segments = [segment for segment, _, _ in found]
+            held = valid_segments(segments, place.journal) if place else []
+            stale |= {*segments} - {*held}
+            self._ends[scene] = held[-1].end if held else 0
+        self._remove(stale)
+
+    def _remove(self, stale: set[JournalSegment]) -> None:
+        """Writes parts without some of their segments again, and without those that a newer part
+        has, too, because the process was killed at this."""
+        seen: set[JournalSegment] = set()
+        for part in sorted(self._index.parts, key=lambda part: -part.number):
+            kept = [s for s in part.segments if s not in stale and s not in seen]
+            seen |= set(kept)
+            if len(kept) == len(part.segments):
+                continue
+            table = read_part(part, column_names(part)) if kept else None
+            self._index.parts.remove(part)
+            if table is not None:
+                arrow = require_arrow("a columnar table")
+                slices, row = [], 0
+                for segment in part.segments:
+                    if segment in kept:
+                        slices.append(table.slice(row, segment.rows))
+                    row += segment.rows
+                self._write(arrow.concat_tables(slices).combine_chunks(), kept)
+            for segment in kept if table is None else ():  # damaged: made again
+                self._ends[segment.scene] = min(self._ends[segment.scene], segment.begin)
+            part.path.unlink(missing_ok=True)
+
+
+def keep_parts(run: Run) -> None:
+    """Keeps parts of a run of one scene, if it is so large that they matter and pyarrow is
+    installed."""
+    if len(run.candidates) < PART_ROWS or find_spec("pyarrow") is None:
+        return
+    writer = PartWriter(run.path, [StoredRun("", run.path)], ())
+    writer.catch_up()
+    writer.close()
+
+
+JOURNAL_LINE_PATTERN = re.compile(
+    rb'^\{"id":"((?:[^"\\]|\\.)*)","outcome":"([a-z_]+)"[^\n]*\}\n', re.MULTILINE
+)
+"""A line of a journal, as `encode_verdict` writes it."""
+PREVIOUS_OUTCOME_PATTERN = re.compile(rb'"outcome_before":"([a-z_]+)"')
+"""In a line of a grasp judged again: the outcome that no longer counts."""
+FAILED_OUTCOME = Outcome.SIMULATION_FAILED.value.encode()
+
+
+@dataclass
+class JournalTail:
+    """What is known of a journal, up to a byte.
+
+    Attributes:
+        path: the journal.
+        place: the byte.
+        lines: grasps that have a verdict.
+        outcomes: number of grasps by outcome.
+        failed: ids of those that could not be simulated, which may be judged again.
+        modified: date of the last verdict, seconds since 1970; 0 if there is none.
+    """
+
+    path: Path
+    place: int = 0
+    lines: int = 0
+    outcomes: Counter[bytes] = field(default_factory=Counter)
+    failed: set[bytes] = field(default_factory=set)
+    modified: float = 0.0
+
+    def refresh(self) -> None:
+        """Reads what has come since."""
+        chunk_bytes = 1 << 22
+        try:
+            status = os.stat(self.path)
+        except OSError:
+            return
+        if status.st_size < self.place:  # it was begun again
+            self.place, self.lines, self.outcomes, self.failed = 0, 0, Counter(), set()
+        self.modified = status.st_mtime if status.st_size else 0.0
+        if status.st_size == self.place:
+            return
+        with open_regular(self.path) as stream:
+            stream.seek(self.place)
+            while data := stream.read(chunk_bytes):
+                whole = data.rfind(b"\n") + 1
+                if not whole:
+                    return
+                self._count(data[:whole])
+                self.place += whole
+                stream.seek(self.place)
+
+    def _count(self, data: bytes) -> None:
+        found = JOURNAL_LINE_PATTERN.findall(data)
+        self.lines += len(found)
+        self.outcomes.update(outcome for _, outcome in found)
+        again = PREVIOUS_OUTCOME_PATTERN.findall(data)
+        self.lines -= len(again)
+        self.outcomes.subtract(again)
+        if not self.failed and self.outcomes[FAILED_OUTCOME] == 0:
+            return
+        for id, outcome in found:
+            if id in self.failed:  # judged again
+                self.failed.discard(id)
+                self.outcomes[FAILED_OUTCOME] -= 1
+                self.lines -= 1
+            if outcome == FAILED_OUTCOME:
+                self.failed.add(id)
+
+
+def read_journal_tails(folder: Path, places: Sequence[StoredRun]) -> dict[str, JournalTail]:
+    """What the parts of a run know of its journals, by scene.
+
+    Args:
+        folder: that has the parts.
+        places: the runs.
+    """
+    tails = {place.scene: JournalTail(place.journal) for place in places}
+    if not (folder / PARTS_FOLDER).is_dir() or find_spec("pyarrow") is None:
+        return tails
+    index = PartIndex.of(folder)
+    names = ["id", "outcome", CANDIDATE_COLUMN]
+    tables: dict[Path, Any] = {part.path: read_part(part, names) for part in index.parts}
+    segments = index.segments()
+    for place in places:
+        where = {s: (part, row) for s, part, row in segments.get(place.scene, [])}
+        found = valid_segments(list(where), place.journal)
+        whole = [segment for segment in found if tables[where[segment][0].path] is not None]
+        if found and found == whole:
+            pieces = [(*where[segment], segment.rows) for segment in found]
+            slices = [tables[part.path].slice(row, rows) for part, row, rows in pieces]
+            _count_rows(tails[place.scene], slices)
+            tails[place.scene].place = found[-1].end
+    return tails
+
+
+def _count_rows(tail: JournalTail, slices: Sequence[Any]) -> None:
+    """Counts rows of Arrow tables."""
+    table = merge_tables(slices) if len(slices) > 1 else slices[0]
+    column = table.column("outcome")
+    counts = {item["values"]: item["counts"] for item in column.value_counts().to_pylist()}
+    tail.lines = table.num_rows
+    tail.outcomes = Counter({str(text).encode(): n for text, n in counts.items()})
+    if tail.outcomes[FAILED_OUTCOME]:
+        pairs = zip(table.column("id").to_pylist(), column.to_pylist(), strict=True)
+        tail.failed = {id.encode() for id, text in pairs if text == FAILED_OUTCOME.decode()}

@@ -1,0 +1,194 @@
+"""Sections of the report about grasps: margins, the best grasps, failed simulations."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import (
+    Array,
+    MarginNames,
+    Stage,
+    column_axis_label,
+    column_title,
+    display_order,
+    display_unit,
+    format_column_value,
+)
+from burg_drake.evaluation.report.charts import Limit, Series, mirrored_histogram
+from burg_drake.evaluation.report.page_elements import (
+    GROUP_CLASSES,
+    LIFTED_GROUP,
+    command,
+    folded_section,
+    group_legend,
+    present_groups,
+    section,
+    table,
+)
+from burg_drake.evaluation.results_table import Columns
+from burg_drake.evaluation.run_folder import Run
+from burg_drake.visualization import OUTCOME_GROUPS, Html, element
+
+MAIN_MARGINS = ("clearance", "slip", "tilt", "others_moved")
+"""Margins that tell most: tolerance to errors, firmness, disturbance of others."""
+FURTHER_MARGINS = display_order(
+    ("pad_force", "patch_area", "arm_clearance", "pushed", "tracking_distance"),
+    MarginNames.all,
+    without=(
+        *MAIN_MARGINS,
+        *("overlap", "joint_excess"),  # 0 of all that was executed
+        *("lift", MarginNames.lift_height, "end_time"),  # follow from what was asked for
+        *("duration", "tracking_error"),  # in the section about the arm
+    ),
+)
+"""All others that differ between executed grasps."""
+
+
+def margin_section(
+    columns: Mapping[str, Array], groups: NDArray[np.int8], trial: Mapping[str, float]
+) -> Html | None:
+    """The chosen margins; nothing where nothing was executed.
+
+    Args:
+        columns: (N,) by name, of grasps that came to a trial.
+        groups: (N,) of each, see `outcome_groups`.
+        trial: settings of the trial's phases, with the limits of what counts as lifted.
+    """
+    # Settings from whose value on a held object does not count as lifted.
+    limiting_settings = {"others_moved": "disturbance", "slip": "slip_limit", "tilt": "tilt_limit"}
+    limits = {
+        name: Limit(trial[limit] * display_unit(name)[1], "limit")
+        for name, limit in limiting_settings.items()
+        if trial.get(limit, math.inf) < math.pi  # an angle or a length that limits nothing
+    }
+    charts = _margin_charts(MAIN_MARGINS, columns, groups, limits)
+    if not charts:
+        return None
+    return section(
+        "Margins",
+        "Margins of all executed grasps: above the axis those that lifted their object,"
+        " below it all others, each half on its own scale. Dashed lines are medians."
+        " Slip and tilt are measured from the grip on, for grasps that both fingers"
+        " held.",
+        element("div", *charts, class_="charts"),
+        group_legend(present_groups(groups)),
+    )
+
+
+def further_margins(columns: Mapping[str, Array], groups: NDArray[np.int8]) -> Html | None:
+    """The others; likewise."""
+    charts = _margin_charts(FURTHER_MARGINS, columns, groups, {})
+    if not charts:
+        return None
+    text = (
+        "Read these like the margins above. Forces and contact patches are those at the"
+        " moment when the outcome was decided."
+    )
+    return folded_section("Further margins", text, element("div", *charts, class_="charts"))
+
+
+def executed_margins(
+    columns: Columns, groups: NDArray[np.int8]
+) -> tuple[dict[str, Array], NDArray[np.int8]]:
+    """What `margin_section` asks for, of a table of results and its groups (N,)."""
+    tried = columns["stage"] == Stage.EXECUTED.value
+    names = [name for name in (*MAIN_MARGINS, *FURTHER_MARGINS) if name in columns]
+    return {name: columns[name][tried] for name in names}, groups[tried]
+
+
+def _margin_charts(
+    margins: Sequence[str],
+    columns: Mapping[str, Array],
+    groups: NDArray[np.int8],
+    limits: Mapping[str, Limit],
+) -> list[Html]:
+    charts = []
+    for margin in margins:
+        _, factor = display_unit(margin)
+        values = columns.get(margin, np.empty(0)) * factor
+        known = np.isfinite(values)
+        if known.any():
+            charts.append(_margin_chart(margin, values[known], groups[known], limits.get(margin)))
+    return charts
+
+
+def _margin_chart(
+    margin: str, values: np.ndarray, groups: NDArray[np.int8], limit: Limit | None
+) -> Html:
+    series = {
+        k: Series(
+            values[groups == k], GROUP_CLASSES[OUTCOME_GROUPS[k].name], OUTCOME_GROUPS[k].name
+        )
+        for k in {LIFTED_GROUP, *present_groups(groups)}
+    }
+    success = series.pop(LIFTED_GROUP)
+    failures = [series[k] for k in sorted(series)]
+    unit, _ = display_unit(margin)
+    return mirrored_histogram(
+        success, failures, title=column_axis_label(margin), unit=unit, limit=limit
+    )
+
+
+def best_section(run: Run) -> Html | None:
+    """The best grasps and how to watch them; nothing where none was lifted."""
+    per_object = 3  # Rows for each object.
+    # Columns, with the decimals that tell the best grasps apart.
+    decimals = {
+        "clearance": 1,
+        "slip": 2,
+        "tilt": 2,
+        "pad_force": 1,
+        "patch_area": 0,
+        "others_moved": 2,
+    }
+    best = run.best(per_object, each=True)
+    if not best:
+        return None
+    head = ["grasp", "object", *map(column_title, decimals)]
+    rows = []
+    for row in map(run.row, best):
+        cells = [format_column_value(name, row[name], digits) for name, digits in decimals.items()]
+        rows.append(
+            element(
+                "tr",
+                element("td", element("code", row["id"], class_="copy")),
+                element("td", row["object"]),
+                *(element("td", cell, class_="number") for cell in cells),
+            )
+        )
+    line = shlex.join(["burg-drake", "replay", str(run.path), "--grasp", best[0]])
+    return folded_section(
+        "Best grasps",
+        f"The {per_object} best grasps of each object: lifted, with the most room around the"
+        " open hand (clearance), and so most likely to succeed when pose, mass and"
+        " friction differ from the model. Among grasps with the same clearance (to 0.5"
+        " mm) those with less slip, tilt and movement of other objects come first, then"
+        " those with the larger contact patch. To watch a grasp, give its id:",
+        command(line),
+        table(head, rows, numbers=range(2, len(head))),
+    )
+
+
+def failure_section(run: Run) -> Html | None:
+    """What could not be simulated and why; nothing if all could."""
+    max_rows = 50  # Rows of the table of failures.
+    failures = run.failures
+    if not failures:
+        return None
+    rows = [
+        element(
+            "tr",
+            element("td", element("code", row["id"])),
+            element("td", row["stage"]),
+            element("td", row["reason"]),
+        )
+        for row in map(run.row, failures[:max_rows])
+    ]
+    more = f" The first {max_rows} are listed." if len(failures) > max_rows else ""
+    text = f"{len(failures)} grasps could not be simulated; they count as not executed.{more}"
+    return folded_section("Failures", text, table(["grasp", "stage", "reason"], rows))

@@ -1,0 +1,154 @@
+"""Page frame, style sheet, blocks and outcome colours that reports share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import Outcome
+from burg_drake.evaluation.outcome_counts import member_codes
+from burg_drake.evaluation.report.charts import legend
+from burg_drake.visualization import (
+    OUTCOME_GROUPS,
+    Child as Child,
+    Html as Html,
+    contrast_ratio,
+    element as element,
+    html_document,
+    join as join,
+    page_style,
+)
+
+GROUP_CLASSES = {
+    group.name: f"g{i}" for i, group in enumerate(OUTCOME_GROUPS)
+}  # CSS class of each outcome group.
+THEMED_COLOURS = {
+    "hand collides": ("#9aa2a9", "#6b747b"),
+    "arm has no path": ("#1a3373", "#8fa6e8"),
+    "simulation failed": ("#1d2328", "#f4f6f7"),
+}
+"""Colours that need one tone on a light page and another on a dark one."""
+
+
+def style_sheet() -> str:
+    """All styles of the page."""
+    sheet = page_style("burg_drake.evaluation.report", "style.css")
+    light = "".join(
+        _group_rule(g.name, THEMED_COLOURS.get(g.name, (g.hex,))[0]) for g in OUTCOME_GROUPS
+    )
+    dark = "".join(_group_rule(name, tones[1]) for name, tones in THEMED_COLOURS.items())
+    return f"{sheet}{light}@media screen and (prefers-color-scheme: dark) {{\n{dark}}}\n"
+
+
+def _group_rule(group: str, colour: str) -> str:
+    # Yellow lines cannot be seen on white: a darker tone of the same hue.
+    stroke_colours = {OUTCOME_GROUPS[1].hex: "#b59f00"}
+    # Colours of numbers: the one with more contrast is taken.
+    text_colours = ("#101418", "#ffffff")
+    text = max(text_colours, key=lambda text: contrast_ratio(text, colour))
+    name = GROUP_CLASSES[group]
+    fill = f".{name} {{ background: {colour}; fill: {colour}; color: {text}; }}"
+    return f"{fill} .grasp.{name} {{ stroke: {stroke_colours.get(colour, colour)}; }}\n"
+
+
+def html_page(title: str, *content: Child) -> str:
+    """A whole HTML document.
+
+    Args:
+        title: of the window.
+        content: of the body.
+    """
+    return html_document(title, style_sheet(), element("main", *content))
+
+
+def header(kind: str, title: str, about: str) -> Html:
+    """The top of a page: what kind of page it is, of what, and a line about it."""
+    return element(
+        "header",
+        element("p", kind, class_="kind"),
+        element("h1", title),
+        element("p", about, class_="about"),
+    )
+
+
+def tiles(entries: list[tuple[str, Child, str]]) -> Html:
+    """Large figures in a row: name, figure, note of each."""
+    return element(
+        "dl",
+        *(
+            element("div", element("dt", name), element("dd", value, element("small", note)))
+            for name, value, note in entries
+        ),
+        class_="tiles",
+    )
+
+
+def closing_section(*sections: Child) -> Html:
+    """The folded sections at the end; on paper they begin a new page."""
+    return element("div", *sections, class_="closer")
+
+
+def section(title: str, text: str, *content: Child) -> Html:
+    """A headed part of the page with one sentence on what it shows."""
+    return element("section", element("h2", title), element("p", text), *content)
+
+
+def table(
+    head: Sequence[str], rows: Sequence[Html], *, numbers: Sequence[int] = (), style: str = ""
+) -> Html:
+    """A table; the columns whose indices are in `numbers` are aligned to the right."""
+    cells = [
+        element("th", name, class_="number" if k in numbers else None, scope="col")
+        for k, name in enumerate(head)
+    ]
+    whole = element(
+        "table",
+        element("thead", element("tr", *cells)),
+        element("tbody", *rows),
+        class_=style or None,
+    )
+    return element("div", whole, class_="scroll")
+
+
+def command(line: str) -> Html:
+    """A command to copy, broken between words only."""
+    words = [element("span", word) for word in line.split(" ")]
+    spaced = [part for word in words for part in (word, " ")]
+    return element("pre", element("code", *spaced[:-1], class_="copy"))
+
+
+def folded_section(title: str, text: str, *content: Child) -> Html:
+    """A part of the page for those who look for it: closed on the screen, open on paper."""
+    summary = element("summary", element("h2", title))
+    return element("section", element("details", summary, element("p", text), *content))
+
+
+GROUP_INDICES = {outcome: k for k, group in enumerate(OUTCOME_GROUPS) for outcome in group.outcomes}
+"""Index into `OUTCOME_GROUPS` of each outcome."""
+LIFTED_GROUP = GROUP_INDICES[Outcome.LIFTED]
+"""Index of the group that is success."""
+
+
+def group_indices(outcomes: NDArray[np.str_]) -> NDArray[np.int8]:
+    """Index into `OUTCOME_GROUPS` (N,) of each outcome (N,); one pass an outcome, not one a row."""
+    return groups_of_codes(member_codes(outcomes, tuple(Outcome)))
+
+
+def groups_of_codes(outcomes: NDArray[np.int8]) -> NDArray[np.int8]:
+    """Index into `OUTCOME_GROUPS` (N,) of outcomes that are given by their places in `Outcome`."""
+    return np.array([GROUP_INDICES[outcome] for outcome in Outcome], dtype=np.int8)[outcomes]
+
+
+def present_groups(groups: NDArray[np.int8]) -> list[int]:
+    """Which groups there are, best first."""
+    counts = np.bincount(groups[groups >= 0], minlength=len(OUTCOME_GROUPS))
+    return np.flatnonzero(counts).tolist()
+
+
+def group_legend(indices: Sequence[int]) -> Html:
+    """The colours of groups and their names."""
+    return legend(
+        [(GROUP_CLASSES[OUTCOME_GROUPS[k].name], OUTCOME_GROUPS[k].name) for k in indices]
+    )

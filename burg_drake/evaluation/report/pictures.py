@@ -1,0 +1,461 @@
+"""Drawings of a scene and of the grasps on its objects, of one scene or of many."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import (
+    Array,
+    BurgError,
+    format_count,
+    make_pose,
+    rot_z,
+    rotation_from_quaternion,
+    transform_points,
+)
+from burg_drake.evaluation.campaign_folder import Campaign
+from burg_drake.evaluation.report.page_elements import (
+    GROUP_CLASSES,
+    LIFTED_GROUP,
+    group_legend,
+    present_groups,
+    section,
+)
+from burg_drake.evaluation.results_table import Columns, best_rows
+from burg_drake.evaluation.run_folder import Run
+from burg_drake.evaluation.table_parts import StoredRows
+from burg_drake.objects import ObjectLibrary, load_library
+from burg_drake.scene import Scene
+from burg_drake.visualization import (
+    OUTCOME_GROUPS,
+    FlatView,
+    Html,
+    SolidMesh,
+    best_yaw,
+    camera_rotation,
+    element,
+    fit_view,
+    footprint,
+    grasp_corners,
+    grasp_strokes,
+    join,
+    object_surface,
+    path_data,
+    project_to_ground,
+    shaded_outline,
+    upright_rotation,
+)
+
+
+class GraspPictureLayout:
+    """Grasp picture layout."""
+
+    panel = 220.0  # Side of a picture [SVG units].
+    caption = 22.0  # Height of the line above it.
+    foot = 16.0  # Height of the scale below it.
+    ruler = 0.05  # Length of the scale [m].
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnGrasps:
+    """Grasps on one instance, to be drawn.
+
+    Attributes:
+        ids: (N,) of the run.
+        X_OG: (N, 4, 4) in the object frame.
+        width: (N,) distance between the fingers [m].
+        groups: (N,) indices into `palette.GROUPS`.
+        counts: how many there are of all groups, drawn or not, by index.
+    """
+
+    ids: NDArray[np.str_]
+    X_OG: Array
+    width: Array
+    groups: NDArray[np.int8]
+    counts: Mapping[int, int]
+
+
+def solid_of(scene: Scene, name: str) -> SolidMesh:
+    """An instance's surface in the scene frame."""
+    surface = object_surface(scene.library, scene.instance(name).object)
+    return SolidMesh(transform_points(scene.X_SO(name), surface.vertices), surface.faces)
+
+
+def scene_drawing(
+    scene: Scene,
+    free: Mapping[str, SolidMesh],
+    fixed: Mapping[str, SolidMesh],
+    notes: Mapping[str, str],
+) -> Html:
+    """The scene, seen from the near edge of the board, with names.
+
+    Args:
+        scene: for its board.
+        free, fixed: its instances by name.
+        notes: a short text for each free instance, below its name.
+    """
+    picture_width = 480.0  # SVG units.
+    elevation = float(np.deg2rad(56.0))  # Radians by which the camera looks down.
+    max_named = 16  # Scenes with more objects have no names in their picture.
+    dx, dy = scene.board.size
+    board = np.array([[0, 0, 0], [dx, 0, 0], [dx, dy, 0], [0, dy, 0]], dtype=float)
+    R_SC = camera_rotation(elevation)
+    everything = np.vstack([board, *(s.vertices for s in (*free.values(), *fixed.values()))])
+    view = fit_view(everything, R_SC, picture_width)
+    labels = [_label(view, solid, name, notes.get(name, "")) for name, solid in free.items()]
+    behind = shaded_outline(list(fixed.values()), view)
+    width, height = view.size
+    return element(
+        "svg",
+        element("path", d=path_data(view.places(board)), class_="board"),
+        *(element("path", d=d, class_="fixed") for d in behind[:1] if d),
+        *(element("path", d=footprint(s, view), class_="ground") for s in free.values()),
+        *_solid_tones(list(free.values()), view),
+        *(labels if len(free) <= max_named else []),
+        viewBox=f"0 0 {width:g} {height:g}",
+        class_="drawing scene",
+        role="img",
+        aria_label=f"The scene with {len(free)} objects: {', '.join(free)}",
+    )
+
+
+def grasp_drawing(name: str, solid: SolidMesh, X_SO: Array, grasps: DrawnGrasps) -> Html:
+    """An instance as it stands in the scene, twice: with the grasps that lifted it, and with all
+    others in the colours of their outcomes. Every grasp is one path.
+
+    Args:
+        name: of the instance.
+        solid: in the scene frame.
+        X_SO: (4, 4) its pose there.
+        grasps: to draw.
+    """
+    elevation = float(np.deg2rad(30.0))  # Radians by which the camera looks down.
+    R_WC = camera_rotation(elevation)
+    X_WS = make_pose(rot_z(best_yaw(solid.vertices - solid.vertices.mean(axis=0), R_WC)))
+    turned = SolidMesh(transform_points(X_WS, solid.vertices), solid.faces)
+    corners = grasp_corners(X_WS @ X_SO @ grasps.X_OG, grasps.width)
+    everything = np.vstack([turned.vertices, project_to_ground(turned), corners.reshape(-1, 3)])
+    view = fit_view(everything, R_WC, GraspPictureLayout.panel, GraspPictureLayout.panel)
+    behind = join(
+        element("path", d=footprint(turned, view), class_="ground"), *_solid_tones([turned], view)
+    )
+    lifted = grasps.groups == LIFTED_GROUP
+    counts = (
+        grasps.counts.get(LIFTED_GROUP, 0),
+        sum(n for k, n in grasps.counts.items() if k != LIFTED_GROUP),
+    )
+    panels = []
+    for place, (mask, text, count) in enumerate(
+        ((lifted, "lifted", counts[0]), (~lifted, "not lifted", counts[1]))
+    ):
+        number = f"{count:,}" if count else "none"
+        panel = (
+            element(
+                "text", f"{text}: {number}", x=GraspPictureLayout.panel / 2, y=15, class_="panel"
+            ),
+            element(
+                "g",
+                behind,
+                *_strokes(grasps, mask, corners, view),
+                _ruler(view),
+                transform=f"translate(0 {GraspPictureLayout.caption:g})",
+            ),
+        )
+        panels.append(
+            element("g", *panel, transform=f"translate({place * GraspPictureLayout.panel:g} 0)")
+        )
+    return element(
+        "svg",
+        *panels,
+        viewBox=f"0 0 {2 * GraspPictureLayout.panel:g} {GraspPictureLayout.caption + GraspPictureLayout.panel + GraspPictureLayout.foot:g}",
+        class_="drawing grasps",
+        role="img",
+        aria_label=f"Grasps on {name}: {counts[0]} lifted it, {counts[1]} did not",
+    )
+
+
+def _strokes(
+    grasps: DrawnGrasps, mask: NDArray[np.bool_], corners: Array, view: FlatView
+) -> list[Html]:
+    """One group of paths for each outcome group, the best ones last and so on top; within a group
+    the nearer grasps on top."""
+    found = []
+    depth = view.depths(corners[:, 0])
+    for k in sorted(set(grasps.groups[mask].tolist()), reverse=True):
+        members = np.flatnonzero(mask & (grasps.groups == k))
+        members = members[np.argsort(-depth[members], kind="stable")]
+        paths = [
+            element("path", element("title", f"{grasps.ids[i]}"), d=d)
+            for i, d in zip(members.tolist(), grasp_strokes(corners[members], view), strict=True)
+        ]
+        found.append(element("g", *paths, class_=f"grasp {GROUP_CLASSES[OUTCOME_GROUPS[k].name]}"))
+    return found
+
+
+def _solid_tones(solids: Sequence[SolidMesh], view: FlatView) -> list[Html]:
+    paths = shaded_outline(solids, view)
+    return [element("path", d=d, class_=f"tone t{k}") for k, d in enumerate(paths) if d]
+
+
+def _ruler(view: FlatView) -> Html:
+    length = GraspPictureLayout.ruler * view.scale
+    x, y = (
+        GraspPictureLayout.panel - 8 - length,
+        GraspPictureLayout.panel + GraspPictureLayout.foot - 3,
+    )
+    return element(
+        "g",
+        element("line", x1=f"{x:.1f}", x2=f"{x + length:.1f}", y1=y, y2=y),
+        element(
+            "text", f"{100 * GraspPictureLayout.ruler:g} cm", x=f"{x + length / 2:.1f}", y=y - 4
+        ),
+        class_="ruler",
+    )
+
+
+def _label(view: FlatView, solid: SolidMesh, name: str, note: str) -> Html:
+    places = view.places(solid.vertices)
+    x, y = (places.min(axis=0) + places.max(axis=0)) / 2.0
+    lines = [element("tspan", name, x=f"{x:.1f}", class_="name")]
+    if note:
+        lines.append(element("tspan", note, x=f"{x:.1f}", dy="1.15em"))
+    return element("text", *lines, x=f"{x:.1f}", y=f"{y:.1f}", class_="label")
+
+
+MAX_PICTURED_INSTANCES = 12
+"""Number of instances with a picture of their grasps."""
+MAX_DRAWN_GRASPS = 1500
+"""Number of grasps that are drawn in all pictures together."""
+DEFAULT_DRAWN_WIDTH = 0.05
+"""Metres between the fingers of a grasp whose width is not known."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pictures:
+    """What the pictures of a run are made from.
+
+    Attributes:
+        scene: as it was judged.
+        columns: the results.
+        groups: (N,) of each row, see `outcome_groups`.
+    """
+
+    scene: Scene
+    columns: Columns
+    groups: NDArray[np.int8]
+
+    @cached_property
+    def solids(self) -> dict[str, SolidMesh]:
+        """Surfaces of the free instances in the scene frame."""
+        return {name: solid_of(self.scene, name) for name in self.scene.instances}
+
+    @cached_property
+    def fixed(self) -> dict[str, SolidMesh]:
+        """Surfaces of the fixed instances in the scene frame."""
+        return {name: solid_of(self.scene, name) for name in self.scene.background}
+
+
+def pictures_of(run: Run, groups: NDArray[np.int8]) -> Pictures | None:
+    """What to draw; nothing if the files that the run was judged with are gone or have changed."""
+    try:
+        pictures = Pictures(run.scene(), run.results, groups)
+        _ = pictures.solids, pictures.fixed
+    except BurgError:
+        return None
+    return pictures
+
+
+def scene_picture(pictures: Pictures | None) -> Html | None:
+    """The scene with how many grasps lifted each object."""
+    if pictures is None:
+        return None
+    instances, lifted = pictures.columns["instance"], pictures.groups == LIFTED_GROUP
+    notes = {}
+    for name in pictures.scene.instances:
+        mine = instances == name
+        notes[name] = f"{int((mine & lifted).sum())} of {int(mine.sum())}" if mine.any() else ""
+    drawing = scene_drawing(pictures.scene, pictures.solids, pictures.fixed, notes)
+    text = (
+        "The scene, seen from the near edge of the board, with the number of grasps that"
+        " lifted each object."
+    )
+    return element("figure", drawing, element("figcaption", text))
+
+
+def grasp_section(pictures: Pictures | None) -> Html | None:
+    """Each instance with its grasps; nothing where there are none, or no meshes any more."""
+    if pictures is None:
+        return None
+    instances = pictures.columns["instance"]
+    with_grasps = [name for name in pictures.scene.instances if (instances == name).any()]
+    shown = with_grasps[:MAX_PICTURED_INSTANCES]
+    if not shown:
+        return None
+    figures, drawn = [], 0
+    for name in shown:
+        rows = np.flatnonzero(instances == name)
+        chosen = rows[drawn_rows(pictures.groups[rows], MAX_DRAWN_GRASPS // len(shown))]
+        figures.append(_instance_figure(pictures, name, rows, chosen))
+        drawn += len(chosen)
+    total = int(np.isin(instances, shown).sum())
+    text = "Each object as it stands in the scene: on the left with the grasps that lifted it, on"
+    text += (
+        " the right with all others. Each fork shows the two fingers; its stem points toward"
+        " the arm. Point at"
+    )
+    text += " a grasp to see its id."
+    if drawn < total:
+        text += (
+            f" Shown are {format_count(drawn)} of {format_count(total)} grasps, from all outcomes."
+        )
+    if len(shown) < len(with_grasps):
+        text += f" The first {len(shown)} of {len(with_grasps)} objects are shown."
+    return section(
+        "The grasps",
+        text,
+        group_legend(present_groups(pictures.groups)),
+        element("div", *figures, class_="pictures"),
+    )
+
+
+def drawn_rows(groups: NDArray[np.int8], most: int) -> NDArray[np.int64]:
+    """Which grasps (N,) to draw: all, or about `most` of them in the shares of their groups, with
+    at least one of each group."""
+    if len(groups) <= most:
+        return np.arange(len(groups))
+    order = np.argsort(groups, kind="stable")
+    even = order[np.linspace(0, len(order) - 1, most).round().astype(np.int64)]
+    first = [int(np.flatnonzero(groups == k)[0]) for k in np.unique(groups)]
+    return np.union1d(even, np.array(first, dtype=np.int64))
+
+
+def _instance_figure(
+    pictures: Pictures, name: str, rows: NDArray[np.int64], chosen: NDArray[np.int64]
+) -> Html:
+    # Columns that `best_rows` needs.
+    ranking_columns = (
+        *("id", "instance", "object", "outcome", "clearance", "slip", "tilt", "others_moved"),
+        *("patch_area", "score", "confidence", "judged_again"),
+    )
+    columns, groups = pictures.columns, pictures.groups
+    counts = np.bincount(groups[rows][groups[rows] >= 0], minlength=len(OUTCOME_GROUPS))
+    width = columns["width"][chosen]
+    grasps = DrawnGrasps(
+        ids=columns["id"][chosen],
+        X_OG=poses_of_rows(columns, chosen),
+        width=np.where(np.isfinite(width), width, DEFAULT_DRAWN_WIDTH),
+        groups=groups[chosen],
+        counts={k: int(n) for k, n in enumerate(counts)},
+    )
+    drawing = grasp_drawing(name, pictures.solids[name], pictures.scene.X_SO(name), grasps)
+    best = best_rows(
+        {key: values[rows] for key, values in columns.items() if key in ranking_columns}
+    )
+    caption = [
+        element("b", name),
+        f" {format_count(int(counts[LIFTED_GROUP]))} of {format_count(len(rows))} lifted",
+    ]
+    if best:
+        id = str(columns["id"][rows[best[0]]])
+        caption += [", best: ", element("code", id, class_="copy")]
+    return element("figure", element("figcaption", *caption), drawing)
+
+
+def poses_of_rows(columns: Columns, rows: NDArray[np.int64]) -> Array:
+    """`X_OG` (M, 4, 4) of some rows of a table."""
+    X_OG = np.tile(np.eye(4), (len(rows), 1, 1))
+    if len(rows):
+        wxyz = np.column_stack([columns[name][rows] for name in ("qw", "qx", "qy", "qz")])
+        X_OG[:, :3, :3] = rotation_from_quaternion(wxyz)
+        X_OG[:, :3, 3] = np.column_stack([columns[name][rows] for name in "xyz"])
+    return X_OG
+
+
+def object_pictures(
+    campaign: Campaign, stored: StoredRows, groups: NDArray[np.int8]
+) -> Html | None:
+    """The objects with most grasps, each with its grasps of all scenes; nothing where there are
+    none, or no meshes any more.
+
+    Args:
+        campaign: the run.
+        stored: its rows, with poses, widths and ids.
+        groups: (N,) of each row, see `outcome_groups`.
+    """
+    codes, names = stored.codes("object")
+    libraries = _unchanged_libraries(campaign)
+    known = [k for k, name in enumerate(names) if _library_with(libraries, name) is not None]
+    numbers = np.bincount(codes, minlength=len(names))
+    ranked = sorted((k for k in known if numbers[k]), key=lambda k: (-numbers[k], names[k]))
+    if not ranked:
+        return None
+    figures, drawn, shown = [], 0, ranked[:MAX_PICTURED_INSTANCES]
+    for k in shown:
+        rows = np.flatnonzero(codes == k)
+        chosen = rows[drawn_rows(groups[rows], MAX_DRAWN_GRASPS // len(shown))]
+        library = _library_with(libraries, names[k])
+        if library is not None:
+            figures.append(_object_figure(library, names[k], stored, groups, rows, chosen))
+            drawn += len(chosen)
+    text = "Each object with its grasps from all scenes: on the left those that lifted it, on the"
+    text += " right all others. Each fork shows the two fingers; its stem points toward the arm."
+    total = int(numbers[shown].sum())
+    if drawn < total:
+        text += (
+            f" Shown are {format_count(drawn)} of {format_count(total)} grasps, from all outcomes."
+        )
+    if len(shown) < len(ranked):
+        text += f" The {len(shown)} of {len(ranked)} objects with the most grasps are shown."
+    legend = group_legend(present_groups(groups))
+    return section("The grasps", text, legend, element("div", *figures, class_="pictures"))
+
+
+def _unchanged_libraries(campaign: Campaign) -> list[ObjectLibrary]:
+    """Those that are where they were, and as they were."""
+    found = []
+    for folder in campaign.document.libraries:
+        try:
+            found.append(load_library(folder, Path(campaign.path)))
+        except BurgError:
+            continue
+    return found
+
+
+def _library_with(libraries: list[ObjectLibrary], name: str) -> ObjectLibrary | None:
+    return next((library for library in libraries if name in library.objects), None)
+
+
+def _object_figure(
+    library: ObjectLibrary,
+    name: str,
+    stored: StoredRows,
+    groups: NDArray[np.int8],
+    rows: NDArray[np.int64],
+    chosen: NDArray[np.int64],
+) -> Html:
+    pose_columns = ("x", "y", "z", "qw", "qx", "qy", "qz")
+    part = stored.table.take(chosen)
+    columns = {
+        key: part.column(key).to_numpy(zero_copy_only=False) for key in (*pose_columns, "width")
+    }
+    width = columns["width"].astype(float)
+    counts = np.bincount(groups[rows], minlength=len(OUTCOME_GROUPS))
+    grasps = DrawnGrasps(
+        ids=np.array(part.column("id").to_pylist(), dtype=np.str_),
+        X_OG=poses_of_rows(columns, np.arange(len(chosen))),
+        width=np.where(np.isfinite(width), width, DEFAULT_DRAWN_WIDTH),
+        groups=groups[chosen],
+        counts={k: int(n) for k, n in enumerate(counts)},
+    )
+    X_SO = make_pose(upright_rotation(library.entry(name)))
+    surface = object_surface(library, name)
+    solid = SolidMesh(transform_points(X_SO, surface.vertices), surface.faces)
+    lifted = f" {format_count(int(counts[LIFTED_GROUP]))} of {format_count(len(rows))} lifted"
+    caption = element("figcaption", element("b", name), lifted)
+    return element("figure", caption, grasp_drawing(name, solid, X_SO, grasps))

@@ -1,0 +1,287 @@
+"""The last sections of a report: commands that repeat the run, its inputs, settings and versions."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from burg_drake.core import format_duration, load_document, option_name
+from burg_drake.evaluation.campaign_document import CampaignDocument
+from burg_drake.evaluation.campaign_folder import Campaign
+from burg_drake.evaluation.journal import JOURNAL_FILE
+from burg_drake.evaluation.report.page_elements import command, folded_section, section
+from burg_drake.evaluation.run_document import HASH_DIGITS, RunDocument
+from burg_drake.evaluation.run_folder import GRASPS_FILE, RUN_FILE, STATION_FILE, Run
+from burg_drake.evaluation.settings import EvaluationSettings
+from burg_drake.evaluation.trial_origin import (
+    engine_label,
+    limit_settings,
+    motion_options,
+    motion_text,
+    read_motion,
+    without_motion,
+)
+from burg_drake.station import ENGINES, Engine, StationDocument
+from burg_drake.visualization import Html, element, join
+
+
+def reproduce_command(run: Run) -> str:
+    """The command line that makes this run; for given grasps their file is among the run's."""
+    document = run.document
+    words = ["burg-drake", "evaluate", document.scene.path, "--station", document.station.path]
+    words += _option_words(mode=document.mode)
+    if document.grasps.per_object is None:
+        words += ["--grasps", str(run.path / GRASPS_FILE)]
+    else:
+        words += _sampling_options(document)
+    if document.grasps.only:
+        words += ["--only", ",".join(document.grasps.only)]
+    words += _settings_options(document, run.path / STATION_FILE)
+    return shlex.join([*words, "-o", str(run.path)])
+
+
+def reproduce_campaign_command(campaign: Campaign) -> str:
+    """The command line that makes this run over many scenes; for given grasps, which it does not
+    keep in one file, the one that began it."""
+    document = campaign.document
+    if document.grasps.per_object is None:
+        return document.command
+    words = ["--station", document.station.path, *_option_words(mode=document.mode)]
+    words += _sampling_options(document)
+    if document.grasps.only:
+        words += ["--only", ",".join(document.grasps.only)]
+    begun = (place.folder / STATION_FILE for place in campaign.places)
+    words += _settings_options(document, next((path for path in begun if path.is_file()), None))
+    scenes = _scene_words([entry.path for entry in document.scenes])
+    return f"burg-drake evaluate {scenes} {shlex.join([*words, '-o', str(campaign.path)])}"
+
+
+def _scene_words(paths: Sequence[str]) -> str:
+    """Scenes as a shell has them; those of one folder with a star if it holds no others."""
+    max_paths = 12  # More scenes of one folder are written as all of its files.
+    folders = {Path(path).parent for path in paths}
+    if len(paths) > max_paths and len(folders) == 1:
+        (folder,) = folders
+        if sorted(map(str, folder.glob("*.yaml"))) == sorted(paths):
+            return f"{shlex.quote(str(folder))}/*.yaml"
+    return shlex.join(paths)
+
+
+def _sampling_options(document: RunDocument | CampaignDocument) -> list[str]:
+    grasps = document.grasps
+    words = _option_words(
+        grasps_per_object=grasps.per_object,
+        approach_angle_deg=grasps.approach_angle_deg,
+        blind=grasps.blind,
+    )
+    if grasps.until_balanced:
+        words += _option_words(
+            until_balanced=grasps.until_balanced,
+            balanced_among=grasps.balanced_among,
+            max_grasps_per_object=grasps.max_per_object,
+        )
+    return words
+
+
+def _settings_options(document: RunDocument | CampaignDocument, station: Path | None) -> list[str]:
+    """Motion, engine, seed, format of the table and share; `station` is a copy of the document."""
+    motion = read_motion(document.trial)
+    words: list[str] = []
+    if station is not None:
+        usual = load_document(station, StationDocument).motion
+        if document.mode == "hand" and not document.trial.get("approach"):  # begins at the grasp
+            motion = replace(motion, standoff=usual.standoff)
+        words += motion_options(motion, usual)
+    words += _changed_options(limit_settings(document.trial))
+    words += _option_words(engine=document.engine.name, seed=document.seed)
+    if document.table != EvaluationSettings.table:
+        words += _option_words(table=document.table)
+    return words + (_option_words(shard=document.shard) if document.shard else [])
+
+
+def _changed_options(asked: dict[str, Any]) -> list[str]:
+    """The options of fields of `EvaluationSettings` whose values are not the usual ones."""
+    unusual = {k: v for k, v in asked.items() if v != getattr(EvaluationSettings, k)}
+    return _option_words(**unusual)
+
+
+def _option_words(**values: Any) -> list[str]:
+    """The options of fields of `EvaluationSettings` with their values; those that take none stand
+    for true."""
+    words: list[str] = []
+    for name, value in values.items():
+        option = option_name(EvaluationSettings, name)
+        if isinstance(value, bool):
+            words += [option] if value else []
+        else:
+            words += [option, str(value)]
+    return words
+
+
+MODE_MEANINGS = {
+    "hand": "the hand alone executes each grasp in simulation",
+    "reach": "the hand alone executes the grasps that the arm can execute",
+    "arm": "the whole arm executes the grasps, from the pregrasp on",
+}
+"""What a mode asks of each grasp."""
+
+
+def repeat_section(run: Run) -> Html:
+    """The command that makes the same results again, and the settings that decide about them."""
+    document = run.document
+    facts = [
+        ("scene", f"{document.scene.path}, content {document.scene.content[:HASH_DIGITS]}"),
+        *_common_facts(document),
+        ("run", f"{document.hash} (hash of all of the above; column run of the table)"),
+    ]
+    return section(
+        "How to repeat it",
+        _approach_text(document),
+        command(reproduce_command(run)),
+        _facts_list(facts),
+    )
+
+
+def provenance_section(run: Run) -> Html:
+    """All inputs with their hashes, settings, versions, sessions and files."""
+    facts = [
+        *_input_facts(run.document),
+        *_setting_facts(run.document),
+        *_session_facts(run.document),
+    ]
+    files = (
+        f"{run.table_path.name} (the table), {RUN_FILE} (this section in full),"
+        f" {GRASPS_FILE} (poses), {JOURNAL_FILE} (the record)"
+    )
+    text = "All inputs, the sessions in which the grasps were judged, and the files of the folder."
+    return folded_section(
+        "All settings and versions", text, _facts_list([*facts, ("files", files)])
+    )
+
+
+def repeat_campaign_section(campaign: Campaign) -> Html:
+    """The command that began a run over many scenes, and the settings that decide about it."""
+    document = campaign.document
+    scenes = [entry.path for entry in document.scenes]
+    text = (
+        "The results depend on the inputs, the seed and the versions below. They do not"
+        " depend on the number of workers, machines or shards, or the order of their"
+        " work."
+    )
+    facts = [
+        ("scenes", f"{len(scenes)}, their contents in campaign.yaml"),
+        *_common_facts(document),
+        ("run", f"{document.hash} (hash of all of that)"),
+    ]
+    return section(
+        "How to repeat it", text, command(reproduce_campaign_command(campaign)), _facts_list(facts)
+    )
+
+
+def campaign_provenance_section(campaign: Campaign) -> Html:
+    """All settings, versions, and who worked on a run over many scenes."""
+    document = campaign.document
+    facts = [
+        *(
+            (f"library {Path(folder).name}", f"{folder}, content {content[:HASH_DIGITS]}")
+            for folder, content in document.libraries.items()
+        ),
+        *_setting_facts(document),
+        *_session_facts(document),
+    ]
+    text = "All inputs except the scenes, and the sessions in which the grasps were judged."
+    return folded_section("All settings and versions", text, _facts_list(facts))
+
+
+def _common_facts(document: RunDocument | CampaignDocument) -> list[tuple[str, str]]:
+    """Settings that people ask for first."""
+    # Software whose version people ask for first, beside that of the engine.
+    packages = ("burg_drake", "drake", "python")
+    approach = "; its approach is simulated" if document.trial.get("approach") else ""
+    names = (*packages, *document.engine.packages)
+    return [
+        ("station", f"{document.station.path}, content {document.station.content[:HASH_DIGITS]}"),
+        ("mode", f"{document.mode}: {MODE_MEANINGS[document.mode]}{approach}"),
+        ("motion", motion_text(read_motion(document.trial))),
+        ("engine", engine_label(document.engine)),
+        ("seed", str(document.seed)),
+        ("versions", ", ".join(f"{n} {document.versions.get(n, '?')}" for n in names)),
+    ]
+
+
+def _facts_list(facts: list[tuple[str, str]]) -> Html:
+    pairs = (join(element("dt", name), element("dd", fact)) for name, fact in facts)
+    return element("dl", *pairs, class_="facts")
+
+
+def _approach_text(document: RunDocument) -> str:
+    preset = document.engine in ENGINES.values()
+    by_hand = "" if preset else " The engine is not a preset; pass it to `evaluate` in Python."
+    return (
+        "The results depend on the inputs, the seed and the versions below, and not on"
+        " the number of workers or the order of their work. In a complete folder the"
+        f" command returns at once; give another -o to judge again.{by_hand} In the table"
+        " of results x, y, z and qw to qz are the pose of the grasp frame G in the"
+        " object frame O; the file next to it describes every column."
+    )
+
+
+def _input_facts(document: RunDocument) -> list[tuple[str, str]]:
+    library = document.library
+    grasps = document.grasps
+    return [
+        ("scene", f"{document.scene.path}, content {document.scene.content[:HASH_DIGITS]}"),
+        ("station", f"{document.station.path}, content {document.station.content[:HASH_DIGITS]}"),
+        ("object library", f"{library.name} ({library.path})"),
+        *(
+            (f"object {name}", f"build {build[:HASH_DIGITS]}")
+            for name, build in library.objects.items()
+        ),
+        ("grasps", f"{grasps.count} {grasps.origin}, content {grasps.content[:HASH_DIGITS]}"),
+    ]
+
+
+def _setting_facts(document: RunDocument | CampaignDocument) -> list[tuple[str, str]]:
+    engine = document.engine
+    return [
+        ("engine", f"{engine_label(engine)}: {_engine_text(engine)}"),
+        ("motion", motion_text(read_motion(document.trial))),
+        ("trial", _settings_list(without_motion(document.trial))),
+        ("mode", document.mode),
+        ("arm", _settings_list(without_motion(document.arm)) if document.arm else "not asked"),
+        ("seed", str(document.seed)),
+        ("run", f"{document.hash} (all of the above; column run of the table)"),
+        *document.versions.items(),
+    ]
+
+
+def _engine_text(engine: Engine) -> str:
+    """All settings of an engine, by name."""
+    settings = {name: value for name, value in vars(engine).items() if name != "name"}
+    return ", ".join(
+        f"{name.replace('_', ' ')} {_engine_value(value)}" for name, value in settings.items()
+    )
+
+
+def _engine_value(value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return format_duration(value) if isinstance(value, float) else str(value).replace("_", " ")
+
+
+def _settings_list(settings: dict[str, float]) -> str:
+    return ", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in settings.items())
+
+
+def _session_facts(document: RunDocument | CampaignDocument) -> list[tuple[str, str]]:
+    lines = []
+    for session in document.stretches:
+        judged = "interrupted" if session.judged is None else f"{session.judged} grasps"
+        took = "" if session.seconds is None else f" in {format_duration(session.seconds)}"
+        plural = "" if session.workers == 1 else "s"
+        text = f"{session.started}: {judged}{took}, {session.workers} worker{plural}"
+        lines.append(("judged", text))
+    return [*lines, ("command", document.command)]

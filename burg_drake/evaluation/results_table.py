@@ -1,0 +1,440 @@
+"""The results table: its columns, one row per trial; trials read from rows; the ranking of rows."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import (
+    CONTESTED_CONFIDENCE,
+    INPUT_PREFIX,
+    Array,
+    InvalidInputError,
+    MarginNames,
+    Outcome,
+    RecordedFields,
+    Stage,
+    TableShape,
+    UnknownNameError,
+    Verdict,
+    VerdictPart,
+    check_pose,
+    fields_of_part,
+    list_names,
+    quaternion_from_rotation,
+    quote_value,
+    suggest_names,
+)
+from burg_drake.evaluation.candidates import Candidate, Candidates, rows_of_names
+from burg_drake.evaluation.trial_origin import ORIGIN_TEXT, TrialOrigin, engine_label
+
+Member = TypeVar("Member", bound=StrEnum)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RecordedTrial:
+    """A grasp and what became of it.
+
+    Attributes:
+        id: of the grasp, or of this trial of it.
+        instance: name of the target in the scene.
+        object: its name in the library.
+        X_OG: (4, 4) grasp in the target's frame.
+        width: distance of the contacts [m].
+        score: the sampler's.
+        friction: coefficient in place of the library's.
+        mass: in place of the library's [kg].
+        verdict: what became of it; None if nobody has judged it.
+    """
+
+    id: str
+    instance: str
+    object: str = ""
+    X_OG: Array
+    width: float = math.nan
+    score: float = math.nan
+    friction: float | None = None
+    mass: float | None = None
+    verdict: Verdict | None = None
+
+    @property
+    def lift(self) -> float | None:
+        """Length of the lift that was executed, in place of the motion's [m]; None if it is not
+        known, which it is not of older releases."""
+        height = (
+            math.nan if self.verdict is None else self.verdict.margins.get(MarginNames.lift_height)
+        )
+        return None if height is None or math.isnan(height) else height
+
+    @property
+    def candidate(self) -> Candidate:
+        """What a judge has to know."""
+        return Candidate(
+            self.id,
+            self.instance,
+            self.X_OG,
+            self.friction,
+            self.mass,
+            width=self.width,
+            lift=self.lift,
+        )
+
+
+def pose_text(X_OG: Array) -> str:
+    """The upper three rows of a pose (4, 4), one after the other; every bit is kept."""
+    return " ".join(map(repr, X_OG[:3].ravel().tolist()))
+
+
+def pose_from_text(text: str, where: str) -> Array:
+    """The pose (4, 4) that `pose_text` wrote.
+
+    Raises:
+        InvalidInputError: the text is something else.
+    """
+    words, numbers = text.split(), []
+    expected = "it must be the 12 numbers of the upper three rows of the pose"
+    for word in words:
+        try:
+            numbers.append(float(word))
+        except ValueError as error:
+            raise InvalidInputError(
+                f"{where}: X_OG contains {quote_value(word)}; {expected}"
+            ) from error
+    if len(words) != 12:
+        raise InvalidInputError(f"{where}: X_OG has {len(words)} numbers; {expected}")
+    upper = np.array(numbers).reshape(3, 4)
+    return check_pose(np.vstack([upper, (0.0, 0.0, 0.0, 1.0)]), f"{where}: X_OG")
+
+
+def read_trial(row: Mapping[str, Any], where: str) -> RecordedTrial:
+    """The trial that a row tells.
+
+    Args:
+        row: cells by column.
+        where: names the row in messages.
+
+    Raises:
+        InvalidInputError: columns are missing, or a cell cannot be read.
+    """
+    # Columns without which a row cannot be executed again.
+    needed = ("id", "instance", "outcome", "stage", "X_OG", "engine", *ORIGIN_TEXT)
+    missing = [name for name in needed if name not in row]
+    if missing:
+        raise InvalidInputError(
+            f"{where}: column {', '.join(missing)} is missing (older releases did not"
+            " write it), so this row cannot be replayed by itself; give the folder of"
+            " its run"
+        )
+    empty = [name for name in needed if row[name] == ""]
+    if empty:
+        raise InvalidInputError(
+            f"{where}: {', '.join(empty)} is empty, without which a row alone cannot be replayed;"
+            " give the folder of its run"
+        )
+    outcome = _read_member(Outcome, row["outcome"], f"{where}: outcome")
+    stage = _read_member(Stage, row["stage"], f"{where}: stage")
+    findings = {one.name: one.from_row(row) for one in RecordedFields.trial}
+    return RecordedTrial(
+        id=row["id"],
+        instance=row["instance"],
+        object=row.get("object", ""),
+        X_OG=pose_from_text(row["X_OG"], where),
+        width=_read_number(row, "width", where),
+        friction=_read_property(row, "friction", where),
+        mass=_read_property(row, "mass", where),
+        verdict=Verdict(outcome, stage, **findings),
+    )
+
+
+def _read_member(kind: type[Member], text: str, where: str) -> Member:
+    known = [member.value for member in kind]
+    if text not in known:
+        raise InvalidInputError(
+            f"{where} {quote_value(text)} is not known to this release; {suggest_names(text, known)}"
+        )
+    return kind(text)
+
+
+def _read_property(row: Mapping[str, Any], name: str, where: str) -> float | None:
+    """A property of the object in place of the library's; None if the row tells none."""
+    max_value = 1e6  # Of mass [kg] and friction; larger ones cannot be simulated.
+    value = _read_number(row, name, where)
+    if math.isnan(value):
+        return None
+    if value < 0.0 or value > max_value or (name == "mass" and value == 0.0):
+        raise InvalidInputError(
+            f"{where}: {name} is {value:g}; it must be above 0 and at most {max_value:g}"
+        )
+    return value
+
+
+def _read_number(row: Mapping[str, Any], name: str, where: str) -> float:
+    """NaN where there is none."""
+    value = row.get(name, math.nan)
+    try:
+        return float(value)
+    except ValueError as error:
+        raise InvalidInputError(f"{where}: {name} is {quote_value(value)}, not a number") from error
+
+
+Columns = dict[str, NDArray[Any]]
+
+TEXT_COLUMNS = (
+    *("id", "instance", "object"),
+    *(one.name for one in RecordedFields.verdict if one.is_text),
+    *("engine", "run"),
+    *ORIGIN_TEXT,
+    "X_OG",
+)
+"""Columns of texts."""
+
+
+def make_columns(
+    candidates: Candidates,
+    verdicts: Mapping[str, Verdict],
+    origin: TrialOrigin,
+    *,
+    instances: Sequence[str],
+    joints: int = 0,
+) -> Columns:
+    """The table of all grasps that are judged, in the order of the candidates.
+
+    Args:
+        candidates: the grasps.
+        verdicts: by grasp id; grasps without one are left out.
+        origin: what made them.
+        instances: names of the scene's free objects.
+        joints: number of the arm's joints, 0 without an arm.
+    """
+    grasps = candidates.grasps
+    judged = [i for i, id in enumerate(candidates.id) if id in verdicts]
+    trials = [
+        RecordedTrial(
+            id=candidates.id[i],
+            instance=str(candidates.instance[i]),
+            object=str(grasps.object[i]),
+            X_OG=grasps.X_OG[i],
+            width=float(grasps.width[i]),
+            score=float(grasps.score[i]),
+            verdict=verdicts[candidates.id[i]],
+        )
+        for i in judged
+    ]
+    columns = trial_columns(trials, origin, instances=instances, joints=joints)
+    return columns | {
+        INPUT_PREFIX + name: _booleans_to_integers(v[judged]) for name, v in grasps.columns.items()
+    }
+
+
+def trial_columns(
+    trials: Sequence[RecordedTrial],
+    origin: TrialOrigin,
+    *,
+    instances: Sequence[str],
+    joints: int = 0,
+) -> Columns:
+    """The table of judged trials; see `make_columns`. Their ids need not differ."""
+    rows = [t.verdict for t in trials if t.verdict is not None]
+    if len(rows) != len(trials):
+        raise ValueError("a table is made of judged trials only")
+    approach = bool(origin.trial.get("approach"))
+    shape = TableShape(origin.mode, instances, joints, approach)
+    X_OG = np.array([t.X_OG for t in trials]).reshape(-1, 4, 4)
+    wxyz = quaternion_from_rotation(X_OG[:, :3, :3]) if rows else np.empty((0, 4))
+    columns: Columns = {
+        "id": _text_column([t.id for t in trials]),
+        "instance": _text_column([t.instance for t in trials]),
+        "object": _text_column([t.object for t in trials]),
+        **columns_of_verdicts(rows, "decided", shape),
+        "width": _number_column([t.width for t in trials]),
+        "score": _number_column([t.score for t in trials]),
+        **{name: X_OG[:, k, 3] for k, name in enumerate("xyz")},
+        **{name: wxyz[:, k] for k, name in enumerate(("qw", "qx", "qy", "qz"))},
+        **columns_of_verdicts(rows, "measured", shape),
+        "friction": _number_column([t.friction for t in trials]),
+        "mass": _number_column([t.mass for t in trials]),
+        **columns_of_verdicts(rows, "posture", shape),
+    }
+    columns["seed"] = np.full(len(rows), origin.seed, dtype=np.int64)
+    judges = [verdict.judged_again for verdict in rows]
+    origins = {name: origin.judged_by(name) for name in {*judges, ""}}
+    labels = {name: engine_label(one.engine) for name, one in origins.items()}
+    columns["engine"] = _judge_column(labels, judges)
+    columns["run"] = _constant_column(origin.run, len(rows))
+    columns |= columns_of_verdicts(rows, "cost", shape)
+    cells = {name: one.cells() for name, one in origins.items()}
+    for name in ORIGIN_TEXT:
+        texts = {judge: cells[judge][name] for judge in cells}
+        columns[name] = _judge_column(texts, judges)
+    columns["X_OG"] = _text_column([pose_text(t.X_OG) for t in trials])
+    return columns
+
+
+def columns_of_verdicts(rows: Sequence[Verdict], part: VerdictPart, shape: TableShape) -> Columns:
+    """The columns of verdicts that lie in a part of a row, see `core.columns`."""
+    columns: Columns = {}
+    for one in fields_of_part(shape, part):
+        values = [getattr(verdict, one.name) for verdict in rows]
+        make = _text_column if one.is_text else _number_column
+        for name, key in one.columns(shape).items():
+            columns[name] = make([one.cell(value, key) for value in values])
+    return columns
+
+
+def table_row(columns: Columns, index: int) -> dict[str, Any]:
+    """One row as Python values by column."""
+    return {name: values[index].item() for name, values in columns.items()}
+
+
+def _booleans_to_integers(values: NDArray[Any]) -> NDArray[Any]:
+    """Truth values as 1 and 0, which every reader takes for numbers."""
+    return values.astype(np.int64) if values.dtype.kind == "b" else values
+
+
+def _text_column(values: Sequence[str]) -> NDArray[Any]:
+    return np.array(values, dtype=np.str_)
+
+
+def _constant_column(text: str, count: int) -> NDArray[Any]:
+    """A column of one text, at the price of one cell."""
+    return np.broadcast_to(np.array(text, dtype=np.str_), count)
+
+
+def _judge_column(texts: Mapping[str, str], judges: Sequence[str]) -> NDArray[Any]:
+    """A column of the texts of judges, which are mostly the same."""
+    if len(set(texts.values())) == 1:
+        return _constant_column(texts[""], len(judges))
+    return _text_column([texts[judge] for judge in judges])
+
+
+def _number_column(values: Sequence[float | None]) -> NDArray[Any]:
+    return np.array([math.nan if value is None else value for value in values], dtype=float)
+
+
+RANKING_CLEARANCE_STEP = 5e-4
+"""Metres; smaller differences in clearance do not rank grasps."""
+
+
+class RankingScales:
+    """Ranking scales."""
+
+    length_step = 1e-4  # Metres; smaller differences do not rank grasps.
+    angle_step = float(np.deg2rad(0.1))  # Radians.
+    area_step = 1e-6  # Square metres.
+    slip = 0.005  # Metres that weigh as much as `tilt` and `push`.
+    tilt = 0.1  # Radians.
+    push = 0.01  # Metres.
+
+
+def best_rows(
+    columns: Columns, count: int = 1, *, each: bool = False, only: Iterable[str] | None = None
+) -> list[int]:
+    """Indices of the lifted grasps that can be trusted most, best first; fewer if fewer were
+    lifted.
+
+    Ranked by the clearance of the open hand, in steps of 0.5 mm: of all margins of a row it tells
+    best how often a grasp is lifted when pose, mass and friction are not quite what they are taken
+    for, as four of five failures then are an open hand that hits something. Its rank correlation
+    with that share is 0.6, that of all others from -0.35 to 0.25 (`benchmarks/best.py`). Of equal
+    ones that which disturbed less, by slip / 5 mm + tilt / 0.1 rad + push of other objects / 10 mm,
+    rounded to 0.1 mm and 0.1 deg; then by the larger contact patch of the weaker pad, rounded to
+    1 mm2, by the higher score of the sampler, and by id. Contested ones, and those whose clearance
+    is not known, rank last; other margins that are not known count as 0.
+
+    Args:
+        columns: a table of results.
+        count: how many.
+        each: so many of each object, in the order of the table, in place of all together.
+        only: names of objects or instances; others are left out.
+
+    Raises:
+        UnknownNameError: the table has no such object or instance.
+    """
+    chosen = rows_of_names(only, "the table", columns["object"], columns["instance"])
+    lifted = np.flatnonzero((columns["outcome"] == Outcome.LIFTED) & chosen)
+    lifted = _clearest_rows(columns, lifted, count, each=each)
+    room = _clearance_steps(columns, lifted)
+    penalty = (
+        _round_to_step(columns["slip"][lifted], RankingScales.length_step) / RankingScales.slip
+        + _round_to_step(columns["tilt"][lifted], RankingScales.angle_step) / RankingScales.tilt
+        + _round_to_step(columns["others_moved"][lifted], RankingScales.length_step)
+        / RankingScales.push
+    )
+    patch = _round_to_step(columns["patch_area"][lifted], RankingScales.area_step)
+    score = np.nan_to_num(columns["score"][lifted], nan=-np.inf)
+    # equal sums may differ in their last digits
+    order = np.lexsort((columns["id"][lifted], -score, -patch, penalty.round(9), -room))
+    ranked = lifted[order].tolist()
+    if not each:
+        return [int(row) for row in ranked[:count]]
+    objects = columns["object"]
+    return [
+        int(row)
+        for name in dict.fromkeys(objects.tolist())
+        for row in [row for row in ranked if objects[row] == name][:count]
+    ]
+
+
+def _clearance_steps(columns: Columns, rows: NDArray[np.int64]) -> Array:
+    """Clearances of some rows in whole steps; those of contested ones are behind all others."""
+    max_steps = 1e6  # More steps of clearance than any grasp has.
+    clearance = columns["clearance"][rows] if "clearance" in columns else np.zeros(len(rows))
+    steps = np.nan_to_num(np.floor(clearance / RANKING_CLEARANCE_STEP + 1e-9), nan=-max_steps)
+    if "confidence" not in columns or "judged_again" not in columns:  # of earlier releases
+        return steps
+    contested = columns["confidence"][rows] < CONTESTED_CONFIDENCE
+    contested &= columns["judged_again"][rows] == ""
+    return np.where(contested, steps - 2.0 * max_steps, steps)
+
+
+def _clearest_rows(
+    columns: Columns, rows: NDArray[np.int64], count: int, *, each: bool
+) -> NDArray[np.int64]:
+    """Those of some rows that can be among the first `count`, of each object or of all together:
+    the others have less room than so many. To rank a million takes seconds."""
+    groups = [rows]
+    if each:
+        objects = columns["object"][rows]
+        groups = [rows[objects == name] for name in set(objects.tolist())]
+    kept = []
+    for mine in groups:
+        room = _clearance_steps(columns, mine)
+        least = np.partition(room, len(room) - count)[-count] if 0 < count < len(room) else -np.inf
+        kept.append(mine[room >= least])
+    return np.sort(np.concatenate(kept)) if kept else rows
+
+
+def _round_to_step(values: Array, step: float) -> Array:
+    """The nearest multiples of a step; 0 for NaN."""
+    return np.nan_to_num(np.round(values / step) * step)
+
+
+def rows_of(columns: Columns, id: str, where: str) -> list[int]:
+    """Indices of the rows of one grasp, at least one.
+
+    Raises:
+        UnknownNameError: there is none; the message names the nearest.
+    """
+    ids = columns["id"].tolist()
+    rows = [row for row, known in enumerate(ids) if known == id]
+    if not rows:
+        raise unknown_grasp_error(id, ids, where)
+    return rows
+
+
+def unknown_grasp_error(
+    id: str, ids: Sequence[str], where: str, hint: str = ""
+) -> UnknownNameError:
+    """The error about an id that nothing goes by; names those that are much like it, if any."""
+    min_similarity = 0.7  # Two grasps of one object have 0.43 on average.
+    close = difflib.get_close_matches(id, ids, n=3, cutoff=min_similarity)
+    known = f"did you mean {' or '.join(close)}?" if close else f"known: {list_names(ids)}"
+    hint = f" ({hint})" if hint else ""
+    return UnknownNameError(f"{where} has no judged grasp {id!r}; {known}{hint}")

@@ -1,0 +1,439 @@
+"""Robustness of grasps that a run found to lift: tests in worker processes, and the table of results."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass, replace
+from operator import itemgetter
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from burg_drake.core import (
+    JUDGING_PACKAGES,
+    STARTING_PHASE,
+    InvalidInputError,
+    Listener,
+    Outcome,
+    Progress,
+    ProgressMeter,
+    Reporter,
+    Stage,
+    TextTable,
+    Verdict,
+    default_workers,
+    ensure_writable_folder,
+    format_number,
+    software_versions,
+)
+from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.executor import judge_all
+from burg_drake.evaluation.journal import JOURNAL_FILE, Journal, read_journal
+from burg_drake.evaluation.judge import require_engine_for
+from burg_drake.evaluation.results_table import Columns
+from burg_drake.evaluation.robustness_probes import (
+    Probe,
+    ProbeAnswer,
+    ProbeJudgeFactory,
+    known_answers,
+    make_probes,
+)
+from burg_drake.evaluation.run_document import origin_of
+from burg_drake.evaluation.run_folder import RUN_FILE, Run, load_run
+from burg_drake.evaluation.settings import (
+    DEFAULT_BEST_COUNT,
+    LOADED_TESTS,
+    ROBUSTNESS_TESTS,
+    RobustnessSettings,
+)
+from burg_drake.evaluation.table_file import require_table, write_table
+from burg_drake.evaluation.trial_origin import engine_label, pairs_text
+from burg_drake.simulation import SHAKE_AXES, TUG_DIRECTIONS, HoldForces, SuccessRate
+from burg_drake.station import Engine
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class GraspRobustness:
+    """What is known of one grasp.
+
+    Attributes:
+        id, instance, object: which grasp on what.
+        friction: the target's coefficient.
+        tug, shake: what the grip bears; None if not asked or failed.
+        friction_min: smallest coefficient that lifts; None if not asked or failed.
+        success: of the perturbed repeats; None if not asked.
+        failed: tests that could not be simulated, each once; perturbed repeats are counted by
+            outcome instead.
+    """
+
+    id: str
+    instance: str
+    object: str
+    friction: float
+    tug: HoldForces | None = None
+    shake: HoldForces | None = None
+    friction_min: float | None = None
+    success: SuccessRate | None = None
+    failed: tuple[str, ...] = ()
+
+
+def gather_answers(
+    id: str, instance: str, object: str, friction: float, answers: Sequence[ProbeAnswer]
+) -> GraspRobustness:
+    """What the answers to the probes of a grasp say of it; see `GraspRobustness`."""
+    by_test = {answer.test: answer for answer in answers if answer.test != "noise"}
+    repeats = Counter(
+        answer.outcome
+        for answer in answers
+        if answer.test == "noise" and answer.outcome is not None
+    )
+    tug, shake, friction_min = (by_test.get(test) for test in ("tug", "shake", "friction"))
+    return GraspRobustness(
+        id,
+        instance,
+        object,
+        friction,
+        tug=tug.forces if tug else None,
+        shake=shake.forces if shake else None,
+        friction_min=friction_min.friction if friction_min else None,
+        success=SuccessRate(repeats) if repeats else None,
+        failed=tuple(test for test, answer in by_test.items() if answer.failed),
+    )
+
+
+def robustness_columns(
+    grasps: Sequence[GraspRobustness],
+    settings: RobustnessSettings,
+    engines: Sequence[Engine],
+    run: str,
+) -> Columns:
+    """The table; `engines` are those of the grasps."""
+    # Outcomes of a grasp that no arm is asked about.
+    hand_outcomes = tuple(o for o in Outcome if o.stage in (Stage.CLEAR, Stage.EXECUTED))
+    columns: Columns = {
+        name: np.array([getattr(g, name) for g in grasps], dtype=np.str_)
+        for name in ("id", "instance", "object")
+    }
+    tugs = [None if g.tug is None else g.tug.accelerations for g in grasps]
+    forces = [None if g.tug is None else g.tug.forces for g in grasps]
+    shakes = [None if g.shake is None else g.shake.accelerations for g in grasps]
+    columns |= {f"tug_{name}_g": _float_column(tugs, itemgetter(name)) for name in TUG_DIRECTIONS}
+    columns |= {f"tug_{name}_N": _float_column(forces, itemgetter(name)) for name in TUG_DIRECTIONS}
+    columns |= {f"shake_{name}_g": _float_column(shakes, itemgetter(name)) for name in SHAKE_AXES}
+    columns["friction_min"] = _float_column([g.friction_min for g in grasps], float)
+    columns["friction"] = np.array([g.friction for g in grasps], dtype=float)
+    rates = [g.success for g in grasps]
+    columns["repeats"] = _integer_column(rates, lambda r: r.trials)
+    columns["lifted"] = _integer_column(rates, lambda r: r.lifted)
+    columns["success"] = _float_column(rates, lambda r: r.probability)
+    columns["success_low"] = _float_column(rates, lambda r: r.interval[0])
+    columns["success_high"] = _float_column(rates, lambda r: r.interval[1])
+    counts = [None if rate is None else rate.outcomes for rate in rates]
+    columns |= {
+        f"n_{outcome}": _integer_column(counts, itemgetter(outcome)) for outcome in hand_outcomes
+    }
+    columns["failed"] = np.array([" ".join(g.failed) for g in grasps], dtype=np.str_)
+    columns["engine"] = np.array([engine_label(engine) for engine in engines], dtype=np.str_)
+    columns["seed"] = np.full(len(grasps), settings.seed, dtype=np.int64)
+    columns["settings"] = np.array([_settings_text(settings)] * len(grasps), dtype=np.str_)
+    columns["run"] = np.array([run] * len(grasps), dtype=np.str_)
+    return columns
+
+
+def _settings_text(settings: RobustnessSettings) -> str:
+    return pairs_text(
+        {
+            f"{group}.{name}": value
+            for group in ("loads", "friction", "noise")
+            for name, value in asdict(getattr(settings, group)).items()
+        }
+    )
+
+
+def robustness_view(grasps: Sequence[GraspRobustness], settings: RobustnessSettings) -> TextTable:
+    """The table for a terminal: weakest directions, friction and success."""
+    table = TextTable("Robustness of lifted grasps", caption=_table_caption(settings)).texts(
+        "grasp"
+    )
+    heads = {"tug": "tug", "shake": "shake", "friction": "least mu", "noise": "success"}
+    table.numbers(*(heads[test] for test in settings.tests))
+    if "noise" in settings.tests:
+        table.numbers("95 % CI")
+    largest = settings.loads.largest
+    for g in grasps:
+        cells = {
+            "tug": _weakest_text(g.tug, largest),
+            "shake": _weakest_text(g.shake, largest),
+            "friction": _friction_text(g, settings),
+            "noise": "-" if g.success is None else f"{g.success.lifted} of {g.success.trials}",
+        }
+        row = [cells[test] for test in settings.tests]
+        if "noise" in settings.tests:
+            low, high = (0.0, 1.0) if g.success is None else g.success.interval
+            row.append(f"{100 * low:.0f}-{100 * high:.0f} %")
+        table.row(g.id, *row)
+    return table
+
+
+def _weakest_text(forces: HoldForces | None, largest: float) -> str:
+    if forces is None:
+        return "-"
+    name, value = forces.weakest
+    return f"> {largest:g} g   " if math.isinf(value) else f"{format_number(value, 1)} g {name:>2}"
+
+
+def _friction_text(grasp: GraspRobustness, settings: RobustnessSettings) -> str:
+    if grasp.friction_min is None:
+        return "-"
+    if grasp.friction_min == 0.0:
+        return f"< {settings.friction.smallest:g}"
+    if math.isinf(grasp.friction_min):
+        return f"> {settings.friction.largest:g}"
+    return f"{format_number(grasp.friction_min, 3)} of {format_number(grasp.friction)}"
+
+
+def _table_caption(settings: RobustnessSettings) -> str:
+    parts = []
+    if {"tug", "shake"} & set(settings.tests):
+        parts.append(
+            "tug, shake: acceleration withstood along the weakest direction of the grasp frame"
+            " (x closing, z approach), in g = 9.81 m/s²"
+        )
+    if "friction" in settings.tests:
+        parts.append("least mu: smallest friction coefficient that lifts, and the object's own")
+    if "noise" in settings.tests:
+        noise = settings.noise
+        parts.append(
+            f"success: lifted of the repeats with deviations of"
+            f" {noise.translation * 1e3:g} mm, {math.degrees(noise.rotation):g} deg,"
+            f" mass {100 * noise.mass:g} %, friction {100 * noise.friction:g} %"
+        )
+    return "\n".join(parts)
+
+
+def _integer_column(values: Sequence[T | None], count: Callable[[T], int]) -> np.ndarray:
+    """A whole number of each value, None where there is none."""
+    return np.array([None if v is None else count(v) for v in values], dtype=object)
+
+
+def _float_column(values: Sequence[T | None], number: Callable[[T], float]) -> np.ndarray:
+    """A number of each value, NaN where there is none."""
+    return np.array([math.nan if v is None else number(v) for v in values], dtype=float)
+
+
+TEST_COSTS = {"tug": 40.0, "shake": 50.0, "friction": 30.0, "noise": 2.0}
+"""CPU time of tests in units of the grasp's own trial, measured."""
+
+
+@dataclass(frozen=True, eq=False)
+class Robustness:
+    """What was found.
+
+    Attributes:
+        grasps: answers by grasp, in the order asked.
+        table_path: the table.
+        failures: ids of probes that could not be simulated, with the reason.
+        interrupted: how many of them failed because their worker process was ended from outside.
+    """
+
+    grasps: tuple[GraspRobustness, ...]
+    table_path: Path
+    failures: dict[str, str]
+    interrupted: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class _EngineTests:
+    """How grasps are tested whose verdicts one engine has given.
+
+    Attributes:
+        factory: how.
+        context: what decides about the answers beside the settings of the tests.
+    """
+
+    factory: ProbeJudgeFactory
+    context: tuple[object, ...]
+
+    @classmethod
+    def of(cls, factory: ProbeJudgeFactory) -> _EngineTests:
+        """With the versions that are installed."""
+        packages = factory.engine.packages
+        versions = software_versions({**JUDGING_PACKAGES, **packages})
+        names = ("burg_drake", "drake", *packages)
+        return cls(factory, (*factory.content(), *(versions[name] for name in names)))
+
+    def probes(self, grasp: Candidate) -> Iterator[Probe]:
+        """All questions about a grasp."""
+        return make_probes(grasp, self.factory.scene, self.factory.settings, self.context)
+
+    def gathered(self, grasp: Candidate, answers: Mapping[str, Verdict]) -> GraspRobustness:
+        """What answers, by the id of the probe, say of a grasp."""
+        scene, settings = self.factory.scene, self.factory.settings
+        return gather_answers(
+            grasp.id,
+            grasp.instance,
+            scene.instance(grasp.instance).object,
+            scene.entry(grasp.instance).friction,
+            known_answers(grasp.id, answers, settings, self.context),
+        )
+
+
+def assess_robustness(
+    run: Run | str | Path,
+    *,
+    grasps: Sequence[str] | None = None,
+    best: int = DEFAULT_BEST_COUNT,
+    only: Iterable[str] | None = None,
+    settings: RobustnessSettings | None = None,
+    out: str | Path | None = None,
+    workers: int | None = None,
+    retry_failed: bool = False,
+    progress: bool | Listener = True,
+) -> Robustness:
+    """Tests how robust lifted grasps of a run are, and writes a table.
+
+    Each is tested by the engine whose verdict it has: the run's, or the one that judged it again.
+
+    Args:
+        run: the run, or its folder.
+        grasps: ids; the best ones of the run if None.
+        best: how many of those of each object at most; see `best_rows`.
+        only: names of the objects or instances whose best grasps are meant; all if None.
+        settings: what is asked; all tests with their defaults if None.
+        out: the table, .csv or .parquet; `robustness.csv` in the run's folder if None. The journal
+            is the file of the same name with the suffix .jsonl.
+        workers: number of processes; as many as there are processors if None.
+        retry_failed: ask all again that an earlier call could not simulate, not only that whose
+            worker process was ended from outside.
+        progress: True shows a bar on standard error, False nothing; a function gets the events.
+
+    Raises:
+        UnknownNameError: a grasp, object or instance is not in the run.
+        InvalidInputError: a grasp was not lifted, the engine that judged it cannot have a test, the
+            scene has changed since the run, or the table cannot be written.
+        MissingDependencyError: that engine is not installed.
+        SimulationError: the simulation of the scene cannot be built.
+    """
+    run = run if isinstance(run, Run) else load_run(run)
+    settings = RobustnessSettings() if settings is None else settings
+    table = run.path / "robustness.csv" if out is None else Path(out)
+    require_table(table)
+    journal_path = table.with_suffix(".jsonl")
+    _require_other_files(run, table, journal_path)
+    chosen = _choose_grasps(run, grasps, best, only)
+    tests = _tests_by_grasp(run, chosen, settings)
+    probes = [probe for grasp in chosen for probe in tests[grasp.id].probes(grasp)]
+    ensure_writable_folder(table.parent)
+    with Reporter(progress) as reporter, Journal(journal_path) as journal:
+        known = {
+            id
+            for id, verdict in read_journal(journal_path).items()
+            if not verdict.is_open(retry_failed=retry_failed)
+        }
+        _answer_probes(run, probes, tests, journal, known, workers, reporter)
+    answers = read_journal(journal_path)
+    found = tuple(tests[grasp.id].gathered(grasp, answers) for grasp in chosen)
+    engines = [tests[grasp.id].factory.engine for grasp in chosen]
+    write_table(table, robustness_columns(found, settings, engines, run.document.hash))
+    failures = {
+        p.id: answers[p.id].reason
+        for p in probes
+        if answers[p.id].outcome is Outcome.SIMULATION_FAILED
+    }
+    interrupted = sum(answers[id].interrupted for id in failures)
+    return Robustness(found, table, failures, interrupted)
+
+
+def _require_other_files(run: Run, *written: Path) -> None:
+    """Refuses to write over the run's own results or journal."""
+    own = [path.resolve() for path in (run.table_path, run.path / JOURNAL_FILE)]
+    for path in written:
+        if path.resolve() in own:
+            raise InvalidInputError(f"{path} belongs to the run itself; choose another file").about(
+                "out"
+            )
+
+
+def _choose_grasps(
+    run: Run, ids: Sequence[str] | None, best: int, only: Iterable[str] | None
+) -> list[Candidate]:
+    if ids is None:
+        ids = run.best(best, each=True, only=only)
+        if not ids:
+            raise InvalidInputError(f"{run.path}: no grasp was lifted, so there is nothing to test")
+    chosen = {id: run.trial(id).candidate for id in ids}
+    for id in chosen:
+        verdict = run.verdicts.get(id)
+        if verdict is None:
+            raise InvalidInputError(f"{run.path}: grasp {id!r} is not judged yet")
+        if not verdict.outcome.held:
+            raise InvalidInputError(
+                f"{run.path}: grasp {id!r} was not lifted ({verdict.outcome}); robustness"
+                " tests need a lifted grasp"
+            )
+    return list(chosen.values())
+
+
+def _tests_by_grasp(
+    run: Run, chosen: Iterable[Candidate], settings: RobustnessSettings
+) -> dict[str, _EngineTests]:
+    """How grasps are tested, by id."""
+    scene, station, origin = run.scene(), run.station(), origin_of(run.document)
+    trial = origin.settings(f"{run.path / RUN_FILE}: trial")
+    loaded = [test for test in settings.tests if test in LOADED_TESTS]
+    by_judge: dict[str, _EngineTests] = {}
+    found = {}
+    for grasp in chosen:
+        judge = run.verdicts[grasp.id].judged_again
+        if judge not in by_judge:
+            engine = origin.judged_by(judge).engine
+            if engine.simulator != "drake" and loaded:
+                raise InvalidInputError(
+                    f"tests {' and '.join(loaded)} need Drake, but {grasp.id} was judged"
+                    f" by engine {engine.name}; give the tests "
+                    f"{','.join(test for test in ROBUSTNESS_TESTS if test not in LOADED_TESTS)}"
+                ).about("tests")
+            require_engine_for(engine, "hand")
+            factory = ProbeJudgeFactory(scene, station, engine, trial, settings)
+            by_judge[judge] = _EngineTests.of(factory)
+        found[grasp.id] = by_judge[judge]
+    return found
+
+
+def _answer_probes(
+    run: Run,
+    probes: Sequence[Probe],
+    tests: Mapping[str, _EngineTests],
+    journal: Journal,
+    known: Collection[str],
+    workers: int | None,
+    reporter: Reporter,
+) -> None:
+    """Asks what is not known yet; each answer is on disk at once."""
+    todo = [probe for probe in probes if probe.id not in known]
+    work = sum(TEST_COSTS[probe.test] for probe in todo)
+    expected = work * _trial_time(run, probes) / (workers or default_workers())
+    begin = Progress(
+        STARTING_PHASE, len(probes) - len(todo), len(probes), unit="tests", left=expected or None
+    )
+    pace = ProgressMeter(reporter.show, begin, "testing", work=work)
+    for engine in dict.fromkeys(tests.values()):
+        own = {probe.id: probe.test for probe in todo if tests[probe.grasp] is engine}
+        trials = [probe.trial for probe in todo if probe.id in own]
+        factory = replace(engine.factory, tests=own)
+        with closing(judge_all(trials, factory, workers=workers)) as answered:
+            for asked, verdict in answered:
+                journal.append(asked.id, verdict)
+                pace.step(work=TEST_COSTS[own[asked.id]])
+
+
+def _trial_time(run: Run, probes: Sequence[Probe]) -> float:
+    """CPU time that the run's own trials of the grasps took on average [s]."""
+    took = [run.verdicts[id].cpu.get(Stage.EXECUTED, 0.0) for id in {p.grasp for p in probes}]
+    return sum(took) / max(len(took), 1)

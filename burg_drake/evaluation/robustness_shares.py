@@ -1,0 +1,71 @@
+"""Shares of perturbed repeats that were lifted, from tables of robustness, as success probabilities."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+
+import numpy as np
+
+from burg_drake.core import InvalidInputError, list_names
+from burg_drake.evaluation.table_file import read_table
+
+ROBUSTNESS_FILES = ("robustness.csv", "robustness.parquet")
+"""Tables of `burg-drake robustness` in the folder of a run."""
+
+
+def find_robustness_table(folder: Path) -> Path | None:
+    """The table of robustness in the folder of a run, if it is there."""
+    places = (folder / name for name in ROBUSTNESS_FILES)
+    return next((place for place in places if place.is_file()), None)
+
+
+def lifted_shares(
+    path: Path, runs: Collection[str], ids: Collection[str] | None
+) -> dict[tuple[str, str], float]:
+    """Shares by the hash of the run and the id of the grasp.
+
+    Args:
+        path: the table.
+        runs: hashes of the runs that it may be of.
+        ids: of all grasps, if it is one run. A table that does not say of which run it is, as those
+            of earlier versions, is then taken for its own if it has no other grasp.
+
+    Raises:
+        InvalidInputError: the table cannot be read, has no such shares, or is of another run.
+    """
+    columns = read_table(path)
+    if "success" not in columns or "id" not in columns or columns["success"].dtype.kind != "f":
+        raise InvalidInputError(
+            f"{path} is not a table of robustness (columns id and success are missing);"
+            " `burg-drake robustness` writes one"
+        )
+    grasps, shares = columns["id"].tolist(), columns["success"].tolist()
+    if "run" in columns:
+        of = columns["run"].tolist()
+        if grasps and not set(of) & set(runs):
+            raise InvalidInputError(
+                f"{path} is of run {list_names(sorted(set(of)))}, not of "
+                f"{list_names(sorted(runs))}; give the table of the run that is compared"
+            )
+    else:
+        of = [_require_one_run(path, runs, ids, grasps)] * len(grasps)
+    rows = zip(of, grasps, shares, strict=True)
+    return {(run, id): share for run, id, share in rows if np.isfinite(share)}
+
+
+def _require_one_run(
+    path: Path, runs: Collection[str], ids: Collection[str] | None, grasps: Collection[str]
+) -> str:
+    """The run of a table that does not say it."""
+    if ids is None or len(runs) != 1:
+        raise InvalidInputError(
+            f"{path} has no column run, but ids of grasps repeat between scenes; make it"
+            " again with `burg-drake robustness`, or give only one of the runs"
+        )
+    foreign = sorted(set(grasps) - set(ids))
+    if foreign:
+        raise InvalidInputError(
+            f"{path} is of another run than {list_names(sorted(runs))}: that has no grasp {foreign[0]}"
+        )
+    return next(iter(runs))

@@ -1,0 +1,368 @@
+"""The folder of a run: its files, and how to read it back."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from burg_drake.core import (
+    InvalidInputError,
+    Outcome,
+    UnknownNameError,
+    Verdict,
+    ensure_writable_folder,
+    load_document,
+    portable_reference,
+    resolve_reference,
+    save_document,
+)
+from burg_drake.evaluation.candidates import Candidate, Candidates
+from burg_drake.evaluation.journal import JOURNAL_FILE as JOURNAL_FILE, read_journal
+from burg_drake.evaluation.results_table import (
+    Columns,
+    RecordedTrial,
+    best_rows,
+    make_columns,
+    table_row,
+    unknown_grasp_error,
+)
+from burg_drake.evaluation.run_document import RunDocument, origin_of
+from burg_drake.evaluation.settings import select_share
+from burg_drake.objects import ObjectLibrary, load_library
+from burg_drake.scene import Scene, SceneDocument, save_scene
+from burg_drake.station import Station, StationDocument, load_station
+
+if TYPE_CHECKING:
+    import pandas
+
+RUN_FILE = "run.yaml"
+SCENE_FILE = "scene.yaml"
+STATION_FILE = "station.yaml"
+GRASPS_FILE = "grasps.npz"
+REPORT_FILE = "report.html"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Run:
+    """A run on disk, complete or not.
+
+    Example::
+
+        run = burg.load_run("runs/first")
+        for id in run.best(3):
+            print(id, run.verdicts[id].outcome, run.verdicts[id].margins)
+
+    Attributes:
+        path: its folder.
+        document: contents of run.yaml.
+    """
+
+    path: Path
+    document: RunDocument
+
+    def __repr__(self) -> str:
+        scene, count = self.document.scene.name, self.document.grasps.count
+        judged = len(read_journal(self.path / JOURNAL_FILE))  # `verdicts` would keep them
+        return f"Run({str(self.path)!r}, scene {scene!r}, {judged} of {count} grasps judged)"
+
+    @cached_property
+    def candidates(self) -> Candidates:
+        """All grasps of the run."""
+        return Candidates.load(self.path / GRASPS_FILE)
+
+    @cached_property
+    def verdicts(self) -> dict[str, Verdict]:
+        """What the journal holds, by grasp id."""
+        return read_journal(self.path / JOURNAL_FILE)
+
+    @property
+    def mine(self) -> list[str]:
+        """Ids of the grasps that are judged here: all, or those of a shard."""
+        return list(select_share(self.candidates.id, self.document.shard))
+
+    @property
+    def complete(self) -> bool:
+        """Whether every grasp that is judged here is judged."""
+        return all(id in self.verdicts for id in self.mine)
+
+    @property
+    def table_path(self) -> Path:
+        """The results file."""
+        return self.path / f"results.{self.document.table}"
+
+    @property
+    def report_path(self) -> Path:
+        """The report."""
+        return self.path / REPORT_FILE
+
+    @cached_property
+    def results(self) -> Columns:
+        """Judged grasps as columns, see `evaluation.results_table`, in the order of the
+        candidates."""
+        return make_columns(
+            self.candidates,
+            self.verdicts,
+            origin_of(self.document),
+            instances=self.instances,
+            joints=self._joints,
+        )
+
+    def frame(self, names: Sequence[str] | None = None) -> pandas.DataFrame:
+        """Judged grasps as a data frame; see `evaluation.table_parts`.
+
+        Args:
+            names: of the columns; all if None.
+
+        Raises:
+            MissingDependencyError: pandas is not installed.
+        """
+        from burg_drake.evaluation.table_parts import frame_of_columns
+
+        return frame_of_columns(self.results, names)
+
+    def with_verdicts(self, verdicts: dict[str, Verdict]) -> Run:
+        """The same run as if only these grasps had been judged."""
+        part = Run(self.path, self.document)
+        part.__dict__.update(
+            candidates=self.candidates,
+            verdicts=verdicts,
+            _instances=self.instances,
+            _joints=self._joints,
+        )
+        return part
+
+    @property
+    def failures(self) -> list[str]:
+        """Ids of the grasps that could not be simulated."""
+        failed: list[str] = self.results["id"][
+            self.results["outcome"] == Outcome.SIMULATION_FAILED
+        ].tolist()
+        return failed
+
+    @property
+    def interrupted(self) -> list[str]:
+        """Ids of those whose worker process was ended from outside; `evaluate` tries them again."""
+        return [id for id in self.failures if self.verdicts[id].interrupted]
+
+    @property
+    def contested(self) -> list[str]:
+        """Ids of the executed grasps whose verdict is contested, see `Verdict.contested`."""
+        verdicts = self.verdicts
+        return [id for id in self.mine if id in verdicts and verdicts[id].contested]
+
+    def row(self, id: str) -> dict[str, Any]:
+        """One row of the results.
+
+        Raises:
+            UnknownNameError: no judged grasp goes by this id; the message names the nearest.
+        """
+        (found,) = np.nonzero(self.results["id"] == id)
+        if not len(found):
+            raise self._unknown(id)
+        return table_row(self.results, found[0])
+
+    def candidate(self, id: str) -> Candidate:
+        """One grasp, judged or not, with its pose as it was judged, bit for bit.
+
+        Raises:
+            UnknownNameError: the run has no such grasp; the message names the nearest.
+        """
+        found = next((c for c in self.candidates if c.id == id), None)
+        if found is None:
+            raise self._unknown(id)
+        return found
+
+    def trial(self, id: str) -> RecordedTrial:
+        """One grasp, judged or not, with its verdict.
+
+        Raises:
+            UnknownNameError: the run has no such grasp; the message names the nearest.
+        """
+        candidate = self.candidate(id)
+        verdict = self.verdicts.get(id)
+        return RecordedTrial(
+            id=id,
+            instance=candidate.instance,
+            X_OG=candidate.X_OG,
+            width=candidate.width,
+            verdict=verdict,
+        )
+
+    def best(
+        self, count: int = 1, *, each: bool = False, only: Iterable[str] | None = None
+    ) -> list[str]:
+        """Ids of the lifted grasps that can be trusted most, best first; see `best_rows`.
+
+        Args:
+            count: how many.
+            each: so many of each object.
+            only: names of objects or instances; others are left out.
+
+        Raises:
+            UnknownNameError: there are no grasps of such an object or instance.
+        """
+        rows = best_rows(self.results, count, each=each, only=only)
+        return [str(self.results["id"][row]) for row in rows]
+
+    def scene(self) -> Scene:
+        """The scene as it was judged.
+
+        Raises:
+            InvalidInputError: the object library is gone, or has changed since.
+        """
+        path = self.path / SCENE_FILE
+        document = load_document(path, SceneDocument)
+        scene = Scene(document, self._library(document.library), path)
+        built = self.document.library.objects
+        changed = [name for name in built if scene.library.content.get(name) != built[name]]
+        if changed or scene.content != self.document.scene.content:
+            what = f"{', '.join(changed)} in library {scene.library.root}" if changed else path
+            raise InvalidInputError(
+                f"{what} has changed since {self.path} was judged; restore it, or evaluate again"
+            )
+        return scene
+
+    def station(self) -> Station:
+        """The station as it was judged.
+
+        Raises:
+            BurgError: a file that it needs is gone, or has changed since.
+        """
+        station = load_station(self.path / STATION_FILE)
+        if station.content != self.document.station.content:
+            raise InvalidInputError(
+                f"{self.path / STATION_FILE}, its hand or a robot model has changed since"
+                " the run; restore it, or evaluate again"
+            )
+        return station
+
+    @cached_property
+    def instances(self) -> tuple[str, ...]:
+        """Names of the free objects of the scene that was judged."""
+        document = load_document(self.path / SCENE_FILE, SceneDocument)
+        return tuple(instance.name or instance.object for instance in document.instances)
+
+    @cached_property
+    def _joints(self) -> int:
+        """Number of the arm's joints, if it was asked."""
+        arm = load_document(self.path / STATION_FILE, StationDocument).arm
+        return len(arm.home) if self.document.mode != "hand" and arm is not None else 0
+
+    def _library(self, reference: str) -> ObjectLibrary:
+        """The library, relative to the run's folder, or where it was then."""
+        recorded = self.document.library.path
+        for place, base in ((reference, self.path), (recorded, None)):
+            with contextlib.suppress(UnknownNameError):
+                return load_library(place, base)
+        raise InvalidInputError(
+            f"{self.path / SCENE_FILE}: the object library {reference} is missing, and is"
+            f" not at {recorded} either; write its place into this file"
+        )
+
+    def _unknown(self, id: str) -> UnknownNameError:
+        hint = f"all ids are in {self.table_path.name}"
+        return unknown_grasp_error(id, self.candidates.id, str(self.path), hint)
+
+
+def load_run(path: str | Path) -> Run:
+    """Reads a run, complete or not.
+
+    Example::
+
+        run = burg.load_run("runs/first")
+        print(len(run.verdicts), run.results["outcome"])
+
+    Args:
+        path: its folder.
+
+    Raises:
+        InvalidInputError: there is no run.
+        DocumentError: its run.yaml does not fit the schema.
+    """
+    path = Path(path)
+    if path.is_file():
+        raise InvalidInputError(f"{path} is a file; give the folder of a run")
+    if not (path / RUN_FILE).exists():
+        raise InvalidInputError(
+            f"{path} is not the folder of a run ({RUN_FILE} is missing); burg-drake"
+            " evaluate makes one"
+        )
+    return Run(path, load_document(path / RUN_FILE, RunDocument))
+
+
+def create_run(
+    folder: Path, document: RunDocument, scene: Scene, station: Station, candidates: Candidates
+) -> Run:
+    """Writes a new run without results.
+
+    The candidates come before run.yaml, which makes the folder a run, and the copies after it:
+    see `require_run_folder`.
+
+    Raises:
+        InvalidInputError: the folder cannot be written.
+    """
+    ensure_writable_folder(folder)
+    candidates.save(folder / GRASPS_FILE)
+    run = save_run(Run(folder, document))
+    write_copies(folder, scene, station)
+    return run
+
+
+def write_copies(folder: Path, scene: Scene, station: Station) -> None:
+    """Writes those copies of the documents that a run lacks because it was killed before."""
+    if not (folder / SCENE_FILE).exists():
+        library = portable_reference(scene.library.root, folder)
+        save_scene(dataclasses.replace(scene.document, library=library), folder / SCENE_FILE)
+    if not (folder / STATION_FILE).exists():
+        save_document(portable_station(station, folder), folder / STATION_FILE)
+
+
+def save_run(run: Run) -> Run:
+    """Writes run.yaml."""
+    header = "Record of a burg-drake evaluation; written by the program."
+    save_document(run.document, run.path / RUN_FILE, header)
+    return run
+
+
+def require_run_folder(folder: Path) -> None:
+    """Refuses a folder that holds anything but a run; makes none.
+
+    Without run.yaml only what a run leaves that is killed at its very start is tolerated: an
+    empty journal, possibly with candidates beside it. Names alone prove nothing: scene.yaml,
+    station.yaml or grasps.npz may be the user's own.
+
+    Raises:
+        InvalidInputError: it cannot be written, or something else is in it.
+    """
+    if not folder.exists():
+        return
+    ensure_writable_folder(folder)
+    if (folder / RUN_FILE).exists():
+        return
+    journal = folder / JOURNAL_FILE
+    begun = journal.is_file() and journal.stat().st_size == 0
+    names = {path.name for path in folder.iterdir() if not path.name.startswith(".")}
+    foreign = sorted(names - {JOURNAL_FILE, GRASPS_FILE} if begun else names)
+    if foreign:
+        raise InvalidInputError(
+            f"{folder} is not empty and not a run: it has {foreign[0]} in it; choose another folder"
+        ).about("out")
+
+
+def portable_station(station: Station, folder: Path) -> StationDocument:
+    """The station's document for a copy in `folder`: references that hold there, too."""
+    document = station.document
+    hand = resolve_reference(document.hand, "models/hands", station.path.parent, station.packages)
+    arm = document.arm
+    if arm is not None and station.arm_model is not None:
+        arm = dataclasses.replace(arm, model=portable_reference(station.arm_model, folder))
+    stated = {n: portable_reference(path, folder) for n, path in station.packages.stated.items()}
+    hand_reference = portable_reference(hand, folder)
+    return dataclasses.replace(document, hand=hand_reference, arm=arm, packages=stated)

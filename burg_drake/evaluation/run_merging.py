@@ -1,0 +1,385 @@
+"""Merges runs of the same scenes and grasps: shards, or copies that were interrupted."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import secrets
+import shutil
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+from burg_drake.core import (
+    InvalidInputError,
+    atomic_write,
+    content_hash,
+    ensure_writable_folder,
+    list_names,
+)
+from burg_drake.evaluation.campaign_document import (
+    LEDGER_FILE,
+    SceneState,
+    campaign_differences,
+    ledger_text,
+)
+from burg_drake.evaluation.campaign_folder import (
+    CAMPAIGN_LOCK_FILE,
+    SCENES_FOLDER,
+    Campaign,
+    is_campaign,
+    open_results,
+    save_campaign,
+)
+from burg_drake.evaluation.journal import JOURNAL_FILE, WriterLock, hold_unchanged
+from burg_drake.evaluation.merged_run import (
+    all_sessions,
+    choose_verdicts,
+    common_shard,
+    copy_documents,
+    missing_shards,
+    write_merged,
+)
+from burg_drake.evaluation.part_store import PARTS_FOLDER, PartIndex, PartWriter
+from burg_drake.evaluation.report.pages import write_campaign_report
+from burg_drake.evaluation.run_folder import REPORT_FILE, RUN_FILE, Run, load_run
+from burg_drake.evaluation.run_preparation import finish_run
+from burg_drake.evaluation.run_summary import run_shortfall_notes
+from burg_drake.evaluation.scene_tasks import is_finished
+from burg_drake.evaluation.settings import select_share
+from burg_drake.evaluation.table_parts import require_arrow
+
+
+@dataclass(frozen=True)
+class MissingFromMerge:
+    """What none of the merged runs had.
+
+    Attributes:
+        missing: number of grasps.
+        scenes: that have not been begun.
+        shards: that were not among the runs.
+    """
+
+    missing: int = 0
+    scenes: tuple[str, ...] = ()
+    shards: tuple[str, ...] = ()
+
+
+def note_unfinished(folder: Path, sources: Sequence[Path], left: MissingFromMerge) -> None:
+    """Notes in a merged run that it is to be finished."""
+    _note_file(folder, sources).write_text(json.dumps(asdict(left)), encoding="utf-8")
+
+
+def read_unfinished(folder: Path, sources: Sequence[Path]) -> MissingFromMerge | None:
+    """What these runs lacked, if a folder has what they make together, not finished."""
+    try:
+        stored = json.loads(_note_file(folder, sources).read_text(encoding="utf-8"))
+        return MissingFromMerge(stored["missing"], tuple(stored["scenes"]), tuple(stored["shards"]))
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def finish_merge(folder: Path, sources: Sequence[Path]) -> Run | Campaign:
+    """Writes what is made from the journals of a merged run, as far as it is not there.
+
+    Raises:
+        InvalidInputError: another process is writing it, or it cannot be written.
+    """
+    with WriterLock(lock_file(folder)):
+        result = open_results(folder)
+        if isinstance(result, Campaign):
+            _finish_campaign(result)
+        else:
+            result = finish_run(result, result.document.table)
+        _note_file(folder, sources).unlink(missing_ok=True)
+    return result
+
+
+def lock_file(folder: Path) -> Path:
+    """The file by which a run is locked."""
+    return folder / (CAMPAIGN_LOCK_FILE if is_campaign(folder) else JOURNAL_FILE)
+
+
+def _finish_campaign(campaign: Campaign) -> None:
+    document = campaign.document
+    reports = document.has_few_scenes
+    for place in campaign.places:
+        if not (place.folder / RUN_FILE).exists():
+            continue
+        size = place.journal.stat().st_size
+        if not is_finished(place.folder, size, document.table, report=reports):
+            finish_run(load_run(place.folder), document.table, report=reports)
+    writer = PartWriter(campaign.path, campaign.places, document.instances)
+    writer.catch_up()
+    writer.close()
+    write_campaign_report(campaign)
+
+
+def _note_file(folder: Path, sources: Sequence[Path]) -> Path:
+    """Named as `files.remove_unfinished` wants it."""
+    names = sorted(str(path.resolve()) for path in sources)
+    return folder / f".merge.{content_hash(names)[:16]}"
+
+
+def merge_campaigns(campaigns: Sequence[Campaign], staging: Path, folder: Path) -> MissingFromMerge:
+    """Writes a merged run over many scenes, but for what is made from its journals.
+
+    Args:
+        campaigns: the runs.
+        staging: an empty folder to write it to.
+        folder: where it is to be, which references have to fit.
+
+    Returns:
+        What no run has.
+
+    Raises:
+        InvalidInputError: the runs are not of the same, or disagree.
+        MissingDependencyError: pyarrow is not installed.
+    """
+    require_arrow("a run over many scenes")
+    first = campaigns[0]
+    for other in campaigns[1:]:
+        if found := campaign_differences(first.document, other.document):
+            raise InvalidInputError(
+                f"{first.path} and {other.path} are different runs ({'; '.join(found)});"
+                " only shards or copies of the same run can be merged"
+            )
+    document = replace(
+        first.document,
+        shard=common_shard(campaigns),
+        stretches=all_sessions([campaign.document.stretches for campaign in campaigns]),
+        hints=next((c.document.hints for c in campaigns if c.document.hints), ()),
+    )
+    merged = Campaign(staging, document)
+    (staging / SCENES_FOLDER).mkdir()
+    merge = _Merge(campaigns, merged, folder)
+    for name in merged.names:
+        merge.take(name)
+    merge.copy_parts()
+    atomic_write(staging / LEDGER_FILE, ledger_text(merge.states))
+    save_campaign(merged)
+    return MissingFromMerge(merge.missing, tuple(merge.not_begun), missing_shards(campaigns))
+
+
+class _Merge:
+    """What is known while scenes are taken.
+
+    Attributes:
+        states: of the scenes.
+        copied: by number of the run: scenes that were copied from it as they are.
+        missing: grasps without a verdict.
+        not_begun: scenes that no run has begun.
+    """
+
+    def __init__(self, campaigns: Sequence[Campaign], merged: Campaign, folder: Path) -> None:
+        self._campaigns, self._merged, self._folder = campaigns, merged, folder
+        shard = merged.document.shard_of_grasps
+        self._shard = "" if shard is None else str(shard)
+        self.states: list[SceneState] = []
+        self.copied: dict[int, set[str]] = {k: set() for k in range(len(campaigns))}
+        self.missing = 0
+        self.not_begun: list[str] = []
+
+    def take(self, name: str) -> None:
+        """Takes a scene."""
+        begun = [k for k, c in enumerate(self._campaigns) if (c.folder(name) / RUN_FILE).exists()]
+        known = [s for c in self._campaigns if (s := c.states.get(name)) is not None]
+        if not begun:
+            if known:
+                self.states.append(known[0])
+            else:
+                self.not_begun.append(name)
+            return
+        with ExitStack() as stack:
+            for k in begun:
+                stack.enter_context(hold_unchanged(self._campaigns[k].folder(name) / JOURNAL_FILE))
+            self._take(name, begun)
+
+    def _take(self, name: str, begun: Sequence[int]) -> None:
+        target = self._merged.folder(name)
+        final = self._folder / SCENES_FOLDER / name
+        runs = [load_run(self._campaigns[k].folder(name)) for k in begun]
+        if len(runs) == 1 and runs[0].document.shard == self._shard:
+            self._copy(begun[0], name, runs[0], target, final)
+            return
+        target.mkdir()
+        choice = write_merged(runs, target, final, self._shard)
+        self._note(name, runs[0], choice.missing, choice.failed, choice.interrupted)
+
+    def copy_parts(self) -> None:
+        """Copies the parts of which all scenes were copied; the others are made from journals."""
+        number = 0
+        parts = self._merged.path / PARTS_FOLDER
+        parts.mkdir()
+        for k, campaign in enumerate(self._campaigns):
+            for part in PartIndex.of(campaign.path).parts:
+                if all(segment.scene in self.copied[k] for segment in part.segments):
+                    number += 1
+                    digest = part.path.stem.rpartition("-")[2]
+                    shutil.copy2(part.path, parts / f"part-{number:06d}-{digest}.parquet")
+
+    def _copy(self, k: int, name: str, run: Run, target: Path, final: Path) -> None:
+        # the report tells commands about the run where it was
+        shutil.copytree(run.path, target, ignore=shutil.ignore_patterns(".*", REPORT_FILE))
+        copy_documents(run, target, final)
+        self.copied[k].add(name)
+        state = self._campaigns[k].states.get(name)
+        size = (target / JOURNAL_FILE).stat().st_size
+        if state is not None and state.state == "done" and state.size == size:
+            self.states.append(state)
+            return
+        choice = choose_verdicts([target / JOURNAL_FILE], run.mine)
+        self._note(name, run, choice.missing, choice.failed, choice.interrupted)
+
+    def _note(self, name: str, run: Run, missing: int, failed: int, interrupted: int) -> None:
+        self.missing += missing
+        count = len(run.candidates)
+        shard = self._merged.document.shard_of_grasps
+        mine = len(select_share(range(count), shard))
+        size = (self._merged.folder(name) / JOURNAL_FILE).stat().st_size
+        state = SceneState(
+            scene=name,
+            state="open" if missing else "done",
+            run=run.document.hash,
+            grasps=count,
+            mine=mine,
+            sampling=run.document.grasps.cpu,
+            size=0 if missing else size,
+            failed=failed,
+            interrupted=interrupted,
+            missing="; ".join(run_shortfall_notes(run)),
+        )
+        self.states.append(state)
+
+
+@dataclass(frozen=True, eq=False)
+class MergeResult:
+    """What came of it.
+
+    Attributes:
+        result: the run.
+        missing: grasps that are not judged.
+        scenes: that have not been begun.
+        shards: that were not among the runs.
+    """
+
+    result: Run | Campaign
+    missing: int = 0
+    scenes: tuple[str, ...] = ()
+    shards: tuple[str, ...] = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is missing, and how to judge it, one sentence each."""
+        notes = []
+        shard = self.result.document.shard
+        if shard:
+            notes.append(f"only shard {shard} was given, so the merged run has that shard alone")
+        if not (self.missing or self.scenes):
+            return tuple(notes)
+        if self.missing:
+            notes.append(f"{self.missing:,} grasps are not judged yet")
+        if self.scenes:
+            notes.append(
+                f"{len(self.scenes):,} scenes are not begun yet: {list_names(self.scenes)}"
+            )
+        if self.shards and not shard:
+            notes.append(f"shards that were not given: {list_names(self.shards)}")
+        how = f"shard {shard}" if shard else "no shard"
+        notes.append(
+            f"to judge the rest, run the same evaluation into {self.result.path}, with {how}"
+        )
+        return tuple(notes)
+
+
+def merge_runs(paths: Sequence[str | Path], out: str | Path) -> Run | Campaign:
+    """Merges runs of the same scenes and grasps; see `merge_folders`."""
+    return merge_folders(paths, out).result
+
+
+def merge_folders(paths: Sequence[str | Path], out: str | Path) -> MergeResult:
+    """Merges runs of the same scenes and grasps: shards, or copies that were interrupted.
+
+    Of each grasp the verdict is taken that some run has; one of a trial goes before
+    `simulation_failed`. The runs stay as they are.
+
+    Args:
+        paths: folders of runs, all of one scene or all of many.
+        out: folder for the merged run; it does not exist, or is empty, or the same call was killed
+            when it had put the run there.
+
+    Raises:
+        InvalidInputError: a folder holds no run or is being written, the runs are not of the same,
+            two disagree about a grasp, or `out` cannot be written.
+        MissingDependencyError: runs over many scenes without pyarrow.
+    """
+    folders, folder = _distinct_folders(paths), Path(out)
+    left = read_unfinished(folder, folders)
+    if left is None:
+        with ExitStack() as stack:
+            for path in folders:
+                stack.enter_context(hold_unchanged(lock_file(path), make=is_campaign(path)))
+            left = _merge_folders(folders, folder)
+    return MergeResult(finish_merge(folder, folders), left.missing, left.scenes, left.shards)
+
+
+def _merge_folders(folders: Sequence[Path], folder: Path) -> MissingFromMerge:
+    """Puts a merged run where it is to be, but for what is made from its journals."""
+    results = [open_results(path) for path in folders]
+    kinds = {type(result) for result in results}
+    if len(kinds) > 1:
+        one = next(r.path for r in results if isinstance(r, Run))
+        many = next(r.path for r in results if isinstance(r, Campaign))
+        raise InvalidInputError(
+            f"{one} is a run of one scene, {many} one of many scenes; merge runs of one kind"
+        )
+    staging = _staging_folder(folder)
+    try:
+        campaigns = [result for result in results if isinstance(result, Campaign)]
+        if campaigns:
+            left = merge_campaigns(campaigns, staging, folder)
+        else:
+            runs = [result for result in results if isinstance(result, Run)]
+            choice = write_merged(runs, staging, folder)
+            left = MissingFromMerge(choice.missing, (), missing_shards(runs))
+        note_unfinished(staging, folders, left)
+        move_folder(staging, folder)
+        return left
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+
+
+def move_folder(staging: Path, folder: Path) -> None:
+    """Puts a folder where it is to be.
+
+    Raises:
+        InvalidInputError: it cannot be.
+    """
+    try:
+        os.rename(staging, folder)  # also in the place of an empty one
+    except OSError as error:
+        raise InvalidInputError(f"cannot write {folder}: {error.strerror}") from error
+
+
+def _distinct_folders(paths: Sequence[str | Path]) -> list[Path]:
+    """The folders, each once, however it is written."""
+    found = {Path(path).resolve(): Path(path) for path in paths}
+    if not found:
+        raise InvalidInputError("no runs are given; give the folders of one or more")
+    return list(found.values())
+
+
+def _staging_folder(folder: Path) -> Path:
+    """An empty folder beside another; those of merges that were killed go."""
+    if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
+        raise InvalidInputError(f"{folder} exists already; choose another folder").about("out")
+    parent = ensure_writable_folder(folder.absolute().parent)
+    left = re.compile(rf"\.{re.escape(folder.name)}\.[0-9a-f]{{16}}")
+    for path in parent.iterdir():
+        if left.fullmatch(path.name) and path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
+    staging = parent / f".{folder.name}.{secrets.token_hex(8)}"
+    staging.mkdir()
+    return staging

@@ -1,0 +1,571 @@
+"""From a call of `evaluate` to a run that can be judged: request, folder, candidates, open grasps.
+
+A balanced run samples further grasps in rounds, each when all grasps so far are judged. What a round
+samples follows from the verdicts alone, not from who judged them or in which order. A later round
+repeats the sampling with the same seed and a larger number, so it begins with the same grasps.
+"""
+
+from __future__ import annotations
+
+import math
+import shlex
+import sys
+import time
+from collections import Counter, defaultdict
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from burg_drake.core import (
+    JUDGING_PACKAGES,
+    PACKAGE_URI,
+    GraspSet,
+    InvalidInputError,
+    Mode,
+    SimulationError,
+    content_hash,
+    list_names,
+    portable_reference,
+    software_versions,
+)
+from burg_drake.evaluation.campaign_folder import Campaign
+from burg_drake.evaluation.candidates import (
+    INSTANCE_COLUMN,
+    Candidate,
+    Candidates,
+    chosen_instances,
+    drop_equal_grasps,
+    given_candidates,
+    join_candidates,
+    select_instances,
+)
+from burg_drake.evaluation.grasp_sets.given_grasps import group_by_names
+from burg_drake.evaluation.grasp_sets.pose_mistakes import correction_of
+from burg_drake.evaluation.grasp_sets.sampling import sample_on_scene
+from burg_drake.evaluation.journal import JOURNAL_FILE
+from burg_drake.evaluation.judge import (
+    arm_settings,
+    mode_for,
+    require_engine_for,
+    require_scene_for,
+)
+from burg_drake.evaluation.report.pages import write_report
+from burg_drake.evaluation.run_document import (
+    Grasps,
+    Library,
+    RunDocument,
+    TableFormat,
+    input_of,
+    require_same_run,
+    run_hash,
+    settings_numbers,
+)
+from burg_drake.evaluation.run_folder import (
+    GRASPS_FILE,
+    RUN_FILE,
+    Run,
+    create_run,
+    load_run,
+    save_run,
+    write_copies,
+)
+from burg_drake.evaluation.run_summary import lifted_and_failed
+from burg_drake.evaluation.settings import EvaluationSettings, SamplingSettings, Shard, as_shard
+from burg_drake.evaluation.table_file import write_table
+from burg_drake.evaluation.trial_origin import MEASURE_NUMBERS
+from burg_drake.scene import Scene
+from burg_drake.station import Engine, GraspMotion, Station, as_engine
+
+if TYPE_CHECKING:
+    from burg_drake.simulation import TrialSettings
+
+ByInstance = Mapping[str, GraspSet]
+GraspsLike = GraspSet | ByInstance | Callable[[Scene], ByInstance]
+"""Grasps that a user has: a set, sets by instance, or a function that has those of a scene.
+Attributes `content` and `correction` of a function, if it has them, are a hash of all that its
+grasps come from, and the correction with which it reads them."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Request:
+    """What is asked.
+
+    Attributes:
+        station: where.
+        settings: as the user has them.
+        engine, mode, motion, shard: what the settings come to on this station.
+        only: names of objects or instances; all if empty.
+        grasps: given in place of sampled ones.
+        retry_failed: whether grasps that could not be simulated are tried again.
+    """
+
+    station: Station
+    settings: EvaluationSettings
+    engine: Engine
+    mode: Mode
+    motion: GraspMotion
+    shard: Shard | None
+    only: tuple[str, ...]
+    grasps: GraspsLike | None
+    retry_failed: bool
+
+    @classmethod
+    def of(
+        cls,
+        station: Station,
+        settings: EvaluationSettings,
+        grasps: GraspsLike | None = None,
+        *,
+        retry_failed: bool = False,
+    ) -> Request:
+        """What settings ask for on a station.
+
+        Raises:
+            UnknownNameError: there is no engine of this name.
+            InvalidInputError: there is no such mode or share, the station or the engine lacks the
+                arm, or the approach is asked for of the whole arm, or without a standoff.
+            MissingDependencyError: the engine is not installed.
+        """
+        engine, mode = as_engine(settings.engine), mode_for(station, settings.mode)
+        if settings.approach and mode == "arm":
+            raise InvalidInputError(
+                "approach is given with mode arm, in which the whole arm approaches"
+                " anyway; leave approach out, or give mode hand or reach"
+            ).about("approach")
+        motion = settings.motion or station.document.motion
+        if settings.approach and motion.standoff <= 0.0:
+            own = motion == station.document.motion
+            where = f"of station {station.name!r}" if own else "asked for"
+            raise InvalidInputError(
+                f"the approach of the hand cannot be simulated, as the standoff {where}"
+                " is 0 mm; give a standoff above 0, or leave approach out"
+            ).about("approach", "standoff_mm")
+        if settings.balanced_among == "reachable" and mode == "hand":
+            raise InvalidInputError(
+                "balanced_among is 'reachable', but mode hand does not check what the"
+                " arm can reach; balance among executed, clear or all, or give mode"
+                " reach or arm"
+            ).about("balanced_among", "mode")
+        require_engine_for(engine, mode)
+        return cls(
+            station=station,
+            settings=settings,
+            engine=engine,
+            mode=mode,
+            motion=motion,
+            shard=as_shard(settings.shard),
+            only=tuple(settings.only or ()),
+            grasps=grasps,
+            retry_failed=retry_failed,
+        )
+
+    def given(self, scene: Scene) -> ByInstance | None:
+        """The user's grasps on the instances of a scene; None where they are sampled.
+
+        Raises:
+            BurgError: they do not fit the scene.
+        """
+        if self.grasps is None:
+            return None
+        found = self.grasps(scene) if callable(self.grasps) else self.grasps
+        found = group_by_names(scene, found) if isinstance(found, GraspSet) else found
+        return select_instances(scene, found, self.only)
+
+    def of_scene(self, scene: Scene) -> Request | None:
+        """What is asked about one scene of many: `only` and grasps may be for others alone.
+
+        Returns:
+            The same without what is not for this scene; None if that leaves no grasps.
+
+        Raises:
+            BurgError: the grasps do not fit the scene.
+        """
+        known = {n for name, i in scene.instances.items() for n in (name, i.object)}
+        only = tuple(name for name in self.only if name in known)
+        if self.only and not only:
+            return None
+        if self.grasps is None:
+            return replace(self, only=only) if scene.instances else None
+        grasps: GraspsLike = self.grasps
+        if isinstance(grasps, GraspSet):
+            by = grasps.columns.get(INSTANCE_COLUMN, grasps.object)
+            among = (
+                list(scene.instances) if INSTANCE_COLUMN in grasps.columns else sorted({*known, ""})
+            )
+            grasps = grasps.select(np.isin(by, among))
+        elif isinstance(grasps, Mapping):
+            grasps = {name: grasps[name] for name in grasps if name in scene.instances}
+        else:
+            grasps = grasps(scene)
+        if not isinstance(grasps, GraspSet):
+            grasps = {name: part for name, part in grasps.items() if len(part)}
+        if not len(grasps):
+            return None
+        chosen = set(chosen_instances(scene, only))
+        found = group_by_names(scene, grasps) if isinstance(grasps, GraspSet) else grasps
+        found = {name: part for name, part in found.items() if name in chosen}
+        return replace(self, only=only, grasps=found) if found else None
+
+    def requested(self, scene: Scene) -> Grasps:
+        """What is asked of the grasps; what comes of it is filled in when it is known.
+
+        Raises:
+            UnknownNameError: `only` has a name that is not in the scene.
+        """
+        chosen = chosen_instances(scene, self.only)
+        only = () if chosen == tuple(scene.instances) else chosen
+        return replace(self.requested_of_all(), only=only)
+
+    def _balance(self) -> dict[str, Any]:
+        """What a run that grows says of its grasps; nothing where they are sampled once."""
+        if self.settings.until_balanced is None:
+            return {}
+        return {
+            "until_balanced": self.settings.until_balanced,
+            "balanced_among": self.settings.balanced_among,
+            "max_per_object": self.settings.max_grasps_per_object,
+        }
+
+    def requested_of_all(self) -> Grasps:
+        """The same, whatever the scene."""
+        if self.grasps is not None:
+            return Grasps(origin="given", only=self.only, count=0, objects={}, content="")
+        return Grasps(
+            origin="sampled",
+            per_object=self.settings.grasps_per_object,
+            approach_angle_deg=float(self.settings.approach_angle_deg),
+            blind=self.settings.blind,
+            only=self.only,
+            **self._balance(),
+            count=0,
+            objects={},
+            content="",
+        )
+
+    def document(self, folder: Path, scene: Scene) -> RunDocument:
+        """The document of a run; what comes of the grasps is filled in later."""
+        instances = [*scene.instances.values(), *scene.background.values()]
+        library = portable_reference(scene.library.root, folder)
+        return RunDocument(
+            command=current_command(),
+            scene=input_of(scene, "scenes"),
+            station=input_of(self.station, "stations"),
+            library=Library(
+                name=scene.library.name,
+                path=library
+                if library.startswith(PACKAGE_URI)
+                else str(scene.library.root.resolve()),
+                objects={i.object: scene.library.entry(i.object).build for i in instances},
+            ),
+            grasps=self.requested(scene),
+            engine=self.engine,
+            trial=self.trial,
+            mode=self.mode,
+            arm=self.arm,
+            seed=self.settings.seed,
+            shard="" if self.shard is None else str(self.shard),
+            table=self.settings.table,
+            versions=software_versions({**JUDGING_PACKAGES, **self.engine.packages}),
+        )
+
+    @property
+    def trial(self) -> dict[str, float]:
+        """Settings of the trial's phases, and how its results are measured, by name."""
+        return {**settings_numbers(self.phases), **MEASURE_NUMBERS}
+
+    @property
+    def phases(self) -> TrialSettings:
+        """Settings of the trial's phases."""
+        from burg_drake.simulation import TrialSettings
+
+        return TrialSettings(
+            motion=self.motion,
+            tilt_limit=math.radians(self.settings.tilt_limit_deg),
+            slip_limit=self.settings.slip_limit_mm / 1000.0,
+            approach=self.settings.approach,
+        )
+
+    @property
+    def arm(self) -> dict[str, float]:
+        """Settings of the search for the arm's motions, by name; none where it is not asked."""
+        return {} if self.mode == "hand" else settings_numbers(arm_settings(self.motion))
+
+
+def current_command() -> str:
+    """The command that is running, as one can type it again."""
+    program = Path(sys.argv[0]).name if sys.argv and sys.argv[0] else "python"
+    return shlex.join([program, *sys.argv[1:]])
+
+
+def given_content(grasps: GraspsLike | None) -> str:
+    """Hash of the grasps that are given for many scenes; empty of those of a function that does not
+    say it: each scene's run has a hash of its own."""
+    if grasps is None or callable(grasps):
+        return str(getattr(grasps, "content", ""))
+    sets = {"": grasps} if isinstance(grasps, GraspSet) else grasps
+    parts = {
+        name: [part.X_OG, part.width, part.object, part.columns.get(INSTANCE_COLUMN)]
+        for name, part in sets.items()
+    }
+    return content_hash(parts)
+
+
+def given_correction(grasps: GraspsLike | None) -> tuple[str, ...]:
+    """The correction with which the grasps that are given for many scenes were read."""
+    if grasps is None or callable(grasps):
+        return tuple(getattr(grasps, "correction", ()))
+    sets = [grasps] if isinstance(grasps, GraspSet) else grasps.values()
+    return next((found for part in sets if (found := correction_of(part))), ())
+
+
+RequestedCounts = dict[str, tuple[int, int]]
+"""Numbers of ordinary and of slippery grasps to sample, by object."""
+
+
+def sample_requested(
+    scene: Scene, station: Station, document: RunDocument, before: Run | None = None
+) -> Candidates:
+    """The grasps that a run's document asks for.
+
+    Args:
+        scene: that they are sampled on.
+        station: gives hand and arm.
+        document: of the run; without `Grasps.asked` every object gets `per_object` ordinary ones.
+        before: the run with the grasps that its own document asks for; objects of which no more are
+            asked for keep theirs. None: all are sampled.
+    """
+    grasps = document.grasps
+    names = grasps.only or tuple(scene.instances)
+    kept = {} if before is None else _kept_grasps(scene, before, grasps)
+    found: defaultdict[str, list[GraspSet]] = defaultdict(list, kept)
+    for slippery in (False, True):
+        by_count: defaultdict[int, list[str]] = defaultdict(list)
+        for name in (name for name in names if name not in kept):
+            by_count[_requested_counts(grasps, scene.instance(name).object)[slippery]].append(name)
+        for count, those in sorted(by_count.items()):
+            if count:
+                settings = SamplingSettings(
+                    approach_angle_deg=grasps.approach_angle_deg,
+                    blind=grasps.blind,
+                    slippery=slippery,
+                )
+                sampled = sample_on_scene(scene, station, count, document.seed, settings, those)
+                for name, part in sampled:
+                    found[name].append(part)
+    return join_candidates({name: _join_sets(found[name]) for name in names})
+
+
+def _kept_grasps(scene: Scene, before: Run, grasps: Grasps) -> dict[str, list[GraspSet]]:
+    """The grasps of the instances that a run has as many of as are asked for now."""
+    there = before.candidates
+    provenance = there.grasps.provenance["parts"]
+    kept = {}
+    for name in provenance:
+        object = scene.instance(name).object
+        if _requested_counts(grasps, object) == _requested_counts(before.document.grasps, object):
+            own = there.grasps.select(there.instance == name)
+            kept[name] = [replace(own, provenance=provenance[name])]
+    return kept
+
+
+def next_round(run: Run) -> RunDocument | None:
+    """The document of a judged run that asks for more grasps; None if no more are needed.
+
+    None are needed if each object has enough lifted and enough failing grasps, or the maximum of
+    grasps. A run that a second engine has judged again gets no further round.
+    """
+    grasps = run.document.grasps
+    if not grasps.until_balanced or any(v.judged_again for v in run.verdicts.values()):
+        return None
+    counts = lifted_and_failed(run)
+    requested: RequestedCounts = {
+        name: _increase_counts(grasps, name, counts[name]) for name in counts
+    }
+    if all(requested[name] == _requested_counts(grasps, name) for name in requested):
+        return None
+    return replace(run.document, grasps=replace(grasps, asked=requested))
+
+
+def _requested_counts(grasps: Grasps, object: str) -> tuple[int, int]:
+    return grasps.asked.get(object, (grasps.per_object or 0, 0))
+
+
+def _increase_counts(grasps: Grasps, object: str, counts: tuple[int, int]) -> tuple[int, int]:
+    """How many grasps are sampled in the next round: twice as many of what is missing."""
+    ordinary, slippery = _requested_counts(grasps, object)
+    lifted, failed = (n < grasps.until_balanced for n in counts)
+    room = grasps.max_per_object - ordinary - slippery
+    more = np.array([ordinary * lifted, (slippery or grasps.per_object or 0) * failed])
+    more = np.minimum(more, room // max(1, int((more > 0).sum())))
+    return ordinary + int(more[0]), slippery + int(more[1])
+
+
+def _join_sets(parts: list[GraspSet]) -> GraspSet:
+    """Ordinary grasps, and slippery ones if there are any; provenance is that of the first."""
+    if len(parts) == 1:
+        return parts[0]
+    return replace(drop_equal_grasps(GraspSet.concatenate(parts)), provenance=parts[0].provenance)
+
+
+def require_sound(scene: Scene, station: Station, mode: Mode, engine: Engine) -> None:
+    """Refuses a scene that cannot be judged, before any work is spent on it.
+
+    Raises:
+        InvalidInputError: unsound scene, an arm that stands in something or does not reach, or
+            objects or a hand that the engine cannot have.
+    """
+    from burg_drake.motion import require_usable_arm
+    from burg_drake.station import require_valid_scene
+
+    require_valid_scene(scene, station)
+    if mode != "hand":
+        require_usable_arm(scene, station)
+    require_scene_for(engine, scene, station)
+
+
+def open_run(
+    folder: Path,
+    scene: Scene,
+    request: Request,
+    given: ByInstance | None,
+    sampling: Callable[[], None] = lambda: None,
+) -> Run:
+    """Goes on with the run in a folder, or begins a new one there.
+
+    Args:
+        folder: of the run.
+        scene: to judge.
+        request: what is asked about it.
+        given: the user's grasps by instance; sampled if None.
+        sampling: called before grasps are sampled.
+
+    Raises:
+        InvalidInputError: the folder holds another run.
+    """
+    document = request.document(folder, scene)
+    candidates = None if given is None else given_candidates(scene, given)
+    if candidates is not None:
+        document = _record_grasps(document, scene, candidates, 0.0)
+    if (folder / RUN_FILE).exists():
+        run = load_run(folder)
+        require_same_run(folder, run.document, document)
+        write_copies(folder, scene, request.station)
+        if document.grasps.until_balanced and run.candidates.content != run.document.grasps.content:
+            # killed between the two files of a round, of which the grasps are the newer one
+            return _resample_run(run, run.document, scene, request.station)
+        return run
+    if candidates is None:
+        sampling()
+        start = time.process_time()
+        candidates = sample_requested(scene, request.station, document)
+        document = _record_grasps(document, scene, candidates, time.process_time() - start)
+    document = replace(document, hash=run_hash(document))
+    return create_run(folder, document, scene, request.station, candidates)
+
+
+def extend_run(run: Run, document: RunDocument, scene: Scene, station: Station) -> Run:
+    """Samples the grasps that a run's new document asks for, those that it has among them, of the
+    objects of which it asks for more.
+
+    The candidates come before run.yaml, so that a call that is killed between them is found out by
+    their hash: `open_run` then samples those of the document again.
+    """
+    return _resample_run(run, document, scene, station, before=run)
+
+
+def _resample_run(
+    run: Run, document: RunDocument, scene: Scene, station: Station, before: Run | None = None
+) -> Run:
+    """With the grasps of a document; see `sample_requested`."""
+    start = time.process_time()
+    candidates = sample_requested(scene, station, document, before)
+    cpu = document.grasps.cpu + time.process_time() - start
+    document = _record_grasps(document, scene, candidates, cpu)
+    candidates.save(run.path / GRASPS_FILE)
+    return save_run(Run(run.path, replace(document, hash=run_hash(document))))
+
+
+def _record_grasps(
+    document: RunDocument, scene: Scene, candidates: Candidates, cpu: float
+) -> RunDocument:
+    names = document.grasps.only or scene.instances
+    counts = Counter({scene.instance(name).object: 0 for name in names})
+    counts.update(scene.instance(name).object for name in candidates.instance.tolist())
+    return replace(
+        document,
+        grasps=replace(
+            document.grasps,
+            correction=correction_of(candidates.grasps),
+            count=len(candidates),
+            objects=dict(counts),
+            content=candidates.content,
+            cpu=cpu,
+        ),
+    )
+
+
+def open_grasps(run: Run, *, retry_failed: bool) -> list[Candidate]:
+    """Grasps that this run judges and has no verdict about, and those to be tried again."""
+    verdicts = run.verdicts
+    mine = set(run.mine)
+    known = {id for id, v in verdicts.items() if not v.is_open(retry_failed=retry_failed)}
+    return [c for c in run.candidates if c.id in mine and c.id not in known]
+
+
+def finish_run(run: Run, table: TableFormat, *, report: bool = True) -> Run:
+    """Writes table and report, unless they are there already; where no report is wanted, one that
+    is out of date is removed."""
+    if run.document.table != table:
+        run = save_run(Run(run.path, replace(run.document, table=table)))
+    journal = run.path / JOURNAL_FILE
+    if not _is_up_to_date(run.table_path, journal):
+        _write_table(run)
+    if not _is_up_to_date(run.report_path, journal):
+        run.report_path.unlink(missing_ok=True)
+        if report:
+            write_report(run)
+    return run
+
+
+def _is_up_to_date(path: Path, journal: Path) -> bool:
+    return path.exists() and path.stat().st_mtime_ns >= journal.stat().st_mtime_ns
+
+
+def _write_table(run: Run) -> None:
+    write_table(run.table_path, run.results, asdict(run.document))
+
+
+def require_judged(run: Run) -> None:
+    """Refuses a run in which grasps that are judged here are open.
+
+    Raises:
+        SimulationError: there are such grasps.
+    """
+    left = [id for id in run.mine if id not in run.verdicts]
+    if left:
+        raise SimulationError(
+            f"{len(left)} of {len(run.mine)} grasps have no verdict yet, such as "
+            f"{left[0]}; the results so far are kept: run the same command to continue"
+        )
+
+
+def require_scenes_judged(campaign: Campaign) -> None:
+    """Refuses a run over many scenes in which scenes are open; those that failed are not.
+
+    Raises:
+        SimulationError: there are such scenes.
+    """
+    ended = ("done", "empty", "failed")
+    states = campaign.states
+    left = [
+        name for name in campaign.names if name not in states or states[name].state not in ended
+    ]
+    if left:
+        raise SimulationError(
+            f"{len(left)} of {len(campaign.names)} scenes are not complete ("
+            f"{list_names(left)}); the results so far are kept: run the same command to"
+            " continue"
+        )

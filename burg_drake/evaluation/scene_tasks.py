@@ -1,0 +1,404 @@
+"""Work on one scene of a run over many: prepared and finished in other processes, judged here."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Literal
+
+from burg_drake.core import (
+    BurgError,
+    Outcome,
+    Prefetcher,
+    Session,
+    SimulationError,
+    Task,
+    Verdict,
+    WorkerFuture,
+    WorkerPool,
+    ensure_writable_folder,
+    remove_unfinished,
+)
+from burg_drake.evaluation.campaign_document import SceneState
+from burg_drake.evaluation.candidates import Candidate
+from burg_drake.evaluation.journal import JOURNAL_FILE, Journal
+from burg_drake.evaluation.part_store import PART_ROWS, PartWriter, StoredRun
+from burg_drake.evaluation.run_document import TableFormat, WorkSession, begin_session
+from burg_drake.evaluation.run_folder import (
+    REPORT_FILE,
+    RUN_FILE,
+    Run,
+    load_run,
+    require_run_folder,
+    save_run,
+)
+from burg_drake.evaluation.run_preparation import (
+    Request,
+    finish_run,
+    open_grasps,
+    open_run,
+    require_sound,
+)
+from burg_drake.evaluation.run_summary import run_shortfall_notes
+from burg_drake.scene import Scene, as_scene
+
+
+class SceneJudging:
+    """A scene that is being judged.
+
+    Attributes:
+        name: in the run.
+        left: grasps that had no verdict when it was opened.
+        mine: how many grasps are judged here.
+        known: how many of them had one.
+    """
+
+    def __init__(self, name: str, folder: Path, request: Request, workers: int) -> None:
+        """Opens the run.
+
+        Raises:
+            InvalidInputError: another process is writing it.
+        """
+        self.name = name
+        self._run = load_run(folder)
+        self._journal: Journal | None = Journal(folder / JOURNAL_FILE)
+        self.left: Sequence[Candidate] = open_grasps(self._run, retry_failed=request.retry_failed)
+        again = {grasp.id for grasp in self.left}
+        self.mine = len(self._run.mine)
+        self.known = self.mine - len(self.left)
+        self._before = len(self._run.verdicts)
+        # verdicts are not kept: a thousand runs have a million
+        self._failed = {
+            id: v.interrupted
+            for id, v in self._run.verdicts.items()
+            if v.outcome is Outcome.SIMULATION_FAILED and id not in again
+        }
+        self._judged = 0
+        self._workers = workers
+        self._count = len(self._run.candidates)
+        self._missing = "; ".join(run_shortfall_notes(self._run))
+        self._run = Run(folder, self._run.document)
+
+    @property
+    def is_done(self) -> bool:
+        """Whether nothing is left."""
+        return self._judged == len(self.left)
+
+    def begin(self) -> None:
+        """Writes into the run's document that it is worked on."""
+        self._session = begin_session(self._workers, self._before)
+        self._begun = time.monotonic()
+        self._save(self._session)
+
+    def take(self, id: str, verdict: Verdict) -> None:
+        """Keeps a verdict."""
+        assert self._journal is not None
+        self._journal.append(id, verdict)
+        self._judged += 1
+        if verdict.outcome is Outcome.SIMULATION_FAILED:
+            self._failed[id] = verdict.interrupted
+
+    def is_part_due(self) -> bool:
+        """Whether so many were judged again that their rows should go to a part."""
+        return self._judged % PART_ROWS == 0
+
+    def close(self) -> None:
+        """Writes into the run's document what was done, and closes the journal."""
+        if self._journal is None:
+            return
+        self._journal.close()
+        self._journal = None
+        if self.left:
+            seconds = round(time.monotonic() - self._begun, 3)
+            self._save(replace(self._session, judged=self._judged, seconds=seconds))
+
+    def state(self, state: Literal["open", "done"]) -> SceneState:
+        """How far it is."""
+        document = self._run.document
+        if state == "done":
+            self.close()
+        journal = self._run.path / JOURNAL_FILE
+        return SceneState(
+            scene=self.name,
+            state=state,
+            run=document.hash,
+            grasps=self._count,
+            mine=self.mine,
+            sampling=document.grasps.cpu,
+            size=journal.stat().st_size if state == "done" else 0,
+            failed=len(self._failed) if state == "done" else 0,
+            interrupted=sum(self._failed.values()) if state == "done" else 0,
+            missing=self._missing,
+        )
+
+    def _save(self, session: WorkSession) -> None:
+        document = self._run.document
+        sessions = (*document.stretches, session)
+        save_run(replace(self._run, document=replace(document, stretches=sessions)))
+
+
+def is_finished(folder: Path, size: int, table: str, *, report: bool) -> bool:
+    """Whether a run's journal has this size, and its table is not older, nor its report."""
+    names = [f"results.{table}", *([REPORT_FILE] if report else [])]
+    try:
+        journal = (folder / JOURNAL_FILE).stat()
+        others = [(folder / name).stat() for name in names]
+    except OSError:
+        return False
+    newer = all(other.st_mtime_ns >= journal.st_mtime_ns for other in others)
+    return journal.st_size == size and newer
+
+
+@dataclass(frozen=True, eq=False)
+class PrepareTask:
+    """A scene whose run is to be begun, or gone on with.
+
+    Attributes:
+        name: of the scene in the run.
+        folder: of its run.
+        scene: as loaded, or its file.
+    """
+
+    name: str
+    folder: Path
+    scene: Scene | Path
+
+
+@dataclass(frozen=True)
+class FinishTask:
+    """A scene that is judged, or so far that its rows go to a part.
+
+    Attributes:
+        name: of the scene in the run.
+        judged: whether all that is judged here is; then table and report are written, too.
+    """
+
+    name: str
+    judged: bool = True
+
+
+@dataclass(frozen=True)
+class ClosePartsTask:
+    """The parts are to be written to the end."""
+
+
+@dataclass(frozen=True, eq=False)
+class Preparer:
+    """Prepares scenes.
+
+    Attributes:
+        request: what is asked.
+    """
+
+    request: Request
+
+    def __call__(self, work: PrepareTask) -> Scene | None:
+        """Makes the folder of a scene's run; returns the scene, or None if there are no grasps.
+
+        Raises:
+            BurgError: it cannot be judged.
+        """
+        scene = as_scene(work.scene)
+        request = self.request.of_scene(scene)
+        if request is None:
+            return None
+        require_run_folder(work.folder)
+        if not (work.folder / RUN_FILE).exists():
+            require_sound(scene, request.station, request.mode, request.engine)
+        given = request.given(scene)
+        remove_unfinished(ensure_writable_folder(work.folder))
+        with Journal(work.folder / JOURNAL_FILE):
+            open_run(work.folder, scene, request, given)
+        return scene
+
+
+@dataclass(frozen=True)
+class SceneOutputs:
+    """What is kept of the scenes.
+
+    Attributes:
+        folder: of the run over many scenes.
+        places: the runs of its scenes.
+        instances: names of the free objects of all of them.
+        table: format of the tables.
+        reports: whether each scene gets a report.
+    """
+
+    folder: Path
+    places: tuple[StoredRun, ...]
+    instances: Sequence[str]
+    table: TableFormat
+    reports: bool
+
+
+class Finisher:
+    """Writes what comes of scenes: tables, reports, parts."""
+
+    def __init__(self, keeping: SceneOutputs) -> None:
+        self._keeping = keeping
+        self._folders = {place.scene: place.folder for place in keeping.places}
+        self._writer: PartWriter | None = None
+
+    def __call__(self, work: FinishTask | ClosePartsTask) -> None:
+        """Does a piece of work.
+
+        Raises:
+            BurgError: a file cannot be written.
+        """
+        if isinstance(work, ClosePartsTask):
+            if self.writer.behind():
+                self.writer.catch_up()
+            self.writer.close()
+            return
+        run = load_run(self._folders[work.name])
+        if work.judged:
+            run = finish_run(run, self._keeping.table, report=self._keeping.reports)
+        self.writer.take(work.name, run)
+
+    @property
+    def writer(self) -> PartWriter:
+        """Opened when it is needed, as it looks at all parts."""
+        if self._writer is None:
+            keeping = self._keeping
+            self._writer = PartWriter(keeping.folder, keeping.places, keeping.instances)
+        return self._writer
+
+
+def prepare_scene(preparer: Preparer, work: PrepareTask) -> Scene | None:
+    """Prepares a scene in a worker; see `Preparer`.
+
+    Raises:
+        BurgError: it cannot be judged.
+    """
+    try:
+        return preparer(work)
+    except SystemExit as error:  # DRAKE_DEMAND ends this way
+        raise SimulationError(f"SystemExit: {error}") from error
+
+
+def finish_scene(finisher: Finisher, work: FinishTask | ClosePartsTask) -> None:
+    """Writes what came of a scene in a worker; see `Finisher`.
+
+    Raises:
+        BurgError: a file cannot be written.
+    """
+    finisher(work)
+
+
+def preparer_count(workers: int) -> int:
+    """How many processes prepare scenes; 0 would do it in this process. A cluster may have no
+    workers yet."""
+    workers_per_process = 16  # Sampling takes about a thirtieth of the time of the trials.
+    return max(1, -(-workers // workers_per_process))
+
+
+class SceneProcesses:
+    """What is done about scenes but judging; a context that ends its processes."""
+
+    def __init__(self, preparer: Preparer, keeping: SceneOutputs, workers: int) -> None:
+        """Starts nothing yet.
+
+        Args:
+            preparer: prepares scenes.
+            keeping: what is kept of them.
+            workers: that judge.
+        """
+        self._preparer = preparer
+        self._count = preparer_count(workers)
+        self._pools: list[WorkerPool] = []
+        self._work: Iterator[PrepareTask] = iter(())
+        self._ahead: Prefetcher[PrepareTask, Scene | None] | None = None
+        self._finisher: WorkerPool | None = None
+        self._finishing: deque[tuple[FinishTask | ClosePartsTask, WorkerFuture[None]]] = deque()
+        self._session = Session("finish", partial(Finisher, keeping))
+        self._here = Finisher(keeping)
+        self._used = False
+        self._failed: list[FinishTask | ClosePartsTask] = []
+        if self._count:
+            self._finisher = self._pool(1)
+
+    def prepare(self, work: Iterable[PrepareTask]) -> None:
+        """Says which scenes are to be prepared, in order."""
+        self._work = iter(work)
+        if self._count:
+            session = Session("prepare", partial(Preparer, self._preparer.request))
+            self._ahead = Prefetcher(
+                self._pool(self._count),
+                self._work,
+                lambda item: Task(prepare_scene, (item,), session=session),
+            )
+
+    def ready(self) -> bool:
+        """Whether `prepared` returns at once."""
+        return self._ahead is None or self._ahead.ready()
+
+    def prepared(self) -> tuple[PrepareTask, Scene | BaseException | None] | None:
+        """The next scene whose run has been begun, or why it cannot be; without grasps its result
+        is None. None when there are no more scenes."""
+        if self._ahead is not None:
+            return self._ahead.take()
+        for item in self._work:
+            return item, self._prepared_here(item)
+        return None
+
+    def finish(self, name: str) -> None:
+        """Has table, report and rows of a judged scene written."""
+        self._give(FinishTask(name))
+
+    def take(self, name: str) -> None:
+        """Has rows of a scene written that is being judged."""
+        self._give(FinishTask(name, judged=False))
+
+    def close(self) -> None:
+        """Waits until all is written.
+
+        Raises:
+            BurgError: something cannot be written.
+        """
+        if self._finisher is not None and self._used:
+            self._submit(self._finisher, ClosePartsTask())
+            self._collect_finished(wait=True)
+        for work in self._failed or (() if self._used else (ClosePartsTask(),)):
+            self._here(work)  # where it fails again it is an error
+        if self._failed:
+            self._here(ClosePartsTask())
+
+    def __enter__(self) -> SceneProcesses:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        for pool in self._pools:
+            pool.kill_workers()
+
+    def _pool(self, workers: int) -> WorkerPool:
+        self._pools.append(WorkerPool(workers, retries=0, own_group=True))
+        return self._pools[-1]
+
+    def _prepared_here(self, item: PrepareTask) -> Scene | BaseException | None:
+        try:
+            return self._preparer(item)
+        except BurgError as error:
+            return error
+
+    def _give(self, work: FinishTask) -> None:
+        if self._finisher is None:
+            self._here(work)
+            return
+        self._used = True
+        self._submit(self._finisher, work)
+        self._collect_finished(wait=False)
+
+    def _submit(self, finisher: WorkerPool, work: FinishTask | ClosePartsTask) -> None:
+        task = Task(finish_scene, (work,), session=self._session)
+        self._finishing.append((work, finisher.submit_task(task)))
+
+    def _collect_finished(self, wait: bool) -> None:
+        """Notes what could not be written, of what is finished, or of all when that is."""
+        while self._finishing and (wait or self._finishing[0][1].done()):
+            work, future = self._finishing.popleft()
+            if future.exception() is not None:
+                self._failed.append(work)

@@ -1,0 +1,202 @@
+"""Progress of a run, read from another process while it works, or afterwards."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from burg_drake.evaluation.campaign_folder import (
+    CAMPAIGN_FILE,
+    CAMPAIGN_LOCK_FILE,
+    Campaign,
+    open_results,
+)
+from burg_drake.evaluation.journal import JOURNAL_FILE, is_locked
+from burg_drake.evaluation.part_store import JournalTail, StoredRun, read_journal_tails
+from burg_drake.evaluation.run_document import WorkSession
+from burg_drake.evaluation.run_folder import RUN_FILE, Run
+from burg_drake.evaluation.settings import select_share
+
+
+@dataclass(frozen=True, kw_only=True)
+class Status:
+    """How far a run is.
+
+    Attributes:
+        path: its folder.
+        kind: `run` of one scene, or `campaign` of many.
+        working: whether a process is at it.
+        judged: grasps that have a verdict.
+        total: of how many; expected, as long as scenes have not been sampled.
+        outcomes: number of grasps by outcome.
+        rate: grasps a second: lately, or of the session of work that is under way; None if unknown.
+        left: expected time left [s]; None if unknown.
+        last: date of the last verdict, seconds since 1970; None if there is none.
+        shard: share that is judged here, as `K/N`; empty if all.
+        scenes: how many there are, and `done` of them.
+        failed: why scenes could not be judged, by name.
+        under_way: scenes that have been begun and are not done.
+    """
+
+    path: str
+    kind: str
+    working: bool
+    judged: int
+    total: int
+    outcomes: Counter[str]
+    rate: float | None = None
+    left: float | None = None
+    last: float | None = None
+    shard: str = ""
+    scenes: int = 1
+    done: int = 0
+    failed: dict[str, str] = field(default_factory=dict)
+    under_way: tuple[str, ...] = ()
+
+    @property
+    def complete(self) -> bool:
+        """Whether nothing is left to judge."""
+        return self.done + len(self.failed) == self.scenes
+
+    def plain(self) -> dict[str, Any]:
+        """As JSON values."""
+        return {**vars(self), "outcomes": dict(self.outcomes), "complete": self.complete}
+
+
+class RunWatch:
+    """Looks at a run again and again."""
+
+    def __init__(self, path: str | Path) -> None:
+        """Reads what does not change.
+
+        Raises:
+            InvalidInputError: there is no run.
+            DocumentError: its document does not fit the schema.
+        """
+        self._date = _document_time(Path(path))
+        self._result = result = open_results(path)
+        places = result.places if isinstance(result, Campaign) else [StoredRun("", result.path)]
+        self._tails = read_journal_tails(result.path, places)
+        self._history: list[tuple[float, int]] = []
+
+    def look(self) -> Status:
+        """How far it is now."""
+        self._result = result = self._reopened()
+        if isinstance(result, Campaign):
+            return self._campaign(result)
+        run, document = result, result.document
+        tail = self._tail("")
+        total = len(select_share(range(document.grasps.count), document.shard))
+        judged = min(tail.lines, total)
+        working = is_locked(run.path / JOURNAL_FILE)
+        rate = self._rate(judged, document.stretches, working)
+        return Status(
+            path=str(run.path),
+            kind="run",
+            working=working,
+            judged=judged,
+            total=total,
+            outcomes=_outcome_texts(tail.outcomes),
+            rate=rate,
+            left=(total - judged) / rate if rate else None,
+            last=tail.modified or None,
+            shard=document.shard,
+            done=int(judged == total),
+            under_way=() if judged == total else (document.scene.name,),
+        )
+
+    def _campaign(self, campaign: Campaign) -> Status:
+        states = campaign.states
+        begun = [n for n in campaign.names if n in states and states[n].state in ("open", "done")]
+        outcomes: Counter[bytes] = Counter()
+        judged, last = 0, 0.0
+        for name in begun:
+            tail = self._tail(name)
+            outcomes.update(tail.outcomes)
+            judged += tail.lines
+            last = max(last, tail.modified)
+        working = is_locked(campaign.path / CAMPAIGN_LOCK_FILE)
+        total = max(judged, campaign.expected)
+        rate = self._rate(judged, campaign.document.stretches, working)
+        mine = set(campaign.names)
+        ended = [s for n, s in states.items() if n in mine and s.state in ("done", "empty")]
+        return Status(
+            path=str(campaign.path),
+            kind="campaign",
+            working=working,
+            judged=judged,
+            total=total,
+            outcomes=_outcome_texts(outcomes),
+            rate=rate,
+            left=(total - judged) / rate if rate else None,
+            last=last or None,
+            shard=campaign.document.shard,
+            scenes=len(campaign.names),
+            done=len(ended),
+            failed=campaign.failed,
+            under_way=tuple(n for n in begun if states[n].state == "open"),
+        )
+
+    def _reopened(self) -> Run | Campaign:
+        """The run as it is now; its document is read if it has another date."""
+        path = self._result.path
+        date = _document_time(path)
+        if date == self._date:
+            return replace(self._result)  # without what it remembers
+        self._date = date
+        return open_results(path)
+
+    def _tail(self, name: str) -> JournalTail:
+        tail = self._tails[name]
+        tail.refresh()
+        return tail
+
+    def _rate(self, judged: int, sessions: tuple[WorkSession, ...], working: bool) -> float | None:
+        """Grasps a second: of the time in which this was followed, if that is long enough, else
+        of the session that is under way."""
+        window = 60.0  # Seconds over which the rate is taken, once followed for that long.
+        now = time.monotonic()
+        self._history.append((now, judged))
+        while len(self._history) > 2 and self._history[1][0] < now - window:
+            self._history.pop(0)
+        if not working:
+            return None
+        begun, before = self._history[0]
+        if now - begun >= window / 4:
+            return (judged - before) / (now - begun) or None
+        return _session_rate(sessions[-1], judged) if sessions else None
+
+
+def _document_time(path: Path) -> tuple[int, ...]:
+    """Of the document of a run."""
+    files = (path / CAMPAIGN_FILE, path / RUN_FILE)
+    return tuple(file.stat().st_mtime_ns if file.exists() else 0 for file in files)
+
+
+def _session_rate(session: WorkSession, judged: int) -> float | None:
+    """Grasps a second of a session that is under way; None if it does not say how many were judged
+    when it began."""
+    if session.judged is not None or session.before is None:
+        return None
+    begun = datetime.fromisoformat(session.started)
+    seconds = (datetime.now(UTC) - begun).total_seconds()
+    done = judged - session.before
+    return done / seconds if seconds > 0 and done > 0 else None
+
+
+def read_status(path: str | Path) -> Status:
+    """How far a run of one scene or of many is.
+
+    Raises:
+        InvalidInputError: there is no run.
+        DocumentError: its document does not fit the schema.
+    """
+    return RunWatch(path).look()
+
+
+def _outcome_texts(outcomes: Counter[bytes]) -> Counter[str]:
+    return Counter({name.decode(): count for name, count in outcomes.items() if count > 0})

@@ -1,0 +1,261 @@
+"""The results table as a file for other tools, CSV or Parquet. Numbers keep every bit."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import (
+    INSTANCE_PREFIXES,
+    FileLimits,
+    InvalidInputError,
+    MarginNames,
+    MissingDependencyError,
+    ReadBudget,
+    atomic_write,
+    atomic_write_all,
+    column_metadata,
+    csv_metadata,
+    describe_column,
+    metadata_path,
+    open_regular,
+    quote_value,
+    read_rows,
+    require_writable,
+    short_message,
+    text_array,
+)
+from burg_drake.evaluation.results_table import TEXT_COLUMNS, Columns
+
+T = TypeVar("T", int, float)
+
+
+RUN_METADATA_KEY = b"burg_drake.run"
+"""Parquet files carry the contents of run.yaml as JSON under this key."""
+
+
+def require_writer(table: str) -> None:
+    """Finds out before any work whether a table format can be written.
+
+    Raises:
+        InvalidInputError: there is no such format.
+        MissingDependencyError: Parquet without pyarrow.
+    """
+    if table not in ("csv", "parquet"):
+        raise InvalidInputError(f"table format {table!r} does not exist; give csv or parquet")
+    if table == "parquet":
+        _pyarrow()
+
+
+def require_table(path: Path) -> None:
+    """Finds out before any work whether a table can be written to a file.
+
+    Raises:
+        InvalidInputError: the suffix tells no format, or the place cannot be written to.
+        MissingDependencyError: Parquet without pyarrow.
+    """
+    if path.suffix not in (".csv", ".parquet"):
+        raise InvalidInputError(
+            f"{path}: the suffix does not say the format of the table; give a file that"
+            " ends in .csv or .parquet, such as "
+            f"{path.with_suffix('.csv') if path.name else 'table.csv'}"
+        )
+    require_writer(path.suffix.removeprefix("."))
+    require_writable(path)
+
+
+def write_table(path: Path, columns: Columns, metadata: Mapping[str, Any] | None = None) -> None:
+    """Writes a table whole or not at all; the suffix (.csv or .parquet) gives the format.
+
+    Beside a CSV file what its columns are goes to a file, see `core.column_descriptions`.
+
+    Args:
+        path: the file.
+        columns: equally long arrays by name.
+        metadata: JSON values that Parquet files carry along; of those of a CSV file the shard is
+            told in the file beside it.
+
+    Raises:
+        MissingDependencyError: Parquet without pyarrow.
+        InvalidInputError: the file cannot be written.
+    """
+    # Of CSV on the Web, by the kind of an array.
+    datatypes = {"U": "string", "f": "double", "i": "integer", "u": "integer", "O": "integer"}
+    if path.suffix == ".parquet":
+        atomic_write(path, _parquet_bytes(columns, metadata or {}))
+    else:
+        meant = {n: (datatypes[v.dtype.kind], describe_column(n)) for n, v in columns.items()}
+        notes = [{"dc:description": note} for note in _csv_notes(metadata or {})]
+        description = json.dumps(csv_metadata(path.name, meant, notes), indent=1) + "\n"
+        atomic_write_all({metadata_path(path): description, path: _csv_text(columns)})
+
+
+def _csv_notes(metadata: Mapping[str, Any]) -> list[str]:
+    """What a reader of a CSV file has to know of its run."""
+    shard = metadata.get("shard")
+    return [f"shard {shard}: only these grasps of the run are judged here"] if shard else []
+
+
+def read_table(path: Path) -> Columns:
+    """Reads a file that `write_table` wrote, or rows of one; numbers come back bit for bit.
+
+    Columns that others have added are numbers if all their cells are, else texts.
+
+    Raises:
+        InvalidInputError: the file is missing or something else.
+        MissingDependencyError: Parquet without pyarrow.
+    """
+    try:
+        if path.suffix == ".parquet":
+            _, parquet = _pyarrow()
+            with open_regular(path) as binary:
+                table = _read_bounded(path, parquet.ParquetFile(binary))
+            cells = {name: table.column(name).to_pylist() for name in table.column_names}
+        else:
+            cells = _csv_cells([row for _, row in read_rows(path)])
+        allowance = ReadBudget(path)
+        return {name: _typed_column(name, values, allowance) for name, values in cells.items()}
+    except OSError as error:
+        why = error.strerror or short_message(error)  # pyarrow's own are OSErrors, too
+        raise InvalidInputError(f"cannot read {path}: {why}") from error
+    except InvalidInputError:
+        raise
+    except ValueError as error:
+        raise InvalidInputError(
+            f"{path} is not a results table ({short_message(error)})"
+        ) from error
+
+
+def _read_bounded(path: Path, file: Any) -> Any:
+    """The table of a Parquet file, which can be a thousand times as large as the file.
+
+    Raises:
+        InvalidInputError: it is beyond the limits of tables.
+    """
+    batch_rows = 1 << 10  # Rows of a Parquet file that are unpacked at once.
+    arrow, _ = _pyarrow()
+    cells = file.metadata.num_rows * file.metadata.num_columns
+    if cells > FileLimits.table.values:
+        raise InvalidInputError(f"cannot read {path}: more than {FileLimits.table.values:,} cells")
+    batches, size = [], 0
+    for batch in file.iter_batches(batch_size=batch_rows):
+        size += batch.nbytes
+        if size > FileLimits.table.size:
+            raise InvalidInputError(f"cannot read {path}: it has cells of more than 1 GiB in all")
+        batches.append(batch)
+    return arrow.Table.from_batches(batches, file.schema_arrow)
+
+
+def is_table(path: Path) -> bool:
+    """Whether a file is a table of results, by its name or its first line."""
+    max_header = 1 << 16  # Characters that are read to recognise a file.
+    if path.suffix == ".parquet":
+        return path.is_file()
+    try:
+        with open_regular(path) as file:
+            line = file.readline(max_header).decode("utf-8-sig")
+        return {"id", "outcome", "X_OG"} <= set(next(csv.reader([line]), []))
+    except (InvalidInputError, UnicodeDecodeError, csv.Error):
+        return False
+
+
+def _csv_cells(rows: list[list[str]]) -> dict[str, list[str]]:
+    if not rows:
+        raise ValueError("it is empty")
+    header, *rows = rows
+    for separator, name in ((";", "semicolons"), ("\t", "tabs")):
+        if len(header) == 1 and separator in header[0]:
+            raise ValueError(f"its cells are separated by {name}; save it with commas")
+    for number, row in enumerate(rows, 1):
+        if len(row) != len(header):
+            raise ValueError(f"row {number} has {len(row)} cells, the header has {len(header)}")
+    return {name: [row[k] for row in rows] for k, name in enumerate(header)}
+
+
+def _csv_text(columns: Columns) -> str:
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*(_cells(values) for values in columns.values()), strict=True))
+    return stream.getvalue()
+
+
+def _cells(values: NDArray[Any]) -> list[Any]:
+    """Python values of a column, an empty text for NaN; csv writes floats by repr: lossless.
+
+    Infinity is `INF`, as XML and with it CSV on the Web have it. Whole numbers with gaps are
+    objects, None in the gaps, which csv leaves empty.
+    """
+    special = {math.inf: "INF", -math.inf: "-INF"}
+    if values.dtype.kind != "f" or np.isfinite(values).all():
+        return list(values.tolist())
+    return ["" if value != value else special.get(value, value) for value in values.tolist()]
+
+
+def _parquet_bytes(columns: Columns, metadata: Mapping[str, Any]) -> bytes:
+    arrow, parquet = _pyarrow()
+    kinds = {"U": arrow.string(), "O": arrow.int64()}
+    arrays = {
+        name: arrow.array(values.tolist(), kinds[values.dtype.kind])
+        if values.dtype.kind in kinds
+        else arrow.array(values, from_pandas=True)  # NaN becomes null
+        for name, values in columns.items()
+    }
+    table = arrow.table(arrays)
+    fields = [field.with_metadata(column_metadata(field.name)) for field in table.schema]
+    table = table.cast(arrow.schema(fields, {RUN_METADATA_KEY: json.dumps(metadata)}))
+    sink = arrow.BufferOutputStream()
+    parquet.write_table(table, sink)
+    return bytes(sink.getvalue().to_pybytes())
+
+
+def _pyarrow() -> tuple[Any, Any]:
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError as error:
+        raise MissingDependencyError(
+            "Parquet needs pyarrow; run: pip install 'burg-drake[parquet]', or choose csv"
+        ) from error
+    return pyarrow, pyarrow.parquet
+
+
+def _typed_column(name: str, values: Sequence[Any], allowance: ReadBudget) -> NDArray[Any]:
+    texts = ["" if value is None else str(value) for value in values]
+    if name in TEXT_COLUMNS:
+        return text_array(f"{allowance.path}: {name}", texts, allowance)
+    if name in ("seed",):
+        whole = [
+            _read_cell(int, name, row, text, "a whole number") for row, text in enumerate(texts, 1)
+        ]
+        return np.array(whole, dtype=np.int64)
+    try:
+        return np.array(
+            [
+                math.nan if text == "" else _read_cell(float, name, row, text, "a number, or empty")
+                for row, text in enumerate(texts, 1)
+            ]
+        )
+    except ValueError:
+        if name in (*MarginNames.all, "friction", "mass") or name.startswith(
+            tuple(INSTANCE_PREFIXES.values())
+        ):
+            raise
+        return text_array(f"{allowance.path}: {name}", texts, allowance)
+
+
+def _read_cell(kind: type[T], name: str, row: int, text: str, expected: str) -> T:
+    try:
+        return kind(text)
+    except ValueError as error:
+        raise ValueError(
+            f"row {row}: {name} is {quote_value(text)}; it must be {expected}"
+        ) from error

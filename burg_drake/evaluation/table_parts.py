@@ -1,0 +1,443 @@
+"""Parts of a table as Parquet files, each with the segments of journals that it was made from."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import (
+    InvalidInputError,
+    MissingDependencyError,
+    RecordedFields,
+    TextField,
+    atomic_write,
+    column_metadata,
+    open_regular,
+)
+from burg_drake.evaluation.results_table import TEXT_COLUMNS, Columns
+
+if TYPE_CHECKING:
+    import pandas
+
+SEGMENT_TAIL = 4096
+"""Bytes at the end of a segment that are compared each time."""
+
+
+@dataclass(frozen=True)
+class JournalSegment:
+    """Rows of a part that were made of a stretch of a journal.
+
+    Attributes:
+        scene: name of the journal's scene in the run; empty in a run of one scene.
+        begin, end: bytes of the journal.
+        rows: of the part.
+        whole, last: hashes of these bytes, and of the last of them.
+        modified: date of the journal at that time [ns], if it ended there.
+    """
+
+    scene: str
+    begin: int
+    end: int
+    rows: int
+    whole: str
+    last: str
+    modified: int
+
+
+def segment_of(scene: str, journal: Path, begin: int, end: int, rows: int) -> JournalSegment:
+    """The segment of bytes that rows have just been made of."""
+    with open_regular(journal) as stream:
+        status = os.fstat(stream.fileno())
+        modified = status.st_mtime_ns if status.st_size == end else 0
+        whole = _stream_hash(stream, begin, end)
+        last = _stream_hash(stream, max(begin, end - SEGMENT_TAIL), end)
+    return JournalSegment(scene, begin, end, rows, whole, last, modified)
+
+
+def valid_segments(segments: Sequence[JournalSegment], journal: Path) -> list[JournalSegment]:
+    """Segments that follow on each other from the beginning of a journal, as far as they hold."""
+    try:
+        with open_regular(journal) as stream:
+            return _follow_segments(segments, stream)
+    except (ValueError, OSError):
+        return []
+
+
+def _follow_segments(segments: Sequence[JournalSegment], stream: BinaryIO) -> list[JournalSegment]:
+    status = os.fstat(stream.fileno())
+    size, modified = status.st_size, status.st_mtime_ns
+    untouched = any(s.end == size and s.modified == modified for s in segments)
+    found: list[JournalSegment] = []
+    place = 0
+    while True:
+        following = [s for s in segments if s.begin == place and place < s.end <= size]
+        following = [s for s in following if _matches_journal(s, stream, untouched=untouched)]
+        if not following:
+            return found
+        found.append(max(following, key=lambda s: s.end))
+        place = found[-1].end
+
+
+def _matches_journal(segment: JournalSegment, stream: BinaryIO, *, untouched: bool) -> bool:
+    """Whether a journal still has the bytes that a segment is made of."""
+    if untouched:
+        return (
+            _stream_hash(stream, max(segment.begin, segment.end - SEGMENT_TAIL), segment.end)
+            == segment.last
+        )
+    return _stream_hash(stream, segment.begin, segment.end) == segment.whole
+
+
+def whole_lines(journal: Path) -> int:
+    """Bytes of a journal up to its last whole line."""
+    if not journal.exists():
+        return 0
+    with open_regular(journal) as stream:
+        end = stream.seek(0, os.SEEK_END)
+        while end > 0:
+            begin = max(0, end - SEGMENT_TAIL)
+            stream.seek(begin)
+            found = stream.read(end - begin).rfind(b"\n")
+            if found >= 0:
+                return begin + found + 1
+            end = begin
+    return 0
+
+
+def line_end(journal: Path, place: int) -> int:
+    """Where the line ends that a byte of a journal is in."""
+    with open_regular(journal) as stream:
+        stream.seek(place)
+        return place + len(stream.readline())
+
+
+def _stream_hash(stream: BinaryIO, begin: int, end: int) -> str:
+    chunk_bytes = 1 << 20
+    digest = hashlib.blake2b(digest_size=12)
+    stream.seek(begin)
+    left = end - begin
+    while left > 0 and (data := stream.read(min(chunk_bytes, left))):
+        digest.update(data)
+        left -= len(data)
+    return digest.hexdigest()
+
+
+CANDIDATE_COLUMN = "candidate"
+"""Column of a row's place among the candidates of its run."""
+UNIQUE_TEXT_COLUMNS = ("id", "X_OG")
+"""Texts that differ from row to row; others repeat, and each is kept once."""
+SEGMENTS_KEY = b"burg_drake.segments"
+PART_NAME_PATTERN = re.compile(r"part-(\d+)-([0-9a-f]{16})\.parquet")
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part on disk.
+
+    Attributes:
+        path: the file.
+        number: by which they are sorted.
+        segments: what its rows are made of, in order.
+    """
+
+    path: Path
+    number: int
+    segments: tuple[JournalSegment, ...]
+
+
+def require_arrow(what: str) -> Any:
+    """The module pyarrow.
+
+    Raises:
+        MissingDependencyError: it is not installed; says what needs it.
+    """
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"{what} needs pyarrow; run: pip install 'burg-drake[parquet]'"
+        ) from error
+    return pyarrow
+
+
+def arrow_table(columns: Columns) -> Any:
+    """Columns as an Arrow table; NaN becomes null, and texts that repeat are kept once."""
+    arrow = require_arrow("a columnar table")
+    return arrow.table({name: _arrow_column(name, values) for name, values in columns.items()})
+
+
+def empty_column(name: str, rows: int) -> Any:
+    """A column of nulls, of the type that columns of this name have."""
+    arrow = require_arrow("a columnar table")
+    return arrow.nulls(rows, _arrow_type(name, "U" if name in TEXT_COLUMNS else "f"))
+
+
+def write_part(folder: Path, number: int, table: Any, segments: Sequence[JournalSegment]) -> Part:
+    """Writes a part, whole or not at all.
+
+    Raises:
+        InvalidInputError: the folder cannot be written.
+    """
+    arrow = require_arrow("a columnar table")
+    meant = [field.with_metadata(column_metadata(field.name)) for field in table.schema]
+    stored = json.dumps([list(asdict(segment).values()) for segment in segments])
+    table = table.cast(arrow.schema(meant, {SEGMENTS_KEY: stored}))
+    sink = arrow.BufferOutputStream()
+    arrow.parquet.write_table(table, sink, compression="zstd", write_page_checksum=True)
+    data = bytes(sink.getvalue())
+    path = folder / f"part-{number:06d}-{_footer_hash(data)}.parquet"
+    atomic_write(path, data)
+    return Part(path, number, tuple(segments))
+
+
+def open_part(path: Path) -> Part | None:
+    """A part, from its footer; None if it is damaged or something else."""
+    max_footer = 1 << 26  # Bytes.
+    name = PART_NAME_PATTERN.fullmatch(path.name)
+    if name is None:
+        return None
+    arrow = require_arrow(f"reading {path.parent}")
+    try:
+        with open_regular(path) as stream:
+            stream.seek(0, 2)
+            size = stream.tell()
+            stream.seek(max(0, size - 8))
+            length = int.from_bytes(stream.read(4), "little")
+            if length > min(max_footer, size):
+                return None
+            stream.seek(size - 8 - length)
+            if _data_hash(stream.read()) != name[2]:
+                return None
+            file = arrow.parquet.ParquetFile(stream)
+            stored = json.loads(file.schema_arrow.metadata[SEGMENTS_KEY])
+            segments = tuple(JournalSegment(*values) for values in stored)
+            if sum(segment.rows for segment in segments) != file.metadata.num_rows:
+                return None
+    except (InvalidInputError, OSError, ValueError, KeyError, TypeError):
+        return None
+    return Part(path, int(name[1]), segments)
+
+
+def read_part(part: Part, names: Sequence[str]) -> Any | None:
+    """Columns of a part, as an Arrow table; None if it is damaged.
+
+    Args:
+        part: the part.
+        names: of the columns; those that it does not have are nulls.
+    """
+    arrow = require_arrow(f"reading {part.path}")
+    try:
+        with open_regular(part.path) as stream:
+            file = arrow.parquet.ParquetFile(stream, page_checksum_verification=True)
+            there = [name for name in names if name in file.schema_arrow.names]
+            table = file.read(columns=there, use_threads=True)
+    except (InvalidInputError, OSError, ValueError, arrow.ArrowException):
+        return None
+    rows = sum(segment.rows for segment in part.segments)
+    if table.num_rows != rows:
+        return None
+    for name in names:
+        if name not in there:
+            table = table.append_column(name, empty_column(name, rows))
+    return table.select(list(names)).replace_schema_metadata()
+
+
+def column_names(part: Part) -> list[str]:
+    """Names of the columns of a part."""
+    arrow = require_arrow(f"reading {part.path}")
+    with open_regular(part.path) as stream:
+        return list(arrow.parquet.read_schema(stream).names)
+
+
+def to_numpy(name: str, column: Any) -> NDArray[Any]:
+    """A column as `table.Columns` have it: nulls are NaN, or empty texts."""
+    arrow = require_arrow("a columnar table")
+    if name in TEXT_COLUMNS or arrow.types.is_dictionary(column.type) or _is_text(column.type):
+        if not arrow.types.is_dictionary(column.type):
+            if column.type == arrow.null():
+                return np.full(len(column), "", dtype=np.str_)
+            filled = column.fill_null("").to_numpy()
+            return filled.astype(np.str_) if len(filled) else np.empty(0, dtype=np.str_)
+        codes, categories = to_codes(column)
+        return np.array([*categories, ""], dtype=np.str_)[codes]
+    values = column.to_numpy()
+    plain: NDArray[Any] = values.astype(np.float64) if values.dtype.kind == "O" else values
+    return plain
+
+
+def to_codes(column: Any) -> tuple[NDArray[np.int64], list[str]]:
+    """A column of texts as numbers and the texts that they stand for; null is -1."""
+    arrow = require_arrow("a columnar table")
+    if not arrow.types.is_dictionary(column.type):
+        column = column.dictionary_encode()
+    column = column.unify_dictionaries()
+    if not column.num_chunks:
+        return np.empty(0, dtype=np.int64), []
+    codes = [chunk.indices.fill_null(-1).to_numpy() for chunk in column.chunks]
+    return np.concatenate(codes).astype(np.int64), column.chunk(0).dictionary.to_pylist()
+
+
+def _arrow_column(name: str, values: NDArray[Any]) -> Any:
+    arrow = require_arrow("a columnar table")
+    if values.dtype.kind == "U":
+        if len(values) and values.strides == (0,):  # one text for all rows
+            places = np.zeros(len(values), dtype=np.int32)
+            return arrow.DictionaryArray.from_arrays(places, arrow.array([str(values[0])]))
+        column = arrow.array(values.tolist(), arrow.string())
+        return column if name in UNIQUE_TEXT_COLUMNS else column.dictionary_encode()
+    if values.dtype.kind == "O":
+        return arrow.array(values.tolist(), arrow.int64())
+    return arrow.array(values, from_pandas=True)
+
+
+def _arrow_type(name: str, kind: str) -> Any:
+    arrow = require_arrow("a columnar table")
+    if kind != "U":
+        return arrow.float64()
+    return (
+        arrow.string()
+        if name in UNIQUE_TEXT_COLUMNS
+        else arrow.dictionary(arrow.int32(), arrow.string())
+    )
+
+
+def _is_text(kind: Any) -> bool:
+    arrow = require_arrow("a columnar table")
+    return bool(arrow.types.is_string(kind) or arrow.types.is_large_string(kind))
+
+
+def _footer_hash(data: bytes) -> str:
+    length = int.from_bytes(data[-8:-4], "little")
+    return _data_hash(data[len(data) - 8 - length :])
+
+
+def _data_hash(data: bytes) -> str:
+    return hashlib.blake2b(data, digest_size=8).hexdigest()
+
+
+@dataclass(frozen=True, eq=False)
+class StoredRows:
+    """Judged grasps of several runs, one after the other, in the order of their candidates.
+
+    Attributes:
+        table: Arrow table.
+        counts: (S,) how many rows each run has.
+    """
+
+    table: Any
+    counts: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return int(self.counts.sum())
+
+    def column(self, name: str) -> NDArray[Any]:
+        """A column as `table.Columns` has it."""
+        return to_numpy(name, self.table.column(name))
+
+    def codes(self, name: str) -> tuple[NDArray[np.int64], list[str]]:
+        """A column of texts as numbers, and the texts that they stand for."""
+        return to_codes(self.table.column(name))
+
+    def columns(self, names: Iterable[str]) -> Columns:
+        """Several columns."""
+        return {name: self.column(name) for name in names}
+
+    @property
+    def run(self) -> NDArray[np.int64]:
+        """(N,) which run each row is of, by its place."""
+        return np.repeat(np.arange(len(self.counts)), self.counts)
+
+
+COLUMN_MEMBERS: Mapping[str, Sequence[str]] = {
+    one.name: [member.value for member in one.of]
+    for one in RecordedFields.verdict
+    if isinstance(one, TextField) and issubclass(one.of, StrEnum)
+}
+"""All texts that a column can have, where they are known."""
+
+
+def frame_of_columns(columns: Columns, names: Sequence[str] | None = None) -> pandas.DataFrame:
+    """A table of results as a data frame.
+
+    Args:
+        columns: the table.
+        names: of its columns; all if None.
+
+    Raises:
+        MissingDependencyError: pandas is not installed.
+        KeyError: the table has no such column.
+    """
+    series: dict[str, Any] = {}
+    for name in names or columns:
+        values = columns[name]
+        if values.dtype.kind == "U" and name not in UNIQUE_TEXT_COLUMNS:
+            texts, codes = np.unique(values, return_inverse=True)
+            series[name] = _category_column(name, codes, texts.tolist())
+        else:
+            series[name] = values.astype(object) if values.dtype.kind == "U" else values
+    return _pandas().DataFrame(series)
+
+
+def frame_of_rows(rows: StoredRows, scenes: Sequence[str]) -> pandas.DataFrame:
+    """The results of many scenes as a data frame, with a column `name` in front: the scene's name
+    in the run.
+
+    Args:
+        rows: of the run.
+        scenes: names of the scenes that `rows.run` counts.
+
+    Raises:
+        MissingDependencyError: pandas is not installed.
+    """
+    pandas = _pandas()
+    series: dict[str, Any] = {"name": _category_column("name", rows.run, list(scenes))}
+    for name in rows.table.column_names:
+        column = rows.table.column(name)
+        if name in TEXT_COLUMNS and name not in UNIQUE_TEXT_COLUMNS:
+            codes, texts = rows.codes(name)
+            series[name] = _category_column(name, *_fill_null(codes, texts))
+        else:
+            values = (
+                rows.column(name) if name not in TEXT_COLUMNS else column.fill_null("").to_pandas()
+            )
+            series[name] = values
+    return pandas.DataFrame(series)
+
+
+def _fill_null(codes: Any, texts: list[str]) -> tuple[Any, list[str]]:
+    """Nulls as empty texts."""
+    if not (codes < 0).any():
+        return codes, texts
+    if "" not in texts:
+        texts = [*texts, ""]
+    return np.where(codes < 0, texts.index(""), codes), texts
+
+
+def _category_column(name: str, codes: Any, texts: list[str]) -> Any:
+    """Codes as categories: all members of what has members, else those that there are, sorted."""
+    pandas = _pandas()
+    members = list(COLUMN_MEMBERS.get(name, texts if name == "name" else sorted(texts)))
+    place = np.array([members.index(text) for text in texts], dtype=np.int64)
+    codes = place[codes] if len(texts) else codes
+    return pandas.Categorical.from_codes(codes, categories=members, ordered=name == "stage")
+
+
+def _pandas() -> Any:
+    try:
+        import pandas
+    except ImportError as error:
+        raise MissingDependencyError(
+            "a data frame needs pandas; run: pip install 'burg-drake[frame]'"
+        ) from error
+    return pandas

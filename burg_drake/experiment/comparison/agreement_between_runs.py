@@ -1,0 +1,278 @@
+"""Agreement of two runs when neither is the truth: verdicts, deciding stages, margins."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from burg_drake.core import CONTESTED_CONFIDENCE, Array, Stage
+from burg_drake.experiment.comparison.confusion_matrix import count_cells, estimate_agreement
+from burg_drake.experiment.comparison.estimates import Estimate, Flags, Values
+from burg_drake.experiment.comparison.group_agreement import (
+    FactorGroup,
+    agreement_by_factor,
+    cross_tabulate,
+)
+from burg_drake.experiment.comparison.judge_assessment import replay_commands
+from burg_drake.experiment.comparison.margin_calibration import MarginCalibration, calibrate_margins
+from burg_drake.experiment.comparison.result_table import TextFactor
+from burg_drake.experiment.comparison.verdict_pairs import (
+    MEASURED_MARGINS,
+    VerdictPairs,
+    is_success_verdict,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PartedGrasp:
+    """A grasp that only one of two runs holds.
+
+    Attributes:
+        scene, object, grasp: which grasp on what.
+        first, second: its outcome in either run.
+        confidence: of the first run's verdict; None where it has none.
+        replays: commands that show it in the first run, and in the second.
+    """
+
+    scene: str
+    object: str
+    grasp: str
+    first: str
+    second: str
+    confidence: float | None
+    replays: tuple[str, ...]
+
+
+def parted_grasps(
+    pairs: VerdictPairs,
+    parted: Flags,
+    scenes: Mapping[str, str],
+    folders: Sequence[Mapping[str, str]],
+) -> tuple[PartedGrasp, ...]:
+    """Names grasps in the order of the first run.
+
+    Args:
+        pairs: N grasps with the verdicts of the first run, and how they ended in the second.
+        parted: (N,) which of them are named.
+        scenes: names of the scenes by their content.
+        folders: of the two runs, by content of the scene.
+    """
+    found = []
+    for row in np.flatnonzero(parted).tolist():
+        scene, grasp, confidence = pairs.scene[row], pairs.id[row], float(pairs.confidence[row])
+        found.append(
+            PartedGrasp(
+                scene=scenes.get(scene, scene),
+                object=pairs.object[row],
+                grasp=grasp,
+                first=pairs.simulated[row],
+                second=pairs.ended[row],
+                confidence=None if np.isnan(confidence) else confidence,
+                replays=replay_commands(folders, scene, grasp),
+            )
+        )
+    return tuple(found)
+
+
+HIGH_CONFIDENCE = 0.95
+"""Confidence above which a verdict counts as sure."""
+CONFIDENCE_GROUPS = (
+    f"below {CONTESTED_CONFIDENCE:g}",
+    f"{CONTESTED_CONFIDENCE:g} to {HIGH_CONFIDENCE:g}",
+    f"above {HIGH_CONFIDENCE:g}",
+)
+"""Groups of verdicts by their confidence, rising."""
+
+
+@dataclass(frozen=True, eq=False)
+class SecondVerdicts:
+    """What the second run found of N grasps.
+
+    Attributes:
+        stage: (N,) that decided.
+        judged_again: (N,) engine that gave the verdict; empty where it is the run's own.
+        confidence: (N,) of the verdict; NaN where there is none.
+        margins: (N,) numbers by name; NaN where there is none.
+    """
+
+    stage: TextFactor
+    judged_again: TextFactor
+    confidence: Array
+    margins: Mapping[str, Array]
+
+    def take(self, rows: Values) -> SecondVerdicts:
+        """Some grasps, as indices or truth values."""
+        margins = {name: values[rows] for name, values in self.margins.items()}
+        texts = self.stage.take(rows), self.judged_again.take(rows)
+        return SecondVerdicts(*texts, self.confidence[rows], margins)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MarginDifference:
+    """How far apart two runs measure a margin of grasps that both executed.
+
+    All is in the unit of its column.
+
+    Attributes:
+        name: of the margin.
+        grasps: that both executed and measured.
+        median: of the second run's less the first's: whether one sees more of it.
+        median_size: of the absolute differences.
+        within: what nine of ten absolute differences are within.
+    """
+
+    name: str
+    grasps: int
+    median: float
+    median_size: float
+    within: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunAgreement:
+    """Agreement of two runs on what is held.
+
+    `lifted`, `lifted_disturbed` and `lifted_turned` are, whatever counts as success elsewhere.
+
+    Attributes:
+        alike: share of the grasps that both hold, or both do not, with Wilson's interval.
+        kappa: Cohen's, of the same.
+        same_rows: grasps with the same outcome, stage, engine, confidence and margins in both, to
+            the last digit, as those of a copy have them.
+        objects: the same by object; their accuracy is the share that is alike.
+        stages: grasps by the stage that decided in the first run, and in the second.
+        apart: the same of the grasps that are not alike.
+        parted: the grasps that are not alike, by name.
+        confidence: as `objects`, by the confidence of the first run's verdicts, of those that have
+            one; see `CONFIDENCE_GROUPS`.
+        margins: share of alike grasps in quantile bins of the first run's margins, of grasps of
+            which both runs measured it; `is_success_verdict` are the alike ones.
+        differences: of the margins, where both executed.
+    """
+
+    alike: Estimate
+    kappa: Estimate
+    same_rows: int
+    objects: tuple[FactorGroup, ...]
+    stages: dict[str, dict[str, int]]
+    apart: dict[str, dict[str, int]]
+    parted: tuple[PartedGrasp, ...]
+    confidence: tuple[FactorGroup, ...]
+    margins: tuple[MarginCalibration, ...]
+    differences: tuple[MarginDifference, ...]
+
+
+def assess_run_agreement(
+    pairs: VerdictPairs,
+    second: SecondVerdicts,
+    scenes: Mapping[str, str],
+    folders: Sequence[Mapping[str, str]],
+    *,
+    seed: int = 0,
+) -> RunAgreement:
+    """Compares two runs with each other.
+
+    Args:
+        pairs: N grasps with the verdicts of the first run, and how they ended in the second.
+        second: what the second run found of them besides.
+        scenes: names of the scenes by their content.
+        folders: of the two runs, by content of the scene.
+        seed: of the intervals' resampling.
+    """
+    held = replace(
+        pairs,
+        predicted=is_success_verdict(pairs.simulated, "held"),
+        actual=is_success_verdict(pairs.ended, "held"),
+    )
+    alike = held.predicted == held.actual
+    found = estimate_agreement(count_cells(held.predicted, held.actual), seed=seed)
+    measured = {
+        name: np.where(np.isfinite(second.margins[name]), pairs.margins[name], np.nan)
+        for name in MEASURED_MARGINS
+    }
+    return RunAgreement(
+        alike=found.accuracy,
+        kappa=found.kappa,
+        same_rows=int(_identical_rows(pairs, second).sum()),
+        objects=agreement_by_factor(held, held.object, seed=seed),
+        stages=_count_stage_pairs(pairs.stage, second.stage),
+        apart=_count_stage_pairs(pairs.stage.take(~alike), second.stage.take(~alike)),
+        parted=parted_grasps(pairs, ~alike, scenes, folders),
+        confidence=_agreement_by_confidence(held, seed),
+        margins=calibrate_margins(measured, alike),
+        differences=margin_differences(pairs, second),
+    )
+
+
+def both_executed(first: TextFactor, second: TextFactor) -> Flags:
+    """(N,) whether the trials of both runs came to the grip, by the stages that decided."""
+    one, other = (
+        stage.where([name == Stage.EXECUTED.value for name in stage.names])
+        for stage in (first, second)
+    )
+    return one & other
+
+
+def _identical_rows(pairs: VerdictPairs, second: SecondVerdicts) -> Flags:
+    """(N,) whether both runs have the same verdicts with the same numbers."""
+    same = _equal_texts(pairs.simulated, pairs.ended) & _equal_texts(pairs.stage, second.stage)
+    same &= _equal_texts(pairs.judged_again, second.judged_again)
+    numbers = [(pairs.margins[name], second.margins[name]) for name in MEASURED_MARGINS]
+    for one, other in [*numbers, (pairs.confidence, second.confidence)]:
+        same &= (one == other) | (np.isnan(one) & np.isnan(other))
+    return same
+
+
+def _equal_texts(first: TextFactor, second: TextFactor) -> Flags:
+    place = {name: k for k, name in enumerate(second.names)}
+    codes = np.array([place.get(name, -1) for name in first.names], dtype=np.intp)
+    same: Flags = codes[first.index] == second.index
+    return same
+
+
+def margin_differences(pairs: VerdictPairs, second: SecondVerdicts) -> tuple[MarginDifference, ...]:
+    """How far apart two runs measure what both executed; margins that they never have in common are
+    left out."""
+    covered_share = 0.9  # Share of the differences that `MarginDifference.within` covers.
+    executed = both_executed(pairs.stage, second.stage)
+    found = []
+    for name in MEASURED_MARGINS:
+        apart = second.margins[name][executed] - pairs.margins[name][executed]
+        apart = apart[np.isfinite(apart)]
+        if len(apart):
+            size = np.abs(apart)
+            found.append(
+                MarginDifference(
+                    name=name,
+                    grasps=len(apart),
+                    median=float(np.median(apart)),
+                    median_size=float(np.median(size)),
+                    within=float(np.quantile(size, covered_share)),
+                )
+            )
+    return tuple(found)
+
+
+def _agreement_by_confidence(held: VerdictPairs, seed: int) -> tuple[FactorGroup, ...]:
+    """Agreement by the confidence of the first run's verdicts, of those that have one."""
+    known = np.isfinite(held.confidence)
+    if not known.any():
+        return ()
+    values = held.confidence[known]
+    group = (values >= CONTESTED_CONFIDENCE).astype(np.intp) + (values > HIGH_CONFIDENCE)
+    names = {name: name for name in CONFIDENCE_GROUPS}
+    return agreement_by_factor(
+        held.take(known), TextFactor(CONFIDENCE_GROUPS, group), names, seed=seed
+    )
+
+
+def _count_stage_pairs(first: TextFactor, second: TextFactor) -> dict[str, dict[str, int]]:
+    """Grasps by stage and stage in the order of the stages; only what occurs."""
+    counts, order = cross_tabulate(first, second), [stage.value for stage in Stage]
+    return {
+        row: {column: counts[row][column] for column in order if column in counts[row]}
+        for row in order
+        if row in counts
+    }

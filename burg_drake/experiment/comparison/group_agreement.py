@@ -1,0 +1,255 @@
+"""Agreement by object, scene or verdict, and groups whose error rate is significantly higher.
+
+Trials of a group are compared with other trials of the same prediction: predicted successes that
+failed with other predicted successes, predicted failures that succeeded with other predicted
+failures. So the number of trials chosen of either kind has no influence. `benchmarks/compare.py`
+measures false alarms and power.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import comb
+from typing import Literal
+
+import numpy as np
+
+from burg_drake.core import Stage
+from burg_drake.experiment.comparison.confusion_matrix import (
+    Agreement,
+    count_cells_by_group,
+    estimate_agreements,
+)
+from burg_drake.experiment.comparison.estimates import Estimate, Flags, Values, estimate_share
+from burg_drake.experiment.comparison.result_table import TextFactor
+from burg_drake.experiment.comparison.verdict_pairs import VerdictPairs
+
+
+@dataclass(frozen=True, kw_only=True)
+class FactorGroup:
+    """Trials that have something in common, such as their object.
+
+    Attributes:
+        name: what that is.
+        agreement: figures.
+    """
+
+    name: str
+    agreement: Agreement
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stopped:
+    """Grasps with the same verdict, and what became of them.
+
+    Attributes:
+        stage, outcome, blocker: the verdict; the blocker is the body in the way, if any.
+        trials: how many.
+        successes: share that succeeded.
+    """
+
+    stage: str
+    outcome: str
+    blocker: str
+    trials: int
+    successes: Estimate
+
+
+def agreement_by_factor(
+    pairs: VerdictPairs,
+    factor: TextFactor,
+    names: Mapping[str, str] | None = None,
+    *,
+    seed: int = 0,
+) -> tuple[FactorGroup, ...]:
+    """Agreement for each text of a column that occurs.
+
+    Args:
+        pairs: the trials.
+        factor: (N,) the column.
+        names: what its texts are called, in the order of the groups; as they are if None.
+        seed: of the intervals' resampling.
+    """
+    counts = count_cells_by_group(pairs.predicted, pairs.actual, factor.index, len(factor.names))
+    seen = np.flatnonzero(counts.sum(axis=1)).tolist()
+    if names:
+        rank = {text: k for k, text in enumerate(names)}
+        seen.sort(key=lambda k: rank.get(factor.names[k], len(rank)))
+    found = estimate_agreements(counts[seen], seed=seed)
+    labels = [factor.names[k] for k in seen]
+    return tuple(
+        FactorGroup(name=(names or {}).get(label, label), agreement=a)
+        for label, a in zip(labels, found, strict=True)
+    )
+
+
+def outcomes_by_verdict(pairs: VerdictPairs) -> tuple[Stopped, ...]:
+    """What became of the grasps by verdict, the most frequent ones of a stage first; success is
+    among the verdicts."""
+    stage_order = [stage.value for stage in Stage]  # In the order of the cascade.
+    stages, outcomes, blockers = pairs.stage, pairs.simulated, pairs.blocker
+    width = (len(outcomes.names), len(blockers.names))
+    code = (stages.index * width[0] + outcomes.index) * width[1] + blockers.index
+    found, index = np.unique(code, return_inverse=True)
+    trials = np.bincount(index, minlength=len(found))
+    good = np.bincount(index, weights=pairs.actual, minlength=len(found))
+    rows = [
+        Stopped(
+            stage=stages.names[c // width[1] // width[0]],
+            outcome=outcomes.names[c // width[1] % width[0]],
+            blocker=blockers.names[c % width[1]],
+            trials=int(trials[k]),
+            successes=estimate_share(int(good[k]), int(trials[k])),
+        )
+        for k, c in enumerate(found.tolist())
+    ]
+    return tuple(sorted(rows, key=lambda row: (stage_order.index(row.stage), -row.trials)))
+
+
+def count_outcomes(pairs: VerdictPairs) -> dict[str, dict[str, int]]:
+    """How many trials ended how, by verdict; only what occurs."""
+    return cross_tabulate(pairs.simulated, pairs.ended)
+
+
+def cross_tabulate(rows: TextFactor, columns: TextFactor) -> dict[str, dict[str, int]]:
+    """How many trials have which text of one column and which of another; only what occurs."""
+    counts = _count_pairs(rows, columns)
+    return {
+        rows.names[r]: {columns.names[c]: int(counts[r, c]) for c in np.flatnonzero(counts[r])}
+        for r in np.flatnonzero(counts.sum(axis=1))
+    }
+
+
+def _count_pairs(rows: TextFactor, columns: TextFactor) -> Values:
+    width = len(columns.names)
+    flat = np.bincount(rows.index * width + columns.index, minlength=len(rows.names) * width)
+    return flat.reshape(len(rows.names), width)
+
+
+OUTLIER_SIGNIFICANCE_LEVEL = 0.05
+"""Approximate probability of a false outlier; mid-p values give no strict bound."""
+GroupKind = Literal["object", "verdict", "body in the way"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutlierGroup:
+    """Trials whose verdicts are wrong more often than those of others with the same prediction.
+
+    Attributes:
+        kind: what the trials have in common.
+        name: the object, simulated outcome, or body in the way.
+        predicted: whether their success was predicted.
+        wrong, trials: how many of these trials ended otherwise, and how many there are.
+        other_wrong, other_trials: the same of all other trials with this prediction.
+        ended: the wrong ones by how they ended, the most frequent first.
+        p_value: one-sided mid-p of Fisher's exact test.
+        corrected: the same by Holm's method, for all tested groups.
+    """
+
+    kind: GroupKind
+    name: str
+    predicted: bool
+    wrong: int
+    trials: int
+    other_wrong: int
+    other_trials: int
+    ended: dict[str, int]
+    p_value: float
+    corrected: float
+
+
+def find_outlier_groups(pairs: VerdictPairs) -> tuple[tuple[OutlierGroup, ...], int]:
+    """Looks for groups whose verdicts are wrong more often than those of others.
+
+    Args:
+        pairs: N trials that the verdicts can predict.
+
+    Returns:
+        Groups with a corrected p-value below `OUTLIER_SIGNIFICANCE_LEVEL`, the smallest first, and the
+        number of tested groups. Groups with too few trials to reach that level are not tested.
+    """
+    factors: list[tuple[GroupKind, TextFactor]] = [
+        ("object", pairs.object),
+        ("verdict", pairs.simulated),
+        ("body in the way", pairs.blocker),
+    ]
+    wrong = pairs.predicted != pairs.actual
+    groups: list[tuple[GroupKind, str, bool, Flags, tuple[int, int, int, int]]] = []
+    for predicted in (True, False):
+        same = pairs.predicted == predicted
+        for kind, factor in factors:
+            for k in np.unique(factor.index[same]).tolist():
+                rows = same & (factor.index == k)
+                counts = _count_errors(wrong, rows, same & ~rows)
+                if factor.names[k] and _can_be_outlier(*counts):
+                    groups.append((kind, factor.names[k], predicted, rows & wrong, counts))
+    p_values = [excess_p_value(*counts) for *_, counts in groups]
+    found = [
+        OutlierGroup(
+            kind=kind,
+            name=name,
+            predicted=predicted,
+            wrong=count[0],
+            trials=count[1],
+            other_wrong=count[2],
+            other_trials=count[3],
+            ended=_count_endings(pairs.ended, rows),
+            p_value=p_value,
+            corrected=corrected,
+        )
+        for (kind, name, predicted, rows, count), p_value, corrected in zip(
+            groups, p_values, holm_correction(p_values), strict=True
+        )
+        if corrected < OUTLIER_SIGNIFICANCE_LEVEL
+    ]
+    return tuple(sorted(found, key=lambda one: one.p_value)), len(groups)
+
+
+def _count_errors(wrong: Flags, rows: Flags, others: Flags) -> tuple[int, int, int, int]:
+    """Wrong verdicts and trials of a group, and of the others."""
+    parts = (rows & wrong, rows, others & wrong, others)
+    return int(parts[0].sum()), int(parts[1].sum()), int(parts[2].sum()), int(parts[3].sum())
+
+
+def _can_be_outlier(wrong: int, trials: int, other_wrong: int, other_trials: int) -> bool:
+    """Whether a group would stand out, uncorrected, if all wrong verdicts were its own as far as it
+    has room; that depends on the totals alone, so that others need not be corrected for."""
+    total = wrong + other_wrong
+    most = min(total, trials)
+    return excess_p_value(most, trials, total - most, other_trials) < OUTLIER_SIGNIFICANCE_LEVEL
+
+
+def _count_endings(ended: TextFactor, rows: Flags) -> dict[str, int]:
+    return dict(Counter(ended.names[k] for k in ended.index[rows].tolist()).most_common())
+
+
+def excess_p_value(errors: int, trials: int, other_errors: int, other_trials: int) -> float:
+    """One-sided p-value of Fisher's exact test that a group errs no more often than the others.
+
+    It is the mid-p (H. O. Lancaster, JASA 56, 1961): half the probability of what was seen counts,
+    as the exact one finds less than it may where counts are small.
+
+    Args:
+        errors, trials: of the group.
+        other_errors, other_trials: of all others.
+    """
+    total = errors + other_errors
+    ways = [
+        comb(trials, k) * comb(other_trials, total - k)
+        for k in range(errors, min(trials, total) + 1)
+    ]
+    return (ways[0] + 2 * sum(ways[1:])) / (2 * comb(trials + other_trials, total))
+
+
+def holm_correction(p_values: Sequence[float]) -> list[float]:
+    """P-values corrected for their number (S. Holm, Scandinavian Journal of Statistics 6, 1979):
+    with those below a level taken for real, the probability of any false one is at most that level,
+    as far as it is for each p-value alone."""
+    order = np.argsort(p_values, kind="stable")
+    factors = np.arange(len(p_values), 0, -1)
+    corrected = np.empty(len(p_values))
+    scaled = np.minimum(1.0, np.asarray(p_values)[order] * factors)
+    corrected[order] = np.maximum.accumulate(scaled)
+    return [float(p) for p in corrected]

@@ -1,1 +1,0 @@
-from .page import comparison_page as comparison_page

@@ -1,0 +1,305 @@
+"""Tables of results with texts as integer codes, and the grasps that two tables have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.evaluation import TEXT_COLUMNS, Columns, StoredRows
+from burg_drake.experiment.comparison.estimates import Flags, Rows, Values
+
+_HASH_FACTORS = np.random.default_rng(1).integers(1, 1 << 63, 4096).astype(np.uint64) | np.uint64(1)
+"""Odd random factors of the words of a text."""
+_BYTE_MASKS = np.array([(1 << 8 * k) - 1 for k in range(9)], dtype=np.uint64)
+"""Masks of the first 0 to 8 bytes of a word."""
+
+
+def text_keys(texts: NDArray[np.str_]) -> NDArray[np.uint64]:
+    """A number for each text that is the same for the same text, whatever the column's width, and
+    in all likelihood another one for another text."""
+    texts = np.ascontiguousarray(texts, dtype=np.str_)
+    keys = np.zeros(len(texts), dtype=np.uint64)
+    if not texts.dtype.itemsize or not len(texts):
+        return keys
+    letters: Values = texts.view(np.uint32).reshape(len(texts), -1)
+    if letters.max() >= 128:
+        letters = np.char.encode(texts, "utf-8").view(np.uint8).reshape(len(texts), -1)
+    words = np.zeros((len(letters), -(-letters.shape[1] // 8) * 8), dtype=np.uint8)
+    words[:, : letters.shape[1]] = letters
+    for k, word in enumerate(words.view(np.uint64).T):
+        keys += word * _HASH_FACTORS[k % len(_HASH_FACTORS)]
+    return keys
+
+
+def stored_keys(column: Any) -> NDArray[np.uint64]:
+    """As `text_keys`, of an Arrow column of texts without nulls; none of them becomes an object."""
+    found = [np.zeros(0, dtype=np.uint64), *(_chunk_keys(chunk) for chunk in column.chunks)]
+    return np.concatenate(found)
+
+
+def _chunk_keys(chunk: Any) -> NDArray[np.uint64]:
+    """Sums of words of eight bytes, each times a number of its own."""
+    _, places, data = chunk.buffers()
+    keys = np.zeros(len(chunk), dtype=np.uint64)
+    if not len(chunk) or data is None:
+        return keys
+    kind = np.int64 if str(chunk.type).startswith("large") else np.int32
+    place = np.frombuffer(places, dtype=kind)[chunk.offset : chunk.offset + len(chunk) + 1]
+    begin, length = place[:-1], np.diff(place)
+    text = np.frombuffer(data, dtype=np.uint8)[place[0] : place[-1]]
+    padded = np.zeros(len(text) + 8, dtype=np.uint8)
+    padded[: len(text)] = text
+    words = np.ndarray(len(text) + 1, dtype=np.uint64, buffer=padded.data, strides=(1,))
+    for k in range(-(-int(length.max()) // 8)):
+        at = np.minimum(begin - place[0] + 8 * k, len(text))
+        keys += (words[at] & _BYTE_MASKS[(length - 8 * k).clip(0, 8)]) * _HASH_FACTORS[
+            k % len(_HASH_FACTORS)
+        ]
+    return keys
+
+
+@dataclass(frozen=True, eq=False)
+class IdColumn:
+    """A column of N texts that all differ; they become objects when they are asked for.
+
+    Attributes:
+        column: array of texts, or an Arrow column of them.
+        rows: (N,) places in it; None for all of it.
+    """
+
+    column: Any
+    rows: Rows | None = None
+
+    def __len__(self) -> int:
+        return len(self.column if self.rows is None else self.rows)
+
+    def __getitem__(self, row: int) -> str:
+        found = self.column[row if self.rows is None else int(self.rows[row])]
+        return str(found.as_py() if hasattr(found, "as_py") else found)
+
+    @property
+    def keys(self) -> NDArray[np.uint64]:
+        """(N,) numbers; see `text_keys`."""
+        stored = not isinstance(self.column, np.ndarray)
+        keys = stored_keys(self.column) if stored else text_keys(self.column)
+        return keys if self.rows is None else keys[self.rows]
+
+    def same(self, other: IdColumn) -> bool:
+        """Whether both columns have the same texts in the same order; they may be found to differ
+        only because they are not kept alike."""
+        if self.rows is not None or other.rows is not None:
+            return False
+        arrays = [isinstance(column, np.ndarray) for column in (self.column, other.column)]
+        if all(arrays):
+            return np.array_equal(self.column, other.column)
+        return not any(arrays) and bool(self.column.equals(other.column))
+
+    def take(self, rows: Values) -> IdColumn:
+        """The column of some rows, as indices or truth values."""
+        rows = np.flatnonzero(rows) if rows.dtype == bool else rows
+        return IdColumn(self.column, rows if self.rows is None else self.rows[rows])
+
+
+@dataclass(frozen=True, eq=False)
+class TextFactor:
+    """A column of N texts that has few different ones.
+
+    Attributes:
+        names: the different texts, in alphabetical order.
+        index: (N,) which of them each row has.
+    """
+
+    names: tuple[str, ...]
+    index: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, texts: NDArray[np.str_]) -> TextFactor:
+        """Finds the different texts."""
+        # Rows that are looked at first; if they have all texts, nothing is sorted.
+        sample_size = 4096
+        texts = np.asarray(texts, dtype=np.str_)
+        if texts.ndim == 1 and len(texts) and texts.strides[0] == 0:  # one text, broadcast
+            return cls((str(texts[0]),), np.zeros(len(texts), dtype=np.intp))
+        keys = text_keys(texts)
+        known, first = np.unique(keys[:sample_size], return_index=True)
+        index = np.searchsorted(known, keys).clip(max=max(len(known) - 1, 0))
+        if not np.array_equal(known[index], keys) if len(keys) else False:
+            known, first, index = np.unique(keys, return_index=True, return_inverse=True)
+        return cls._sorted(texts[first], index)
+
+    @classmethod
+    def of_codes(cls, codes: Rows, names: Sequence[str]) -> TextFactor:
+        """From (N,) numbers and the texts that they stand for; -1 stands for an empty one."""
+        empty = codes < 0
+        if not empty.any():
+            return cls._sorted(np.array(names, dtype=np.str_), codes)
+        known = list(names) if "" in names else [*names, ""]
+        return cls._sorted(np.array(known), np.where(empty, known.index(""), codes))
+
+    @classmethod
+    def _sorted(cls, names: NDArray[np.str_], index: Rows) -> TextFactor:
+        order = np.argsort(names)
+        rank = np.empty(len(order), dtype=np.intp)
+        rank[order] = np.arange(len(order))
+        return cls(tuple(names[order].tolist()), rank[index] if len(index) else index)
+
+    def take(self, rows: Values) -> TextFactor:
+        """The column of some rows."""
+        return TextFactor(self.names, self.index[rows])
+
+    def same(self, other: TextFactor) -> bool:
+        """Whether both columns have the same texts in the same order."""
+        return self.names == other.names and np.array_equal(self.index, other.index)
+
+    def __getitem__(self, row: int) -> str:
+        text: str = self.names[self.index[row]]
+        return text
+
+    def where(self, wanted: list[bool]) -> Flags:
+        """(N,) truth values from one for each name."""
+        return np.array(wanted, dtype=bool)[self.index]
+
+
+class StoredNumbers(Mapping[str, Values]):
+    """Columns of numbers in the columnar store, read as they are asked for."""
+
+    def __init__(self, rows: StoredRows, names: Sequence[str]) -> None:
+        """Of some names."""
+        self._rows, self._names = rows, tuple(names)
+        self._read: dict[str, Values] = {}
+
+    def __getitem__(self, name: str) -> Values:
+        if name not in self._read:
+            self._read[name] = self._rows.column(name)
+        return self._read[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def same(self, other: StoredNumbers, name: str) -> bool:
+        """Whether a column of both is the same, without reading it."""
+        return bool(self._rows.table.column(name).equals(other._rows.table.column(name)))
+
+
+@dataclass(frozen=True, eq=False)
+class ResultTable:
+    """N rows of results.
+
+    Attributes:
+        id: (N,) of the grasps.
+        texts: other columns of texts by name.
+        numbers: (N,) columns of numbers by name.
+    """
+
+    id: IdColumn
+    texts: Mapping[str, TextFactor]
+    numbers: Mapping[str, Values]
+
+    def __len__(self) -> int:
+        return len(self.id)
+
+    @classmethod
+    def of_columns(cls, columns: Columns, names: Sequence[str]) -> ResultTable:
+        """From columns in memory."""
+        others = [name for name in names if name != "id"]
+        return cls(
+            IdColumn(columns["id"]),
+            {name: TextFactor.of(columns[name]) for name in others if name in TEXT_COLUMNS},
+            {name: columns[name] for name in others if name not in TEXT_COLUMNS},
+        )
+
+    @classmethod
+    def of_rows(cls, rows: StoredRows, names: Sequence[str]) -> ResultTable:
+        """From the columnar store, which has texts as numbers already."""
+        others = [name for name in names if name != "id"]
+        return cls(
+            IdColumn(rows.table.column("id")),
+            {
+                name: TextFactor.of_codes(*rows.codes(name))
+                for name in others
+                if name in TEXT_COLUMNS
+            },
+            StoredNumbers(rows, [name for name in others if name not in TEXT_COLUMNS]),
+        )
+
+    def same(self, other: ResultTable, name: str) -> bool:
+        """Whether a column of numbers is known to be the same in both."""
+        one, two = self.numbers, other.numbers
+        return (
+            isinstance(one, StoredNumbers)
+            and isinstance(two, StoredNumbers)
+            and one.same(two, name)
+        )
+
+    def take(self, rows: Rows, numbers: Sequence[str]) -> ResultTable:
+        """Some rows with some columns of numbers; the table itself if they are all of it, in
+        order."""
+        if len(rows) == len(self) and np.array_equal(rows, np.arange(len(self))):
+            return self
+        return ResultTable(
+            self.id.take(rows),
+            {name: factor.take(rows) for name, factor in self.texts.items()},
+            {name: self.numbers[name][rows] for name in numbers},
+        )
+
+
+GRASP_KEY_COLUMNS: tuple[str, ...] = ("scene_content", "id")  # Columns that identify a grasp.
+GRASP_CONTENT_COLUMNS: tuple[str, ...] = ("x", "y", "z", "qw", "qx", "qy", "qz", "width")
+"""Columns of pose and width; with its instance they define a grasp."""
+
+
+@dataclass(frozen=True, eq=False)
+class Match:
+    """Rows of two tables that are about the same grasp.
+
+    Attributes:
+        first, second: (N,) rows.
+        other_content: grasps that only have their id in common.
+        only_first, only_second: grasps of one table alone.
+    """
+
+    first: Rows
+    second: Rows
+    other_content: int
+    only_first: int
+    only_second: int
+
+
+def match_rows(first: ResultTable, second: ResultTable) -> Match:
+    """Finds the grasps that two tables have in common; of equal rows the first one counts."""
+    tolerance = 1e-9  # Metres, or 1 for quaternions: tables may have been stored as text.
+    if first.id.same(second.id) and first.texts["scene_content"].same(
+        second.texts["scene_content"]
+    ):
+        one = other = np.arange(len(first))
+    else:
+        _, one, other = np.intersect1d(_row_keys(first), _row_keys(second), return_indices=True)
+        order = np.argsort(one)
+        one, other = one[order], other[order]
+    same = np.ones(len(one), dtype=bool)
+    whole = one is other
+    for name in GRASP_CONTENT_COLUMNS:
+        if whole and first.same(second, name):
+            continue
+        a, b = first.numbers[name][one], second.numbers[name][other]
+        same &= (np.abs(a - b) <= tolerance) | (np.isnan(a) & np.isnan(b))
+    return Match(
+        one[same],
+        other[same],
+        int((~same).sum()),
+        len(first) - len(one),
+        len(second) - len(other),
+    )
+
+
+def _row_keys(table: ResultTable) -> Values:
+    scene_factor = np.uint64(0x9E3779B97F4A7C15)  # Separates the keys of scenes.
+    scenes = table.texts["scene_content"]
+    return table.id.keys + (text_keys(np.array(scenes.names)) * scene_factor)[scenes.index]

@@ -1,0 +1,432 @@
+"""Compares runs with trials on the robot, or with each other."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+from burg_drake.core import Array, InvalidInputError, list_names, quote_value, suggest_names
+from burg_drake.evaluation import Campaign, Columns, Run
+from burg_drake.experiment.comparison.agreement_between_runs import (
+    SecondVerdicts,
+    assess_run_agreement,
+    both_executed,
+)
+from burg_drake.experiment.comparison.compared_runs import (
+    JudgedRuns,
+    add_rejudging_engines,
+    approach_note,
+    differing_settings,
+    require_common_scene,
+    require_same_phases,
+    side_of_trials,
+    unpredictable_for,
+)
+from burg_drake.experiment.comparison.comparison import Comparison, Coverage
+from burg_drake.experiment.comparison.confusion_matrix import compare_paired
+from burg_drake.experiment.comparison.estimates import Flags
+from burg_drake.experiment.comparison.judge_assessment import (
+    PLACEMENT_LIMIT_MM,
+    Judgement,
+    Strata,
+    assess_judge,
+    list_wrong_verdicts,
+    placement_agreement,
+    placement_errors_mm,
+)
+from burg_drake.experiment.comparison.margin_calibration import PROBABILITY_MARGIN
+from burg_drake.experiment.comparison.result_table import Match, ResultTable, TextFactor, match_rows
+from burg_drake.experiment.comparison.verdict_pairs import (
+    MEASURED_MARGINS,
+    PREDICTION_COLUMNS,
+    PREDICTION_NUMBERS,
+    REFERENCE_COLUMNS,
+    VerdictPairs,
+    find_tried,
+    is_success_verdict,
+    make_pairs,
+    predicted_probability,
+    rows_without_prediction,
+)
+from burg_drake.experiment.trials.trial_sheet import (
+    RealTrial,
+    Success,
+    TrialSheet,
+    is_success,
+    load_trials,
+)
+
+SUCCESS_CRITERIA: tuple[Success, ...] = ("lifted", "held")
+"""Criteria by which a trial counts as a success."""
+
+
+def compare(
+    first: Run | Campaign | str | Path,
+    second: Run | Campaign | str | Path,
+    trials: str | Path | None = None,
+    *,
+    success: Success | None = None,
+    placement_limit_mm: float = PLACEMENT_LIMIT_MM,
+    robustness: str | Path | None = None,
+    seed: int = 0,
+) -> Comparison:
+    """Compares a run with trials on the robot or with another run, or two runs with trials.
+
+    Example::
+
+        found = burg.trials.compare("runs/first", "trials.yaml").judgement
+        print(found.selected.precision.value, found.selected.precision.low)
+
+    Args:
+        first: run whose verdicts are taken as predictions, or its folder.
+        second: a trials file, or a run of the same grasps, which then counts as what happened.
+        trials: a trials file; both runs are then compared with it, and with each other.
+        success: what counts as success; if None what the trials were planned with, or `lifted`.
+        placement_limit_mm: how far off every object may be in trials with good placement [mm].
+        robustness: table of robustness whose shares of success are a predicted probability;
+            `robustness.csv` in the folder of the first run if None and it is there.
+        seed: of the intervals' resampling.
+
+    Raises:
+        InvalidInputError: they have nothing in common that can be compared.
+        DocumentError: the trials file does not fit its schema.
+    """
+    if success is not None and success not in SUCCESS_CRITERIA:
+        raise InvalidInputError(
+            f"success is {quote_value(success)}; {suggest_names(str(success), SUCCESS_CRITERIA)}"
+        )
+    if not np.isfinite(placement_limit_mm) or placement_limit_mm < 0.0:
+        raise InvalidInputError(f"the placement limit is {placement_limit_mm} mm; give 0 or more")
+    if trials is None and not is_trials_file(second):
+        return compare_runs(
+            first, second, success=success or "lifted", robustness=robustness, seed=seed
+        )
+    sheet = second if trials is None else trials
+    return compare_trials(
+        [first] if trials is None else [first, second],
+        Path(str(sheet)),
+        success=success,
+        placement_limit_mm=placement_limit_mm,
+        robustness=robustness,
+        seed=seed,
+    )
+
+
+def is_trials_file(path: Run | Campaign | str | Path) -> bool:
+    """Whether it is a trials file rather than a run, going by its name."""
+    return isinstance(path, (str, Path)) and Path(path).suffix in (".yaml", ".yml")
+
+
+def compare_trials(
+    runs: Sequence[Run | Campaign | str | Path],
+    path: Path,
+    *,
+    success: Success | None,
+    placement_limit_mm: float,
+    robustness: str | Path | None = None,
+    seed: int = 0,
+) -> Comparison:
+    """Compares one or two runs with the trials of a sheet; see `compare`."""
+    sheet = load_trials(path)
+    success = success or sheet.selection.success
+    sides = [JudgedRuns.load(run) for run in runs]
+    found_rows = [find_tried(sheet, path, side) for side in sides]
+    tables = [columns for columns, _ in found_rows]
+    left_out = _count_missing([missing for _, missing in found_rows])
+    indices = set.intersection(*(set(t["trial"].tolist()) for t in tables))
+    chosen, uninformative = _select_informative(sheet, tables, sorted(indices))
+    left_out.update(uninformative)
+    if not chosen:
+        raise InvalidInputError(_no_outcome_message(path, left_out))
+    trials = [sheet.trials[k] for k in chosen]
+    found = []
+    for side, columns in zip(sides, tables, strict=True):
+        pairs = _pair_trials(trials, columns, chosen, success)
+        probability = predicted_probability(side, pairs, robustness if side is sides[0] else None)
+        found.append(
+            pairs if probability is None else pairs.with_margin(PROBABILITY_MARGIN, probability)
+        )
+    scenes = [sheet.runs[trial.run].scene.content for trial in trials]
+    instances = sides[0].instances_of(set(scenes))
+    there = placement_errors_mm(trials, [instances[scene] for scene in scenes], placement_limit_mm)
+    judged = [
+        _assess_run(pairs, side, sheet, trials, there, placement_limit_mm, seed)
+        for pairs, side in zip(found, sides, strict=True)
+    ]
+    two = len(sides) == 2
+    asked = [
+        add_rejudging_engines(side.side, pairs.judged_again)
+        for pairs, side in zip(found, sides, strict=True)
+    ]
+    right = [pairs.predicted == pairs.actual for pairs in found]
+    strata = selection_strata(sheet, trials)
+    return Comparison(
+        kind="simulators" if two else "trials",
+        success=success,
+        first=asked[0],
+        second=asked[1] if two else None,
+        reference=side_of_trials(sheet, path),
+        coverage=Coverage(compared=len(trials), left_out=dict(left_out)),
+        judgement=judged[0],
+        other=judged[1] if two else None,
+        difference=compare_paired(*right, seed=seed) if two else None,
+        difference_of_all=strata.agreement(*right, seed=seed).excess if two and strata else None,
+        settings=differing_settings(*sides) if two else (),
+        notes=(
+            *_comparison_notes(sheet, trials, sides, tables, judged[0]),
+            *(f"{side.path}: {side.engines}" for side in asked if side.judged_again),
+        ),
+        seed=seed,
+    )
+
+
+def _count_missing(by_side: Sequence[Mapping[int, str]]) -> Counter[str]:
+    """Trials that a run has no verdict on, by reason; those that both have none on count once."""
+    left_out: Counter[str] = Counter()
+    for k in sorted(set[int]().union(*by_side)):
+        reasons = [missing.get(k) for missing in by_side]
+        if len(reasons) == 1:
+            reason_texts = [f"{reasons[0]} in the run"]
+        elif reasons[0] == reasons[1]:
+            reason_texts = [f"{reasons[0]} in either run"]
+        else:
+            named = zip(reasons, ("first", "second"), strict=True)
+            reason_texts = [f"{reason} in the {which} run" for reason, which in named if reason]
+        left_out[f"grasp {' and '.join(reason_texts)}"] += 1
+    return left_out
+
+
+def _select_informative(
+    sheet: TrialSheet, tables: Sequence[Columns], indices: Sequence[int]
+) -> tuple[list[int], Counter[str]]:
+    """Trials that tell something of their grasp, and why the others do not."""
+    left_out: Counter[str] = Counter()
+    silent: dict[int, str] = {}
+    for columns in tables:
+        for verdict, rows in rows_without_prediction(TextFactor.of(columns["outcome"])).items():
+            silent |= dict.fromkeys(columns["trial"][rows].tolist(), f"simulated {verdict}")
+    chosen = []
+    for k in indices:
+        outcome = sheet.trials[k].outcome
+        if outcome is None:
+            left_out["not carried out yet"] += 1
+        elif not outcome.attempted:
+            left_out[outcome.value] += 1
+        elif k in silent:
+            left_out[silent[k]] += 1
+        else:
+            chosen.append(k)
+    return chosen, left_out
+
+
+def _pair_trials(
+    trials: Sequence[RealTrial], columns: Columns, chosen: Sequence[int], success: Success
+) -> VerdictPairs:
+    """Verdicts and outcomes of the chosen trials."""
+    row = {k: r for r, k in enumerate(columns["trial"].tolist())}
+    rows = np.array([row[k] for k in chosen], dtype=np.intp)
+    outcomes = [t.outcome for t in trials if t.outcome is not None]
+    ended = TextFactor.of(np.array([o.value for o in outcomes], dtype=np.str_))
+    actual = np.array([is_success(o, success) for o in outcomes], dtype=bool)
+    table = ResultTable.of_columns(columns, PREDICTION_COLUMNS).take(rows, PREDICTION_NUMBERS)
+    return make_pairs(table, ended, actual, success)
+
+
+def _assess_run(
+    pairs: VerdictPairs,
+    side: JudgedRuns,
+    sheet: TrialSheet,
+    trials: Sequence[RealTrial],
+    offsets_mm: tuple[Array, Array],
+    limit_mm: float,
+    seed: int,
+) -> Judgement:
+    placement = placement_agreement(pairs, *offsets_mm, limit_mm=limit_mm, seed=seed)
+    return assess_judge(
+        pairs,
+        scenes=side.scenes,
+        strata=selection_strata(sheet, trials),
+        placement=placement,
+        unpredictable=unpredictable_for(side),
+        real=True,
+        disagreements=list_wrong_verdicts(
+            pairs, side.scenes, [side.folders], trials, offsets_mm[0]
+        ),
+        seed=seed,
+    )
+
+
+def selection_strata(sheet: TrialSheet, trials: Sequence[RealTrial]) -> Strata | None:
+    """What the trials were chosen from; None if one of them was not chosen from anything."""
+    keys = {key: k for k, key in enumerate(sheet.strata)}
+    if not keys or any(trial.stratum not in keys for trial in trials):
+        return None
+    population: Array = np.array([s.population for s in sheet.strata.values()], dtype=float)
+    return Strata(np.array([keys[t.stratum] for t in trials], dtype=np.intp), population)
+
+
+def _comparison_notes(
+    sheet: TrialSheet,
+    trials: Sequence[RealTrial],
+    sides: Sequence[JudgedRuns],
+    tables: Sequence[Columns],
+    judged: Judgement,
+) -> tuple[str, ...]:
+    """What people should know before they trust the figures."""
+    notes = []
+    hashes = {source.hash for source in sheet.runs.values()}
+    for side, columns in zip(sides, tables, strict=True):
+        own = set(columns["run"].tolist()) & hashes
+        if not own:
+            notes.append(
+                f"the grasps were not chosen from {side.path}, but from another run of"
+                " the same grasps"
+            )
+        changed = [
+            sheet.trials[k].number
+            for k, outcome in zip(columns["trial"].tolist(), columns["outcome"], strict=True)
+            if own and sheet.trials[k].simulated != outcome
+        ]
+        if changed:
+            notes.append(
+                f"verdicts in {side.path} differ from those in the trials file for "
+                f"{len(changed)} trials, such as trial {changed[0]}; those of the run are"
+                " used"
+            )
+    if judged.not_represented:
+        tried = {trial.stratum for trial in trials}
+        without = [s for key, s in sheet.strata.items() if s.population and key not in tried]
+        kinds = list_names([f"{s.object} ({s.label})" for s in without])
+        every = sum(s.population for s in sheet.strata.values())
+        notes.append(
+            f"figures for all grasps leave out {judged.not_represented} of the {every}"
+            f" grasps from which the trials were chosen, as no trial of {kinds} was"
+            " compared"
+        )
+    twice = len(trials) - len({(t.run, t.grasp) for t in trials})
+    if twice:
+        notes.append(f"{twice} trials repeat a grasp; intervals take them as independent")
+    return tuple(notes)
+
+
+def _no_outcome_message(path: Path, left_out: Counter[str]) -> str:
+    reasons = ", ".join(f"{n} {reason}" for reason, n in left_out.most_common())
+    return f"{path}: no trial can be compared yet ({reasons})"
+
+
+def compare_runs(
+    first: Run | Campaign | str | Path,
+    second: Run | Campaign | str | Path,
+    *,
+    success: Success = "lifted",
+    robustness: str | Path | None = None,
+    seed: int = 0,
+) -> Comparison:
+    """Compares the verdicts of two runs; see `compare`.
+
+    Of runs in different modes only grasps count that both executed: what else they say answers
+    different questions.
+    """
+    sides = JudgedRuns.load(first), JudgedRuns.load(second)
+    require_common_scene(*sides)
+    require_same_phases(*sides)
+    with ThreadPoolExecutor() as pool:  # reading and unpacking leave Python alone
+        one, other = pool.map(JudgedRuns.table, sides, (PREDICTION_COLUMNS, REFERENCE_COLUMNS))
+    tables = one, other
+    found = match_rows(*tables)
+    if not len(found.first):
+        raise InvalidInputError(_no_common_grasps_message(sides, found))
+    modes = [side.found.document.mode for side in sides]
+    pairs, others, left_out = pair_runs(tables, found, success, modes[0] == modes[1])
+    if not len(pairs) and modes[0] != modes[1]:
+        raise InvalidInputError(_nothing_executed_message(sides, modes))
+    probability = predicted_probability(sides[0], pairs, robustness)
+    if probability is not None:
+        pairs = pairs.with_margin(PROBABILITY_MARGIN, probability)
+    scenes = sides[0].scenes
+    folders = [side.folders for side in sides]
+    wrong = list_wrong_verdicts(pairs, scenes, folders)
+    apart, note = differing_settings(*sides), approach_note(*sides)
+    notes = () if apart else ("the runs have the same settings",)
+    return Comparison(
+        kind="runs",
+        success=success,
+        first=add_rejudging_engines(sides[0].side, pairs.judged_again),
+        reference=add_rejudging_engines(sides[1].side, others.judged_again),
+        coverage=Coverage(
+            compared=len(pairs),
+            only_first=found.only_first,
+            only_second=found.only_second,
+            other_content=found.other_content,
+            left_out=left_out,
+        ),
+        judgement=assess_judge(pairs, scenes=scenes, disagreements=wrong, seed=seed),
+        agreement=assess_run_agreement(pairs, others, scenes, folders, seed=seed),
+        settings=apart,
+        notes=(*notes, note) if note else notes,
+        seed=seed,
+    )
+
+
+def pair_runs(
+    tables: tuple[ResultTable, ResultTable],
+    found: Match,
+    success: Success,
+    same_mode: bool = True,
+) -> tuple[VerdictPairs, SecondVerdicts, dict[str, int]]:
+    """Pairs of verdicts of the grasps in common, what else the second run found of them, and what
+    is left out by reason: of different modes all that not both executed."""
+    # Runs of different modes ask different questions before the grip.
+    not_executed = "not executed in both runs, which have different modes"
+    others = tables[1].take(found.second, (*MEASURED_MARGINS, "confidence"))
+    ended, stage = others.texts["outcome"], others.texts["stage"]
+    pairs = make_pairs(
+        tables[0].take(found.first, PREDICTION_NUMBERS),
+        ended,
+        is_success_verdict(ended, success),
+        success,
+    )
+    margins = {name: others.numbers[name] for name in MEASURED_MARGINS}
+    again, confidence = others.texts["judged_again"], others.numbers["confidence"]
+    second = SecondVerdicts(stage, again, confidence, margins)
+    reasons: dict[str, Flags] = {}
+    for where, verdicts in (("first", pairs.simulated), ("second", pairs.ended)):
+        reasons |= {
+            f"{k} in the {where}": rows for k, rows in rows_without_prediction(verdicts).items()
+        }
+    if not same_mode:
+        reasons[not_executed] = ~both_executed(pairs.stage, stage)
+    keep = np.ones(len(pairs), dtype=bool)
+    left_out = {}
+    for reason, rows in reasons.items():
+        if rows.any():
+            left_out[reason] = int((rows & keep).sum())
+            keep &= ~rows
+    if keep.all():
+        return pairs, second, left_out
+    return pairs.take(keep), second.take(keep), left_out
+
+
+def _nothing_executed_message(sides: tuple[JudgedRuns, JudgedRuns], modes: Sequence[str]) -> str:
+    return (
+        f"{sides[0].path} and {sides[1].path} were made in different modes ({modes[0]}"
+        f" and {modes[1]}), and no grasp was executed in both, so there is nothing to"
+        " compare; evaluate one of them again in the mode of the other"
+    )
+
+
+def _no_common_grasps_message(sides: tuple[JudgedRuns, JudgedRuns], found: Match) -> str:
+    paths, place = f"{sides[0].path} and {sides[1].path}", sides[0].grasps_place
+    if found.other_content:
+        return (
+            f"{paths} have {found.other_content} grasps with the same ids, but none with the same"
+            f" pose and width; evaluate the second run with the grasps of the first ({place})"
+        )
+    return (
+        f"{paths} have no grasp in common ({found.only_first} and {found.only_second} are judged);"
+        f" evaluate the second run with the grasps of the first ({place})"
+    )

@@ -1,0 +1,314 @@
+"""Pairs of a verdict and an outcome for each grasp, the input of all figures of a comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from burg_drake.core import Array, InvalidInputError, Outcome, list_names
+from burg_drake.evaluation import (
+    HASH_DIGITS,
+    TEXT_COLUMNS,
+    Campaign,
+    Columns,
+    Run,
+    find_robustness_table,
+    lifted_shares,
+)
+from burg_drake.experiment.comparison.compared_runs import JudgedRuns, list_scene_names
+from burg_drake.experiment.comparison.estimates import Flags, Values
+from burg_drake.experiment.comparison.margin_calibration import PREDICTOR_COLUMNS
+from burg_drake.experiment.comparison.result_table import (
+    GRASP_CONTENT_COLUMNS,
+    GRASP_KEY_COLUMNS,
+    IdColumn,
+    ResultTable,
+    TextFactor,
+)
+from burg_drake.experiment.trials.source_runs import grasp_content
+from burg_drake.experiment.trials.trial_sheet import RealTrial, Success, TrialSheet, is_success
+
+PREDICTION_NUMBERS = (*PREDICTOR_COLUMNS, "confidence")
+"""Columns of numbers of the run that predicts."""
+PREDICTION_COLUMNS = (
+    *(
+        *GRASP_KEY_COLUMNS,
+        *GRASP_CONTENT_COLUMNS,
+        "object",
+        "outcome",
+        "stage",
+        "blocker",
+        "run",
+        "judged_again",
+    ),
+    *PREDICTION_NUMBERS,
+)
+"""Columns of the run that predicts."""
+MEASURED_MARGINS = tuple(name for name in PREDICTOR_COLUMNS if name != "score")
+"""Margins that trials measure; a score belongs to the grasp."""
+REFERENCE_COLUMNS = (
+    *GRASP_KEY_COLUMNS,
+    *GRASP_CONTENT_COLUMNS,
+    "outcome",
+    "stage",
+    "judged_again",
+    "confidence",
+    *MEASURED_MARGINS,
+)
+"""Columns of the run whose verdicts count as the truth."""
+
+
+@dataclass(frozen=True, eq=False)
+class VerdictPairs:
+    """N grasps with a verdict and an outcome each.
+
+    Attributes:
+        id: (N,) of the grasps.
+        run: (N,) hashes of the runs of the verdicts.
+        scene, object: of each grasp.
+        simulated, stage, blocker: the verdict.
+        judged_again: engine that gave the verdict; empty where it is the run's own.
+        confidence: (N,) of the verdicts; NaN where there is none.
+        ended: what happened: outcome of a trial, or verdict of the other run.
+        predicted, actual: (N,) whether that is success.
+        margins: (N,) numbers of the verdicts by name.
+    """
+
+    id: IdColumn
+    run: TextFactor
+    scene: TextFactor
+    object: TextFactor
+    simulated: TextFactor
+    stage: TextFactor
+    blocker: TextFactor
+    judged_again: TextFactor
+    confidence: Array
+    ended: TextFactor
+    predicted: Flags
+    actual: Flags
+    margins: Mapping[str, Array]
+
+    def __len__(self) -> int:
+        return len(self.predicted)
+
+    def with_margin(self, name: str, values: Array) -> VerdictPairs:
+        """With one more number of each verdict, (N,)."""
+        return replace(self, margins={**self.margins, name: values})
+
+    def take(self, rows: Values) -> VerdictPairs:
+        """Some rows, as indices or truth values."""
+        factors = (
+            *("run", "scene", "object", "simulated", "stage", "blocker", "judged_again"),
+            "ended",
+        )
+        return replace(
+            self,
+            id=self.id.take(rows),
+            confidence=self.confidence[rows],
+            predicted=self.predicted[rows],
+            actual=self.actual[rows],
+            margins={name: values[rows] for name, values in self.margins.items()},
+            **{name: getattr(self, name).take(rows) for name in factors},
+        )
+
+
+def make_pairs(
+    verdicts: ResultTable, ended: TextFactor, actual: Flags, success: Success
+) -> VerdictPairs:
+    """Pairs from rows of results.
+
+    Args:
+        verdicts: columns `PREDICTION_COLUMNS`, N rows.
+        ended: what happened in each row.
+        actual: (N,) whether that is success.
+        success: what counts as success.
+    """
+    texts = verdicts.texts
+    return VerdictPairs(
+        id=verdicts.id,
+        run=texts["run"],
+        scene=texts["scene_content"],
+        object=texts["object"],
+        simulated=texts["outcome"],
+        stage=texts["stage"],
+        blocker=texts["blocker"],
+        judged_again=texts["judged_again"],
+        confidence=verdicts.numbers["confidence"],
+        ended=ended,
+        predicted=is_success_verdict(texts["outcome"], success),
+        actual=actual,
+        margins={name: verdicts.numbers[name] for name in PREDICTOR_COLUMNS},
+    )
+
+
+def is_success_verdict(simulated: TextFactor, success: Success) -> Flags:
+    """(N,) whether verdicts are success."""
+    return simulated.where([is_success(Outcome(name), success) for name in simulated.names])
+
+
+def rows_without_prediction(simulated: TextFactor) -> dict[str, Flags]:
+    """Which rows have a verdict that predicts nothing, by the verdict."""
+    # Verdicts without a completed simulation.
+    undecided_outcomes = (Outcome.SIMULATION_FAILED, Outcome.REACHABLE)
+    return {
+        outcome.value: simulated.where([name == outcome.value for name in simulated.names])
+        for outcome in undecided_outcomes
+        if outcome.value in simulated.names
+    }
+
+
+def predicted_probability(
+    judged: JudgedRuns, pairs: VerdictPairs, table: str | Path | None = None
+) -> Array | None:
+    """Share of the perturbed repeats that were lifted.
+
+    Args:
+        judged: the run of the grasps.
+        pairs: N verdicts of it.
+        table: of robustness; those in the folders of its runs if None.
+
+    Returns:
+        (N,) NaN where a grasp was not tested; None without a table.
+
+    Raises:
+        InvalidInputError: a table cannot be read, or is of another run.
+    """
+    found = judged.found
+    known: dict[tuple[str, str], float] = {}
+    places = _find_tables(found, None if table is None else Path(table))
+    for runs, path in places:
+        known |= lifted_shares(
+            path, runs, None if isinstance(found, Campaign) else found.candidates.id
+        )
+    return _look_up_shares(pairs, known) if places else None
+
+
+def _find_tables(found: Run | Campaign, table: Path | None) -> list[tuple[set[str], Path]]:
+    """Tables, with the runs that they may be of."""
+    folders = {found.document.hash: found.path}
+    if isinstance(found, Campaign):
+        folders = {state.run: found.folder(n) for n, state in found.states.items() if state.run}
+    if table is not None:
+        return [(set(folders), table)]
+    own = {run: find_robustness_table(folder) for run, folder in folders.items()}
+    return [({run}, path) for run, path in own.items() if path is not None]
+
+
+def _look_up_shares(pairs: VerdictPairs, known: dict[tuple[str, str], float]) -> Array:
+    """(N,) shares of pairs by run and id."""
+    values = np.full(len(pairs), np.nan)
+    tested = {run for run, _ in known}
+    rows = np.flatnonzero(pairs.run.where([name in tested for name in pairs.run.names]))
+    for row in rows.tolist():
+        values[row] = known.get((pairs.run[row], pairs.id[row]), np.nan)
+    return values
+
+
+@dataclass(frozen=True, eq=False)
+class _TriedTable:
+    """A run with its rows by grasp."""
+
+    run: Run
+
+    @cached_property
+    def rows(self) -> dict[str, int]:
+        return {id: row for row, id in enumerate(self.run.results["id"].tolist())}
+
+    @cached_property
+    def candidates(self) -> dict[str, int]:
+        return {id: row for row, id in enumerate(self.run.candidates.id)}
+
+    def content(self, grasp: str) -> str:
+        """Hash of a grasp; empty if the run has none of this id."""
+        k = self.candidates.get(grasp)
+        if k is None:
+            return ""
+        candidates = self.run.candidates
+        instance, grasps = str(candidates.instance[k]), candidates.grasps
+        return grasp_content(instance, grasps.X_OG[k], float(grasps.width[k]))
+
+
+def find_tried(sheet: TrialSheet, path: Path, side: JudgedRuns) -> tuple[Columns, dict[int, str]]:
+    """Rows of the results about the grasps that were tried.
+
+    Args:
+        sheet: contents of the trials file.
+        path: the trials file, for messages.
+        side: the run, of one scene or of many.
+
+    Returns:
+        Columns `PREDICTION_COLUMNS` for the trials that have a row, with their index in the sheet as `trial`;
+        and why others have none, by their index.
+
+    Raises:
+        InvalidInputError: none has one, or a grasp is not the one that was planned with.
+    """
+    tables: dict[str, list[_TriedTable]] = {}
+    for run in side.runs_of({source.scene.content for source in sheet.runs.values()}):
+        tables.setdefault(run.document.scene.content, []).append(_TriedTable(run))
+    found: list[tuple[int, _TriedTable, int]] = []
+    missing: dict[int, str] = {}
+    for k, trial in enumerate(sheet.trials):
+        source = sheet.runs[trial.run]
+        there = tables.get(source.scene.content, [])
+        holds = [t for t in there if t.content(trial.grasp) == trial.content]
+        judged = [t for t in holds if trial.grasp in t.rows]
+        if judged:
+            judged.sort(key=lambda t: t.run.document.hash != source.hash)
+            found.append((k, judged[0], judged[0].rows[trial.grasp]))
+        else:
+            _reject_changed_grasp(
+                trial, [t for t in there if t.run.document.hash == source.hash], path
+            )
+            missing[k] = (
+                "is not judged" if holds else "is not there" if there else "is of another scene"
+            )
+    if not found:
+        raise InvalidInputError(_no_common_grasps_message(sheet, path, side, missing))
+    return _result_columns(found), missing
+
+
+def _reject_changed_grasp(trial: RealTrial, own: Sequence[_TriedTable], path: Path) -> None:
+    """Refuses a trial whose own run has another grasp by its id, or none."""
+    for table in own:
+        content = table.content(trial.grasp)
+        if content and content != trial.content:
+            raise InvalidInputError(
+                f"{path}: trial {trial.number}: grasp {trial.grasp} of {table.run.path}"
+                f" has changed: its content is {content}, but was {trial.content} when"
+                " the trials were planned"
+            )
+
+
+def _no_common_grasps_message(
+    sheet: TrialSheet, path: Path, side: JudgedRuns, missing: Mapping[int, str]
+) -> str:
+    if not sheet.trials:
+        return f"{path} has no trials; burg-drake trials plan chooses some"
+    sources = sheet.runs.values()
+    if set(missing.values()) == {"is of another scene"}:
+        theirs = {s.scene.content[:HASH_DIGITS]: s.scene.name for s in sources}
+        what = f"{path} is about scene {list_scene_names(theirs)}, but {side.path} holds {list_scene_names(side.scenes)}"
+    else:
+        what = f"no grasp of {path} is judged in {side.path}, which is on the same scene"
+    meant = list_names([f"{source.path} ({source.hash})" for source in sources])
+    return (
+        f"{what}; give the run from which the trials were chosen, {meant}, or one of the same"
+        " grasps"
+    )
+
+
+def _result_columns(found: Sequence[tuple[int, _TriedTable, int]]) -> Columns:
+    columns: Columns = {"trial": np.array([k for k, _, _ in found], dtype=np.intp)}
+    for name in PREDICTION_COLUMNS:
+        text = name in TEXT_COLUMNS
+        missing = "" if text else np.nan
+        cells = [
+            t.run.results[name][row] if name in t.run.results else missing for _, t, row in found
+        ]
+        columns[name] = np.array(cells, dtype=np.str_ if text else float)
+    return columns

@@ -1,0 +1,410 @@
+"""Scenes with objects away from their planned poses: random errors, measured poses, their judge.
+
+The robot moves to the planned grasp, so X_WG stays. An object that stands elsewhere is grasped at
+X_O'G = inv(X_WO') X_WO X_OG.
+
+Random errors of placement follow from the seed, the object's name and the number of the scene.
+Errors that make objects overlap or leave the board are drawn again. Measured poses are corrected
+where measuring errors make objects float, sink or overlap a little.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from burg_drake.core import (
+    Array,
+    BurgError,
+    InvalidInputError,
+    Mode,
+    Pose,
+    Units,
+    content_hash,
+    inverse,
+    rng_from,
+    rot_z,
+    rotation_angle,
+    setting,
+)
+from burg_drake.evaluation import Candidates, StationJudge, StationJudgeFactory, build_judge
+from burg_drake.experiment.trials.trial_sheet import ObjectPlace
+from burg_drake.scene import TOUCH_TOLERANCE, Scene, SceneIssue
+from burg_drake.station import Engine, Station
+
+if TYPE_CHECKING:
+    from burg_drake.simulation import TrialSettings
+
+
+def displaced_scene(scene: Scene, X_SO: Mapping[str, Array]) -> Scene:
+    """The scene with some of its free objects elsewhere.
+
+    Args:
+        scene: as planned.
+        X_SO: (4, 4) poses in the scene frame by name of an instance. One that is the planned pose,
+            bit for bit, changes nothing, so that a scene in which all are has the same content.
+    """
+    instances = tuple(
+        replace(instance, X_SO=Pose.from_matrix(X_SO[name], quaternion=True))
+        if name in X_SO and not np.array_equal(X_SO[name], instance.X_SO.matrix())
+        else instance
+        for name, instance in scene.instances.items()
+    )
+    if instances == scene.document.instances:
+        return scene
+    document = replace(scene.document, instances=instances, origin=None)
+    return Scene(document, scene.library, scene.path)
+
+
+def grasps_as_commanded(planned: Scene, now: Scene, instance: str, X_OG: Array) -> Array:
+    """(N, 4, 4) or (4, 4) grasps in the frame of their object where it stands now, for hands that
+    go where they were told to when it stood as planned.
+
+    Args:
+        planned, now: the same scene, with objects in two places.
+        instance: the target.
+        X_OG: (N, 4, 4) or (4, 4) grasps as planned; of an object that stands there, they are
+            returned as they are, to the last bit.
+    """
+    there, here = planned.X_SO(instance), now.X_SO(instance)
+    if np.array_equal(there, here):
+        return X_OG
+    X_OO = inverse(here) @ there
+    moved: Array = X_OO @ X_OG
+    moved[..., 3, :] = (0.0, 0.0, 0.0, 1.0)
+    return moved
+
+
+def candidates_as_commanded(planned: Scene, now: Scene, candidates: Candidates) -> Candidates:
+    """All grasps of a run as `grasps_as_commanded`; they keep their ids, by which they are told to be the
+    same motions of the hand."""
+    X_OG = candidates.grasps.X_OG.copy()
+    for name in np.unique(candidates.instance).tolist():
+        of = candidates.instance == name
+        X_OG[of] = grasps_as_commanded(planned, now, name, X_OG[of])
+    return Candidates(replace(candidates.grasps, X_OG=X_OG), candidates.instance)
+
+
+MAX_PLACEMENT_DRAWS = 200
+"""Draws of one object; then it stays where it was planned."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlacementNoise:
+    """How far objects are from where they should be.
+
+    Attributes:
+        place: standard deviation along x and along y of the scene frame [m].
+        turn: standard deviation of the turn about z [rad].
+        seed: of the errors.
+    """
+
+    place: float = setting(
+        0.002,
+        "standard deviation along x and y",
+        unit=Units.millimetres_by_division,
+        name="placement_sd_mm",
+        low=0,
+    )
+    turn: float = setting(
+        math.radians(2.0),
+        "standard deviation about the vertical",
+        unit=Units.degrees,
+        name="placement_sd_deg",
+        low=0,
+    )
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("place", "turn"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise InvalidInputError(
+                    f"noise of the {name} is {getattr(self, name):g}; give 0 or more"
+                )
+
+
+@dataclass(frozen=True, eq=False)
+class NoisyScene:
+    """One scene of displaced objects.
+
+    Attributes:
+        scene: the scene.
+        draws: how often each object was drawn again.
+        kept: objects that stay as planned, because all `MAX_PLACEMENT_DRAWS` draws were refused.
+    """
+
+    scene: Scene
+    draws: dict[str, int]
+    kept: tuple[str, ...] = ()
+
+    @property
+    def redrawn(self) -> int:
+        """Number of draws that were refused."""
+        return sum(self.draws.values())
+
+
+def noisy_scene(
+    scene: Scene,
+    noise: PlacementNoise,
+    number: int,
+    issues: Callable[[Scene], Iterable[SceneIssue]],
+) -> NoisyScene:
+    """Displaces every free object.
+
+    Args:
+        scene: as planned; sound.
+        noise: how far.
+        number: of the scene among those with this noise.
+        issues: what is wrong with a scene, such as `SceneCheck.issues`. What is wrong with the
+            scene as planned already is nobody's fault here.
+
+    Returns:
+        A scene without errors; objects that had a part in one were drawn again, until there was
+        none.
+    """
+    if noise.place == noise.turn == 0.0:
+        return NoisyScene(scene, dict.fromkeys(scene.instances, 0))
+    draws = dict.fromkeys(scene.instances, 0)
+    while True:
+        X_SO = {
+            name: draw_displaced_pose(scene, name, noise, number, draws[name])
+            for name in scene.instances
+            if draws[name] < MAX_PLACEMENT_DRAWS
+        }
+        drawn = displaced_scene(scene, X_SO)
+        wrong = _objects_to_redraw(issues(drawn), X_SO)
+        if not wrong:
+            kept = tuple(name for name in draws if name not in X_SO)
+            return NoisyScene(drawn, draws, kept)
+        for name in wrong:
+            draws[name] += 1
+
+
+def draw_displaced_pose(
+    scene: Scene, name: str, noise: PlacementNoise, number: int, draw: int
+) -> Array:
+    """(4, 4) pose of an object in the scene frame with an error of place, and of turn about the
+    vertical through its middle."""
+    rng = rng_from("placement noise", noise.seed, name, number, draw)
+    x, y, turn = rng.standard_normal(3)
+    return move_on_board(scene, name, noise.place * np.array([x, y, 0.0]), noise.turn * float(turn))
+
+
+def move_on_board(scene: Scene, name: str, p_S: Array, angle: float) -> Array:
+    """(4, 4) pose of an object in the scene frame, moved by `p_S` (3,) [m] and turned by `angle`
+    [rad] about the vertical through the middle of its box."""
+    entry, X_SO = scene.entry(name), scene.X_SO(name)
+    if angle == 0.0 and not np.any(p_S):
+        return X_SO
+    p_SM = X_SO[:3, :3] @ (np.add(entry.lower, entry.upper) / 2.0) + X_SO[:3, 3]
+    R = rot_z(angle)
+    X = X_SO.copy()
+    X[:3, :3] = R @ X_SO[:3, :3]
+    X[:3, 3] = p_SM + R @ (X_SO[:3, 3] - p_SM) + p_S
+    return X
+
+
+def _objects_to_redraw(issues: Iterable[SceneIssue], movable: Iterable[str]) -> set[str]:
+    """Objects that had a part in errors and can be drawn again: both of two that overlap."""
+    pairs = ((issue.instance, issue.other) for issue in issues if issue.is_error)
+    return {name for pair in pairs for name in pair}.intersection(movable)
+
+
+class PoseMeasurementTolerances:
+    """Pose measurement tolerances."""
+
+    height = 0.005  # Metres above or below the planned pose that are a measuring error.
+    tilt = math.radians(5.0)  # Radians; an object with a larger tilt has fallen over.
+    separating_shift = 0.005  # Metres by which overlapping objects are moved apart at most.
+    board_overhang = 0.05  # Metres that an object may extend beyond the board, which is paper.
+
+
+Issues = Callable[[Scene], Iterable[SceneIssue]]
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredScene:
+    """What was made of the measurements.
+
+    Attributes:
+        scene: the scene; None if it cannot be, and then `reason` says why.
+        notes: what was not taken as measured, one clause each.
+        reason: one line; empty if there is a scene.
+    """
+
+    scene: Scene | None
+    notes: tuple[str, ...] = ()
+    reason: str = ""
+
+
+def measured_scene(
+    scene: Scene, placement: Mapping[str, ObjectPlace], issues: Issues
+) -> MeasuredScene:
+    """The scene with its free objects where they were measured.
+
+    Args:
+        scene: as planned.
+        placement: where they stood, by instance. What is uncertain or was not seen stays as it was
+            planned, and so does what is not named.
+        issues: what is wrong with a scene, such as `SceneCheck.issues`.
+    """
+    unknown = [name for name in placement if name not in (*scene.instances, *scene.background)]
+    if unknown:
+        return MeasuredScene(None, (), f"the scene has no {unknown[0]!r}, although it was measured")
+    X_SO: dict[str, Array] = {}
+    notes: list[str] = []
+    for name in scene.instances:
+        place = placement.get(name)
+        if place is None or place.status != "measured" or place.X_SO is None:
+            why = "not measured" if place is None else place.status.replace("_", " ")
+            notes.append(f"{name} as planned ({why if why != 'measured' else 'no pose'})")
+            continue
+        X_SO[name], note = correct_height_and_tilt(scene.X_SO(name), place.X_SO.matrix())
+        notes += [f"{name} {note}"] if note else []
+    try:
+        return _separate_objects(scene, X_SO, issues, notes)
+    except BurgError as error:
+        return MeasuredScene(None, tuple(notes), " ".join(str(error).split()))
+
+
+def correct_height_and_tilt(target: Array, measured: Array) -> tuple[Array, str]:
+    """A measured pose with height and tilt of the planned one, where they differ by no more than
+    measuring errors.
+
+    An object stands in one of its stable poses: what a measurement can tell is its place and its
+    turn about the vertical.
+
+    Args:
+        target, measured: (4, 4) poses in the scene frame.
+
+    Returns:
+        The pose, and what was left out of the measured one; nothing if less than 0.1 mm and 0.1
+        degrees.
+    """
+    if np.array_equal(target, measured):
+        return target, ""
+    R_turned = _rotation_about_z(measured[:3, :3] @ target[:3, :3].T) @ target[:3, :3]
+    tilt = float(rotation_angle(R_turned.T @ measured[:3, :3]))
+    height = float(measured[2, 3] - target[2, 3])
+    if tilt > PoseMeasurementTolerances.tilt or abs(height) > PoseMeasurementTolerances.height:
+        return measured, ""
+    X = measured.copy()
+    X[:3, :3], X[2, 3] = R_turned, target[2, 3]
+    parts = []
+    if abs(height) > 1e-4:
+        parts.append(f"{1e3 * abs(height):.1f} mm {'lower' if height > 0 else 'higher'}")
+    if tilt > math.radians(0.1):
+        parts.append(f"upright by {math.degrees(tilt):.1f} degrees")
+    return X, f"{' and '.join(parts)} than measured" if parts else ""
+
+
+def _rotation_about_z(R: Array) -> Array:
+    """(3, 3) the rotation about z that is nearest to R."""
+    angle = math.atan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1])
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _separate_objects(
+    scene: Scene, X_SO: dict[str, Array], issues: Issues, notes: list[str]
+) -> MeasuredScene:
+    """The scene with overlapping objects moved apart, if they are within each other by little."""
+    max_iterations = 20  # Rounds of moving overlapping objects apart.
+    start = displaced_scene(scene, X_SO)
+    now, shift = start, {name: np.zeros(3) for name in scene.instances}
+    for _ in range(max_iterations):
+        errors = [issue for issue in issues(now) if _is_significant(issue)]
+        if not errors:
+            break
+        for issue in errors:
+            if issue.kind != "overlap" or issue.other not in scene.instances:
+                return MeasuredScene(None, tuple(notes), issue.message)
+            half = _half_overlap(now, issue)
+            shift[issue.instance] += half
+            shift[issue.other] -= half
+        far = [
+            name
+            for name, p in shift.items()
+            if np.linalg.norm(p) > PoseMeasurementTolerances.separating_shift
+        ]
+        if far:
+            return MeasuredScene(None, tuple(notes), errors[0].message)
+        now = displaced_scene(
+            scene,
+            {n: move_on_board(start, n, shift[n], 0.0) for n in {*X_SO, *_shifted_objects(shift)}},
+        )
+    else:
+        return MeasuredScene(None, tuple(notes), errors[0].message)
+    notes += [
+        f"{name} moved by {1e3 * np.linalg.norm(shift[name]):.1f} mm, out of another object"
+        for name in _shifted_objects(shift)
+    ]
+    return MeasuredScene(now, tuple(notes))
+
+
+def _is_significant(issue: SceneIssue) -> bool:
+    """Whether a trial would be another one than that of the measured scene. The board is paper;
+    what hovers falls, and only much of it is another scene."""
+    if issue.kind == "out_of_bounds":
+        return issue.amount > PoseMeasurementTolerances.board_overhang
+    return issue.is_error or issue.amount > PoseMeasurementTolerances.height
+
+
+def _half_overlap(scene: Scene, issue: SceneIssue) -> Array:
+    """(3,) half of the way that brings an object out of another one, along the board [m]."""
+    one, other = (_object_center(scene, name) for name in (issue.instance, issue.other))
+    direction = (one - other) * (1.0, 1.0, 0.0)
+    length = float(np.linalg.norm(direction))
+    unit = direction / length if length > 1e-9 else np.array([1.0, 0.0, 0.0])
+    return unit * (issue.amount - 0.9 * TOUCH_TOLERANCE) / 2.0
+
+
+def _object_center(scene: Scene, name: str) -> Array:
+    entry, X_SO = scene.entry(name), scene.X_SO(name)
+    return X_SO[:3, :3] @ (np.add(entry.lower, entry.upper) / 2.0) + X_SO[:3, 3]
+
+
+def _shifted_objects(shift: Mapping[str, Array]) -> list[str]:
+    return [name for name, p in shift.items() if np.any(p)]
+
+
+@dataclass(frozen=True)
+class SceneJudgeFactory:
+    """Builds the judge of a scene with all settings that a run has recorded.
+
+    Attributes:
+        scene, station: what to build.
+        engine, mode, settings: see `build_judge`.
+    """
+
+    scene: Scene
+    station: Station
+    engine: Engine
+    mode: Mode
+    settings: TrialSettings
+
+    def __call__(self) -> StationJudge:
+        return build_judge(
+            self.scene,
+            self.station,
+            engine=self.engine,
+            mode=self.mode,
+            settings=self.settings,
+        )
+
+    @property
+    def plain(self) -> Callable[[], StationJudge]:
+        """The usual factory, which does the same: clusters know how to send that one."""
+        return StationJudgeFactory(self.scene, self.station, self.engine, self.mode, self.settings)
+
+    @property
+    def content(self) -> str:
+        """Hash of all that decides about its verdicts, but for the versions."""
+        return content_hash(
+            *(self.scene.content, self.station.content, self.mode),
+            *(asdict(self.engine), asdict(self.settings)),
+        )

@@ -1,0 +1,510 @@
+"""The page about the steps in which grasps are lost: one self-contained HTML file."""
+
+from __future__ import annotations
+
+import shlex
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from burg_drake.core import PUSHED_PREFIX, Outcome, atomic_write, format_percent, outcome_label
+from burg_drake.evaluation import (
+    GROUP_CLASSES,
+    MIN_PUSH,
+    command,
+    count_pushes,
+    engine_label,
+    header,
+    html_page,
+    interval_mark,
+    section,
+    table,
+    tiles,
+)
+from burg_drake.experiment.comparison.estimates import Estimate
+from burg_drake.experiment.gap.gap_steps import (
+    Change,
+    GapSteps,
+    OutcomeChange,
+    StepAgreement,
+    gap_changes,
+    successes_by_object,
+)
+from burg_drake.experiment.gap.gap_words import (
+    GAP_STEP_TITLES,
+    left_out_sentence,
+    reality_sentence,
+    replay_arguments,
+    step_sentences,
+)
+from burg_drake.experiment.trials.trial_sheet import Success
+from burg_drake.visualization import OUTCOME_GROUPS, Child, Html, element, join, outcome_group
+
+GAP_REPORT_FILE = "gap.html"  # Page about a gap measurement, in its folder.
+
+
+def write_gap_report(
+    steps: GapSteps, success: Success, agreement: Sequence[StepAgreement], command_line: str
+) -> None:
+    """Writes the page into the folder of the steps.
+
+    Args:
+        steps: all steps.
+        success: what counts.
+        agreement: with real trials, if there are any.
+        command_line: that makes it again.
+
+    Raises:
+        InvalidInputError: it cannot be written.
+    """
+    page = gap_page(steps, success, agreement, command_line)
+    atomic_write(steps.path / GAP_REPORT_FILE, page)
+
+
+def gap_page(
+    steps: GapSteps, success: Success, agreement: Sequence[StepAgreement], command_line: str
+) -> str:
+    """The page as HTML."""
+    found = gap_changes(steps, success)
+    document = steps.first.document
+    title = f"{document.scene.name} on {document.station.name}"
+    return html_page(
+        f"Where grasps are lost: {title}",
+        element("style", Html(FLOW_CHART_STYLE)),
+        header("Where grasps are lost", title, _subtitle(steps, success)),
+        *_paragraphs(step_sentences(steps, found, success)),
+        tiles(_tiles(steps, found)),
+        flow_section(steps, found),
+        objects_section(steps, success),
+        *(change_section(change) for change in found),
+        push_section(steps),
+        reality_section(agreement),
+        _reproduction_section(steps, command_line),
+    )
+
+
+def _subtitle(steps: GapSteps, success: Success) -> str:
+    document = steps.first.document
+    counts = "lifted, and nothing else disturbed" if success == "lifted" else "lifted and held"
+    about = f"{document.grasps.count} grasps, engine {engine_label(document.engine)}"
+    return f"{about}; success: {counts}"
+
+
+def _paragraphs(sentences: Sequence[str]) -> list[Html]:
+    return [element("p", " ".join(sentences), class_="lead")]
+
+
+def _tiles(steps: GapSteps, found: Sequence[Change]) -> list[tuple[str, Child, str]]:
+    whole = len(steps.first.candidates)
+    entries: list[tuple[str, Child, str]] = [("Grasps", f"{whole}", "the same in every step")]
+    first = found[0].successes if found else 0
+    if found and found[0].step != "placed":
+        entries.append((GAP_STEP_TITLES["hand"].capitalize(), f"{first}", "succeed"))
+    for change in found:
+        left = change.successes - len(change.lost) + len(change.won)
+        if change.step == "placed":
+            share = format_percent(left / change.successes) if change.successes else "-"
+            entries.append(("Objects displaced", share, "of these succeed again"))
+        else:
+            note = f"{len(change.lost)} lost, {len(change.won)} won"
+            entries.append((GAP_STEP_TITLES[change.step].capitalize(), f"{left}", note))
+    return entries
+
+
+def _reproduction_section(steps: GapSteps, command_line: str) -> Html:
+    document = steps.document
+    facts = [("folder", str(steps.path))]
+    facts += [
+        (GAP_STEP_TITLES[step.name], ", ".join(str(run.path) for run in step.runs) or "-")
+        for step in steps.steps
+    ]
+    if document.samples:
+        noise = f"{document.place_mm:g} mm, {document.turn_deg:g} degrees, seed {document.seed}"
+        redrawn = (
+            f"{sum(document.redrawn)} displaced positions were drawn again, as something was"
+            " there already"
+        )
+        facts.append(("displaced by", f"{noise}; {redrawn}"))
+        for scene, names in document.kept.items():
+            facts.append((f"scene {scene}", f"{', '.join(names)} as planned: no other place found"))
+    facts.append(("versions", ", ".join(f"{k} {v}" for k, v in document.versions.items())))
+    listed = [join(element("dt", name), element("dd", fact)) for name, fact in facts]
+    return section(
+        "How to repeat",
+        "Every step is an ordinary run, which burg-drake report, replay and robustness"
+        " can open. If interrupted, the same command continues it.",
+        command(command_line),
+        element("dl", *listed, class_="facts"),
+    )
+
+
+GAP_STEP_DESCRIPTIONS = {
+    "reach": "The same simulation of the hand, but only of grasps that the arm can execute: with"
+    " a posture within its limits, a straight approach, a straight lift and a path, all"
+    " free of collisions.",
+    "arm": "The whole arm executes the grasps that it can reach, from the pregrasp on, with"
+    " controllers that yield; here the hand may push objects before it closes.",
+    "placed": "The hand goes where it was planned to go, but the objects stand a little off. It"
+    " counts as a collision if the open hand overlaps a displaced object. The arm knows"
+    " where things stand and plans its path again. Each grasp counts once a scene.",
+}
+"""What each step judges."""
+
+
+def flow_section(steps: GapSteps, found: Sequence[Change]) -> Html | None:
+    """The picture of all steps."""
+    if not found:
+        return None
+    columns, scale = [], []
+    for step in steps.steps:
+        outcomes = Counter(v.outcome for run in step.runs for v in run.verdicts.values())
+        plural = "" if len(step.runs) == 1 else "s"
+        scenes = f" in {len(step.runs)} scene{plural}" if step.name == "placed" else ""
+        columns.append(FlowColumn(GAP_STEP_TITLES[step.name] + scenes, outcomes))
+        scale.append(1.0 / max(len(step.runs), 1))
+    return section(
+        "From step to step",
+        "How grasps end in each step; the colour of a band is that of the outcome in the"
+        " next step. In displaced scenes only grasps that succeeded in the step before"
+        " are tried, each once a scene.",
+        element("div", flow_chart(columns, [c.flow for c in found], scale), class_="scroll"),
+    )
+
+
+def objects_section(steps: GapSteps, success: Success) -> Html:
+    """Successes of each object in each step."""
+    by_step = [successes_by_object(step, success) for step in steps.steps]
+    whole = by_step[0]
+    head = ["object", "grasps", *(GAP_STEP_TITLES[step.name] for step in steps.steps)]
+    rows = []
+    for name, (_, grasps) in whole.items():
+        cells: list[Child] = [grasps]
+        for step, counts in zip(steps.steps, by_step, strict=True):
+            good, all = counts.get(name, (0, 0))
+            share = f"{good} of {all}" if all else "-"
+            cells.append(share if step.name == "placed" else good)
+        numbers = [element("td", cell, class_="number") for cell in cells]
+        rows.append(element("tr", element("th", name, scope="row"), *numbers))
+    return section(
+        "By object",
+        "Grasps of each object that succeed in each step; in displaced scenes, successful trials.",
+        table(head, rows, numbers=tuple(range(1, len(head)))),
+    )
+
+
+def change_section(change: Change) -> Html:
+    """What one step changes: outcomes, objects, bodies in the way, and the grasps."""
+    title = GAP_STEP_TITLES[change.step].capitalize()
+    lost, whole = len(change.lost), change.successes
+    parts: list[Child] = []
+    if whole:
+        low, high = change.share_lost
+        share = f"{lost} of {whole} successes are lost ({format_percent(lost / whole)})"
+        mark = interval_mark(lost / whole, low, high)
+        parts.append(element("p", f"{share} ", mark))
+    if change.failed:
+        parts.append(element("p", left_out_sentence(change)))
+    if change.lost or change.won:
+        parts += [_flow_table(change), _objects_table(change), _change_list(change)]
+    return section(title, GAP_STEP_DESCRIPTIONS[change.step], *parts)
+
+
+def _flow_table(change: Change) -> Html:
+    """Outcomes before and after, where they differ."""
+    moved = {pair: count for pair, count in change.flow.items() if pair[0] is not pair[1]}
+    rows = []
+    for (before, after), count in sorted(moved.items(), key=lambda item: -item[1]):
+        blockers = Counter(
+            m.blocker for m in change.moves if (m.before, m.after) == (before, after) and m.blocker
+        )
+        by = ", ".join(f"{name} {n}" for name, n in blockers.most_common(3))
+        rows.append(
+            element(
+                "tr",
+                element("td", outcome_label(before)),
+                element("td", outcome_label(after)),
+                element("td", count, class_="number"),
+                element("td", by or "-", class_="faint"),
+            )
+        )
+    head = ["before", "after", "grasps", "in the way"]
+    return table(head, rows, numbers=(2,))
+
+
+def _objects_table(change: Change) -> Html | None:
+    """Which objects suffer."""
+    lost = Counter(move.object for move in change.lost)
+    if not lost:
+        return None
+    had = Counter(m.object for m in change.moves if m.lost or m.before.held)
+    rows = [
+        element(
+            "tr",
+            element("th", name, scope="row"),
+            element("td", f"{count} of {had[name]}", class_="number"),
+            element("td", ", ".join(f"{outcome_label(o)} {n}" for o, n in into.most_common(3))),
+        )
+        for name, count in lost.most_common()
+        for into in [Counter(m.after for m in change.lost if m.object == name)]
+    ]
+    return table(["object", "lost", "what they become"], rows, numbers=(1,))
+
+
+def _change_list(change: Change) -> Html:
+    """The grasps that change, and how to watch them."""
+    max_rows = 40  # Grasps in the table of a step.
+    moves = [*change.lost, *change.won]
+    rows = [_change_row(move) for move in moves[:max_rows]]
+    first = shlex.join(replay_arguments(moves[0].run, moves[0].grasp))
+    more = f", the first {max_rows} of {len(moves)}" if len(moves) > max_rows else ""
+    inside = join(
+        element("p", "To watch one of them (replay also shows what was in the way):"),
+        command(first),
+        table(["grasp", "before", "after", "in the way", "command"], rows),
+    )
+    return element("details", element("summary", f"Grasps that change{more}"), inside)
+
+
+def _change_row(move: OutcomeChange) -> Html:
+    line = shlex.join(replay_arguments(move.run, move.grasp))
+    return element(
+        "tr",
+        element("td", element("code", move.grasp)),
+        element("td", outcome_label(move.before)),
+        element("td", outcome_label(move.after)),
+        element("td", move.blocker or "-", class_="faint"),
+        element("td", element("code", line, class_="copy")),
+    )
+
+
+def push_section(steps: GapSteps) -> Html | None:
+    """By how much the hand pushes objects before it closes."""
+    arm = next((step.runs[0] for step in steps.steps if step.name == "arm"), None)
+    sentence = None if arm is None else count_pushes(arm.results)
+    if arm is None or sentence is None:
+        return None
+    columns = arm.results
+    went = np.isfinite(columns["pushed"])
+    target = np.array(
+        [
+            columns[PUSHED_PREFIX + str(name)][k]
+            if PUSHED_PREFIX + str(name) in columns
+            else np.nan
+            for k, name in enumerate(columns["instance"])
+        ]
+    )
+    rows = []
+    for name in dict.fromkeys(columns["object"].tolist()):
+        of = went & (columns["object"] == name)
+        if not of.any():
+            continue
+        values = 1e3 * target[of]
+        moved = values > 1e3 * MIN_PUSH
+        held = np.array([Outcome(o).held for o in columns["outcome"][of]])
+        cells: list[Child] = [
+            int(of.sum()),
+            int(moved.sum()),
+            f"{np.median(values):.1f}",
+            f"{values.max():.1f}",
+            f"{int((held & moved).sum())} of {int(moved.sum())}",
+            f"{int((held & ~moved).sum())} of {int((~moved).sum())}",
+        ]
+        numbers = [element("td", cell, class_="number") for cell in cells]
+        rows.append(element("tr", element("th", name, scope="row"), *numbers))
+    limit = f"{1e3 * MIN_PUSH:g} mm"
+    head = ["object", "trials", f"pushed over {limit}", "median [mm]", "largest [mm]"]
+    head += ["held if pushed", "held if not"]
+    return section(
+        "Pushed before the hand closes",
+        f"{sentence} The table counts only the object to be grasped.",
+        table(head, rows, numbers=(1, 2, 3, 4, 5, 6)),
+    )
+
+
+def reality_section(agreement: Sequence[StepAgreement]) -> Html | None:
+    """What each step does to the agreement with the robot."""
+    if not agreement or not agreement[0].found.trials:
+        return None
+    rows = []
+    for one in agreement:
+        cells: list[Child] = [one.found.trials, *(f"{cell:g}" for cell in one.found.cells)]
+        cells.append(one.unpredictable)
+        numbers = [element("td", cell, class_="number") for cell in cells]
+        shares = [
+            element("td", _estimate_cell(one.estimated.figure(name)), class_="estimate")
+            for name in ("precision", "recall", "accuracy")
+        ]
+        head = element("th", GAP_STEP_TITLES[one.step], scope="row")
+        rows.append(element("tr", head, *numbers, *shares))
+    names = ["step", "trials", "TP", "FP", "FN", "TN", "not predictable"]
+    names += ["precision", "recall", "accuracy"]
+    return section(
+        "Compared with the robot",
+        "Real trials compared with each step's verdicts on the same grasps, with 95 %"
+        " intervals. Positive means: success is predicted (in displaced scenes: in more"
+        f" than half of them). Here {reality_sentence(agreement)}. "
+        f"{'not predictable'.capitalize()} are trials with a failure that the step cannot"
+        " predict, for example that the arm has no path if the step judges the hand"
+        " alone.",
+        table(names, rows, numbers=(1, 2, 3, 4, 5, 6)),
+    )
+
+
+def _estimate_cell(found: Estimate) -> Child:
+    if found.value is None or found.low is None or found.high is None:
+        return "-"
+    return join(
+        interval_mark(found.value, found.low, found.high), f" {format_percent(found.value)}"
+    )
+
+
+class FlowChartLayout:
+    """Flow chart layout."""
+
+    width = 1000  # SVG units.
+    height = 430  # SVG units.
+    top = 34  # Room for the heads of columns.
+    right = 190  # Room for the names in the last column.
+    node_width = 14  # SVG units.
+    node_gap = 19  # Room for a name between two nodes.
+
+
+FLOW_CHART_STYLE = """
+.flow { width: 100%; min-width: 680px; height: auto; }
+.flow text { font-size: 13px; fill: var(--ink); paint-order: stroke; stroke: var(--paper);
+  stroke-width: 3px; stroke-linejoin: round; }
+.flow .head { font-weight: 600; font-size: 14px; }
+.flow path { opacity: 0.38; }
+.scroll + .scroll { margin-top: 20px; }
+"""
+"""CSS of the chart."""
+Flow = Counter[tuple[Outcome, Outcome]]
+
+
+@dataclass(frozen=True)
+class FlowColumn:
+    """A step.
+
+    Attributes:
+        title: its name.
+        counts: grasps by outcome.
+    """
+
+    title: str
+    counts: Counter[Outcome]
+
+
+def flow_chart(
+    columns: Sequence[FlowColumn], flows: Sequence[Flow], scale: Sequence[float]
+) -> Html:
+    """The chart.
+
+    Args:
+        columns: one a step.
+        flows: between a column and the next; what is in no flow ends there.
+        scale: grasps that one of each column's counts stands for, such as 1/5 where each grasp was
+            judged in five scenes.
+    """
+    whole = max((c.counts.total() * s for c, s in zip(columns, scale, strict=True)), default=1.0)
+    rows = max(len(_count_by_group(column)) for column in columns)
+    unit = (FlowChartLayout.height - FlowChartLayout.top - FlowChartLayout.node_gap * rows) / max(
+        whole, 1e-9
+    )
+    step = (FlowChartLayout.width - FlowChartLayout.right - FlowChartLayout.node_width) / max(
+        len(columns) - 1, 1
+    )
+    places = [_node_tops(c, s * unit) for c, s in zip(columns, scale, strict=True)]
+    bands: list[Html] = []
+    for k, flow in enumerate(flows):
+        bands += _draw_bands(flow, places[k], places[k + 1], k * step, step, scale[k + 1] * unit)
+    nodes = [
+        part
+        for k, column in enumerate(columns)
+        for part in _draw_nodes(column, places[k], k * step, scale[k] * unit)
+    ]
+    return element(
+        "svg",
+        *bands,
+        *nodes,
+        viewBox=f"0 0 {FlowChartLayout.width} {FlowChartLayout.height}",
+        class_="flow",
+        role="img",
+        aria_label="Flow of grasps between outcomes; the tables below have the numbers",
+    )
+
+
+def _count_by_group(column: FlowColumn) -> dict[str, int]:
+    found = {g.name: sum(column.counts[o] for o in g.outcomes) for g in OUTCOME_GROUPS}
+    return {name: count for name, count in found.items() if count}
+
+
+def _node_tops(column: FlowColumn, unit: float) -> dict[str, float]:
+    """Upper edge of each group's node."""
+    y, places = float(FlowChartLayout.top), {}
+    for name, count in _count_by_group(column).items():
+        places[name] = y
+        y += count * unit + FlowChartLayout.node_gap
+    return places
+
+
+def _draw_nodes(column: FlowColumn, places: dict[str, float], x: float, unit: float) -> list[Html]:
+    parts = [element("text", column.title, x=f"{x:.1f}", y=16, class_="head")]
+    for name, count in _count_by_group(column).items():
+        height = max(count * unit, 1.0)
+        tip = element("title", f"{count} {name}")
+        y = places[name]
+        parts.append(
+            element(
+                *("rect", tip),
+                x=f"{x:.1f}",
+                y=f"{y:.1f}",
+                width=FlowChartLayout.node_width,
+                height=f"{height:.1f}",
+                class_=GROUP_CLASSES[name],
+            )
+        )
+        middle = f"{y + height / 2 + 4.5:.1f}"
+        parts.append(
+            element(
+                "text", f"{count} {name}", x=f"{x + FlowChartLayout.node_width + 6:.1f}", y=middle
+            )
+        )
+    return parts
+
+
+def _draw_bands(
+    flow: Flow,
+    before: dict[str, float],
+    after: dict[str, float],
+    x: float,
+    step: float,
+    unit: float,
+) -> list[Html]:
+    pairs: Counter[tuple[str, str]] = Counter()
+    for (a, b), count in flow.items():
+        pairs[outcome_group(a).name, outcome_group(b).name] += count
+    starts, ends = dict(before), dict(after)
+    order = [group.name for group in OUTCOME_GROUPS]
+    parts = []
+    for pair in sorted(pairs, key=lambda pair: (order.index(pair[0]), order.index(pair[1]))):
+        first, second = pair
+        thick = pairs[pair] * unit
+        tip = element("title", f"{pairs[pair]}: {first} → {second}")
+        shape = _band_path(
+            x + FlowChartLayout.node_width, starts[first], x + step, ends[second], thick
+        )
+        parts.append(element("path", tip, d=shape, class_=GROUP_CLASSES[second]))
+        starts[first] += thick
+        ends[second] += thick
+    return parts
+
+
+def _band_path(x0: float, y0: float, x1: float, y1: float, thick: float) -> str:
+    middle = (x0 + x1) / 2
+    return (
+        f"M{x0:.1f},{y0:.1f}C{middle:.1f},{y0:.1f} {middle:.1f},{y1:.1f} {x1:.1f},{y1:.1f}"
+        f"V{y1 + thick:.1f}C{middle:.1f},{y1 + thick:.1f} {middle:.1f},{y0 + thick:.1f}"
+        f" {x0:.1f},{y0 + thick:.1f}Z"
+    )

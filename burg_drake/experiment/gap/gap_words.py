@@ -1,0 +1,238 @@
+"""The steps of the gap in sentences, as tables for a terminal, and as JSON."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from burg_drake.core import TextTable, format_percent, outcome_label, plain_data
+from burg_drake.evaluation import count_pushes
+from burg_drake.experiment.comparison.comparison import bracketed_interval, json_values
+from burg_drake.experiment.comparison.estimates import Estimate
+from burg_drake.experiment.gap.gap_steps import (
+    Change,
+    GapDocument,
+    GapSteps,
+    StepAgreement,
+    StepName,
+    successes_by_object,
+)
+from burg_drake.experiment.trials.trial_sheet import Success, is_success
+
+GAP_STEP_TITLES: dict[StepName, str] = {
+    "hand": "hand alone",
+    "reach": "with the arm",
+    "arm": "whole arm executes",
+    "placed": "objects displaced",
+}
+"""Titles of the steps."""
+
+
+def step_sentences(steps: GapSteps, changes: Sequence[Change], success: Success) -> list[str]:
+    """One sentence or two a step."""
+    verbs = {"lifted": "lifts", "held": "holds"}  # Verb by the criterion of success.
+    hand = steps.first
+    outcomes = [verdict.outcome for verdict in hand.verdicts.values()]
+    good = sum(is_success(outcome, success) for outcome in outcomes)
+    sentences = [f"Of {len(outcomes)} grasps the hand alone {verbs[success]} {good}."]
+    sentences += [_change_sentence(change, steps.document) for change in changes]
+    return sentences + [text for change in changes if (text := left_out_sentence(change))]
+
+
+def left_out_sentence(change: Change) -> str:
+    """What is said of grasps that a step leaves out; empty if there are none."""
+    if not change.failed:
+        return ""
+    return (
+        f"{GAP_STEP_TITLES[change.step].capitalize()}: {change.failed} could not be simulated here or in the"
+        f" step before, and {'counts' if change.failed == 1 else 'count'} as neither lost nor won."
+    )
+
+
+def _change_sentence(change: Change, document: GapDocument) -> str:
+    if change.successes == 0:
+        return (
+            f"{GAP_STEP_TITLES[change.step].capitalize()}: no success is left that could be lost."
+        )
+    lost, whole = len(change.lost), change.successes
+    share = f" ({format_percent(lost / whole)})"
+    left = whole - lost + len(change.won)
+    won = f", {len(change.won)} {_is_or_are(len(change.won))} won" if change.won else ""
+    if change.step == "reach":
+        return (
+            f"Of these {whole}, {lost}{share} {_is_or_are(lost)} lost to the arm{_failure_outcomes(change)}{won};"
+            f" {left} {_is_or_are(left)} left."
+        )
+    if change.step == "arm":
+        return (
+            f"Of these {whole}, {lost}{share} {_is_or_are(lost)} lost when the whole arm executes them"
+            f"{_failure_outcomes(change)}{won}; {left} {_is_or_are(left)} left."
+        )
+    low, high = change.share_lost
+    return (
+        f"When objects stand {_noise_text(document)} from where they should be (standard deviations),"
+        f" {format_percent(lost / whole)} of the {whole} trials of these grasps in"
+        f" {document.samples} displaced scenes fail{_failure_outcomes(change)}; the 95 % interval is"
+        f" {100 * low:.0f} to {100 * high:.0f} %."
+    )
+
+
+def _is_or_are(count: int) -> str:
+    return "is" if count == 1 else "are"
+
+
+def _noise_text(document: GapDocument) -> str:
+    return f"{document.place_mm:g} mm along x and y and {document.turn_deg:g} degrees"
+
+
+def _failure_outcomes(change: Change) -> str:
+    """The outcomes that successes turn into, most frequent first."""
+    into = Counter(move.after for move in change.lost)
+    parts = [f"{count} {outcome_label(outcome)}" for outcome, count in into.most_common(4)]
+    rest = into.total() - sum(count for _, count in into.most_common(4))
+    return f" ({', '.join(parts)}{f', {rest} otherwise' if rest else ''})" if parts else ""
+
+
+def reality_sentence(agreement: Sequence[StepAgreement]) -> str:
+    """What the counts and the shares beside the robot are of."""
+    if any(one.all_grasps is None for one in agreement):
+        return "counts and shares are of the tried grasps, each counted once"
+    grasps = round(max(sum(one.estimated.cells) for one in agreement))
+    return (
+        "counts are those of the tried grasps; precision, recall and accuracy are"
+        f" estimated for the {grasps:,} grasps from which they were chosen"
+    )
+
+
+def replay_arguments(run: str, grasp: str) -> list[str]:
+    """Words of the command that shows a grasp."""
+    return ["burg-drake", "replay", run, "--grasp", grasp]
+
+
+def steps_view(steps: GapSteps, found: Sequence[Change]) -> TextTable:
+    """What each step keeps and loses."""
+    table = TextTable("Where grasps are lost", caption=_caption(steps))
+    table.names("step").numbers(
+        "before", "lost", "won", "left", "lost %", "95 % CI", "not simulated"
+    )
+    table.texts("turned into")
+    for change in found:
+        lost, whole = len(change.lost), change.successes
+        low, high = change.share_lost
+        into = Counter(outcome_label(move.after) for move in change.lost)
+        table.row(
+            GAP_STEP_TITLES[change.step],
+            *(str(n) for n in (whole, lost, len(change.won), whole - lost + len(change.won))),
+            format_percent(lost / whole) if whole else "-",
+            f"{100 * low:.0f}-{100 * high:.0f} %" if whole else "-",
+            str(change.failed),
+            ", ".join(f"{name} {count}" for name, count in into.most_common()),
+        )
+    return table
+
+
+def _caption(steps: GapSteps) -> str:
+    document = steps.document
+    if not document.samples:
+        return ""
+    return (
+        f"objects displaced: {document.place_mm:g} mm and {document.turn_deg:g} degrees (standard"
+        f" deviations) in {document.samples} scenes; each grasp counts once a scene"
+    )
+
+
+def reality_view(agreement: Sequence[StepAgreement]) -> TextTable:
+    """What each step does to the agreement with the robot."""
+    measures = ("precision", "recall", "accuracy")  # Measures in the table.
+    table = TextTable(
+        "Compared with the robot",
+        caption=f"{reality_sentence(agreement)}; positive: success predicted",
+    )
+    table.names("step").numbers("trials", "TP", "FP", "FN", "TN", "not predictable", *measures)
+    for one in agreement:
+        found = one.found
+        counts = (found.trials, *(f"{cell:g}" for cell in found.cells), one.unpredictable)
+        table.row(
+            GAP_STEP_TITLES[one.step],
+            *map(str, counts),
+            *(_share_text(one.estimated.figure(n)) for n in measures),
+        )
+    return table
+
+
+def _share_text(found: Estimate) -> str:
+    if found.value is None:
+        return "-"
+    return f"{100 * found.value:.0f} {bracketed_interval(found, percent=True)} %"
+
+
+def gap_json(
+    steps: GapSteps,
+    found: Sequence[Change],
+    agreement: Sequence[StepAgreement],
+    success: Success,
+) -> dict[str, Any]:
+    """All figures, and the grasps that change."""
+    results = {"arm": next((s.runs[0].results for s in steps.steps if s.name == "arm"), None)}
+    pushed = None if results["arm"] is None else count_pushes(results["arm"])
+    return {
+        "success": success,
+        "asked": plain_data(steps.document),
+        "story": step_sentences(steps, found, success),
+        "steps": [
+            {
+                "name": step.name,
+                "runs": [str(run.path) for run in step.runs],
+                "outcomes": dict(
+                    Counter(v.outcome.value for run in step.runs for v in run.verdicts.values())
+                ),
+                "objects": {
+                    name: {"successes": good, "grasps": all}
+                    for name, (good, all) in successes_by_object(step, success).items()
+                },
+            }
+            for step in steps.steps
+        ],
+        "changes": [_change_json(change) for change in found],
+        "pushed": None if pushed is None else asdict(pushed),
+        "reality": [
+            {
+                "step": one.step,
+                "weighted": False,
+                **json_values(one.found),
+                "all_grasps": json_values(one.all_grasps),
+                "unpredictable": one.unpredictable,
+            }
+            for one in agreement
+        ],
+    }
+
+
+def _change_json(change: Change) -> dict[str, Any]:
+    low, high = change.share_lost
+    return {
+        "step": change.step,
+        "successes": change.successes,
+        "lost": len(change.lost),
+        "won": len(change.won),
+        "not_simulated": change.failed,
+        "share_lost": {"low": low, "high": high},
+        "flow": [
+            {"before": a.value, "after": b.value, "count": n}
+            for (a, b), n in change.flow.most_common()
+        ],
+        "blockers": dict(change.blockers.most_common()),
+        "grasps": [
+            {
+                "grasp": move.grasp,
+                "object": move.object,
+                "before": move.before.value,
+                "after": move.after.value,
+                "blocker": move.blocker,
+                "replay": replay_arguments(move.run, move.grasp),
+            }
+            for move in (*change.lost, *change.won)
+        ],
+    }

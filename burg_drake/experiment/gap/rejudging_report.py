@@ -1,0 +1,202 @@
+"""Results of judging trials again, as a section of a page and as a table for a terminal."""
+
+from __future__ import annotations
+
+import shlex
+from collections import Counter
+from collections.abc import Sequence
+
+from burg_drake.core import Stage, TextTable, format_percent, outcome_label
+from burg_drake.evaluation import command, interval_mark, section, table
+from burg_drake.experiment.gap.rejudged_trials import (
+    DISAGREEMENT_CAUSES,
+    REJUDGED_TABLE_FILE,
+    Rejudged,
+    Rejudging,
+)
+from burg_drake.visualization import Child, Html, element, join
+
+
+def rejudged_sentences(found: Rejudging) -> list[str]:
+    """What came of it, in sentences."""
+    if not found.judged:
+        return ["None of the trials could be judged again.", *_skipped_sentence(found)]
+    of, whole = found.causes, len(found.predictable)
+    planned, measured = (found.agreement(measured=m)[0] for m in (False, True))
+    count, wrong, low, high = found.explained
+    sentences = _unpredictable_sentence(found)
+    if whole:
+        sentences.append(
+            f"Of {whole} {'other ' if sentences else ''}trials, each counted once whatever it"
+            f" stands for, {planned} agree with the robot as planned"
+            f" ({format_percent(planned / whole)}), and {measured} with the objects where they"
+            f" stood ({format_percent(measured / whole)}); McNemar's exact test:"
+            f" p = {found.paired.p_value:.2g}."
+        )
+    if wrong:
+        sentences.append(
+            f"Of the {wrong} that disagree{'s' if wrong == 1 else ''} as planned, placement"
+            f" explains {count} ({format_percent(count / wrong)}, 95 % interval {100 * low:.0f} to"
+            f" {100 * high:.0f} %), and {of['physics']}"
+            f" {'is' if of['physics'] == 1 else 'are'} left to physics."
+        )
+    if of["worsened"]:
+        sentences.append(
+            f"{of['worsened']} agreed with the objects as planned, but not where they stood."
+        )
+    within = sum(t.outcome is not None and t.outcome.stage is Stage.CLEAR for t in found.judged)
+    if within:
+        sentences.append(
+            f"In {within} trials the open hand would overlap a displaced object, which"
+            " counts as a collision, although a robot may push it aside."
+        )
+    not_judged = [trial for trial in found.trials if trial not in found.judged]
+    if not_judged:
+        sentences.append(f"{len(not_judged)} could not be judged again.")
+    return [*sentences, *_skipped_sentence(found)]
+
+
+def _unpredictable_sentence(found: Rejudging) -> list[str]:
+    """What is counted apart, and precision with and without it."""
+    apart = [trial for trial in found.judged if trial.unpredictable]
+    if not apart:
+        return []
+    ended = Counter(outcome_label(trial.real) for trial in apart)
+    plural = "" if len(apart) == 1 else "s"
+    texts = ", ".join(f"{n} {name}" for name, n in ended.most_common())
+    precision = "; ".join(
+        f"{name} {_share_text(found.precision(measured=m, every=True))} with them,"
+        f" {_share_text(found.precision(measured=m))} without"
+        for name, m in (("as planned", False), ("as measured", True))
+    )
+    return [
+        f"{len(apart)} trial{plural} failed for reasons that a run of the hand alone"
+        f" cannot predict ({texts}). They are counted separately, as neither placement"
+        f" nor physics caused them. Precision {precision}."
+    ]
+
+
+def _share_text(count: tuple[int, int]) -> str:
+    part, whole = count
+    return f"{part} of {whole} ({format_percent(part / whole)})" if whole else "undefined"
+
+
+def _skipped_sentence(found: Rejudging) -> list[str]:
+    counts = Counter(found.skipped.values())
+    parts = [f"{count} {why}" for why, count in counts.items()]
+    return [f"Left out: {', '.join(parts)}."] if parts else []
+
+
+def rejudged_view(found: Rejudging) -> TextTable:
+    """Counts of what the verdicts say, for a terminal."""
+    whole = len(found.judged)
+    table = TextTable(
+        "Judged again where objects stood", caption=" ".join(rejudged_sentences(found))
+    )
+    table.texts("verdict as planned, as measured").numbers("trials", "share %")
+    for cause, text in DISAGREEMENT_CAUSES.items():
+        count = found.causes[cause]
+        table.row(text, str(count), format_percent(count / whole) if whole else "-")
+    return table
+
+
+def rejudged_section(found: Rejudging) -> Html:
+    """Counts, the table of both verdicts and reality, and the trials that changed."""
+    return section(
+        "Judged again where objects stood",
+        " ".join(rejudged_sentences(found)),
+        *_space_tables(_agreement_table(found), _verdict_table(found), _trial_list(found)),
+        element("p", f"Rows of {REJUDGED_TABLE_FILE} can be replayed in the scene as measured:"),
+        command(replay_line(found, 1)),
+    )
+
+
+def _space_tables(*parts: Html | None) -> list[Html]:
+    """Tables with some room between them."""
+    return [element("div", part, style="margin-top:20px") for part in parts if part is not None]
+
+
+def _agreement_table(found: Rejudging) -> Html:
+    rows = []
+    cases = [("as planned", False, False), ("as measured", True, False)]
+    if len(found.predictable) < len(found.judged):
+        cases += [(f"{name}, with what cannot be predicted", m, True) for name, m, _ in cases]
+    for name, measured, every in cases:
+        whole = len(found.judged if every else found.predictable)
+        count, low, high = found.agreement(measured=measured, every=every)
+        share: Child = "-"
+        if whole:
+            share = join(
+                interval_mark(count / whole, low, high), f" {format_percent(count / whole)}"
+            )
+        rows.append(
+            element(
+                "tr",
+                element("th", name, scope="row"),
+                element("td", f"{count} of {whole}", class_="number"),
+                element("td", share, class_="estimate"),
+            )
+        )
+    return table(["verdict", "right", "share with 95 % interval"], rows, numbers=(1,))
+
+
+def _verdict_table(found: Rejudging) -> Html:
+    """Both verdicts and reality."""
+    rows = []
+    for planned in (True, False):
+        for measured in (True, False):
+            counts = [found.table[planned, measured, real] for real in (True, False)]
+            cells = [element("td", count, class_="number") for count in counts]
+            texts = [element("td", _outcome_word(value)) for value in (planned, measured)]
+            rows.append(element("tr", *texts, *cells))
+    head = ["as planned", "as measured", "robot: success", "robot: failure"]
+    return table(head, rows, numbers=(2, 3))
+
+
+def _outcome_word(success: bool) -> str:
+    return "success" if success else "failure"
+
+
+def _trial_list(found: Rejudging) -> Html | None:
+    """Trials by what they say, those that changed first, and those that were not judged."""
+    # Heading of each group of trials, changed verdicts first.
+    headings = {
+        "placement": "Explained by placement",
+        "worsened": "Worsened",
+        "physics": "Left to physics",
+        "unpredictable": "Not predictable",
+    }
+    rows: list[Html] = []
+    for cause, head in headings.items():
+        chosen = [t for t in found.trials if t.cause(found.success) == cause]
+        rows += _trial_rows(chosen, head)
+    rows += _trial_rows([t for t in found.trials if t.cause(found.success) is None], "Not judged")
+    if not rows:
+        return None
+    names = ["", "trial", "object", "planned", "as measured", "robot", "notes"]
+    return table(names, rows, numbers=(1,))
+
+
+def _trial_rows(trials: Sequence[Rejudged], head: str) -> list[Html]:
+    max_rows = 40  # Trials in a group.
+    rows = []
+    for k, trial in enumerate(trials[:max_rows]):
+        more = f" (first {max_rows} of {len(trials)})" if len(trials) > max_rows else ""
+        measured = outcome_label(trial.outcome) if trial.outcome else trial.why_not
+        planned, real = outcome_label(trial.planned), outcome_label(trial.real)
+        cells: list[Child] = [trial.object, planned, measured, real, "; ".join(trial.notes)]
+        rows.append(
+            element(
+                "tr",
+                element("th", f"{head}{more}" if k == 0 else "", scope="row"),
+                element("td", trial.number, class_="number"),
+                *(element("td", cell) for cell in cells),
+            )
+        )
+    return rows
+
+
+def replay_line(found: Rejudging, row: int) -> str:
+    """The command that shows a row of the table, the first one is 1."""
+    table_file = str(found.path / REJUDGED_TABLE_FILE)
+    return shlex.join(["burg-drake", "replay", table_file, "--row", str(row)])

@@ -1,0 +1,271 @@
+"""The trials file as the lab page reads and writes it, with entries from several browsers.
+
+An entry names the state of the trial that it replaces. It is written if the trial is still in that
+state. If the file or its journal already has the entry, it counts as written, so that a browser may
+send it repeatedly. Otherwise another browser was faster, and this one gets an error.
+"""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from burg_drake.core import BurgError, InvalidInputError, RealOutcome, content_hash, outcome_label
+from burg_drake.experiment.lab.tried_grasps import (
+    MAIN_OUTCOMES,
+    TriedRuns,
+    approach_text,
+    closing_text,
+    point_text,
+)
+from burg_drake.experiment.trials.journal import entered_values
+from burg_drake.experiment.trials.trial_book import TrialBook, TrialChanged
+from burg_drake.experiment.trials.trial_sheet import ObjectPlace, RealTrial, RobotReport, TrialSheet
+
+OPERATOR_FIELDS = ("outcome", "time", "operator", "note", "robot")
+"""What people enter; photo and placement come from the camera."""
+
+
+class EntryConflict(InvalidInputError):
+    """Somebody else has entered something else meanwhile.
+
+    Attributes:
+        trial: as it stands now.
+    """
+
+    def __init__(self, message: str, trial: RealTrial) -> None:
+        super().__init__(message)
+        self.trial = trial
+
+
+@dataclass(frozen=True, kw_only=True)
+class LabEntry:
+    """What somebody has entered on the page.
+
+    Attributes:
+        number: of the trial.
+        replaces: state of the trial that was seen when it was entered, see `trial_state_hash`.
+        outcome: how it ended; None takes an entry back.
+        time: of the click, ISO 8601 with time zone.
+        operator, note: who, and what was noticed.
+        width_mm: between the pads at the end [mm].
+    """
+
+    number: int
+    replaces: str
+    outcome: RealOutcome | None
+    time: str = ""
+    operator: str = ""
+    note: str = ""
+    width_mm: float | None = None
+
+
+class LabBook:
+    """Reads and writes a trials file; every method may be called from any thread.
+
+    Args:
+        runs: of the file.
+        show_simulated: whether the page may tell what was simulated.
+    """
+
+    def __init__(self, runs: TriedRuns, *, show_simulated: bool = False) -> None:
+        self.runs, self.show_simulated = runs, show_simulated
+        self.book = TrialBook(runs.path)
+        self.plan = plan_hash(runs.sheet)
+        self._lock = threading.Lock()
+        self._cached: tuple[object, TrialSheet, str] | None = None
+
+    def sheet(self) -> TrialSheet:
+        """What the file holds now.
+
+        Raises:
+            DocumentError: it cannot be read, which may pass: somebody may be editing it.
+            InvalidInputError: it is another plan by now.
+        """
+        return self.sheet_and_version()[0]
+
+    def enter(self, entry: LabEntry) -> RealTrial:
+        """Writes an entry; it is on the disk when this returns.
+
+        Returns:
+            The trial as it stands then.
+
+        Raises:
+            EntryConflict: the trial is neither as `entry.replaces` says nor as the entry says, and
+                the entry was never written before.
+            BurgError: there is no such trial, or the file cannot be read or written.
+        """
+        with self._lock:
+            trial = self.sheet().trial(entry.number)
+            while True:
+                values = _entered_values(entry, trial)
+                if self._is_written(entry, values, trial):
+                    return trial
+                if trial_state_hash(trial) != entry.replaces:
+                    raise _conflict(trial)
+                empty = all(getattr(trial, name) in ("", None) for name in OPERATOR_FIELDS)
+                try:
+                    return self.book.record(
+                        entry.number, correct=not empty, expected=trial, **values
+                    )
+                except TrialChanged as changed:  # by another program, since it was read
+                    trial = changed.trial
+
+    def photographed(self, number: int, photo: str, placement: dict[str, ObjectPlace]) -> RealTrial:
+        """Enters what was seen before a trial, be it carried out meanwhile or not; what people
+        entered stays.
+
+        Raises:
+            BurgError: as for `enter`.
+        """
+        with self._lock:
+            return self.book.record(number, correct=True, photo=photo, placement=placement)
+
+    def require_open(self, number: int) -> RealTrial:
+        """The trial; refuses a photo of what was before one that is over.
+
+        Raises:
+            InvalidInputError: the trial has an outcome; or there is none of that number.
+        """
+        trial = self.sheet().trial(number)
+        if trial.outcome is not None:
+            raise InvalidInputError(
+                f"trial {number} already has an outcome; photo and placement were not saved"
+            )
+        return trial
+
+    def _is_written(self, entry: LabEntry, values: dict[str, Any], trial: RealTrial) -> bool:
+        """Whether the entry is in the file, or was until something else was entered."""
+        if all(getattr(trial, name) == value for name, value in values.items()):
+            return True
+        if trial_state_hash(trial) == entry.replaces or entry.outcome is None:
+            return False
+        wanted = entered_values(replace(trial, **values))
+        return any(
+            past.is_of(trial)
+            and all(past.after.get(name) == wanted.get(name) for name in OPERATOR_FIELDS)
+            for past in self.book.entries()
+        )
+
+    def sheet_and_version(self) -> tuple[TrialSheet, str]:
+        """What the file holds now, and a text that changes with it; raises as `sheet` does."""
+        path = Path(self.runs.path)
+        try:
+            status = path.stat()
+        except OSError as error:
+            raise InvalidInputError(f"cannot read {path}: {error.strerror}") from error
+        key = (status.st_mtime_ns, status.st_size, status.st_ino)
+        cached = self._cached
+        if cached is None or cached[0] != key:
+            sheet = self.book.sheet()
+            if plan_hash(sheet) != self.plan:
+                raise InvalidInputError(f"{path} now holds other trials; start the page again")
+            cached = (key, sheet, content_hash(*map(str, key))[:12])
+            self._cached = cached
+        return cached[1], cached[2]
+
+
+def _conflict(trial: RealTrial) -> EntryConflict:
+    what = "nothing" if trial.outcome is None else outcome_label(trial.outcome)
+    who = f" by {trial.operator}" if trial.operator else ""
+    message = f"trial {trial.number} was changed by someone else: it now has {what}{who}"
+    return EntryConflict(message, trial)
+
+
+def _entered_values(entry: LabEntry, trial: RealTrial) -> dict[str, Any]:
+    """Fields of the trial that an entry sets."""
+    effort = None if trial.robot is None else trial.robot.effort_n
+    known = entry.width_mm is not None or effort is not None
+    robot = RobotReport(width_mm=entry.width_mm, effort_n=effort) if known else None
+    if entry.outcome is None:
+        robot = None
+    return {
+        "outcome": entry.outcome,
+        "time": entry.time if entry.outcome is not None else "",
+        "operator": entry.operator if entry.outcome is not None else "",
+        "note": entry.note,
+        "robot": robot,
+    }
+
+
+def plan_hash(sheet: TrialSheet) -> str:
+    """Short hash of what is to be tried, whatever was entered."""
+    trials = [f"{t.number} {t.run} {t.grasp} {t.content}" for t in sheet.trials]
+    return content_hash(sheet.created, [run.hash for run in sheet.runs.values()], trials)[:12]
+
+
+def trial_state_hash(trial: RealTrial) -> str:
+    """Short hash of what people have entered for a trial."""
+    values = entered_values(trial)
+    return content_hash({k: str(values.get(k)) for k in OPERATOR_FIELDS})[:12]
+
+
+def plan_data(lab: LabBook) -> dict[str, Any]:
+    """What does not change, for the page."""
+    sheet, runs = lab.runs.sheet, lab.runs
+    return {
+        "plan": lab.plan,
+        "file": lab.runs.path.name,
+        "outcomes": [
+            {"value": outcome.value, "label": label, "meaning": meaning}
+            for outcome, (label, meaning) in MAIN_OUTCOMES.items()
+        ],
+        "others": [
+            {"value": outcome.value, "label": outcome_label(outcome)}
+            for outcome in RealOutcome
+            if outcome not in MAIN_OUTCOMES
+        ],
+        "trials": [
+            {
+                "number": trial.number,
+                "block": trial.block,
+                "scene": runs.of(trial).scene.name,
+                "station": runs.of(trial).station.name,
+                "instance": trial.instance,
+                "object": trial.object,
+                "grasp": trial.grasp,
+                "approach": approach_text(runs.X_SG(trial)),
+                "fingers": closing_text(runs.X_SG(trial)),
+                "point": point_text(runs.X_SG(trial)),
+                "width": round(1e3 * runs.width(trial), 1),
+                "opening": round(1e3 * runs.of(trial).station.hand.opening[1], 2),
+                **({"simulated": trial.simulated.value} if lab.show_simulated else {}),
+            }
+            for trial in sorted(sheet.trials, key=lambda trial: trial.number)
+        ],
+    }
+
+
+def entry_data(trial: RealTrial) -> dict[str, Any]:
+    """What was entered for a trial, for the page."""
+    return {
+        "number": trial.number,
+        "state": trial_state_hash(trial),
+        "outcome": trial.outcome and trial.outcome.value,
+        "label": outcome_label(trial.outcome) if trial.outcome else "",
+        "time": trial.time,
+        "operator": trial.operator,
+        "note": trial.note,
+        "width_mm": trial.robot and trial.robot.width_mm,
+        "photo": trial.photo,
+        "placement": {name: _placement_data(place) for name, place in trial.placement.items()},
+    }
+
+
+def _placement_data(place: ObjectPlace) -> dict[str, Any]:
+    note = "doubtful; the file in placements/ has the reason"  # The trials file has no reasons.
+    off = None if place.offset_mm is None else sum(d * d for d in place.offset_mm) ** 0.5
+    reason = note if place.status == "uncertain" else ""
+    return {"status": place.status, "mm": off, "deg": place.turn_deg, "reason": reason}
+
+
+def entry_states(lab: LabBook) -> dict[str, Any]:
+    """What has been entered so far, for the page; says so if the file cannot be read just now."""
+    try:
+        sheet, version = lab.sheet_and_version()
+    except BurgError as error:
+        return {"plan": lab.plan, "problem": str(error)}
+    entries = [entry_data(trial) for trial in sheet.trials]
+    return {"plan": lab.plan, "version": version, "problem": "", "entries": entries}

@@ -1,0 +1,253 @@
+"""The camera above the board: live view of the scene under trial, and check of object placement."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from burg_drake.cameras import (
+    EventLog,
+    FrameProcessor,
+    FrameSource,
+    Intrinsics,
+    LiveSession,
+    LocatedFrame,
+    OverlayStyle,
+    Picture,
+    Placement,
+    PlacementCheck,
+    describe_pose,
+    write_image,
+)
+from burg_drake.core import BurgError, InvalidInputError, one_line
+from burg_drake.experiment.lab.lab_book import LabBook
+from burg_drake.experiment.trials.trial_photos import save_photo_and_placement, summarize_placements
+from burg_drake.scene import Scene
+
+OpenSource = Callable[[Scene], FrameSource]
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    """The live view of one scene; pictures of different views have different epochs."""
+
+    epoch: int
+    scene: Scene
+    live: LiveSession
+
+
+class LabCamera:
+    """Watches the board; every method may be called from any thread.
+
+    Args:
+        lab: the trials.
+        open_source: opens the camera over a scene.
+        intrinsics: of the camera.
+        print_scale: size of the printed boards against the documents', along x and y.
+    """
+
+    def __init__(
+        self,
+        lab: LabBook,
+        open_source: OpenSource,
+        intrinsics: Intrinsics,
+        *,
+        print_scale: tuple[float, float] = (1.0, 1.0),
+    ) -> None:
+        self._lab, self._open, self._intrinsics = lab, open_source, intrinsics
+        self._print_scale = print_scale
+        self._lock = threading.RLock()
+        self._view: _View | None = None
+        self._epoch = 0
+        self._check: threading.Thread | None = None
+        self._checked: dict[str, Any] | None = None
+        self._measuring: tuple[int, bool] | None = None
+        self._drawing = threading.Lock()
+        self._shown = self._drawn = 0
+
+    def watch(self, number: int) -> None:
+        """Looks at the scene of a trial from now on; offsets of another trial are no longer drawn.
+
+        Raises:
+            BurgError: there is no such trial, or the camera cannot be opened.
+        """
+        scene = self._lab.runs.of(self._lab.runs.sheet.trial(number)).scene
+        with self._lock:
+            with self._drawing:
+                self._shown = number
+                if self._view is not None and self._drawn not in (0, number):
+                    self._view.live.placement, self._drawn = None, 0
+            if self._view is not None and self._view.scene.content == scene.content:
+                return
+            self.close()
+            source = self._open(scene)
+            try:
+                processor = FrameProcessor(scene, self._intrinsics, print_scale=self._print_scale)
+                events = EventLog(lambda event: None)
+                live = LiveSession(processor, source, events=events, idle_after=5.0)
+            except BaseException:
+                source.close()
+                raise
+            self._epoch += 1
+            self._view, self._drawn = _View(self._epoch, scene, live), 0
+            live.start()
+
+    def close(self) -> None:
+        """Ends the live view."""
+        with self._lock:
+            view, self._view = self._view, None
+            if view is not None:
+                view.live.close()
+            self.wait_for_check()  # OpenCV must not be at work when Python ends
+
+    def next_picture(self, epoch: int, after: int, seconds: float) -> tuple[int, Picture] | None:
+        """The newest picture, as soon as it is another one than that of this epoch and number."""
+        view = self._view
+        if view is None:
+            time.sleep(min(seconds, 0.2))
+            return None
+        picture = view.live.next_picture(after if epoch == view.epoch else 0, seconds)
+        return None if picture is None else (view.epoch, picture)
+
+    @property
+    def is_checking(self) -> bool:
+        """A placement check is at work."""
+        return self._check is not None and self._check.is_alive()
+
+    def check(self, number: int, *, keep: bool) -> None:
+        """Measures in a thread of its own how the objects of the newest picture stand.
+
+        Args:
+            number: of the trial that it is for.
+            keep: enter photo and placement for the trial when the check ends, also if it has an
+                outcome by then: the photo is from before. One that has an outcome already keeps
+                what it has.
+
+        Raises:
+            BurgError: there is no picture with a pose, or a check is at work.
+        """
+        picture_timeout = 5.0  # Seconds to wait for a picture.
+        self.watch(number)
+        with self._lock:
+            if self.is_checking:
+                raise InvalidInputError("a placement check is already running")
+            view = self._view
+            assert view is not None
+            stale = view.live.request_pictures()
+            picture = view.live.picture if not stale else None
+            picture = picture or view.live.next_picture(stale, picture_timeout)
+            if picture is None or not picture.located.estimate.valid:
+                raise InvalidInputError(
+                    "the board is not seen in the picture; move the camera or the light,"
+                    " then check again"
+                )
+            refusal = self._refusal(number) if keep else ""
+            self._measuring = (number, keep and not refusal)
+            self._check = threading.Thread(
+                target=self._measure,
+                args=(view, number, picture.located, keep, refusal),
+                name="placement check",
+                daemon=True,
+            )
+            self._check.start()
+
+    def wait_for_check(self, seconds: float | None = None) -> None:
+        """Until the placement check that is at work, if any, is done."""
+        if self._check is not None:
+            self._check.join(seconds)
+
+    def status(self) -> dict[str, Any]:
+        """What the page shows beside the picture."""
+        view = self._view
+        if view is None:
+            return {"scene": "", "line": "", "checking": False, "check": None, "drawn": 0}
+        picture, reader = view.live.picture, view.live.reader
+        lost = reader.fault if reader.state == "lost" else ""
+        line = describe_pose(picture.located.estimate, view.scene.board) if picture else "waiting"
+        return {
+            "scene": view.scene.name,
+            "fault": lost,
+            "valid": picture is not None and picture.located.estimate.valid,
+            "line": line,
+            "checking": self.is_checking,
+            "measuring": self._measured_now(),
+            "drawn": self._drawn,
+            "check": self._checked,
+        }
+
+    def _measured_now(self) -> dict[str, Any] | None:
+        """Which trial a check is at work for, and whether it is kept."""
+        measuring = self._measuring
+        if measuring is None or not self.is_checking:
+            return None
+        return {"number": measuring[0], "keep": measuring[1]}
+
+    def _refusal(self, number: int) -> str:
+        """Why a photo that is taken now is not kept; empty if it is."""
+        try:
+            self._lab.require_open(number)
+        except BurgError as error:
+            return str(error)
+        return ""
+
+    def _show_offsets(self, view: _View, number: int, check: PlacementCheck) -> None:
+        """Draws offsets of a trial, if it is the one that is shown."""
+        with self._drawing:
+            if self._shown == number:
+                view.live.placement, self._drawn = check, number
+
+    def _measure(
+        self, view: _View, number: int, located: LocatedFrame, keep: bool, refusal: str
+    ) -> None:
+        begun = time.monotonic()
+        report: dict[str, Any] = {"number": number, "kept": False, "problem": "", "objects": {}}
+        try:
+            check = view.live.processor.check(located)
+            self._show_offsets(view, number, check)
+            report["objects"] = {n: _offset_row(p) for n, p in check.instances.items()}
+            report["problem"] = check.reason or refusal
+            if keep and not report["problem"]:
+                self._keep(number, located, check)
+                report["kept"] = True
+        except BurgError as error:
+            report["problem"] = str(error)
+        except Exception as error:  # a thread that ends would leave an older answer on the page
+            report["problem"] = f"the check failed: {one_line(error)}"
+            traceback.print_exc()
+        report["seconds"] = time.monotonic() - begun
+        report["time"] = datetime.now().astimezone().isoformat(timespec="seconds")
+        self._checked = report
+
+    def _keep(self, number: int, located: LocatedFrame, check: PlacementCheck) -> None:
+        """Writes the photo, then the entry that names it."""
+        path = self._lab.runs.path
+        with tempfile.TemporaryDirectory() as folder:
+            photo = Path(folder) / "photo.png"
+            write_image(photo, located.frame.image)
+            name = save_photo_and_placement(path, number, photo=photo, check=check)
+        self._lab.photographed(number, name, summarize_placements(check))
+
+
+def _offset_row(placed: Placement) -> dict[str, Any]:
+    """How far an object is off, for the page; within the overlay's tolerance or not."""
+    style = OverlayStyle()
+    off = None if placed.displacement is None else math.hypot(*placed.displacement)
+    turn = placed.angle
+    within = (
+        off is not None and off <= style.tolerance and abs(turn or 0.0) <= style.angle_tolerance
+    )
+    return {
+        "status": placed.status,
+        "reason": placed.reason,
+        "within": within,
+        "mm": None if off is None else round(1e3 * off, 2),
+        "deg": None if turn is None else round(math.degrees(turn), 2) + 0.0,
+    }

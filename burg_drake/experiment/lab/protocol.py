@@ -1,0 +1,270 @@
+"""The printable protocol of trials for the lab: one self-contained HTML page.
+
+Simulated outcomes are left out by default, so that the operator does not know them.
+"""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+import burg_drake
+from burg_drake.core import RealOutcome, outcome_label, transform_points
+from burg_drake.experiment.lab.trial_pictures import (
+    GRASP_PICTURE_SIZE,
+    SETUP_PICTURE_SIZE,
+    TrialPictures,
+)
+from burg_drake.experiment.lab.tried_grasps import (
+    MAIN_OUTCOMES,
+    TriedRuns,
+    TriedScene,
+    approach_text,
+    closing_text,
+    format_time,
+    point_text,
+    trials_by_block,
+)
+from burg_drake.experiment.trials.trial_sheet import RealTrial
+from burg_drake.scene import Scene
+from burg_drake.visualization import Html, element, html_document, join, page_style
+
+
+def trial_card(trial: RealTrial, runs: TriedRuns, picture: bytes, show_simulated: bool) -> Html:
+    """The card of a trial.
+
+    Args:
+        trial: as it stands in the file.
+        runs: of the file.
+        picture: JPEG of its grasp.
+        show_simulated: whether it tells what was simulated.
+    """
+    address = f"data:image/jpeg;base64,{base64.b64encode(picture).decode()}"
+    width, height = GRASP_PICTURE_SIZE
+    alt = f"the hand at the grasp of trial {trial.number}, on {trial.instance}"
+    name = trial.instance
+    if trial.object != trial.instance:
+        name = f"{trial.instance} ({trial.object})"
+    return element(
+        "article",
+        element("figure", element("img", src=address, alt=alt, width=width, height=height)),
+        element(
+            "div",
+            element("h3", element("b", trial.number), name),
+            _grasp_description(trial, runs, show_simulated),
+            _outcome_boxes(trial.outcome),
+            _entry_lines(trial),
+        ),
+        id=f"trial-{trial.number}",
+    )
+
+
+def _grasp_description(trial: RealTrial, runs: TriedRuns, show_simulated: bool) -> Html:
+    X_SG, hand = runs.X_SG(trial), runs.of(trial).station.hand
+    width = f"{1e3 * runs.width(trial):.0f} mm (the hand opens {1e3 * hand.opening[1]:.0f} mm)"
+    rows = [
+        ("approach", approach_text(X_SG)),
+        ("fingers", f"{closing_text(X_SG)}; width {width}"),
+        ("grasp at", point_text(X_SG)),
+    ]
+    if show_simulated:
+        rows.append(("simulated", trial.simulated.value.replace("_", " ")))
+    cells = [cell for name, text in rows for cell in (element("dt", name), element("dd", text))]
+    id_row = (element("dt", "grasp"), element("dd", trial.grasp, class_="id"))
+    return element("dl", *cells, *id_row)
+
+
+def _outcome_boxes(outcome: RealOutcome | None) -> Html:
+    """A box for each outcome of the short list, and a line for others."""
+    tick_mark = "✕"  # In the box of the recorded outcome.
+    items = []
+    for known, (label, _) in MAIN_OUTCOMES.items():
+        chosen = known is outcome
+        box = element("i", tick_mark if chosen else "")
+        items.append(element("li", box, label, class_="chosen" if chosen else None))
+    other = outcome is not None and outcome not in MAIN_OUTCOMES
+    text = outcome_label(outcome) if other and outcome is not None else ""
+    line = element("span", text, class_="line")
+    items.append(
+        element("li", element("i", tick_mark if other else ""), "other:", line, class_="other")
+    )
+    return element("ul", *items, class_="boxes")
+
+
+def _entry_lines(trial: RealTrial) -> Html:
+    robot = trial.robot
+    width = "" if robot is None or robot.width_mm is None else f"{robot.width_mm:g}"
+    lines = (
+        ("note", trial.note, "note"),
+        ("width [mm]", width, None),
+        ("time", format_time(trial.time), None),
+        ("operator", trial.operator, None),
+    )
+    return element(
+        "div",
+        *(
+            element("span", name, element("b", text, class_="line"), class_=kind)
+            for name, text, kind in lines
+        ),
+        class_="fill",
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class SheetOptions:
+    """What is on the page beside the trials.
+
+    Attributes:
+        show_simulated: what was simulated.
+        printouts: by block, address of the printed board.
+    """
+
+    show_simulated: bool = False
+    printouts: Mapping[int, str] | None = None
+
+
+def sheet_page(
+    runs: TriedRuns, pictures: TrialPictures, options: SheetOptions | None = None
+) -> str:
+    """The page.
+
+    Args:
+        runs: of the trials file.
+        pictures: of its trials.
+        options: the usual ones if None.
+    """
+    options = options or SheetOptions()
+    blocks = trials_by_block(runs.sheet)
+    style = page_style("burg_drake.experiment.lab", "sheet_page.css")
+    sections = [
+        _block_section(runs, pictures, number, trials, options) for number, trials in blocks.items()
+    ]
+    return html_document(
+        f"Trials on the robot: {runs.path.name}",
+        style,
+        _header(runs, blocks),
+        *sections,
+        element("footer", f"Written by burg_drake {burg_drake.__version__}."),
+    )
+
+
+def _header(runs: TriedRuns, blocks: Mapping[int, tuple[RealTrial, ...]]) -> Html:
+    # How to carry out the trials.
+    instructions = (
+        "Carry out the trials in the order of their numbers. Each block has one scene: set"
+        " it up on its printed board as the pictures show, and again after every trial.",
+        "Tick one box for each trial when the robot has stopped. If none fits, write what"
+        " happened next to “other”.",
+        "Before a trial, compare with its picture: it shows the hand where the robot will"
+        " close it, and the object to be gripped has an orange rim. Do not correct the scene"
+        " or the robot because of it.",
+        "If a person interfered or an object fell before the trial, tick “not attempted” and"
+        " go on; repeat the trial at the end if there is time.",
+    )
+    sheet, tried = runs.sheet, [runs.of(trials[0]) for trials in blocks.values()]
+    robots = list(dict.fromkeys(_robot_name(one) for one in tried))
+    scenes = list(dict.fromkeys(one.scene.name for one in tried))
+    done = sum(trial.outcome is not None for trial in sheet.trials)
+    count = len(sheet.trials)
+    about = [f"{count} trials in {len(blocks)} block{'' if len(blocks) == 1 else 's'}"]
+    about += [f"seed {sheet.selection.seed}", f"file {runs.path.name}"]
+    about += [f"planned {sheet.created[:10]}"] if sheet.created else []
+    about += [f"{done} carried out so far"] if done else []
+    lines = [element("span", name) for name in ("date", "operator", "robot, gripper (serial no.)")]
+    return element(
+        "header",
+        element("p", "Trials on the robot", class_="kind"),
+        element("h1", f"{', '.join(scenes)} on {', '.join(robots)}"),
+        element("p", "; ".join(about), class_="about"),
+        element("div", *lines, class_="who"),
+        element("ul", *(element("li", text) for text in instructions), class_="how"),
+        _outcome_list(),
+    )
+
+
+def _robot_name(tried: TriedScene) -> str:
+    return f"{tried.station.name} ({tried.station.hand.name})"
+
+
+def _outcome_list() -> Html:
+    rows = [
+        element("tr", element("th", label, scope="row"), element("td", meaning))
+        for label, meaning in MAIN_OUTCOMES.values()
+    ]
+    return element("table", element("tbody", *rows), class_="outcomes")
+
+
+def _block_section(
+    runs: TriedRuns,
+    pictures: TrialPictures,
+    number: int,
+    trials: tuple[RealTrial, ...],
+    options: SheetOptions,
+) -> Html:
+    scene = runs.of(trials[0]).scene
+    first, last = trials[0].number, trials[-1].number
+    which = f"trial {first}" if len(trials) == 1 else f"trials {first} to {last}"
+    seen = pictures.setup(trials[0])
+    figures = [
+        _figure(picture, f"{scene.name} {where}", where)
+        for picture, where in zip(seen, ("from above", "from the front"), strict=True)
+    ]
+    cards = [
+        trial_card(trial, runs, pictures.grasp(trial), options.show_simulated) for trial in trials
+    ]
+    top = element(
+        "div",
+        element("h2", f"Block {number}: {scene.name}, {which}"),
+        element("div", *figures, class_="setup"),
+        _placement_table(scene),
+        _printout_paragraph(scene, (options.printouts or {}).get(number)),
+        class_="top",
+    )
+    return element("section", top, *cards, class_="block", id=f"block-{number}")
+
+
+def _figure(data: bytes, alt: str, caption: str) -> Html:
+    width, height = SETUP_PICTURE_SIZE
+    address = f"data:image/jpeg;base64,{base64.b64encode(data).decode()}"
+    image = element("img", src=address, alt=alt, width=width, height=height)
+    return element("figure", image, element("figcaption", caption))
+
+
+def _placement_table(scene: Scene) -> Html:
+    """Where each object stands."""
+    heads = ("object", "x [mm]", "y [mm]", "turned [°]", "height [mm]")
+    rows = []
+    for name in (*scene.background, *scene.instances):
+        X_SO, thing = scene.X_SO(name), scene.instance(name).object
+        surface = scene.library.surface(thing)
+        p_SQ = transform_points(X_SO, np.asarray(surface.vertices))
+        x, y, _ = (p_SQ.min(axis=0) + p_SQ.max(axis=0)) / 2.0
+        turn = math.degrees(math.atan2(X_SO[1, 0], X_SO[0, 0]))
+        height = p_SQ[:, 2].max()
+        cells = (1e3 * x, 1e3 * y, turn, 1e3 * height)
+        text = name if name == thing else f"{name} ({thing})"
+        numbers = (element("td", f"{value:.0f}", class_="number") for value in cells)
+        rows.append(element("tr", element("th", text, scope="row"), *numbers))
+    head = [
+        element("th", text, scope="col", class_="number" if k else None)
+        for k, text in enumerate(heads)
+    ]
+    body = join(element("thead", element("tr", *head)), element("tbody", *rows))
+    return element("div", element("table", body, class_="places"), class_="scroll")
+
+
+def _printout_paragraph(scene: Scene, address: str | None) -> Html:
+    width, height = (round(1e3 * side) for side in scene.board.size)
+    board = (
+        f"The board ({width} x {height} mm) shows where everything stands; x and y are"
+        " those of the middle of each object. "
+    )
+    if address:
+        link = element("a", address, href=address)
+        return element("p", board, "Print it at 100\u00a0%: ", link, ".", class_="print")
+    code = element("code", "burg-drake printout RUN/scene.yaml -o board.pdf")
+    return element("p", board, "To print it: ", code, class_="print")

@@ -1,0 +1,469 @@
+"""Choice of grasps for trials: eligible grasps, strata, random selection, and notes on shortfalls.
+
+The random order follows from hashes of the seed and of each grasp. So the selection does not
+depend on the order of the runs, and a smaller selection is a part of a larger one.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import (
+    DECIDED_STAGES,
+    MODES,
+    Among,
+    InvalidInputError,
+    MarginNames,
+    Outcome,
+    content_hash,
+    format_number,
+    list_names,
+    make_name,
+    quote_value,
+    suggest_names,
+)
+from burg_drake.evaluation import (
+    ROBUSTNESS_FILES,
+    Campaign,
+    Run,
+    find_robustness_table,
+    lifted_shares,
+    load_runs,
+)
+from burg_drake.experiment.trials.source_runs import grasp_content
+from burg_drake.experiment.trials.trial_sheet import Selection, Stratum, is_success
+
+
+@dataclass(frozen=True, eq=False)
+class EligibleGrasps:
+    """Grasps of one run to choose from.
+
+    Attributes:
+        key: of the run.
+        run: the run.
+        rows: (N,) their rows in its results.
+    """
+
+    key: str
+    run: Run
+    rows: NDArray[np.int64]
+
+    @property
+    def scene(self) -> str:
+        """Content hash of the scene."""
+        return self.run.document.scene.content
+
+    def cells(self, name: str) -> NDArray[Any]:
+        """(N,) cells of a column of the results."""
+        return np.asarray(self.run.results[name][self.rows])
+
+
+def gather_runs(given: Iterable[Run | Campaign | str | Path]) -> dict[str, Run]:
+    """Runs by short keys that do not depend on their order; each run once.
+
+    Args:
+        given: runs, of one scene or of many, or their folders.
+
+    Raises:
+        InvalidInputError: there is no run, nothing is judged yet, or a run is given in two copies.
+    """
+    runs: dict[str, Run] = {}
+    places = []
+    for one in given:
+        for run in _load_runs(one):
+            places.append(str(run.path))
+            if not run.document.hash or not len(run.results["id"]):
+                continue
+            same = runs.setdefault(run.document.hash, run)
+            if same.path.resolve() != run.path.resolve():
+                raise InvalidInputError(
+                    f"{same.path} and {run.path} are the same run; give one of them, or"
+                    " merge them if they are shards"
+                )
+    if not runs:
+        raise InvalidInputError(
+            f"{list_names(places) or 'no run is given'}: no grasp is judged yet"
+        )
+    by_scene: defaultdict[str, list[Run]] = defaultdict(list)
+    for hash in sorted(runs):
+        by_scene[make_name(runs[hash].document.scene.name)].append(runs[hash])
+    return {
+        key: run
+        for name in sorted(by_scene)
+        for key, run in zip(_scene_keys(name, by_scene[name]), by_scene[name], strict=True)
+    }
+
+
+def list_eligible_grasps(
+    runs: dict[str, Run], among: Among
+) -> tuple[list[EligibleGrasps], list[str]]:
+    """What there is to choose from in each run, and what people should know about it.
+
+    A grasp that several runs have judged on the same scene and station is one; it belongs to the
+    run that asked most of it: mode `arm` before `reach` before `hand`.
+
+    Raises:
+        InvalidInputError: reachable grasps are wanted of a run that asked no arm.
+    """
+    notes: list[str] = []
+    pools = []
+    owned: defaultdict[tuple[str, str], set[str]] = defaultdict(set)
+    order = sorted(runs, key=lambda k: (-MODES.index(runs[k].document.mode), runs[k].document.hash))
+    shared = _shared_worlds(runs)
+    for key in order:
+        run = runs[key]
+        pool = _make_pool(key, run, among, notes)
+        world = (run.document.scene.content, run.document.station.content)
+        if world in shared:
+            own = content_by_id(run)
+            twice = np.isin(pool.cells("id"), [id for id, c in own.items() if c in owned[world]])
+            owned[world].update(own.values())
+            if twice.any():
+                notes.append(
+                    f"{twice.sum()} grasps of run {key} are also in another run of the"
+                    " same scene; each is tried once and counts there"
+                )
+                pool = replace(pool, rows=pool.rows[~twice])
+        pools.append(pool)
+    return sorted((p for p in pools if len(p.rows)), key=lambda p: p.key), notes
+
+
+def content_by_id(run: Run, only: Collection[str] | None = None) -> dict[str, str]:
+    """Content of the grasps of a run, or of some of them, by id."""
+    grasps = run.candidates.grasps
+    cells = zip(run.candidates.id, run.candidates.instance, grasps.X_OG, grasps.width, strict=True)
+    return {
+        id: grasp_content(str(name), X_OG, float(width))
+        for id, name, X_OG, width in cells
+        if only is None or id in only
+    }
+
+
+def _load_runs(one: Run | Campaign | str | Path) -> Sequence[Run]:
+    if isinstance(one, Run):
+        return [one]
+    return one.runs if isinstance(one, Campaign) else load_runs(one)
+
+
+def _make_pool(key: str, run: Run, among: Among, notes: list[str]) -> EligibleGrasps:
+    if among == "reachable" and run.document.mode == "hand":
+        raise InvalidInputError(
+            f"{run.path} was judged in mode hand, which does not check what the arm can"
+            " reach; choose among all, clear or executed grasps"
+        )
+    results = run.results
+    failed = results["outcome"] == Outcome.SIMULATION_FAILED.value
+    passed = np.isin(results["stage"], [stage.value for stage in DECIDED_STAGES[among]])
+    if failed.any():
+        notes.append(f"{failed.sum()} grasps of run {key} could not be simulated and are left out")
+    count, judged = run.document.grasps.count, len(results["id"])
+    if judged < count:
+        notes.append(f"run {key} is not complete: {judged} of {count} grasps are judged")
+    return EligibleGrasps(key, run, np.flatnonzero(passed & ~failed))
+
+
+def _shared_worlds(runs: dict[str, Run]) -> set[tuple[str, str]]:
+    """Scenes and stations that several runs are about."""
+    worlds = [(r.document.scene.content, r.document.station.content) for r in runs.values()]
+    return {world for world in worlds if worlds.count(world) > 1}
+
+
+def _scene_keys(name: str, runs: Sequence[Run]) -> list[str]:
+    """Keys for runs on scenes of the same name."""
+    min_digits = 4  # Digits of a hash in a key.
+    if len(runs) == 1:
+        return [name]
+    modes = [run.document.mode for run in runs]
+    if len(set(modes)) == len(modes):
+        return [f"{name}-{mode}" for mode in modes]
+    hashes = [run.document.hash for run in runs]
+    digits = min_digits
+    while len({hash[:digits] for hash in hashes}) < len(hashes):
+        digits += 1
+    return [f"{name}-{hash[:digits]}" for hash in hashes]
+
+
+def stratum_labels(
+    pool: EligibleGrasps, selection: Selection, probability: Callable[[Run], Mapping[str, float]]
+) -> NDArray[np.str_]:
+    """(N,) the stratum of each grasp within its object; empty where it has none.
+
+    Args:
+        pool: the grasps.
+        selection: what they are balanced by.
+        probability: gives the predicted probability of success by grasp id.
+
+    Raises:
+        InvalidInputError: the run has no such margin.
+    """
+    if selection.balance == "none":
+        return np.full(len(pool.rows), "all")
+    outcomes = pool.cells("outcome").tolist()
+    if selection.balance == "outcome":
+        good = [is_success(Outcome(outcome), selection.success) for outcome in outcomes]
+        return np.where(good, "success", "failure")
+    if selection.balance == "stage":
+        pairs = zip(pool.cells("stage").tolist(), outcomes, strict=True)
+        return np.array([f"{stage}/{outcome}" for stage, outcome in pairs], dtype=np.str_)
+    if selection.balance == "margin":
+        values, name = _margin_values(pool, selection.margin), selection.margin
+    else:
+        known = probability(pool.run)
+        values = np.array([known.get(id, np.nan) for id in pool.cells("id").tolist()])
+        name = "probability"
+    objects = pool.cells("object")
+    labels = np.full(len(values), "", dtype=object)
+    for held in np.unique(objects):
+        mine = objects == held
+        labels[mine] = _quantile_labels(values[mine], name, selection.bins)
+    return labels.astype(np.str_)
+
+
+def robustness_by_grasp(run: Run, table: Path | None = None) -> dict[str, float]:
+    """Share of a grasp's perturbed repeats that were lifted, by grasp id.
+
+    Args:
+        run: the run.
+        table: what `robustness` has written; the one in the run's folder if None.
+
+    Raises:
+        InvalidInputError: there is no such table, it has no such shares, or it is of another run.
+    """
+    found = find_robustness_table(run.path) if table is None else table
+    if found is None:
+        raise InvalidInputError(
+            f"{run.path / ROBUSTNESS_FILES[0]} does not exist; run `burg-drake robustness "
+            f"{run.path}`, which predicts how often grasps are lifted"
+        )
+    shares = lifted_shares(found, {run.document.hash}, run.candidates.id)
+    return {id: share for (of, id), share in shares.items() if of == run.document.hash}
+
+
+def allocate_to_strata(
+    populations: Mapping[str, int], wanted: int, first: Sequence[str]
+) -> dict[str, int]:
+    """How many of each stratum: as evenly as there are enough, together `wanted` if there are.
+
+    Args:
+        populations: by stratum.
+        wanted: in all.
+        first: the strata, those first that get one more where it does not come out even.
+    """
+    chosen = dict.fromkeys(populations, 0)
+    left = min(wanted, sum(populations.values()))
+    while left:
+        for label in first:
+            if left and chosen[label] < populations[label]:
+                chosen[label] += 1
+                left -= 1
+    return chosen
+
+
+def divide_evenly(labels: Sequence[str], wanted: int) -> dict[str, int]:
+    """How many of each stratum are asked for, the first ones one more."""
+    share, more = divmod(wanted, len(labels))
+    return {label: share + (k < more) for k, label in enumerate(labels)}
+
+
+def _margin_values(pool: EligibleGrasps, name: str) -> NDArray[np.float64]:
+    if name not in pool.run.results or name not in MarginNames.all:
+        there = [margin for margin in MarginNames.all if margin in pool.run.results]
+        raise InvalidInputError(
+            f"{pool.run.path} has no margin {quote_value(name)}; {suggest_names(name, there)}"
+        )
+    return pool.cells(name).astype(float)
+
+
+def _quantile_labels(values: NDArray[np.float64], name: str, bins: int) -> NDArray[np.str_]:
+    """Labels of bins of as equal numbers as equal values, which stay together, allow."""
+    known = np.isfinite(values)
+    labels = np.full(len(values), "", dtype=object)
+    if known.any():
+        edges = np.unique(np.quantile(values[known], np.linspace(0.0, 1.0, bins + 1)))
+        place = np.searchsorted(edges[1:-1], values, side="right")
+        for k in np.unique(place[known]):
+            own = known & (place == k)
+            low, high = (format_number(float(v), 4) for v in (values[own].min(), values[own].max()))
+            text = low if low == high else f"{low} to {high}"
+            labels[own] = f"{name} {text} ({k + 1} of {max(len(edges) - 1, 1)})"
+    return labels
+
+
+MAX_SHORTFALL_ITEMS = 20
+"""Lines, and objects in a line; the rest is counted."""
+
+
+@dataclass(frozen=True)
+class Shortfall:
+    """What an object of a run lacks.
+
+    Attributes:
+        run, object: key of the run, and name in the library.
+        kind: what is lacking; objects with the same share a line.
+        counts: how much there is of it, such as `3 of 5`.
+        description: kind and counts together, where all objects of a line have the same; the
+            kind if empty.
+    """
+
+    run: str
+    object: str
+    kind: str
+    counts: str = ""
+    description: str = ""
+
+
+def find_shortfall(strata: Sequence[Stratum], wanted: int) -> list[Shortfall]:
+    """What one object lacks that has too few grasps of a stratum, or in all; none if nothing.
+
+    Args:
+        strata: of the object.
+        wanted: grasps in all.
+    """
+    missing = [s for s in strata if s.selected < s.wanted]
+    if not missing:
+        return []
+    total = sum(stratum.selected for stratum in strata)
+    labels = " and ".join(s.label for s in missing)
+    counts = ", ".join(f"{s.selected} of {s.wanted}" for s in missing)
+    description = ", ".join(f"{s.selected} of {s.wanted} with {s.label}" for s in missing)
+    first = strata[0]
+    if total == wanted:
+        rest = "; others make up for it"
+        return [
+            Shortfall(
+                first.run, first.object, f"too few with {labels}{rest}", counts, description + rest
+            )
+        ]
+    kind = f"too few with {labels}, and in all"
+    in_all = f"{total} of {wanted} in all"
+    return [
+        Shortfall(first.run, first.object, kind, f"{counts}; {in_all}", f"{description}; {in_all}")
+    ]
+
+
+def shortfall_notes(found: Iterable[Shortfall]) -> list[str]:
+    """A line for each kind, with the objects; figures by object where they differ."""
+    kinds: defaultdict[str, list[Shortfall]] = defaultdict(list)
+    for one in found:
+        kinds[one.kind].append(one)
+    lines = [_shortfall_line(kind, members) for kind, members in kinds.items()]
+    more = len(lines) - MAX_SHORTFALL_ITEMS
+    return (
+        lines if more <= 0 else [*lines[:MAX_SHORTFALL_ITEMS], f"and {more} more such shortfalls"]
+    )
+
+
+def _shortfall_line(kind: str, members: Sequence[Shortfall]) -> str:
+    alike = len({one.description for one in members}) == 1
+    by_run: defaultdict[str, list[str]] = defaultdict(list)
+    for one in members[:MAX_SHORTFALL_ITEMS]:
+        by_run[one.run].append(one.object if alike else f"{one.object} ({one.counts})")
+    where = "; ".join(f"{', '.join(objects)} of run {run}" for run, objects in by_run.items())
+    more = len(members) - MAX_SHORTFALL_ITEMS
+    where += f" and {more} others" if more > 0 else ""
+    return f"{where}: {members[0].description or kind}" if alike else f"{where}: {kind}"
+
+
+Chosen = list[tuple[EligibleGrasps, int, str]]
+"""Grasps with the key of their stratum; a number is a place in the pool."""
+
+
+def draw_scenes(pools: list[EligibleGrasps], selection: Selection) -> list[EligibleGrasps]:
+    """The pools of as many scenes as are wanted."""
+    found = sorted({p.scene for p in pools}, key=lambda s: content_hash(selection.seed, "scene", s))
+    if selection.scenes > len(found):
+        raise InvalidInputError(
+            f"{selection.scenes} scenes were asked for, but only {len(found)} have such grasps"
+        )
+    return [p for p in pools if not selection.scenes or p.scene in found[: selection.scenes]]
+
+
+def select_grasps(
+    pools: Sequence[EligibleGrasps], selection: Selection, table: Path | None
+) -> tuple[dict[str, Stratum], Chosen, list[str]]:
+    """Strata, the grasps chosen, and notes about what is missing."""
+    strata: dict[str, Stratum] = {}
+    chosen: Chosen = []
+    short: list[Shortfall] = []
+    unknown = 0
+    for pool in pools:
+        labels = stratum_labels(pool, selection, lambda run: robustness_by_grasp(run, table))
+        objects = pool.cells("object")
+        unknown += int((labels == "").sum())
+        for held in np.unique(objects).tolist():
+            members: defaultdict[str, list[int]] = defaultdict(list)
+            for k in np.flatnonzero((objects == held) & (labels != "")).tolist():
+                members[str(labels[k])].append(k)
+            if selection.balance == "outcome":
+                members["success"], members["failure"]  # also without any
+            if not members:
+                short.append(Shortfall(pool.key, held, "no grasp to choose from"))
+                continue
+            found = _make_strata(pool, held, members, selection)
+            strata |= found
+            short += find_shortfall(list(found.values()), selection.per_object)
+            for key, stratum in found.items():
+                ranked = _random_order(pool, members[stratum.label], selection.seed)
+                chosen += [(pool, k, key) for k in ranked[: stratum.selected]]
+    notes = (
+        [f"{unknown} grasps have no {_balancing_quantity(selection)} and are left out"]
+        if unknown
+        else []
+    )
+    return strata, chosen, notes + shortfall_notes(short) + _rare_class_note(chosen, selection)
+
+
+def _rare_class_note(chosen: Chosen, selection: Selection) -> list[str]:
+    """A sentence if nearly all chosen grasps succeed, or nearly all fail."""
+    rare_share = 0.1  # Share of successes or failures below which a note is added.
+    pools = {pool.key: pool for pool, _, _ in chosen}
+    outcomes = {key: pool.cells("outcome") for key, pool in pools.items()}
+    found = [Outcome(str(outcomes[pool.key][k])) for pool, k, _ in chosen]
+    good = [is_success(outcome, selection.success) for outcome in found]
+    for name, count in (("failures", good.count(False)), ("successes", good.count(True))):
+        if good and count < rare_share * len(good):
+            return [
+                f"only {count} of {len(good)} are {name} in simulation, so the trials"
+                f" hardly tell how well {name} are predicted; evaluate with"
+                " until_balanced=10 to get more"
+            ]
+    return []
+
+
+def _make_strata(
+    pool: EligibleGrasps, held: str, members: Mapping[str, Sequence[int]], selection: Selection
+) -> dict[str, Stratum]:
+    """Strata of one object, with how many of each are chosen."""
+    seed = selection.seed
+    first = sorted(members, key=lambda name: content_hash(seed, "more", pool.scene, held, name))
+    asked = divide_evenly(first, selection.per_object)
+    taken = allocate_to_strata({k: len(v) for k, v in members.items()}, selection.per_object, first)
+    return {
+        f"{pool.key}/{held}/{label}": Stratum(
+            run=pool.key,
+            object=held,
+            label=label,
+            population=len(members[label]),
+            selected=taken[label],
+            wanted=asked[label],
+        )
+        for label in sorted(members)
+    }
+
+
+def _balancing_quantity(selection: Selection) -> str:
+    return selection.margin or "probability"
+
+
+def _random_order(pool: EligibleGrasps, members: Sequence[int], seed: int) -> list[int]:
+    """Places in a random order that follows from the grasps themselves."""
+    ids = pool.cells("id")
+    world = pool.scene
+    return sorted(members, key=lambda k: content_hash(seed, "grasp", world, str(ids[k])))

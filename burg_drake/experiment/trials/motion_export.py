@@ -1,0 +1,261 @@
+"""Timed robot motions of the trials: one file for each trial, named by its number.
+
+017_mug-3f2a.json or .csv    the motion of trial 17, with its target; see `motion.plans`
+index.csv                    all trials with their files, or the reason why there is no motion
+runs/KEY/                    the verdicts on the grasps of each run; a repeated call reuses them
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from burg_drake.core import (
+    STARTING_PHASE,
+    InvalidInputError,
+    Listener,
+    Outcome,
+    Progress,
+    ProgressMeter,
+    Reporter,
+    Verdict,
+    atomic_write,
+    default_workers,
+    ensure_writable_folder,
+    remove_unfinished,
+    require_name,
+)
+from burg_drake.evaluation import (
+    Candidates,
+    PlanFolder,
+    PlanFormat,
+    ReachJudgeFactory,
+    Run,
+    arm_settings,
+    input_of,
+    judge_all,
+    plans_document,
+    read_motion,
+    settings_numbers,
+)
+from burg_drake.experiment.trials.source_runs import Moved, load_sources
+from burg_drake.experiment.trials.trial_sheet import RealTrial, load_trials
+from burg_drake.station import StationLike, as_station
+
+MOTION_INDEX_FILE = "index.csv"  # Table of the exported motions.
+
+
+@dataclass(frozen=True)
+class ExportedMotion:
+    """What became of the motion of a trial.
+
+    Attributes:
+        number, block, run, grasp, instance, object: as in `RealTrial`.
+        answer: `reachable`, or what hinders the arm.
+        blocker: what is in the way.
+        reason: why there is no answer, or no file of what is reachable.
+        file: name of the file; empty if there is none.
+        duration: of the motion, to a millisecond [s]; None without one.
+    """
+
+    number: int
+    block: int
+    run: str
+    grasp: str
+    instance: str
+    object: str
+    answer: str
+    blocker: str
+    reason: str
+    file: str
+    duration: float | None
+
+
+@dataclass(frozen=True)
+class TrialPlans(PlanFolder):
+    """A folder for plans that have other names, and lie elsewhere than their journal.
+
+    Attributes:
+        out: folder of the plans.
+        stems: their names without suffix, by grasp id.
+    """
+
+    out: Path
+    stems: Mapping[str, str]
+
+    def plan(self, id: str) -> Path:
+        """The file for the plan of a grasp."""
+        return self.out / f"{self.stems[id]}.{self.document.format}"
+
+
+def export_trials(
+    path: str | Path,
+    out: str | Path,
+    *,
+    format: PlanFormat = "json",
+    station: StationLike | None = None,
+    moved: Moved | None = None,
+    retry_failed: bool = False,
+    workers: int | None = None,
+    progress: bool | Listener = False,
+) -> list[ExportedMotion]:
+    """Plans the motion of every trial and writes it to a file, as `reach` does.
+
+    The hand moves as in the run that the grasp is from. What an earlier call with the same sheet
+    has finished is kept.
+
+    Args:
+        path: the trials file.
+        out: folder for the plans.
+        format: of these.
+        station: with the arm; each run's own if None.
+        moved: folders of runs in place of those that the sheet names, by key.
+        retry_failed: try all trials again that an earlier call could not judge.
+        workers: number of processes; as many as there are processors if None.
+        progress: True shows a bar on standard error; a function gets the events.
+
+    Returns:
+        A row a trial, in the order of the sheet; also in index.csv.
+
+    Raises:
+        InvalidInputError: a run or grasp is gone or has changed, a station has no arm, or the
+            folder cannot be written, or holds something else.
+        SimulationError: the worker processes die.
+    """
+    sheet, out = load_trials(path), Path(out)
+    for trial in sheet.trials:
+        require_name(trial.grasp)
+    runs = load_sources(sheet, path, moved=moved, only={t.run: t for t in sheet.trials})
+    _require_export_folder(out)
+    jobs = []
+    for key, run in runs.items():
+        own = [trial for trial in sheet.trials if trial.run == key]
+        jobs.append((own, _make_judge_factory(run, own, out / "runs" / key, out, format, station)))
+    ensure_writable_folder(out)
+    remove_unfinished(out)
+    rows: dict[int, ExportedMotion] = {}
+    with Reporter(progress) as reporter:
+        for own, (factory, candidates) in jobs:
+            verdicts = _judge_candidates(
+                factory, candidates, retry_failed, workers or default_workers(), reporter
+            )
+            assert isinstance(factory.plans, TrialPlans)
+            for trial in own:
+                rows[trial.number] = _make_row(trial, verdicts[trial.grasp], factory.plans)
+    found = [rows[trial.number] for trial in sheet.trials]
+    atomic_write(out / MOTION_INDEX_FILE, _index_csv(found))
+    return found
+
+
+def _make_judge_factory(
+    run: Run,
+    trials: Sequence[RealTrial],
+    folder: Path,
+    out: Path,
+    format: PlanFormat,
+    station: StationLike | None,
+) -> tuple[ReachJudgeFactory, Candidates]:
+    """What judges the grasps of one run, and these."""
+    from burg_drake.motion import require_usable_arm
+
+    scene = run.scene()
+    station = run.station() if station is None else as_station(station)
+    if station.document.arm is None:
+        raise InvalidInputError(
+            f"station {station.name!r} of {run.path} has no arm to plan motions for; give"
+            " another one"
+        ).about("station")
+    require_usable_arm(scene, station)
+    stems: dict[str, str] = {}
+    for trial in trials:
+        stems.setdefault(trial.grasp, _file_stem(trial))
+    chosen = np.array([id in stems for id in run.candidates.id])
+    candidates = Candidates(run.candidates.grasps.select(chosen), run.candidates.instance[chosen])
+    motion = read_motion(run.document.trial)
+    document = plans_document(
+        input_of(scene, "scenes"),
+        input_of(station, "stations"),
+        candidates,
+        settings_numbers(arm_settings(motion)),
+        exact=True,
+        format=format,
+    )
+    plans = TrialPlans(folder, document, out, stems)
+    return ReachJudgeFactory(scene, station, motion, True, plans), candidates
+
+
+def _judge_candidates(
+    factory: ReachJudgeFactory,
+    candidates: Candidates,
+    retry_failed: bool,
+    workers: int,
+    reporter: Reporter,
+) -> dict[str, Verdict]:
+    """Verdicts by grasp id; each is on disk at once."""
+    folder = factory.plans
+    assert folder is not None
+    with folder.opened() as journal:
+        known = folder.finished(retry_failed=retry_failed)
+        left = [candidate for candidate in candidates if candidate.id not in known]
+        known_already = len(candidates) - len(left)
+        begin = Progress(STARTING_PHASE, known_already, len(candidates), unit="trials")
+        pace = ProgressMeter(reporter.show, begin, "planning")
+        with closing(judge_all(left, factory, workers=workers)) as judged:
+            for candidate, verdict in judged:
+                journal.append(candidate.id, verdict)
+                pace.step(outcome=verdict.outcome)
+    return folder.verdicts()
+
+
+def _make_row(trial: RealTrial, verdict: Verdict, plans: TrialPlans) -> ExportedMotion:
+    plan = plans.plan(trial.grasp)
+    failed = verdict.outcome is Outcome.SIMULATION_FAILED
+    there = verdict.outcome is Outcome.REACHABLE and plan.is_file()
+    own = plan.with_name(f"{_file_stem(trial)}{plan.suffix}")
+    if there and own != plan and not own.exists():  # the same grasp is tried twice
+        atomic_write(own, plan.read_bytes())
+    duration = verdict.margins.get("duration") if there else None
+    return ExportedMotion(
+        number=trial.number,
+        block=trial.block,
+        run=trial.run,
+        grasp=trial.grasp,
+        instance=trial.instance,
+        object=trial.object,
+        answer="" if failed else verdict.outcome.value,
+        blocker=verdict.blocker,
+        reason=verdict.reason,
+        file=own.name if there else "",
+        duration=None if duration is None else round(duration, 3),
+    )
+
+
+def _file_stem(trial: RealTrial) -> str:
+    return f"{trial.number:03d}_{trial.grasp}"
+
+
+def _require_export_folder(out: Path) -> None:
+    """Refuses a folder with anything but exported trials."""
+    if out.is_dir() and not (out / "runs").is_dir():
+        held = sorted(item.name for item in out.iterdir() if not item.name.startswith("."))
+        if held:
+            raise InvalidInputError(
+                f"folder {out} is not empty and not an export of trials: it has {held[0]}"
+                " in it; choose another folder, or empty it"
+            )
+
+
+def _index_csv(rows: Sequence[ExportedMotion]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([field.name for field in fields(ExportedMotion)])
+    for row in rows:
+        cells = vars(row).values()
+        writer.writerow(["" if cell is None else cell for cell in cells])
+    return text.getvalue()

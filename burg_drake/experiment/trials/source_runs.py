@@ -1,0 +1,188 @@
+"""The runs from which the grasps of a trials file were chosen; checks that they have not changed."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from burg_drake.core import (
+    InvalidInputError,
+    UnknownNameError,
+    check_pose,
+    content_hash,
+    quote_value,
+    suggest_names,
+)
+from burg_drake.evaluation import HASH_DIGITS, RUN_FILE, Columns, Run, engine_label, load_runs
+from burg_drake.experiment.trials.trial_sheet import RealTrial, SourceRun, TrialSheet
+
+Moved = Mapping[str, "str | Path"]
+
+
+def grasp_content(instance: str, X_OG: ArrayLike, width: float) -> str:
+    """Short hash of a grasp: of its pose in the frame of its object and its width, both to the
+    last bit, and of the instance that it is on."""
+    pose = check_pose(X_OG, "X_OG")
+    return content_hash(instance, pose, float(width))[:HASH_DIGITS]
+
+
+def grasp_contents(run: Run, ids: Iterable[str]) -> dict[str, str]:
+    """`grasp_content` of those of some grasps that a run has, by id."""
+    grasps, instances, wanted = run.candidates.grasps, run.candidates.instance, {*ids}
+    return {
+        id: grasp_content(str(instances[k]), grasps.X_OG[k], float(grasps.width[k]))
+        for k, id in enumerate(run.candidates.id)
+        if id in wanted
+    }
+
+
+def load_sources(
+    sheet: TrialSheet,
+    path: str | Path,
+    *,
+    moved: Moved | None = None,
+    only: Mapping[str, object] | None = None,
+) -> dict[str, Run]:
+    """The runs of a sheet by key, with every grasp that is tried.
+
+    Args:
+        sheet: contents of the trials file.
+        path: the trials file; folders of runs are found from its own.
+        moved: folders in place of those that the sheet names, by key.
+        only: keys of the runs that are needed; all if None.
+
+    Raises:
+        UnknownNameError: `moved` names a run that the sheet does not have.
+        InvalidInputError: a folder is gone or holds another run, or a grasp is gone, not judged, or
+            not the same any more; the message names the trials file and what to do.
+    """
+    moved = moved or {}
+    for key in moved:
+        if key not in sheet.runs:
+            raise UnknownNameError(
+                f"{path} has no run {quote_value(key)}; {suggest_names(key, sheet.runs)}"
+            )
+    wanted = sheet.runs if only is None else {k: sheet.runs[k] for k in sheet.runs if k in only}
+    found = {key: _load_source(key, source, Path(path), moved) for key, source in wanted.items()}
+    for key, run in found.items():
+        _check_grasps(run, [t for t in sheet.trials if t.run == key], Path(path))
+    return found
+
+
+def load_source_run(
+    sheet: TrialSheet, path: str | Path, key: str, *, moved: Moved | None = None
+) -> Run:
+    """One run of a sheet, without a look at its grasps; see `load_sources`."""
+    return _load_source(key, sheet.runs[key], Path(path), moved or {})
+
+
+def trial_rows(sheet: TrialSheet, runs: Mapping[str, Run]) -> Columns:
+    """The row of the results of each trial's grasp, in the order of `sheet.trials`.
+
+    Args:
+        sheet: contents of the trials file.
+        runs: what `load_sources` returned.
+
+    Returns:
+        Columns as in `evaluation.results_table`; what a run does not have is NaN, or an empty text.
+        `run` is the hash of the run, as in the table.
+    """
+    names = list(dict.fromkeys(name for run in runs.values() for name in run.results))
+    rows = {key: _rows_by_id(run) for key, run in runs.items()}
+    columns: Columns = {}
+    for name in names:
+        cells = [
+            runs[t.run].results[name][rows[t.run][t.grasp]] if name in runs[t.run].results else None
+            for t in sheet.trials
+        ]
+        text = any(isinstance(cell, str) for cell in cells)
+        missing = "" if text else np.nan
+        columns[name] = np.array([missing if cell is None else cell for cell in cells])
+    return columns
+
+
+def _rows_by_id(run: Run) -> dict[str, int]:
+    return {id: row for row, id in enumerate(run.results["id"].tolist())}
+
+
+def _load_source(key: str, source: SourceRun, path: Path, moved: Moved) -> Run:
+    beside = Path(os.path.realpath(path)).parent
+    folder = Path(moved[key]) if key in moved else beside / source.path
+    if not folder.is_dir():
+        raise InvalidInputError(
+            f"{path}: run {key!r} is not in {folder}; write its folder into runs.{key}.path, or"
+            f" say in which folder it is now"
+        ).about("moved")
+    there = load_runs(folder)
+    for run in there:
+        if run.document.hash == source.hash:
+            return run
+    what = f"run {there[0].document.hash}" if len(there) == 1 else f"{len(there)} other runs"
+    raise InvalidInputError(
+        f"{path}: run {key!r} is {source.hash}, of scene {source.scene.name!r}, but {folder} holds"
+        f" {what}, of scene {there[0].document.scene.name!r}; give the one"
+        " that the trials were planned with, or plan them again"
+    ).about("moved")
+
+
+def _check_grasps(run: Run, trials: list[RealTrial], path: Path) -> None:
+    """Refuses trials whose grasp is not the one that was planned with."""
+    number = {id: i for i, id in enumerate(run.candidates.id)}
+    grasps, instances = run.candidates.grasps, run.candidates.instance
+    for trial in trials:
+        where = f"{path}: trial {trial.number}"
+        i = number.get(trial.grasp)
+        if i is None:
+            raise InvalidInputError(
+                f"{where}: grasp {quote_value(trial.grasp)} is not in {run.path};"
+                f" {suggest_names(trial.grasp, number)}"
+            )
+        instance = str(instances[i])
+        content = grasp_content(instance, grasps.X_OG[i], float(grasps.width[i]))
+        if (instance, content) != (trial.instance, trial.content):
+            raise InvalidInputError(
+                f"{where}: grasp {trial.grasp} of {run.path} has changed: it is on "
+                f"{instance!r} with content {content}, but was on {trial.instance!r} with"
+                f" content {trial.content} when the trials were planned"
+            )
+        verdict = run.verdicts.get(trial.grasp)
+        if verdict is None:
+            raise InvalidInputError(
+                f"{where}: grasp {trial.grasp} has no verdict in {run.path} any more; run"
+                " the command that made the run again"
+            )
+        if verdict.outcome is not trial.simulated:
+            raise InvalidInputError(
+                f"{where}: simulated is {trial.simulated}, but {run.path} has "
+                f"{verdict.outcome} for grasp {trial.grasp}; restore the run or this line"
+            )
+
+
+def make_source_run(run: Run, folder: Path | None = None) -> SourceRun:
+    """The entry of a run in a sheet.
+
+    Args:
+        run: the run.
+        folder: of the sheet; the path is absolute if None.
+
+    Raises:
+        InvalidInputError: the run was begun, but has no hash yet.
+    """
+    document = run.document
+    if not document.hash:
+        raise InvalidInputError(
+            f"{run.path / RUN_FILE} has no hash yet, as the run has only just begun"
+        )
+    path = run.path.absolute()
+    return SourceRun(
+        path=str(path) if folder is None else os.path.relpath(path, folder.absolute()),
+        hash=document.hash,
+        scene=document.scene,
+        station=document.station,
+        mode=document.mode,
+        engine=engine_label(document.engine),
+    )

@@ -1,0 +1,166 @@
+"""Expected interval widths and detectable differences for a number of trials.
+
+Both are known before the first trial, for assumed success rates.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import TextTable, wilson_interval
+from burg_drake.experiment.trials.trial_sheet import Stratum, TrialSheet, is_success
+
+
+@dataclass(frozen=True)
+class ExpectedEstimate:
+    """A share that will be estimated.
+
+    Attributes:
+        name: of what.
+        trials: how many it will be estimated from; not whole where weights make some count less.
+    """
+
+    name: str
+    trials: float
+
+
+def half_width(share: float, trials: int) -> float:
+    """Half the width that Wilson's 95 % interval of a share will have on average.
+
+    Args:
+        share: true share of successes.
+        trials: how many there will be.
+    """
+    from scipy.stats import binom
+
+    if trials == 0:
+        return 0.5
+    counts = np.arange(trials + 1)
+    bounds = np.array([wilson_interval(k, trials) for k in counts.tolist()])
+    return float(binom.pmf(counts, trials, share) @ (bounds[:, 1] - bounds[:, 0]) / 2.0)
+
+
+def mcnemar_power(trials: int, better: float, worse: float, alpha: float = 0.05) -> float:
+    """Chance that McNemar's exact test tells two methods apart on the same trials.
+
+    Args:
+        trials: how many.
+        better: share of them where the better method alone is right.
+        worse: share where the other one alone is.
+        alpha: significance level, two-sided.
+    """
+    from scipy.stats import binom
+
+    apart = better + worse
+    if apart <= 0.0:
+        return 0.0
+    m = np.arange(trials + 1)
+    most = _rejection_limit(m, alpha)
+    q = better / apart
+    found = np.where(most >= 0, binom.cdf(most, m, q) + binom.sf(m - most - 1, m, q), 0.0)
+    return float(binom.pmf(m, trials, min(apart, 1.0)) @ found)
+
+
+def smallest_difference(
+    trials: int, worse: float = 0.0, *, power: float = 0.8, alpha: float = 0.05
+) -> float:
+    """Smallest difference between two methods that McNemar's exact test finds with some chance.
+
+    Args:
+        trials: how many both are compared on.
+        worse: share of them where the worse method alone is right.
+        power: the chance.
+        alpha: significance level, two-sided.
+
+    Returns:
+        Difference of the shares of trials where each is right; NaN if not even the largest possible
+        one is found.
+    """
+    from scipy.optimize import brentq
+
+    largest = 1.0 - 2.0 * worse  # all the others: the better method alone is right
+
+    def lack(difference: float) -> float:
+        return mcnemar_power(trials, worse + difference, worse, alpha) - power
+
+    if largest <= 0.0 or lack(largest) < 0.0:
+        return math.nan
+    return float(brentq(lack, 0.0, largest, xtol=1e-4))
+
+
+def expected_estimates(sheet: TrialSheet) -> list[ExpectedEstimate]:
+    """Shares that the trials of a sheet will give: success by object and in all, weighted to all
+    grasps, and precision and recall of the simulation."""
+    objects = Counter(trial.object for trial in sheet.trials)
+    positive = sum(is_success(t.simulated, sheet.selection.success) for t in sheet.trials)
+    figures = [ExpectedEstimate(name, count) for name, count in sorted(objects.items())]
+    figures.append(ExpectedEstimate("all", len(sheet.trials)))
+    weighted = effective_trials(sheet.strata)
+    if weighted < len(sheet.trials) - 0.5:
+        figures.append(ExpectedEstimate("all, weighted", weighted))
+    return [*figures, ExpectedEstimate("precision", positive), ExpectedEstimate("recall", positive)]
+
+
+def effective_trials(strata: Mapping[str, Stratum]) -> float:
+    """Number of trials of equal weight that tell as much as those of strata, each of which stands
+    for `population / selected` grasps (L. Kish, Survey Sampling, 1965)."""
+    chosen = [s for s in strata.values() if s.selected]
+    total = sum(s.population for s in chosen)
+    squares = sum(s.population**2 / s.selected for s in chosen)
+    return total**2 / squares if squares else 0.0
+
+
+def power_table(sheet: TrialSheet) -> TextTable:
+    """How wide 95 % intervals will be, a row a figure."""
+    shares = (0.5, 0.8, 0.95)  # Success rates of the table's columns; at 0.5 intervals are widest.
+    table = TextTable("Half-width of the 95 % interval if the share turns out to be").names("share")
+    table.numbers("trials", *(f"{100 * share:.0f} %" for share in shares))
+    for row in expected_estimates(sheet):
+        widths = [half_width(share, round(row.trials)) for share in shares]
+        cells = [f"± {100 * width:.0f} %" for width in widths]
+        table.row(row.name, f"{row.trials:.0f}", *cells)
+    table.caption = (
+        "precision: of the grasps that succeed in simulation; recall: if as many succeed"
+        " on the robot; weighted: for all grasps to choose from, not only the chosen"
+        " ones"
+    )
+    return table
+
+
+def detectable_difference_sentence(trials: int) -> str:
+    """Which difference between two methods will show, in a sentence."""
+    # Shares of trials in which only the method that is worse overall is right.
+    reversed_shares = (0.0, 0.05, 0.1)
+    found = {worse: smallest_difference(trials, worse) for worse in reversed_shares}
+    if all(math.isnan(size) for size in found.values()):
+        return (
+            f"{trials} trials are too few for McNemar's exact test (5 %) to tell two"
+            " methods apart with 80 % power, however much they differ."
+        )
+    differences = [
+        f"{100 * size:.0f} points"
+        + (f", if it is right alone in {100 * worse:.0f} % of the trials" if worse else "")
+        for worse, size in found.items()
+        if not math.isnan(size)
+    ]
+    return (
+        f"Comparing two methods on the same {trials} trials (McNemar's exact test at 5 %,"
+        " power 80 %): if the worse one is never right alone, they must differ by "
+        f"{'; by '.join(differences)}."
+    )
+
+
+def _rejection_limit(m: NDArray[np.int64], alpha: float) -> NDArray[np.int64]:
+    """The largest number of the rarer of `m` disagreements at which the two-sided exact test
+    rejects; -1 where it never does."""
+    from scipy.stats import binom
+
+    most = binom.ppf(alpha / 2.0, m, 0.5).astype(np.int64)  # the first with a tail of that at least
+    critical: NDArray[np.int64] = np.where(2.0 * binom.cdf(most, m, 0.5) <= alpha, most, most - 1)
+    return critical

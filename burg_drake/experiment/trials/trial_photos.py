@@ -1,0 +1,164 @@
+"""Photos and placement checks of trials, in folders beside the trials file.
+
+photos/017.png         the photo of trial 17, as it was taken
+placements/017.yaml    the whole placement check; the trials file has its main numbers
+
+No file is overwritten: a second photo of trial 17 is called 017_2.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from itertools import count
+from pathlib import Path
+
+from burg_drake.cameras import Placement, PlacementCheck, save_placement
+from burg_drake.core import FileLimits, InvalidInputError, Pose, atomic_write, read_bytes
+from burg_drake.experiment.trials.journal import lock_trials_file
+from burg_drake.experiment.trials.trial_sheet import ObjectPlace, RealTrial, TrialSheet
+from burg_drake.scene import Scene
+
+
+def summarize_placements(check: PlacementCheck) -> dict[str, ObjectPlace]:
+    """The main numbers of a placement check, by instance, rounded to a micrometre and a thousandth
+    of a degree."""
+    return {name: _summarize_placement(placement) for name, placement in check.instances.items()}
+
+
+def require_scene_of_check(
+    check: PlacementCheck, sheet: TrialSheet, trial: RealTrial, where: str
+) -> None:
+    """Refuses a placement check of another scene than that of a trial.
+
+    Raises:
+        InvalidInputError: it is of another one.
+    """
+    expected = sheet.runs[trial.run].scene
+    if check.scene.content != expected.content:
+        raise InvalidInputError(
+            f"{where} is of scene {check.scene.name!r} ({check.scene.content[:12]}), but"
+            f" trial {trial.number} is on {expected.name!r} ({expected.content[:12]})"
+        )
+
+
+def require_same_scene(scene: Scene, sheet: TrialSheet, trial: RealTrial) -> None:
+    """Refuses another scene than that of a trial.
+
+    Raises:
+        InvalidInputError: it is another one.
+    """
+    expected = sheet.runs[trial.run].scene
+    if scene.content != expected.content:
+        raise InvalidInputError(
+            f"{scene.path} is not the scene of trial {trial.number}, {expected.name!r}:"
+            f" its content is {scene.content[:12]}, not {expected.content[:12]}"
+        )
+
+
+def measure_placement(
+    scene: Scene,
+    photo: str | Path,
+    intrinsics: str | Path,
+    *,
+    depth: str | Path | None = None,
+    depth_unit: float | None = None,
+    scale: tuple[float, float] = (1.0, 1.0),
+) -> PlacementCheck:
+    """The placement check of a photo in a file; see `check_placement`.
+
+    Raises:
+        InvalidInputError: a file cannot be read, or the images do not belong to the intrinsics.
+    """
+    from burg_drake.cameras import (
+        check_placement,
+        describe_image_file,
+        load_intrinsics,
+        read_depth,
+        read_image,
+    )
+
+    camera = load_intrinsics(intrinsics)
+    image = read_image(photo)
+    camera.require_size(image.shape[1], image.shape[0], str(photo))
+    distances = None
+    if depth is not None:
+        distances = read_depth(depth, depth_unit)
+        camera.require_size(distances.shape[1], distances.shape[0], str(depth))
+    return check_placement(
+        scene,
+        image,
+        camera,
+        depth=distances,
+        scale=scale,
+        image_source=describe_image_file(photo),
+        depth_source=None if depth is None else describe_image_file(depth),
+    )
+
+
+def save_photo_and_placement(
+    sheet_path: str | Path,
+    number: int,
+    *,
+    photo: str | Path | None = None,
+    check: PlacementCheck | None = None,
+) -> str:
+    """Copies a photo and writes a placement check beside a trials file.
+
+    Args:
+        sheet_path: the trials file.
+        number: of the trial.
+        photo: the photo; none if None.
+        check: its placement check; none if None.
+
+    Returns:
+        The copy of the photo, from the folder of the trials file; empty without a photo.
+
+    Raises:
+        InvalidInputError: the photo cannot be read, or nothing be written.
+    """
+    from burg_drake.cameras import decode_image
+
+    folder = Path(os.path.realpath(sheet_path)).parent
+    content = None if photo is None else read_bytes(photo, FileLimits.image_bytes)
+    if content is not None and decode_image(content) is None:
+        raise InvalidInputError(f"{photo} is not a readable image; give a PNG or JPEG")
+    copy = ""
+    with lock_trials_file(Path(sheet_path)):  # no other one takes the same name
+        stem = _free_stem(folder, number)
+        if photo is not None and content is not None:
+            copy = f"photos/{stem}{Path(photo).suffix.lower()}"
+            atomic_write(folder / copy, content)
+        if check is not None:
+            save_placement(check, folder / "placements" / f"{stem}.yaml")
+    return copy
+
+
+def _free_stem(folder: Path, number: int) -> str:
+    """A name that no photo and no placement check has yet."""
+    for k in count(1):
+        stem = f"{number:03d}" if k == 1 else f"{number:03d}_{k}"
+        if not any(any((folder / place).glob(f"{stem}.*")) for place in ("photos", "placements")):
+            return stem
+    raise AssertionError
+
+
+def _summarize_placement(placement: Placement) -> ObjectPlace:
+    offset, sd = placement.displacement, placement.displacement_sd
+    return ObjectPlace(
+        status=placement.status,
+        offset_mm=None if offset is None else _millimetres(offset),
+        offset_sd_mm=None if sd is None else _millimetres(sd),
+        turn_deg=None if placement.angle is None else _degrees(placement.angle),
+        turn_sd_deg=None if placement.angle_sd is None else _degrees(placement.angle_sd),
+        X_SO=None if placement.measured is None else Pose.readable(placement.measured.matrix()),
+    )
+
+
+def _millimetres(offset: tuple[float, float]) -> tuple[float, float]:
+    x, y = (round(1e3 * value, 3) + 0.0 for value in offset)
+    return x, y
+
+
+def _degrees(angle: float) -> float:
+    return round(math.degrees(angle), 3) + 0.0

@@ -1,0 +1,196 @@
+"""Scenes as MJCF: for other programs, and as the model of grasp trials.
+
+Bodies have the poses of the scene's objects, with the frames O. For other programs, visual and
+collision geoms are of two classes: MuJoCo collides the convex hull of a mesh, so collision geoms
+are the convex pieces. The hand of grasp trials may be above them, moved by actuators.
+
+In the model of grasp trials, poses, friction and the motion of the hand are set for each trial.
+Objects on the table stand on a plane, with contact pairs of their own, because MuJoCo combines
+friction by pairs of geoms and Drake by pairs of bodies; other bodies touch the table as a box.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+from burg_drake.core import atomic_write
+from burg_drake.export.layout import Layout, LegalNames, PlacedObject, legal_model_name
+from burg_drake.export.mjcf_hand import (
+    RIGID_CONTACT_SOLREF,
+    CarrierJoint,
+    CollisionBits,
+    add_hand,
+    add_moved_hand,
+    add_trial_options,
+)
+from burg_drake.export.mjcf_objects import (
+    MjcfAssets,
+    add_body,
+    add_object,
+    box_geom_attributes,
+    collision_shapes,
+    format_numbers,
+)
+from burg_drake.station import FixedBox, HandDescription
+
+
+def write_mjcf(
+    layout: Layout, folder: Path, hand: HandDescription | None = None
+) -> tuple[str, ...]:
+    """Writes `scene.xml` and the meshes and textures that it names.
+
+    Args:
+        layout: what to write.
+        folder: empty.
+        hand: to float above the scene.
+
+    Returns:
+        What became other than it is in the scene, and how the hand is moved, one sentence each.
+
+    Raises:
+        UnknownNameError: a mesh is missing.
+        MeshError: it is damaged.
+        InvalidInputError: a place cannot be written to.
+    """
+    # Attributes of the solver.
+    options = {
+        "timestep": "0.002",
+        "integrator": "implicitfast",
+        "cone": "elliptic",
+        "impratio": "10",
+    }
+    names = LegalNames.of_sdf(layout)
+    root = Element("mujoco", {"model": legal_model_name(layout.name)})
+    SubElement(root, "compiler", {"angle": "radian", "autolimits": "true"})
+    if hand is None:
+        SubElement(root, "option", options)
+    else:
+        add_trial_options(root)
+    _add_classes(root)
+    asset = SubElement(root, "asset")
+    assets = MjcfAssets(asset, layout.library, folder)
+    world = SubElement(root, "worldbody")
+    light = {"directional": "true", "pos": "0 0 2", "dir": "0.2 0.3 -1", "diffuse": "0.5 0.5 0.5"}
+    SubElement(world, "light", light)
+    for name, box in layout.boxes.items():
+        _add_box(add_body(world, names[name], box.X_WB), box)
+    for placed in layout.objects:
+        body = add_object(world, names[placed.name], placed, free=not placed.fixed)
+        _add_geoms(body, placed, assets)
+    notes = names.notes
+    if hand is not None:
+        mobilities = [1.0 / placed.entry.mass for placed in layout.objects if not placed.fixed]
+        notes += (add_moved_hand(root, world, asset, hand, mobilities),)
+    ElementTree.indent(root)
+    atomic_write(folder / "scene.xml", f"{ElementTree.tostring(root, encoding='unicode')}\n")
+    return notes
+
+
+def _add_classes(root: Element) -> None:
+    default = SubElement(root, "default")
+    visual = SubElement(default, "default", {"class": "visual"})
+    drawn = {"type": "mesh", "contype": "0", "conaffinity": "0", "group": "2", "mass": "0"}
+    SubElement(visual, "geom", drawn)
+    collision = SubElement(default, "default", {"class": "collision"})
+    SubElement(collision, "geom", {"type": "mesh", "group": "3"})
+
+
+def _add_geoms(body: Element, placed: PlacedObject, assets: MjcfAssets) -> None:
+    entry = placed.entry
+    for mesh, material in assets.visuals(placed.object, entry):
+        SubElement(body, "geom", {"class": "visual", "mesh": mesh, "material": material})
+    for shape in collision_shapes(placed, assets):
+        touching = {"class": "collision", "friction": repr(entry.friction)}
+        SubElement(body, "geom", {**touching, **shape})
+
+
+def _add_box(body: Element, box: FixedBox) -> None:
+    """One geom that is drawn and collides, in the group that is drawn."""
+    SubElement(
+        body,
+        "geom",
+        {
+            "class": "collision",
+            **box_geom_attributes(box),
+            "friction": repr(box.friction),
+            "rgba": format_numbers(box.color),
+            "group": "2",
+        },
+    )
+
+
+LIFT_JOINT = CarrierJoint("hand lift", (0.0, 0.0, 1.0), "hand lift speed", 1e5, 1.0)
+"""Joint of the carrier. Its servos only correct the force that a trial applies."""
+
+
+class MjcfBodyNames:
+    """Mjcf body names."""
+
+    object = "object"  # Start of the names of movable bodies; the name in the scene follows.
+    fixed = "fixed"  # Start of the names of fixed bodies.
+    plane = "plane"  # Name of the ground plane.
+    table = "table"  # Name of the table's box in the layout.
+
+
+def trial_mjcf(
+    layout: Layout,
+    hand: HandDescription,
+    *,
+    step: float,
+    on_table: Collection[str],
+    alone: str | None = None,
+) -> str:
+    """The model as text; meshes are read where they are.
+
+    Args:
+        layout: with table and boxes.
+        hand: at first it is where its diagram has it.
+        step: time step [s].
+        on_table: names of objects that have the plane under them, in place of the table's box.
+        alone: the one object that can move; all that could if None.
+    """
+    root = Element("mujoco")
+    SubElement(root, "compiler", angle="radian", autolimits="true")
+    add_trial_options(root, step)
+    SubElement(root[-1], "flag", autoreset="disable")
+    default = SubElement(root, "default")
+    bits = {"contype": f"{CollisionBits.object}", "conaffinity": f"{CollisionBits.object}"}
+    SubElement(default, "geom", {"condim": "3", "solref": RIGID_CONTACT_SOLREF, **bits})
+    SubElement(default, "pair", condim="3", solref=RIGID_CONTACT_SOLREF)
+    asset, world = SubElement(root, "asset"), SubElement(root, "worldbody")
+    contact = SubElement(root, "contact")
+    assets = MjcfAssets(asset, layout.library, None)
+    SubElement(
+        world, "geom", name=MjcfBodyNames.plane, type="plane", size="1 1 1", contype="0", conaffinity="0"
+    )  # fmt: skip
+    for name, box in layout.boxes.items():
+        body = add_body(world, f"{MjcfBodyNames.fixed} {name}", box.X_WB)
+        met = (
+            {"contype": f"{CollisionBits.table}", "conaffinity": f"{CollisionBits.hand}"}
+            if name == MjcfBodyNames.table
+            else {}
+        )
+        SubElement(
+            body,
+            "geom",
+            {"name": f"{MjcfBodyNames.fixed} {name} 0", **box_geom_attributes(box), **met},
+        )
+    for placed in layout.objects:
+        free = not placed.fixed and alone in (None, placed.name)
+        name = f"{MjcfBodyNames.fixed if placed.fixed else MjcfBodyNames.object} {placed.name}"
+        body = add_object(world, name, placed, free=free)
+        aware = (
+            CollisionBits.object
+            if placed.name in on_table
+            else CollisionBits.object | CollisionBits.table
+        )
+        for k, shape in enumerate(collision_shapes(placed, assets)):
+            geom = f"{name} {k}"
+            SubElement(body, "geom", {"name": geom, "conaffinity": f"{aware}", **shape})
+            if free and placed.name in on_table:
+                SubElement(contact, "pair", name=geom, geom1=MjcfBodyNames.plane, geom2=geom)
+    add_hand(root, world, asset, hand, [LIFT_JOINT])
+    return ElementTree.tostring(root, encoding="unicode")

@@ -1,0 +1,275 @@
+"""Grasps of the ACRONYM dataset: one HDF5 file for each object and scale.
+
+The layout is that of C. Eppner, A. Mousavian, D. Fox, "ACRONYM: A Large-Scale Grasp Dataset Based
+on Simulation", ICRA 2021, as `load_mesh` and `load_grasps` in acronym_tools/acronym.py
+(github.com/NVlabs/acronym) read it:
+
+- `grasps/transforms` (N, 4, 4): poses of the gripper in the frame of the scaled mesh [m].
+  `grasps/qualities/flex` has the trials of the simulator FleX, each (N,): `object_in_gripper` (1 or
+  0) and `object_motion_during_{closing,shaking}_{linear,angular}`.
+- `object/file` is the mesh, such as `meshes/Mug/10f6....obj`, `object/scale` the factor that
+  `load_mesh` applies to it. `object/mass`, `friction`, `inertia`, `com`, `density`, `volume`
+  describe it further.
+- `gripper/type` is `panda`, `gripper/configuration` the opening of each finger.
+- Files are named after category, mesh and scale: `Mug_10f6..._0.0002682457830986903.h5`.
+
+The gripper frame has its origin at the hand's base, which for the Panda is the frame of its link
+`panda_hand`, +z towards the tips and x along the closing direction, the left finger at +x, as
+`create_gripper_marker` (fingers at x = +-0.041 m, tips at z = 0.112 m) draws it, and the author of
+the dataset confirms the same of its predecessor (github.com/NVlabs/6dof-graspnet, issue 8).
+
+Written files have further columns in `grasps/qualities/burg_drake`, next to `flex`.
+"""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import (
+    FIXED_COLUMNS,
+    NUMBER_KINDS,
+    READ_ERRORS,
+    Array,
+    ArrayShape,
+    GraspSet,
+    Hdf5File,
+    InvalidInputError,
+    atomic_write,
+    inverse,
+    is_hdf5,
+    open_hdf5,
+    report_read_errors,
+)
+from burg_drake.formats.grasp_conversion import (
+    GRASP_SUCCESS_COLUMN,
+    HAND_ALIASES,
+    check_gripper_name,
+    object_name,
+    require_single_object,
+    scale_note,
+    shareable_description,
+    success_labels,
+)
+from burg_drake.formats.grasp_format import GraspFormat, Gripper, ImportedGrasps, conversion_losses
+from burg_drake.formats.pose_files import nearest_rigid
+
+
+class AcronymPaths:
+    """Acronym paths."""
+
+    transforms = "grasps/transforms"  # Data set of the poses (N, 4, 4).
+    qualities = "grasps/qualities"  # Group of the results of trials.
+    simulator = "flex"  # Subgroup of results of the simulator FleX.
+    own = "burg_drake"  # Subgroup of columns that burg_drake adds.
+
+
+ACRONYM_OBJECT_PROPERTIES: dict[str, tuple[ArrayShape, ...]] = {
+    **dict.fromkeys(("mass", "friction", "density", "volume"), ((), (1,))),
+    "com": ((3,),),
+    "inertia": ((3, 3), (9,)),
+}
+"""Properties of the object in a file, with their array shapes."""
+
+
+def _X_GF(gripper: Gripper) -> Array:
+    """The hand's base, x along the closing direction."""
+    return gripper.X_GB
+
+
+def recognise_acronym(path: Path) -> bool:
+    """An HDF5 file with `grasps/transforms`."""
+    try:
+        if not is_hdf5(path):
+            return False
+        with open_hdf5(path) as file:
+            return AcronymPaths.transforms in file
+    except (OSError, *READ_ERRORS):
+        return False
+
+
+def read_acronym(path: Path, gripper: Gripper) -> ImportedGrasps:
+    """The grasps of a file; `score` is `object_in_gripper`.
+
+    Raises:
+        InvalidInputError: no such file, or a value that cannot be used; the message says where.
+    """
+    with report_read_errors(path, "a readable HDF5 file"), open_hdf5(path) as file:
+        return _read_tree(path, file, gripper)
+
+
+def _read_tree(path: Path, file: Hdf5File, gripper: Gripper) -> ImportedGrasps:
+    notes: tuple[str, ...] = ()
+    X_OF, rounded = nearest_rigid(_read_poses(file), f"{path}: {AcronymPaths.transforms}")
+    mesh = _read_text(file, "object/file")
+    scale = _read_number(file, "object/scale")
+    if scale <= 0.0:
+        raise InvalidInputError(f"{path}: object/scale is {scale:g}; it must be above 0")
+    name = object_name(mesh)
+    described: dict[str, Any] = {"file": mesh, "scale": scale}
+    for key, shapes in ACRONYM_OBJECT_PROPERTIES.items():
+        if f"object/{key}" in file:
+            values = file.array(f"object/{key}").read(NUMBER_KINDS, *shapes).astype(float)
+            if np.isfinite(values).all():
+                described[key] = values.tolist()
+    if "gripper/type" in file:
+        notes = check_gripper_name(
+            _read_text(file, "gripper/type"), gripper, f"{path}: gripper/type"
+        )
+    columns = _read_qualities(file, len(X_OF))
+    success = columns.pop(GRASP_SUCCESS_COLUMN, None)
+    width = columns.pop("width", None)
+    score = columns.pop("score", success)
+    if success is not None and score is not success:
+        columns[GRASP_SUCCESS_COLUMN] = success
+    grasps = GraspSet.create(
+        X_OF @ inverse(_X_GF(gripper)),
+        object=name,
+        width=width,
+        score=score,
+        columns=columns,
+        provenance={
+            "format": ACRONYM_FORMAT.name,
+            "file": str(path.absolute()),
+            "object_files": {name: described},
+        },
+    )
+    return ImportedGrasps(grasps, "object", (*notes, *rounded, scale_note(name, mesh, scale)))
+
+
+def _read_poses(file: Hdf5File) -> NDArray[Any]:
+    if AcronymPaths.transforms not in file:
+        raise InvalidInputError(
+            f"{file.path}: {AcronymPaths.transforms} is missing; is it an ACRONYM file?"
+        )
+    stored = file.array(AcronymPaths.transforms)
+    stored.rows(4, 4)
+    return stored.read("fiu")
+
+
+def _read_qualities(file: Hdf5File, n: int) -> dict[str, NDArray[Any]]:
+    """(n,) values by column: of FleX and of us under their names, of others as `WHO.NAME`."""
+    columns: dict[str, NDArray[Any]] = {}
+    if AcronymPaths.qualities not in file:
+        return columns
+    for who in file.names(AcronymPaths.qualities):
+        for name in file.names(f"{AcronymPaths.qualities}/{who}"):
+            values = file.array(f"{AcronymPaths.qualities}/{who}/{name}").read(NUMBER_KINDS, (n,))
+            plain = who in (AcronymPaths.simulator, AcronymPaths.own) and name not in FIXED_COLUMNS
+            plain = plain or (who == AcronymPaths.own and name in ("score", "width"))
+            columns[name if plain else f"{who}.{name}"] = values.astype(float)
+    return columns
+
+
+def _read_number(file: Hdf5File, key: str) -> float:
+    values = file.array(key).read("fiu", (), (1,))
+    if not np.isfinite(values).all():
+        raise InvalidInputError(f"{file.path}: {key} is {values.item()}; expected a finite number")
+    return float(values.item())
+
+
+def _read_text(file: Hdf5File, key: str) -> str:
+    value = str(file.array(key).read("U", (), (1,)).item())
+    if not value:
+        raise InvalidInputError(f"{file.path}: {key} is empty; expected a name")
+    return value
+
+
+def write_acronym(grasps: GraspSet, path: Path, gripper: Gripper) -> tuple[str, ...]:
+    """Writes the grasps of one object.
+
+    Raises:
+        InvalidInputError: grasps of several objects, or the place cannot be written to.
+    """
+    import h5py
+
+    name = require_single_object(grasps, "an ACRONYM file")
+    described = shareable_description(grasps, name, path)
+    success = success_labels(grasps)
+    notes = _notes_on_losses(grasps, name, described, success)
+    buffer = io.BytesIO()
+    with h5py.File(buffer, "w") as file:
+        file["object/file"] = str(described.get("file", f"{name}.obj"))
+        file["object/scale"] = float(described.get("scale", 1.0))
+        for key in ACRONYM_OBJECT_PROPERTIES:
+            if key in described:
+                file[f"object/{key}"] = np.asarray(described[key], dtype=float)
+        foreign = {ours: theirs for theirs, ours in reversed(HAND_ALIASES.items())}
+        file["gripper/type"] = foreign.get(gripper.name, gripper.name)
+        file["gripper/configuration"] = np.array([gripper.opening[1] / 2.0])
+        packed = {"compression": "gzip", "shuffle": True}
+        file.create_dataset(AcronymPaths.transforms, data=grasps.X_OG @ _X_GF(gripper), **packed)
+        for key, values in _quality_arrays(grasps, success).items():
+            file.create_dataset(f"{AcronymPaths.qualities}/{key}", data=values, **packed)
+    atomic_write(path, buffer.getvalue())
+    return notes
+
+
+def _quality_arrays(grasps: GraspSet, success: Array) -> dict[str, NDArray[Any]]:
+    """Values by dataset below `grasps/qualities`."""
+    # Results of FleX other than `object_in_gripper`.
+    motion_columns = tuple(
+        f"object_motion_during_{phase}_{kind}"
+        for phase in ("closing", "shaking")
+        for kind in ("angular", "linear")
+    )
+    known = not np.isnan(success).any()
+    result: dict[str, NDArray[Any]] = {
+        f"{AcronymPaths.simulator}/{GRASP_SUCCESS_COLUMN}": success.astype(np.int64)
+        if known
+        else success
+    }
+    if not np.array_equal(grasps.score, success, equal_nan=True):
+        result[f"{AcronymPaths.own}/score"] = grasps.score
+    if not np.isnan(grasps.width).all():
+        result[f"{AcronymPaths.own}/width"] = grasps.width
+    for name, values in grasps.columns.items():
+        if name != GRASP_SUCCESS_COLUMN and values.dtype.kind in "fiub":
+            who, dot, rest = name.partition(".")
+            simulated = (
+                f"{AcronymPaths.simulator}/{name}"
+                if name in motion_columns
+                else f"{AcronymPaths.own}/{name}"
+            )
+            result[f"{who}/{rest}" if dot and who and rest else simulated] = values
+    return result
+
+
+def _notes_on_losses(
+    grasps: GraspSet, name: str, described: dict[str, Any], success: Array
+) -> tuple[str, ...]:
+    notes = []
+    if "file" not in described:
+        notes.append(
+            f"object/file is {name + '.obj'!r} and object/scale 1, as it is not known"
+            f" which mesh {name!r} was made of."
+        )
+    if np.isnan(success).any():
+        notes.append(
+            f"{GRASP_SUCCESS_COLUMN} is NaN for {int(np.isnan(success).sum())} grasps, as it is"
+            " not known whether they succeed."
+        )
+    numbers = [key for key, values in grasps.columns.items() if values.dtype.kind in "fiub"]
+    carried = ("object", "width", "score", "outcome", *numbers)
+    return (*notes, *conversion_losses(grasps, carried, ACRONYM_FORMAT.title))
+
+
+ACRONYM_FORMAT = GraspFormat(
+    name="acronym",
+    title="ACRONYM",
+    suffixes=(".h5", ".hdf5"),
+    frame="object",
+    source="github.com/NVlabs/acronym, acronym_tools/acronym.py; Eppner et al., ICRA 2021",
+    carries=("score as object_in_gripper", "width", "further numbers", "mesh, scale and mass"),
+    cannot_carry=("ids", "several objects", "text columns", "provenance"),
+    X_GF=_X_GF,
+    recognises=recognise_acronym,
+    read=read_acronym,
+    write=write_acronym,
+    one_object=True,
+)
+"""The format of ACRONYM files."""

@@ -1,0 +1,237 @@
+"""Conversion between formats: object names, success, and files with the grasps of one object."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from burg_drake.core import (
+    MESH_FILE,
+    UNTRIED_OUTCOMES,
+    Array,
+    GraspSet,
+    InvalidInputError,
+    Outcome,
+    UnknownNameError,
+    list_names,
+    make_name,
+    provenance_parts,
+    suggest_names,
+    with_shareable_references,
+)
+from burg_drake.formats.grasp_format import GraspFormat, Gripper
+
+GRASP_SUCCESS_COLUMN = "object_in_gripper"
+"""Column: 1 if the grasp holds its object, 0 if not, NaN if unknown."""
+
+HAND_ALIASES = {"panda": "panda_hand", "franka_panda": "panda_hand"}
+"""Names of hands in burg_drake, by their names in other projects."""
+
+
+def require_single_object(grasps: GraspSet, kind: str) -> str:
+    """The object that all grasps are of.
+
+    Raises:
+        InvalidInputError: there are none, or of several objects.
+    """
+    names = sorted(set(grasps.object.tolist()))
+    if not names:
+        raise InvalidInputError(
+            f"there are no grasps to write; a file of {kind} needs at least one"
+        )
+    if len(names) > 1:
+        raise InvalidInputError(
+            f"the grasps are of {len(names)} objects ({list_names(names)}), but a file of "
+            f"{kind} holds those of one; choose one of them, or write a file for each"
+        )
+    name: str = names[0]
+    return name
+
+
+def object_name(file: str) -> str:
+    """What an object is called whose mesh or prim has this path, such as `meshes/Mug/1a2b.obj`.
+
+    Meshes of our libraries are called alike and lie in a folder an object: `mug/mesh.obj`.
+    """
+    # Suffixes of mesh and scene files.
+    mesh_suffixes = (
+        "obj",
+        "stl",
+        "ply",
+        "off",
+        "dae",
+        "glb",
+        "gltf",
+        "usd",
+        "usda",
+        "usdc",
+        "usdz",
+    )
+    *folders, last = file.replace("\\", "/").rstrip("/").split("/")
+    if last in (MESH_FILE, "surface.obj") and folders and folders[-1]:
+        return folders[-1]
+    stem, _, suffix = last.rpartition(".")
+    return stem if stem and suffix.lower() in mesh_suffixes else last
+
+
+def object_description(grasps: GraspSet, name: str) -> dict[str, Any]:
+    """What is told of an object: its mesh `file`, its `scale` and more; empty if nothing is."""
+    found = _find_description(grasps.provenance, name) or {}
+    return {key: value for key, value in found.items() if _is_description(key, value)}
+
+
+def shareable_description(grasps: GraspSet, name: str, path: Path) -> dict[str, Any]:
+    """The same, with the mesh as a file at `path` refers to it."""
+    described: dict[str, Any] = with_shareable_references(
+        object_description(grasps, name), path.absolute().parent
+    )
+    return described
+
+
+def _is_description(key: str, value: Any) -> bool:
+    """Whether it is a name of a file, or else finite numbers; provenances come from anywhere."""
+    if key == "file":
+        return isinstance(value, str) and bool(value)
+    try:
+        return bool(np.isfinite(np.asarray(value, dtype=float)).all())
+    except (TypeError, ValueError, OverflowError):
+        return False
+
+
+def _find_description(provenance: Mapping[str, Any], name: str) -> dict[str, Any] | None:
+    files = provenance.get("object_files")
+    if isinstance(files, Mapping) and isinstance(files.get(name), Mapping):
+        return dict(files[name])
+    for part in provenance_parts(provenance):
+        if found := _find_description(part, name):
+            return found
+    return None
+
+
+def success_labels(grasps: GraspSet) -> Array:
+    """(N,) 1 for success, 0 for failure, NaN if unknown.
+
+    From the column `object_in_gripper`, or else from `outcome`, or else from scores if they are
+    nothing but 0 and 1.
+    """
+    if GRASP_SUCCESS_COLUMN in grasps.columns:
+        return grasps.columns[GRASP_SUCCESS_COLUMN].astype(float)
+    if "outcome" in grasps.columns:
+        outcome = grasps.columns["outcome"]
+        lifted = (outcome == Outcome.LIFTED.value).astype(float)
+        return np.where(np.isin(outcome, UNTRIED_OUTCOMES), np.nan, lifted)
+    if np.isin(grasps.score[~np.isnan(grasps.score)], (0.0, 1.0)).all():
+        return grasps.score.copy()
+    return np.full(len(grasps), np.nan)
+
+
+def check_gripper_name(given: str, gripper: Gripper, where: str) -> tuple[str, ...]:
+    """Compares what a file says of its hand; a note if the name tells nothing.
+
+    Raises:
+        InvalidInputError: the name is that of another hand.
+    """
+    known = HAND_ALIASES.get(given, given)
+    if known == gripper.name:
+        return ()
+    if given in HAND_ALIASES:
+        raise InvalidInputError(
+            f"{where}: the grasps were made for hand {known!r}, but hand {gripper.name!r}"
+            " was given; read them with the hand that they were made for"
+        ).about("hand")
+    return (f"{where}: the file names a hand {given!r}, which was taken to be {gripper.name!r}.",)
+
+
+def scale_note(name: str, file: str, scale: float) -> str:
+    """What the scale of an object means for its grasps."""
+    return (
+        f"The grasps are in metres, for {name!r} made of {file!r} scaled by {scale:g};"
+        " they fit an object of a library only if it was built at that size."
+    )
+
+
+def with_objects_renamed(grasps: GraspSet, names: Mapping[str, str]) -> GraspSet:
+    """The same grasps with some of their objects called otherwise; identifiers change with them.
+
+    Args:
+        grasps: the grasps.
+        names: new names by old ones; the one by the empty text is for all grasps, if they are of
+            one object.
+
+    Raises:
+        InvalidInputError: one name is given for grasps of several objects.
+        UnknownNameError: there are no grasps of an object of an old name.
+    """
+    known = set(grasps.object.tolist())
+    if not names or not known:
+        return grasps
+    if "" in names and "" not in known:
+        if len(known) > 1:
+            raise InvalidInputError(
+                f"the grasps are of {len(known)} objects ({list_names(sorted(known))}); say"
+                f" which of them is {names['']!r}: THEIRS={names['']}"
+            )
+        names = {next(iter(known)): names[""]}
+    for name in names:
+        if name not in known:
+            raise UnknownNameError(
+                f"no grasps are of object {name!r}; {suggest_names(name, known)}"
+            )
+    return GraspSet.create(
+        grasps.X_OG,
+        object=np.array([names.get(name, name) for name in grasps.object.tolist()], dtype=str),
+        width=grasps.width,
+        score=grasps.score,
+        provenance=_rename_in_provenance(grasps.provenance, names),
+        columns=grasps.columns,
+    )
+
+
+def _rename_in_provenance(provenance: Any, names: Mapping[str, str]) -> Any:
+    """A provenance whose `object_files`, and those of its parts, go by the new names."""
+    if not isinstance(provenance, Mapping):
+        return provenance
+    result = dict(provenance)
+    files, parts = result.get("object_files"), result.get("parts")
+    if isinstance(files, Mapping):
+        result["object_files"] = {names.get(key, key): value for key, value in files.items()}
+    if isinstance(parts, Mapping):
+        result["parts"] = {key: _rename_in_provenance(part, names) for key, part in parts.items()}
+    elif isinstance(parts, (list, tuple)):
+        result["parts"] = [_rename_in_provenance(part, names) for part in parts]
+    return result
+
+
+def with_success(grasps: GraspSet, above: float) -> GraspSet:
+    """The same grasps, of which those succeed whose score is above a limit."""
+    success = np.where(np.isnan(grasps.score), np.nan, (grasps.score > above).astype(float))
+    return grasps.with_columns(**{GRASP_SUCCESS_COLUMN: success})
+
+
+def write_each_object(
+    grasps: GraspSet, folder: Path, format: GraspFormat, gripper: Gripper
+) -> dict[Path, tuple[str, ...]]:
+    """Writes a file for each object into a folder.
+
+    Returns:
+        What each file cannot carry.
+
+    Raises:
+        InvalidInputError: files of two objects would share a name, or see `GraspFormat.write`.
+    """
+    paths: dict[Path, str] = {}
+    for name in dict.fromkeys(grasps.object.tolist()):
+        path = folder / f"{make_name(name) if name else 'grasps'}{format.suffixes[0]}"
+        if path in paths:
+            raise InvalidInputError(
+                f"grasps of {paths[path]!r} and of {name!r} would both be written to "
+                f"{path}; rename one of the objects"
+            )
+        paths[path] = name
+    return {
+        path: format.write(grasps.select(grasps.object == name), path, gripper)
+        for path, name in paths.items()
+    }

@@ -1,0 +1,181 @@
+"""Description of a grasp file format: its frame, its gripper, and the columns that it cannot carry.
+
+A format is an instance of `GraspFormat` in a module of its own; `formats.grasp_files` lists them.
+Frames are those of `core.frames`: G is the grasp frame of burg_drake, H the frame of the hand's
+body, F the grasp frame of the format.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from burg_drake.core import Array, GraspSet, inverse, list_names, make_pose, rot_z
+
+PoseFrame = Literal["object", "world", "camera"]
+"""What grasp poses of a file are measured in."""
+
+PREGRASP_WIDTH_COLUMN = "pregrasp_width"
+"""Column: opening of the hand on arrival, in metres; NaN if unknown."""
+
+
+@dataclass(frozen=True)
+class GripperJoint:
+    """A joint that moves a finger.
+
+    Attributes:
+        name: of the joint.
+        closed: position with the pads at the smallest distance [m].
+        open: position with the pads at the largest distance [m].
+    """
+
+    name: str
+    closed: float
+    open: float
+
+
+@dataclass(frozen=True, eq=False)
+class Gripper:
+    """What formats have to know of a parallel hand.
+
+    Attributes:
+        name: the hand's name.
+        body: link of the hand whose frame is H.
+        X_HG: (4, 4) grasp frame in H.
+        tip: how far the finger tips reach beyond G along the approach [m].
+        opening: smallest and largest distance between the pads [m].
+        joints: of the fingers; each position follows the distance of the pads in proportion.
+    """
+
+    name: str
+    body: str
+    X_HG: Array
+    tip: float
+    opening: tuple[float, float]
+    joints: tuple[GripperJoint, ...]
+
+    @property
+    def X_GH(self) -> Array:
+        """(4, 4) the hand's body in G."""
+        return inverse(self.X_HG)
+
+    @property
+    def X_GB(self) -> Array:
+        """(4, 4) the hand's base as several projects have it: the origin of H, the axes of G."""
+        return make_pose(p_AB=self.X_GH[:3, 3])
+
+    def positions(self, width: ArrayLike) -> dict[str, Array]:
+        """Joint positions (...) [m] by joint that put the pads `width` (...) [m] apart."""
+        low, high = self.opening
+        share = (np.asarray(width, dtype=float) - low) / (high - low)
+        return {j.name: j.closed + share * (j.open - j.closed) for j in self.joints}
+
+    def width(self, positions: Mapping[str, ArrayLike]) -> Array:
+        """Distance between the pads (...) [m] with some of the joints at these positions (...).
+
+        The mean over the joints that are given; there has to be one.
+        """
+        low, high = self.opening
+        shares = [
+            (np.asarray(positions[j.name], dtype=float) - j.closed) / (j.open - j.closed)
+            for j in self.joints
+            if j.name in positions
+        ]
+        return np.asarray(low + (high - low) * np.mean(shares, axis=0))
+
+
+PANDA_GRIPPER = Gripper(
+    name="panda_hand",
+    body="panda_hand",
+    X_HG=make_pose(rot_z(np.pi / 2), (0.0, 0.0, 0.1034)),
+    tip=0.0095,
+    opening=(0.0, 0.08),
+    joints=(
+        GripperJoint("panda_finger_joint1", 0.0, 0.04),
+        GripperJoint("panda_finger_joint2", 0.0, 0.04),
+    ),
+)
+"""The Franka Hand, as in models/hands/panda_hand.yaml (franka_ros, franka_hand.xacro)."""
+
+
+@dataclass(frozen=True, eq=False)
+class ImportedGrasps:
+    """What was read of a file.
+
+    Attributes:
+        grasps: `X_OG` has the poses of G in `frame`, whatever that is.
+        frame: what the poses are measured in.
+        notes: what of the file was left behind or changed, one sentence each.
+    """
+
+    grasps: GraspSet
+    frame: PoseFrame
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class GraspFormat:
+    """A kind of grasp file.
+
+    Attributes:
+        name: as options have it, such as `acronym`.
+        title: for people.
+        suffixes: of its files, such as `.h5`; the first one is what is written.
+        frame: what grasp poses are measured in.
+        source: who defines it: repository and file, or paper.
+        carries: what it has of a grasp besides the pose.
+        cannot_carry: what gets lost when written.
+        X_GF: (4, 4) its grasp frame in ours, for a gripper.
+        recognises: whether a file is of this kind, by its content; False for what cannot be read.
+        read: the grasps of a file made for a gripper.
+        write: writes grasps of a gripper and returns what the file cannot carry, one sentence each.
+        one_object: a file holds the grasps of one object.
+        X_GF_each: (N, 4, 4) the same for each grasp of a set that was read, where they differ.
+    """
+
+    name: str
+    title: str
+    suffixes: tuple[str, ...]
+    frame: PoseFrame
+    source: str
+    carries: tuple[str, ...]
+    cannot_carry: tuple[str, ...]
+    X_GF: Callable[[Gripper], Array]
+    recognises: Callable[[Path], bool]
+    read: Callable[[Path, Gripper], ImportedGrasps]
+    write: Callable[[GraspSet, Path, Gripper], tuple[str, ...]]
+    one_object: bool = False
+    X_GF_each: Callable[[GraspSet, Gripper], Array] | None = None
+
+    def frames(self, grasps: GraspSet, gripper: Gripper) -> Array:
+        """(N, 4, 4) the format's grasp frame in ours, for each grasp that was read of a file."""
+        if self.X_GF_each is not None:
+            return self.X_GF_each(grasps, gripper)
+        return np.broadcast_to(self.X_GF(gripper), (len(grasps), 4, 4))
+
+
+def conversion_losses(grasps: GraspSet, carried: Collection[str], title: str) -> tuple[str, ...]:
+    """A sentence about the columns that get lost, `id` among them; none if nothing gets lost.
+
+    Args:
+        grasps: what is written.
+        carried: columns that the file has a place for.
+        title: of the format.
+    """
+    lost = [
+        name
+        for name in grasps.column_names
+        if name not in carried and _has_values(grasps.column(name))
+    ]
+    return (f"{title} has no place for {list_names(lost)}.",) if lost else ()
+
+
+def _has_values(values: NDArray[Any]) -> bool:
+    if values.dtype.kind == "U":
+        return bool((values != "").any())
+    return values.dtype.kind != "f" or bool(np.isfinite(values).any())

@@ -1,0 +1,261 @@
+"""Finds the meshes of the YCB object set in a folder, in any of the usual folder layouts.
+
+The layouts are those of the downloads (one folder an object with `google_16k`, `google_64k`,
+`google_512k`, `poisson` or `tsdf` in it), of the archives unpacked each into a folder of its own
+(`003_cracker_box_google_16k/...`), of YCB-Video (`003_cracker_box/textured.obj`), and flat files
+(`003_cracker_box.obj`, `003_cracker_box_textured.obj`). Nothing is downloaded.
+
+Masses are those of the object table in B. Calli, A. Walsman, A. Singh, S. Srinivasa, P. Abbeel,
+A. M. Dollar, "Benchmarking in Manipulation Research: Using the Yale-CMU-Berkeley Object and Model
+Set", IEEE Robotics & Automation Magazine 22(3), 2015, p. 43. They were taken from the transcription
+in github.com/google-deepmind/dm_robotics, py/manipulation/props/ycb_objects/ycb_object.py, and each
+was found again in at least one more. Objects have none here where the table gives one figure for a
+set of which the meshes are the parts (wood blocks, peg test, toy airplane, Lego Duplo), or no
+figure (marbles).
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from burg_drake.core import InvalidInputError
+
+YCB_MASS_SOURCE = "Calli et al. 2015 (IEEE RAM 22(3), object table)"
+"""Publication that the masses are from."""
+
+YCB_MASSES = {
+    "001_chips_can": 0.205,
+    "002_master_chef_can": 0.414,
+    "003_cracker_box": 0.411,
+    "004_sugar_box": 0.514,
+    "005_tomato_soup_can": 0.349,
+    "006_mustard_bottle": 0.603,
+    "007_tuna_fish_can": 0.171,
+    "008_pudding_box": 0.187,
+    "009_gelatin_box": 0.097,
+    "010_potted_meat_can": 0.370,
+    "011_banana": 0.066,
+    "012_strawberry": 0.018,
+    "013_apple": 0.068,
+    "014_lemon": 0.029,
+    "015_peach": 0.033,
+    "016_pear": 0.049,
+    "017_orange": 0.047,
+    "018_plum": 0.025,
+    "019_pitcher_base": 0.178,
+    "021_bleach_cleanser": 1.131,
+    "022_windex_bottle": 1.022,
+    "023_wine_glass": 0.133,
+    "024_bowl": 0.147,
+    "025_mug": 0.118,
+    "026_sponge": 0.0062,
+    "027_skillet": 0.950,
+    "028_skillet_lid": 0.652,
+    "029_plate": 0.279,
+    "030_fork": 0.034,
+    "031_spoon": 0.030,
+    "032_knife": 0.031,
+    "033_spatula": 0.0515,
+    "035_power_drill": 0.895,
+    "036_wood_block": 0.729,
+    "037_scissors": 0.082,
+    "038_padlock": 0.304,
+    "039_key": 0.0101,
+    "040_large_marker": 0.0158,
+    "041_small_marker": 0.0082,
+    "042_adjustable_wrench": 0.252,
+    "043_phillips_screwdriver": 0.097,
+    "044_flat_screwdriver": 0.0984,
+    "046_plastic_bolt": 0.0036,
+    "047_plastic_nut": 0.001,
+    "048_hammer": 0.665,
+    "049_small_clamp": 0.0192,
+    "050_medium_clamp": 0.059,
+    "051_large_clamp": 0.125,
+    "052_extra_large_clamp": 0.202,
+    "053_mini_soccer_ball": 0.123,
+    "054_softball": 0.191,
+    "055_baseball": 0.148,
+    "056_tennis_ball": 0.058,
+    "057_racquetball": 0.041,
+    "058_golf_ball": 0.046,
+    "059_chain": 0.098,
+    "061_foam_brick": 0.028,
+    "062_dice": 0.0052,
+    "065-a_cups": 0.013,
+    "065-b_cups": 0.014,
+    "065-c_cups": 0.017,
+    "065-d_cups": 0.019,
+    "065-e_cups": 0.021,
+    "065-f_cups": 0.026,
+    "065-g_cups": 0.028,
+    "065-h_cups": 0.031,
+    "065-i_cups": 0.035,
+    "065-j_cups": 0.038,
+    "076_timer": 0.102,
+    "077_rubiks_cube": 0.094,
+}
+"""Published mass of each object, in kg; see the module's docstring."""
+
+YCB_OBJECTS_WITHOUT_MASS = (
+    *(f"063-{letter}_marbles" for letter in "abcdef"),
+    *(f"070-{letter}_colored_wood_blocks" for letter in "ab"),
+    "071_nine_hole_peg_test",
+    *(f"072-{letter}_toy_airplane" for letter in "abcdefghijk"),
+    *(f"073-{letter}_lego_duplo" for letter in "abcdefghijklm"),
+)
+"""Objects without a published mass."""
+
+YCB_NAMES = {name.split("_", 1)[0]: name for name in (*YCB_MASSES, *YCB_OBJECTS_WITHOUT_MASS)}
+"""Object name by number, such as `065-a`."""
+
+YCB_VARIANTS = ("google_16k", "google_64k", "google_512k", "", "poisson", "tsdf")
+"""Scans of an object, best first; empty if no folder names the scan."""
+
+
+_VARIANT_SUFFIX = re.compile(
+    r"_(google_16k|google_64k|google_512k|poisson|tsdf|berkeley_meshes|textured_simple|textured"
+    r"|nontextured)$"
+)
+"""Suffix of a name that tells the scan or the kind of mesh."""
+_NUMBERED_NAME = re.compile(r"(?:ycb_)?(\d{3})(?:[-_]([a-z]))?_(.+)")
+"""YCB number, optional letter, and name."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class YcbObject:
+    """An object of the YCB set that is on this disk.
+
+    Attributes:
+        number: such as `003` or `065-a`.
+        name: such as `003_cracker_box`.
+        mesh: the best mesh file that was found; YCB meshes are in metres.
+        variant: the scan it is of, such as `google_16k`; empty if its path does not tell.
+        mass: as published [kg]; None if no mass is published for what the mesh shows.
+        mass_source: where the mass was published; empty without one.
+    """
+
+    number: str
+    name: str
+    mesh: Path
+    variant: str
+    mass: float | None
+    mass_source: str
+
+
+def find_ycb(folder: str | Path) -> list[YcbObject]:
+    """Finds the objects of the YCB set in a folder and its subfolders.
+
+    Args:
+        folder: where the downloads were unpacked.
+
+    Returns:
+        One entry an object, by number; of several meshes of an object the one that suits best, see
+        `YCB_VARIANTS`, `STEMS` and `SUFFIXES`.
+
+    Raises:
+        InvalidInputError: there is no such folder, or no object of the set in it.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise InvalidInputError(
+            f"{folder} is not a folder; give the one that the YCB downloads were unpacked in"
+        )
+    found: dict[str, tuple[tuple[int | str, ...], Path]] = {}
+    archives = []
+    for file in _walk_files(folder):
+        if file.name.lower().endswith((".tgz", ".tar.gz", ".zip")):
+            archives.append(file)
+            continue
+        described = _identify_mesh(file)
+        if described is None:
+            continue
+        name, rank = described
+        if name not in found or rank < found[name][0]:
+            found[name] = (rank, file)
+    if not found:
+        raise InvalidInputError(_nothing_found(folder, archives))
+    return [_make_object(name, *found[name]) for name in sorted(found)]
+
+
+def find_ycb_name(text: str) -> str | None:
+    """The object that a file or folder is named after, such as `003_cracker_box_google_16k`."""
+    match = _NUMBERED_NAME.fullmatch(_strip_variant_suffixes(text))
+    if match is None:
+        return None
+    digits, letter, rest = match.groups()
+    name = YCB_NAMES.get(f"{digits}-{letter}" if letter else digits)
+    return name if name is not None and name.split("_", 1)[1] == rest else None
+
+
+def _make_object(name: str, rank: tuple[int | str, ...], mesh: Path) -> YcbObject:
+    mass = YCB_MASSES.get(name)
+    return YcbObject(
+        number=name.split("_", 1)[0],
+        name=name,
+        mesh=mesh,
+        variant=YCB_VARIANTS[int(rank[0])],
+        mass=mass,
+        mass_source=YCB_MASS_SOURCE if mass is not None else "",
+    )
+
+
+def _strip_variant_suffixes(text: str) -> str:
+    """Without what layouts add to a name."""
+    text = text.lower()
+    while (shorter := _VARIANT_SUFFIX.sub("", text)) != text:
+        text = shorter
+    return text
+
+
+def _walk_files(folder: Path) -> Iterator[Path]:
+    # Folders of the downloads without surface meshes.
+    ignored_folders = {"clouds", "masks", "poses", "urdf"}
+    for place, folders, files in os.walk(folder):
+        folders[:] = sorted(f for f in folders if f not in ignored_folders and f[0] != ".")
+        yield from (Path(place, file) for file in sorted(files))
+
+
+def _identify_mesh(file: Path) -> tuple[str, tuple[int | str, ...]] | None:
+    """The object that a file shows, and a rank (lower is better); None for any other file."""
+    # File names without suffix, best first; empty: the object's own name.
+    stems = ("textured", "", "textured_simple", "nontextured")
+    suffixes = (".obj", ".ply", ".stl", ".glb", ".gltf")  # Suffixes of mesh files, best first.
+    suffix = file.suffix.lower()
+    if suffix not in suffixes:
+        return None
+    stem = file.stem.lower()
+    parts = [part.lower() for part in Path(os.path.abspath(file)).parts[:-1]]
+    name = find_ycb_name(stem)
+    if name is None:
+        if stem not in stems:
+            return None
+        name = next((n for n in map(find_ycb_name, reversed(parts)) if n is not None), None)
+        kind = stem
+    else:
+        kind = next((s for s in stems if s and stem.endswith(f"_{s}")), "")
+    if name is None:
+        return None
+    # the nearest folder that tells the variant; above the object's own folder none does
+    near = [stem.removesuffix(f"_{kind}"), *reversed(parts)][:4]
+    variant = next(
+        (v for p in near for v in YCB_VARIANTS if v and (p == v or p.endswith(f"_{v}"))), ""
+    )
+    rank = (YCB_VARIANTS.index(variant), stems.index(kind), suffixes.index(suffix), str(file))
+    return name, rank
+
+
+def _nothing_found(folder: Path, archives: list[Path]) -> str:
+    message = (
+        f"no YCB objects found in {folder} or its subfolders; expected folders such as"
+        " 003_cracker_box/google_16k with a textured.obj, or files such as"
+        " 003_cracker_box.obj;"
+    )
+    if archives:
+        more = f" and {len(archives) - 1} more" if len(archives) > 1 else ""
+        return f"{message} there are archives ({archives[0].name}{more}): unpack them there"
+    return f"{message} nothing is downloaded: get the meshes from https://www.ycbbenchmarks.com/object-models and unpack them there"

@@ -1,0 +1,369 @@
+"""Samples many scenes in worker processes into a folder, and resumes where an earlier call stopped.
+
+The folder has one file per scene, the recipe, and a table of all scenes.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from types import TracebackType
+
+from burg_drake.core import (
+    DocumentError,
+    FolderLock,
+    InvalidInputError,
+    SimulationError,
+    atomic_write,
+    ensure_writable_folder,
+    load_document,
+    map_unordered,
+    one_line,
+    open_regular,
+    remove_unfinished,
+    save_document,
+)
+from burg_drake.generation.scene_sampling import (
+    SampledScene,
+    SceneSampler,
+    require_possible_recipe,
+    sampling_provenance,
+)
+from burg_drake.objects import ObjectLibrary, load_library
+from burg_drake.scene import SamplingProvenance, SceneDocument, SceneRecipe, save_scene
+from burg_drake.station import Station, StationLike, as_station, load_station
+
+
+@dataclass(frozen=True)
+class SceneRow:
+    """What the table tells of a number.
+
+    Attributes:
+        scene: its number.
+        accepted: there is a file of it.
+        objects: in it; of the best attempt if none was accepted.
+        missing: objects that found no place there.
+        attempts: scenes that were drawn.
+        tries: places that were looked at.
+        refused: how many attempts were refused, by reason.
+    """
+
+    scene: int
+    accepted: bool
+    objects: int
+    missing: tuple[str, ...]
+    attempts: int
+    tries: int
+    refused: Mapping[str, int]
+
+    @classmethod
+    def of(cls, sampled: SampledScene) -> SceneRow:
+        """The row of a scene."""
+        return cls(
+            sampled.number,
+            sampled.accepted,
+            sampled.placed,
+            sampled.missing,
+            sampled.attempts,
+            sampled.tries,
+            sampled.refused,
+        )
+
+    def text(self) -> str:
+        """A line of the table."""
+        line = io.StringIO()
+        reasons = "; ".join(f"{count} x {reason}" for reason, count in sorted(self.refused.items()))
+        csv.writer(line, lineterminator="\n").writerow(
+            [
+                self.scene,
+                "yes" if self.accepted else "no",
+                self.objects,
+                " ".join(self.missing),
+                self.attempts,
+                self.tries,
+                reasons,
+            ]
+        )
+        return line.getvalue()
+
+    @classmethod
+    def read(cls, fields: Mapping[str, str]) -> SceneRow:
+        """Reads a line.
+
+        Raises:
+            ValueError, KeyError, TypeError: it was not written by `text`.
+        """
+        refused = {}
+        for part in filter(None, fields["refused"].split("; ")):
+            count, _, reason = part.partition(" x ")
+            refused[reason] = int(count)
+        return cls(
+            int(fields["scene"]),
+            {"yes": True, "no": False}[fields["accepted"]],
+            int(fields["objects"]),
+            tuple(fields["missing"].split()),
+            int(fields["attempts"]),
+            int(fields["tries"]),
+            refused,
+        )
+
+
+class SceneFolder:
+    """A folder opened for sampling; one process at a time can hold it."""
+
+    def __init__(self, path: str | Path, provenance: SamplingProvenance) -> None:
+        """Opens or makes the folder.
+
+        Raises:
+            InvalidInputError: it cannot be written to, another process is writing it, it holds
+                scenes that are made with other things, or something that is none of this.
+            DocumentError: its recipe or a scene is damaged.
+        """
+        self.path = ensure_writable_folder(path)
+        self._lock = FolderLock(self.path)
+        try:
+            self._open(provenance)
+        except BaseException:
+            self._lock.release()
+            raise
+
+    def _open(self, provenance: SamplingProvenance) -> None:
+        remove_unfinished(self.path)
+        recipe = self.path / "recipe.yaml"
+        if recipe.exists():
+            there = load_document(recipe, SamplingProvenance)
+            found = there.differences(provenance)
+            if found:
+                raise InvalidInputError(
+                    f"{self.path} already holds other scenes ({'; '.join(found)}); choose"
+                    " another folder, or delete it"
+                ).about("folder")
+        elif any(self.path.iterdir()):
+            raise InvalidInputError(
+                f"{self.path} is not empty, but has no sampled scenes (recipe.yaml is missing);"
+                " choose another folder"
+            ).about("folder")
+        else:
+            save_document(provenance, recipe, "What the scenes of this folder were made with.")
+        self._table = self.path / "scenes.csv"
+        self.rows = {row.scene: row for row in read_scene_table(self._table)}
+        self.rows = {
+            n: row for n, row in self.rows.items() if not row.accepted or self.file(n).is_file()
+        }
+        for number, row in self.rows.items():
+            if row.accepted:
+                _require_readable(self.file(number))
+        self.sort()
+
+    def file(self, number: int) -> Path:
+        """The file of a scene."""
+        return self.path / f"scene_{number:04d}.yaml"
+
+    def add(self, sampled: SampledScene) -> None:
+        """Writes a scene and its row.
+
+        Raises:
+            InvalidInputError: the disk is full, for example.
+        """
+        if sampled.accepted:
+            save_scene(sampled.scene.document, self.file(sampled.number))
+        row = SceneRow.of(sampled)
+        try:
+            with self._table.open("a", encoding="utf-8") as stream:
+                stream.write(row.text())
+        except OSError as error:
+            raise InvalidInputError(
+                f"cannot write {self._table}: {error.strerror}; the scenes so far are"
+                " kept. Run the same command to continue"
+            ) from error
+        self.rows[row.scene] = row
+
+    def sort(self) -> None:
+        """Writes the table in the order of the scenes."""
+        columns = ("scene", "accepted", "objects", "missing", "attempts", "tries", "refused")
+        rows = [self.rows[number].text() for number in sorted(self.rows)]
+        text = ",".join(columns) + "\n" + "".join(rows)
+        if not self._table.is_file() or self._table.read_bytes() != text.encode():
+            atomic_write(self._table, text)
+
+    def __enter__(self) -> SceneFolder:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._lock.release()
+
+
+def _require_readable(path: Path) -> None:
+    try:
+        load_document(path, SceneDocument)
+    except DocumentError as error:
+        raise DocumentError(f"{error}; fix the file, or delete it to have it made again") from error
+
+
+def read_scene_table(path: Path) -> list[SceneRow]:
+    """The rows of a table; lines that cannot be read, such as a torn last one, count as not there.
+
+    Raises:
+        InvalidInputError: it is not a file, or cannot be read.
+    """
+    max_bytes = 1 << 28  # A row has some hundred bytes.
+    if not path.exists():
+        return []
+    with open_regular(path) as stream:
+        text = stream.read(max_bytes).decode(errors="replace")
+    whole = text[: text.rfind("\n") + 1]
+    rows = []
+    for fields in csv.DictReader(io.StringIO(whole)):
+        try:
+            rows.append(SceneRow.read(fields))
+        except (ValueError, KeyError, TypeError, AttributeError):
+            continue
+    return rows
+
+
+@dataclass(frozen=True)
+class SamplingInputs:
+    """Where a recipe's scenes are made: all that a worker needs to know.
+
+    Attributes:
+        recipe: the recipe.
+        library, station: where they are.
+        contents: hashes of the two, so that nobody goes on with what has changed.
+        folder: that scenes are written to.
+    """
+
+    recipe: SceneRecipe
+    library: Path
+    station: Path
+    contents: tuple[str, str]
+    folder: Path
+
+
+@dataclass(frozen=True)
+class SceneTask:
+    """A scene to sample: where, and its number."""
+
+    inputs: SamplingInputs
+    number: int
+
+
+@dataclass(frozen=True)
+class SampledFolder:
+    """What is in a folder after sampling.
+
+    Attributes:
+        rows: of all scenes that were asked for and came to an end, by number.
+        new: numbers of those that were sampled now.
+        failed: one line for each scene that could not be sampled, by number: they are tried again
+            the next time.
+    """
+
+    rows: dict[int, SceneRow]
+    new: tuple[int, ...]
+    failed: dict[int, str]
+
+
+def sample_scenes(
+    recipe: SceneRecipe,
+    library: ObjectLibrary,
+    station: StationLike,
+    folder: str | Path,
+    count: int,
+    *,
+    workers: int = 1,
+    progress: Callable[[SampledScene], None] | None = None,
+    known: Callable[[int], None] | None = None,
+) -> SampledFolder:
+    """Samples scenes 0 to `count` - 1 of a recipe, but for those that the folder has.
+
+    Example::
+
+        library, station = burg.load_library("household"), burg.load_station("panda_tabletop")
+        recipe = burg.SceneRecipe(library="household", count=5, layout="packed")
+        burg.sample_scenes(recipe, library, station, "scenes", 100, workers=4)
+
+    Args:
+        recipe: how scenes are drawn; what it refers to is relative to the folder.
+        library, station: those of the recipe.
+        folder: where to write.
+        count: number of scenes.
+        workers: number of processes; with one this process does it.
+        progress: called after each scene.
+        known: called at the beginning with the number of scenes that the folder has.
+
+    Raises:
+        InvalidInputError, UnknownNameError: see `SceneFolder` and `require_possible_recipe`.
+    """
+    station = as_station(station)
+    require_possible_recipe(recipe, library, station)
+    provenance = sampling_provenance(recipe, library, station)
+    with SceneFolder(folder, provenance) as opened:
+        inputs = _sampling_inputs(provenance, library, station, opened.path)
+        todo = [SceneTask(inputs, number) for number in range(count) if number not in opened.rows]
+        if known is not None:
+            known(count - len(todo))
+        new: list[int] = []
+        failed: dict[int, str] = {}
+        try:
+            for work, outcome in map_unordered(run_scene_task, todo, workers):
+                if isinstance(outcome, BaseException):
+                    failed[work.number] = one_line(outcome)
+                    continue
+                opened.add(outcome)
+                new.append(work.number)
+                if progress is not None:
+                    progress(outcome)
+        finally:
+            opened.sort()
+        rows = {number: row for number, row in sorted(opened.rows.items()) if number < count}
+    return SampledFolder(rows, tuple(sorted(new)), failed)
+
+
+def run_scene_task(work: SceneTask) -> SampledScene:
+    """Samples one scene.
+
+    Raises:
+        SimulationError: Drake ended by a failed condition.
+        Exception: what cannot be simulated is one failure.
+    """
+    try:
+        return _worker_sampler(work.inputs).sample(work.number, work.inputs.folder)
+    except SystemExit as error:  # DRAKE_DEMAND ends this way
+        raise SimulationError(f"Drake failed: {error}") from error
+
+
+def _sampling_inputs(
+    provenance: SamplingProvenance, library: ObjectLibrary, station: Station, folder: Path
+) -> SamplingInputs:
+    contents = (provenance.library_content, provenance.station_content)
+    return SamplingInputs(provenance.recipe, library.root, station.path, contents, folder)
+
+
+@lru_cache(maxsize=1)
+def _worker_sampler(inputs: SamplingInputs) -> SceneSampler:
+    """The sampler that a process keeps from scene to scene.
+
+    Raises:
+        InvalidInputError: library or station are not any more what they were.
+    """
+    library, station = load_library(inputs.library), load_station(inputs.station)
+    sampler = SceneSampler(inputs.recipe, library, station)
+    there = sampler.provenance
+    for what, found, path, content in (
+        ("library", there.library_content, library.root, inputs.contents[0]),
+        ("station", there.station_content, station.path, inputs.contents[1]),
+    ):
+        if found != content:
+            raise InvalidInputError(
+                f"the {what} {path} was changed while scenes were sampled; run the command again"
+            )
+    return sampler

@@ -1,8 +1,0 @@
-"""Antipodal grasps on meshes.
-
-Read `antipodal` first.
-"""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,392 @@
+"""Statistics of a set of grasps, and comparison of two sets: coverage, precision, nearest grasps.
+
+Coverage is the share of a reference that has a grasp of the other set nearby (coverage_1 of
+Eppner, Mousavian and Fox, "A Billion Ways to Grasp", ISRR 2019). Precision is the share of the
+other set that has a grasp of the reference nearby. Only grasps of the same object match, and of
+the same instance if both sets have the column `instance`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from burg_drake.core import Array, GraspSet
+from burg_drake.grasping.grasp_distance import (
+    DISTANCE_LEVER,
+    DISTANCE_VERSION,
+    INSTANCE_COLUMN,
+    by_shared_target,
+    check_lever,
+    grasp_components,
+    pair_angle,
+    pair_translation,
+)
+from burg_drake.grasping.neighbour_search import (
+    Tolerance,
+    find_nearest,
+    find_within,
+    neighbour_distances,
+)
+
+DEFAULT_TOLERANCE = Tolerance()  # Tolerances of `coverage` and `precision`.
+
+
+@dataclass(frozen=True)
+class Share:
+    """How many of how many.
+
+    Attributes:
+        count: grasps with a match.
+        total: grasps.
+    """
+
+    count: int
+    total: int
+
+    @property
+    def value(self) -> float:
+        """The share in [0, 1]; NaN of nothing."""
+        return self.count / self.total if self.total else math.nan
+
+
+@dataclass(frozen=True, eq=False)
+class Matches:
+    """Which grasps of a set have a match in another one.
+
+    Attributes:
+        matched: (N,) bool, in the order of the set.
+        object: (N,) names of the objects.
+        tolerance: what counted as a match.
+        version: `DISTANCE_VERSION`.
+    """
+
+    matched: NDArray[np.bool_]
+    object: NDArray[np.str_]
+    tolerance: Tolerance
+    version: int = field(default=DISTANCE_VERSION)
+
+    @property
+    def overall(self) -> Share:
+        """The share of all grasps; each counts the same, whatever its object."""
+        return Share(int(self.matched.sum()), len(self.matched))
+
+    @property
+    def by_object(self) -> dict[str, Share]:
+        """The share of each object's grasps, by name."""
+        names, inverse = np.unique(self.object, return_inverse=True)
+        total = np.bincount(inverse, minlength=len(names)).tolist()
+        count = np.bincount(inverse[self.matched], minlength=len(names)).tolist()
+        return {str(n): Share(c, t) for n, c, t in zip(names, count, total, strict=True)}
+
+
+@dataclass(frozen=True, eq=False)
+class Nearest:
+    """For each grasp of a set, the nearest one of another set.
+
+    Attributes:
+        index: (N,) in the other set, see `find_nearest` for ties; -1 if it has none of that object.
+        distance: (N,) combined distance [m]; infinite if there is none, as are the other two.
+        translation: (N,) [m].
+        angle: (N,) modulo the swap of the fingers [rad].
+        lever: of the combined distance [m/rad].
+        version: `DISTANCE_VERSION`.
+    """
+
+    index: NDArray[np.intp]
+    distance: Array
+    translation: Array
+    angle: Array
+    lever: float
+    version: int = field(default=DISTANCE_VERSION)
+
+
+def coverage(
+    reference: GraspSet,
+    grasps: GraspSet,
+    *,
+    translation: float = DEFAULT_TOLERANCE.translation,
+    angle: float = DEFAULT_TOLERANCE.angle,
+    distance: float = DEFAULT_TOLERANCE.distance,
+    lever: float = DISTANCE_LEVER,
+) -> Matches:
+    """Which grasps of a reference have one of `grasps` within all bounds.
+
+    Args:
+        reference: the set to be covered.
+        grasps: the set that covers it.
+        translation: largest translation [m].
+        angle: largest angle modulo the swap of the fingers [rad].
+        distance: largest combined distance [m]; not bounded by default.
+        lever: weight of the angle in it [m/rad].
+
+    Returns:
+        For each grasp of the reference.
+
+    Raises:
+        InvalidInputError: a bound is negative or NaN.
+    """
+    tolerance = Tolerance(translation, angle, distance, lever)
+    matched = np.zeros(len(reference), dtype=bool)
+    for rows, columns in by_shared_target(reference, grasps):
+        G, F = grasp_components(reference.X_OG[rows]), grasp_components(grasps.X_OG[columns])
+        matched[rows] = find_within(G, F, tolerance)
+    return Matches(matched, reference.object, tolerance)
+
+
+def precision(
+    grasps: GraspSet,
+    reference: GraspSet,
+    *,
+    translation: float = DEFAULT_TOLERANCE.translation,
+    angle: float = DEFAULT_TOLERANCE.angle,
+    distance: float = DEFAULT_TOLERANCE.distance,
+    lever: float = DISTANCE_LEVER,
+) -> Matches:
+    """Which of `grasps` have a grasp of a reference within all bounds; see `coverage`.
+
+    Returns:
+        For each of `grasps`.
+
+    Raises:
+        InvalidInputError: a bound is negative or NaN.
+    """
+    return coverage(
+        grasps, reference, translation=translation, angle=angle, distance=distance, lever=lever
+    )
+
+
+def nearest_grasps(grasps: GraspSet, others: GraspSet, *, lever: float = DISTANCE_LEVER) -> Nearest:
+    """The nearest grasp of another set to each grasp, by combined distance.
+
+    Args:
+        grasps: N grasps.
+        others: M grasps.
+        lever: weight of the angle [m/rad].
+
+    Raises:
+        InvalidInputError: the lever is negative or not finite.
+    """
+    check_lever(lever)
+    index = np.full(len(grasps), -1, dtype=np.intp)
+    distance, translation, angle = (np.full(len(grasps), np.inf) for _ in range(3))
+    for rows, columns in by_shared_target(grasps, others):
+        G, F = grasp_components(grasps.X_OG[rows]), grasp_components(others.X_OG[columns])
+        found, distance[rows] = find_nearest(G, F, lever=lever)
+        index[rows] = columns[found]
+        translation[rows] = pair_translation(G, F[:, found])
+        angle[rows] = pair_angle(G, F[:, found])
+    return Nearest(index, distance, translation, angle, lever)
+
+
+Mask = NDArray[np.bool_]
+
+QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)  # Quantiles of a `Distribution`.
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """Of numbers; those that are not finite are counted and left out.
+
+    Attributes:
+        count: finite numbers.
+        missing: others.
+        mean: of the finite ones; NaN if there are none.
+        quantiles: at `QUANTILES`, least to greatest; NaN likewise.
+    """
+
+    count: int
+    missing: int
+    mean: float
+    quantiles: tuple[float, ...]
+
+    @property
+    def median(self) -> float:
+        """The middle of the quantiles."""
+        return self.quantiles[QUANTILES.index(0.5)]
+
+
+@dataclass(frozen=True)
+class ObjectSummary:
+    """Grasps of one object, or of all.
+
+    Attributes:
+        grasps: how many.
+        instances: how many instances they are on; 0 if the set does not say.
+        duplicates: grasps that another one of the same object and instance equals.
+        neighbour: distance of each to the nearest other one [m], see `neighbour_distances`.
+        width: distance of the contacts [m].
+        score: of the grasps.
+    """
+
+    grasps: int
+    instances: int
+    duplicates: int
+    neighbour: Distribution
+    width: Distribution
+    score: Distribution
+
+
+@dataclass(frozen=True)
+class SetSummary:
+    """Figures of a set of grasps.
+
+    Attributes:
+        overall: of all grasps.
+        objects: by name of the object.
+        numbers: of each column of numbers, and of the coordinates `x`, `y`, `z` [m].
+        truths: grasps for which each column of truth values holds.
+        texts: how often each value of each column of text occurs, the most frequent first.
+        version: `DISTANCE_VERSION`.
+    """
+
+    overall: ObjectSummary
+    objects: dict[str, ObjectSummary]
+    numbers: dict[str, Distribution]
+    truths: dict[str, Share]
+    texts: dict[str, dict[str, int]]
+    version: int = field(default=DISTANCE_VERSION)
+
+
+@dataclass(frozen=True)
+class ObjectComparison:
+    """Grasps of one object, or of all, of a reference and of another set.
+
+    Attributes:
+        coverage: share of the reference with a match in the other set.
+        precision: share of the other set with a match in the reference.
+        to_grasps: combined distance of each grasp of the reference to the nearest other one [m].
+        to_reference: the same of each other grasp to the nearest of the reference [m].
+        translation, angle: between each grasp of the reference and that nearest one [m, rad].
+    """
+
+    coverage: Share
+    precision: Share
+    to_grasps: Distribution
+    to_reference: Distribution
+    translation: Distribution
+    angle: Distribution
+
+
+@dataclass(frozen=True)
+class SetComparison:
+    """Two sets of grasps held against each other.
+
+    Attributes:
+        overall: of all grasps.
+        objects: by name, of every object of either set.
+        shared_ids: identifiers that both sets have.
+        tolerance: what counts as a match.
+        version: `DISTANCE_VERSION`.
+    """
+
+    overall: ObjectComparison
+    objects: dict[str, ObjectComparison]
+    shared_ids: int
+    tolerance: Tolerance
+    version: int = field(default=DISTANCE_VERSION)
+
+
+def distribution(values: ArrayLike) -> Distribution:
+    """Of (N,) numbers."""
+    all_values = np.asarray(values, dtype=float)
+    finite = all_values[np.isfinite(all_values)]
+    missing = len(all_values) - len(finite)
+    if not len(finite):
+        return Distribution(0, missing, np.nan, (np.nan,) * len(QUANTILES))
+    quantiles = tuple(np.quantile(finite, QUANTILES).tolist())
+    return Distribution(len(finite), missing, float(finite.mean()), quantiles)
+
+
+def summarize(grasps: GraspSet, *, lever: float = DISTANCE_LEVER) -> SetSummary:
+    """Figures of a set.
+
+    Args:
+        grasps: the set.
+        lever: weight of the angle in distances [m/rad].
+
+    Raises:
+        InvalidInputError: the lever is negative or not finite.
+    """
+    neighbour = neighbour_distances(grasps, lever=lever)
+    everything = np.full(len(grasps), True)
+    objects = {name: grasps.object == name for name in np.unique(grasps.object).tolist()}
+    numbers = {name: distribution(grasps.X_OG[:, k, 3]) for k, name in enumerate(("x", "y", "z"))}
+    truths, texts = {}, {}
+    for name in grasps.column_names:
+        values = grasps.column(name)
+        if values.dtype.kind == "b":
+            truths[name] = _finite_share(values)
+        elif values.dtype.kind != "U":
+            numbers[name] = distribution(values)
+        elif name not in ("id", "object"):
+            texts[name] = _count_values(values.tolist())
+    return SetSummary(
+        overall=_summarize_object(grasps, neighbour, everything),
+        objects={name: _summarize_object(grasps, neighbour, of) for name, of in objects.items()},
+        numbers=numbers,
+        truths=truths,
+        texts=texts,
+    )
+
+
+def compare_grasps(
+    reference: GraspSet, grasps: GraspSet, tolerance: Tolerance | None = None
+) -> SetComparison:
+    """Holds a set of grasps against a reference.
+
+    Args:
+        reference: what is to be covered.
+        grasps: the other set.
+        tolerance: what counts as a match, and the lever of distances; the default one if None.
+    """
+    tolerance = tolerance or Tolerance()
+    bounds = {name: getattr(tolerance, name) for name in ("translation", "angle", "distance")}
+    lever = tolerance.lever
+    covered = coverage(reference, grasps, **bounds, lever=lever).matched
+    precise = coverage(grasps, reference, **bounds, lever=lever).matched
+    nearest = nearest_grasps(reference, grasps, lever=lever)
+    back = nearest_grasps(grasps, reference, lever=lever).distance
+
+    def part(of: Mask, others: Mask) -> ObjectComparison:
+        return ObjectComparison(
+            coverage=_finite_share(covered[of]),
+            precision=_finite_share(precise[others]),
+            to_grasps=distribution(nearest.distance[of]),
+            to_reference=distribution(back[others]),
+            translation=distribution(nearest.translation[of]),
+            angle=distribution(nearest.angle[of]),
+        )
+
+    names = np.union1d(reference.object, grasps.object).tolist()
+    return SetComparison(
+        overall=part(np.full(len(reference), True), np.full(len(grasps), True)),
+        objects={name: part(reference.object == name, grasps.object == name) for name in names},
+        shared_ids=len(np.intersect1d(reference.id, grasps.id)),
+        tolerance=tolerance,
+    )
+
+
+def _summarize_object(grasps: GraspSet, neighbour: Array, of: Mask) -> ObjectSummary:
+    instances = grasps.columns.get(INSTANCE_COLUMN)
+    return ObjectSummary(
+        grasps=int(of.sum()),
+        instances=0 if instances is None else len(set(instances[of].tolist())),
+        duplicates=int((neighbour[of] == 0.0).sum()),
+        neighbour=distribution(neighbour[of]),
+        width=distribution(grasps.width[of]),
+        score=distribution(grasps.score[of]),
+    )
+
+
+def _finite_share(values: Mask) -> Share:
+    return Share(int(values.sum()), len(values))
+
+
+def _count_values(values: list[str]) -> dict[str, int]:
+    """How often each value occurs, the most frequent first, then by name."""
+    return dict(sorted(Counter(values).items(), key=lambda item: (-item[1], item[0])))

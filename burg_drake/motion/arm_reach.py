@@ -1,0 +1,462 @@
+"""Decides whether the arm can execute a grasp, all the way from home to the top of the lift.
+
+The motion leads from home to the pregrasp, straight to the grasp, and straight back and up.
+Where there is no room for the whole lift, lower ones are tried.
+
+A positive verdict carries the whole motion, checked by Drake's collision checker. A negative one
+names what failed first and what was in the way. Both finger assignments are tried. A verdict
+depends on the grasp alone: not on other grasps, their order, or a random stream.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from burg_drake.core import (
+    Array,
+    Booleans,
+    Indices,
+    InvalidInputError,
+    Outcome,
+    check_pose,
+    inverse,
+    swap_fingers,
+)
+from burg_drake.geometry import CONTACT_TOLERANCE
+from burg_drake.motion.arm_collision import ArmCollision
+from burg_drake.motion.clearance_bounds import ArmProximity
+from burg_drake.motion.closed_form_lines import ClosedFormLineSearch
+from burg_drake.motion.edge_checker import EdgeChecker
+from burg_drake.motion.hand_sweep import HandSweep, SweepResult
+from burg_drake.motion.home_posture import require_free_home
+from burg_drake.motion.home_tree import HomeTree
+from burg_drake.motion.ik_solutions import IkRoutine, RoutineSolutions
+from burg_drake.motion.line_poses import LinePoses
+from burg_drake.motion.line_search import LineSearch, SuccessiveLineSearch
+from burg_drake.motion.motion_search import GraspBatch, MotionSearch
+from burg_drake.motion.motion_settings import ReachSettings
+from burg_drake.motion.numeric_ik import ArmKinematics
+from burg_drake.motion.numeric_lines import NumericLineSearch
+from burg_drake.motion.panda_ik import PandaIk
+from burg_drake.motion.reach_verdict import Reach
+from burg_drake.motion.roadmap import postures_over_objects
+from burg_drake.scene import SceneLike, as_scene
+from burg_drake.station import StationLike, as_station, build_station_diagram
+
+
+@dataclass(frozen=True, eq=False)
+class HandVerdicts:
+    """What the hand's ways decide about N grasps with the fingers either way.
+
+    Attributes:
+        blocked_by: (N, 2) what is in the way first; None where nothing is.
+        clearance: (N, 2) of the hand on its way, negative where it is not free [m].
+    """
+
+    blocked_by: NDArray[np.object_]
+    clearance: Array
+
+    def __getitem__(self, chosen: Indices) -> HandVerdicts:
+        return HandVerdicts(self.blocked_by[chosen].copy(), self.clearance[chosen].copy())
+
+    @property
+    def blocked(self) -> NDArray[np.bool_]:
+        """(N,) grasps that the hand gets to, or away from, with its fingers in neither way."""
+        return np.asarray((self.clearance < 0.0).all(axis=1))
+
+    def refusal(self, grasp: int) -> Reach:
+        """Of one that is blocked; the first way to put the fingers decides."""
+        said = next(no for no in self.blocked_by[grasp] if no is not None)
+        assert isinstance(said, Reach)
+        return said
+
+    def put(self, flip: int, rows: Indices, sweep: SweepResult, outcome: Outcome) -> None:
+        """Takes over what is in the way of some grasps (S,) with the fingers in one way."""
+        blocked = np.minimum(sweep.clearance, -CONTACT_TOLERANCE)
+        room = np.where(sweep.free, np.maximum(sweep.clearance, 0.0), blocked)
+        self.clearance[rows, flip] = np.minimum(self.clearance[rows, flip], room)
+        for k in np.flatnonzero(~sweep.free):
+            self.blocked_by[rows[k], flip] = Reach(
+                outcome, str(sweep.blocker[k]), float(sweep.clearance[k])
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class HandPaths:
+    """N grasps whose hand's ways are judged.
+
+    Attributes:
+        sweep: the hand in its scene.
+        instance: (N,) names of the targets; "" without one.
+        X_both: (N, 2, 4, 4) grasps in the world with their fingers either way.
+        width: (N,) distances between the pads that hold the target [m].
+        retreats: whether the hand goes back before it is lifted.
+    """
+
+    sweep: HandSweep
+    instance: NDArray[np.object_]
+    X_both: Array
+    width: Array
+    retreats: bool
+
+    def __getitem__(self, chosen: Indices) -> Self:
+        return type(self)(
+            self.sweep,
+            self.instance[chosen],
+            self.X_both[chosen],
+            self.width[chosen],
+            self.retreats,
+        )
+
+    def before_lift(self) -> HandVerdicts:
+        """Approach and retreat."""
+        shape = self.X_both.shape[:2]
+        found = HandVerdicts(np.full(shape, None, dtype=object), np.full(shape, np.inf))
+        for name, flip, at in self._to_check(found):
+            sweep = self.sweep.approach(name, self.X_both[at, flip])
+            found.put(flip, at, sweep, Outcome.HAND_COLLISION_APPROACH)
+        for name, flip, at in self._to_check(found) if self.retreats else ():
+            sweep = self.sweep.retreat(name, self.X_both[at, flip], self.width[at])
+            found.put(flip, at, sweep, Outcome.HAND_COLLISION_RETREAT)
+        return self._mirrored(found)
+
+    def lifted(self, before: HandVerdicts, height: float) -> HandVerdicts:
+        """The same with the lift to a height [m]."""
+        found = before[np.arange(len(before.blocked_by))]
+        for name, flip, at in self._to_check(found):
+            sweep = self.sweep.lift(name, self.X_both[at, flip], self.width[at], height)
+            found.put(flip, at, sweep, Outcome.HAND_COLLISION_LIFT)
+        return self._mirrored(found)
+
+    def _to_check(self, found: HandVerdicts) -> list[tuple[str, int, Indices]]:
+        """Targets, ways to put the fingers, and the grasps that are free so far."""
+        flips = (0,) if self.sweep.symmetric else (0, 1)
+        return [
+            (
+                name,
+                flip,
+                np.flatnonzero((self.instance == name) & (found.clearance[:, flip] >= 0.0)),
+            )
+            for name in dict.fromkeys(self.instance.tolist())
+            for flip in flips
+        ]
+
+    def _mirrored(self, found: HandVerdicts) -> HandVerdicts:
+        if self.sweep.symmetric:
+            found.clearance[:, 1], found.blocked_by[:, 1] = (
+                found.clearance[:, 0],
+                found.blocked_by[:, 0],
+            )
+        return found
+
+
+ReachAtHeight = Callable[[float, Indices], Sequence[Reach]]
+"""Verdicts on some grasps (S,) that are lifted to a height [m]."""
+HandIsFree = Callable[[float, Indices], Booleans]
+"""Whether the hand alone is free on its ways (S,), lifted to a height [m]."""
+LevelIsFree = Callable[[int, Indices], Booleans]
+"""Whether some rows (S,) are free up to a level."""
+
+
+def lift_heights(least: float, most: float) -> Array:
+    """What is tried, rising from `least` by `STEP` to `most` [m]."""
+    height_step = 0.01  # Metres between the heights that are tried.
+    decimals = 9  # Of heights in metres. Sums of steps have rounding errors.
+    rising = np.arange(least, most - 1e-9, height_step)
+    rising[1:] = np.round(rising[1:], decimals)
+    return np.append(rising, most)
+
+
+def raise_lifts(
+    whole: Sequence[Reach], tried: Array, judge: ReachAtHeight, hand_is_free: HandIsFree
+) -> list[Reach]:
+    """Goes on with grasps whose lift is not whole.
+
+    Args:
+        whole: N verdicts with the whole lift.
+        tried: (H,) rising heights, of which the last is the whole lift [m].
+        judge: asks about others.
+        hand_is_free: likewise.
+
+    Returns:
+        N verdicts: where there is room for the first of the heights, a yes with the largest one
+        that was found, and as its `blocker` what is in the way of the whole lift; otherwise why
+        there is no room for the first.
+    """
+    # Outcomes that a lower lift does not change.
+    height_independent = (
+        Outcome.HAND_COLLISION_APPROACH,
+        Outcome.HAND_COLLISION_RETREAT,
+        Outcome.NO_IK,
+        Outcome.JOINT_LIMIT,
+    )
+    found = list(whole)
+    asked = _true_indices(
+        reach.outcome is not None and reach.outcome not in height_independent for reach in whole
+    )
+    low, high = np.full(len(asked), -1), np.full(len(asked), len(tried) - 1)
+
+    def reached(level: int, rows: Indices) -> Booleans:
+        verdicts = judge(tried[level], asked[rows])
+        for k, reach in zip(asked[rows], verdicts, strict=True):
+            if reach.outcome is None:
+                found[k] = replace(reach, blocker=whole[k].blocker)
+            elif level == 0:
+                found[k] = reach
+        return np.array([reach.outcome is None for reach in verdicts], dtype=bool)
+
+    by_hand = _true_indices(whole[k].outcome is Outcome.HAND_COLLISION_LIFT for k in asked)
+    free, _ = _bisect_levels(
+        low[by_hand],
+        high[by_hand],
+        lambda level, rows: hand_is_free(tried[level], asked[by_hand[rows]]),
+    )
+    # As high as the hand gets by itself, the arm often does, too.
+    guess = np.full(len(asked), -1)
+    guess[by_hand] = np.maximum(free, 0)
+    high[by_hand] = guess[by_hand] + 1
+    low, high = _narrow_levels(low, high, guess, reached)
+    # Where there is no room for the first of the heights, there is none for any.
+    low, high = _narrow_levels(low, high, np.where(low < 0, 0, -1), reached)
+    _bisect_levels(low, high, reached)
+    return found
+
+
+def _bisect_levels(low: Indices, high: Indices, is_free: LevelIsFree) -> tuple[Indices, Indices]:
+    """Neighbouring levels of which the lower is free and the upper is not, for R rows, from levels
+    (R,) of which that is known."""
+    while (high - low > 1).any():
+        low, high = _narrow_levels(low, high, (low + high) // 2, is_free)
+    return low, high
+
+
+def _narrow_levels(
+    low: Indices, high: Indices, middle: Indices, is_free: LevelIsFree
+) -> tuple[Indices, Indices]:
+    """The same with what is between them looked at at one level each (R,)."""
+    low, high = low.copy(), high.copy()
+    between = (low < middle) & (middle < high)
+    for level in np.unique(middle[between]).tolist():
+        rows = np.flatnonzero(between & (middle == level))
+        free = is_free(level, rows)
+        low[rows[free]], high[rows[~free]] = level, level
+    return low, high
+
+
+def _true_indices(said: Iterable[bool]) -> Indices:
+    return np.flatnonzero(np.fromiter(said, dtype=bool))
+
+
+GRASPS_PER_BATCH = 128
+"""Grasps searched together. Larger batches are hardly cheaper per grasp."""
+
+
+class ArmReach:
+    """Judges grasps of one scene; objects stand where the document places them.
+
+    Attributes:
+        settings: how thoroughly it looks.
+        motion: the hand's straight segments to a grasp and away from it.
+        kinematics: the arm on its own.
+        diagram: the station diagram of the checks.
+    """
+
+    def __init__(
+        self,
+        scene: SceneLike,
+        station: StationLike,
+        *,
+        settings: ReachSettings | None = None,
+        ik: IkRoutine | None = None,
+    ) -> None:
+        """Builds the diagrams that all checks share.
+
+        Args:
+            scene, station: what stands where: as loaded, or references for `load_scene` and
+                `load_station`.
+            settings: how thoroughly to look, if not as usual.
+            ik: inverse kinematics of one's own for an arm without a closed form here.
+
+        Raises:
+            InvalidInputError: the station has no arm, or in its home posture something collides.
+        """
+        self.settings = settings or ReachSettings()
+        scene, station = as_scene(scene), as_station(station)
+        diagram = build_station_diagram(scene, station, robot="arm", weld_objects=True)
+        self.motion = self.settings.motion or station.document.motion
+        arm = station.document.arm
+        assert arm is not None  # build_station_diagram has seen to it
+        self.diagram = diagram
+        self._proximity = ArmProximity(diagram)
+        collision = ArmCollision(diagram, apart=self._proximity.apart)
+        require_free_home(diagram, collision)
+        self.kinematics = ArmKinematics.of(diagram)
+        edges = EdgeChecker(self._proximity, collision, exact=self.settings.exact)
+        home = np.array(arm.home)
+        lower, upper = self.kinematics.one_revolution_around(home, self.settings.limit_margin)
+        focus = postures_over_objects(diagram, self._proximity.links, home, lower, upper)
+        self._tree = HomeTree(edges, home, lower, upper, focus=focus)
+        self._sweep = HandSweep(scene, station, self.motion)
+        X_WA = arm.X_WA.matrix()
+        self._X_AW = inverse(X_WA)
+        self._lines = LinePoses.of(station.hand.X_HG.matrix(), X_WA[:3, :3], self.motion)
+        self._search = _line_search(self, self._proximity, self._lines, home, ik)
+        self._searches: dict[float, LineSearch] = {}
+
+    def check(self, instance: str, X_WG: ArrayLike, width: float = np.nan) -> Reach:
+        """Judges one grasp: as in a batch.
+
+        Args:
+            instance: the target's name in the scene.
+            X_WG: (4, 4) grasp in the world, at which the open hand is clear.
+            width: distance between the pads that hold the target [m]; NaN if it is not known, and
+                the hand goes back and up as wide as it is open then.
+
+        Returns:
+            The verdict; the same for a grasp and for the one with its fingers swapped.
+
+        Raises:
+            InvalidInputError: `X_WG` is not a pose.
+            UnknownNameError: the scene has no such instance.
+        """
+        X = check_pose(X_WG, "X_WG")
+        return self.check_all([instance], X[None], np.array([width]))[0]
+
+    def check_all(
+        self, instances: Sequence[str], X_WG: ArrayLike, width: ArrayLike | None = None
+    ) -> list[Reach]:
+        """Judges N grasps.
+
+        Args:
+            instances: N names of the targets.
+            X_WG: (N, 4, 4) grasps in the world.
+            width: (N,) as for `check`; unknown if None.
+
+        Returns:
+            N verdicts, which do not depend on each other.
+
+        Raises:
+            InvalidInputError: `X_WG` are not poses, or the numbers differ.
+            UnknownNameError: the scene has no such instance.
+        """
+        X = check_pose(X_WG, "X_WG")
+        widths = np.full(len(X), np.nan) if width is None else np.asarray(width, dtype=float)
+        if X.ndim != 3 or not len(X) == len(instances) == len(widths):
+            raise InvalidInputError(
+                f"X_WG has shape {X.shape} for {len(instances)} instances and {len(widths)}"
+                " widths; give N poses (N, 4, 4), N instances and N widths"
+            )
+        paths = HandPaths(
+            self._sweep,
+            np.array(instances, dtype=object),
+            _with_swapped_fingers(X, self._X_AW),
+            widths,
+            retreats=self.motion.retreat > 0.0,
+        )
+        before, motion = paths.before_lift(), self.motion
+
+        def judge(height: float, some: Indices) -> list[Reach]:
+            return self._lifted(paths[some], before[some], float(height))
+
+        def hand_is_free(height: float, some: Indices) -> NDArray[np.bool_]:
+            return ~paths[some].lifted(before[some], height).blocked
+
+        whole = judge(motion.lift_height, np.arange(len(X)))
+        if motion.shortest >= motion.lift_height:
+            return whole
+        tried = lift_heights(motion.shortest, motion.lift_height)
+        return raise_lifts(whole, tried, judge, hand_is_free)
+
+    def path_is_free(
+        self,
+        q: Array,
+        *,
+        hand: bool = True,
+        carried: str | None = None,
+        moved_W: Array | None = None,
+        width: float = np.nan,
+    ) -> bool:
+        """Whether the arm can follow a polyline in joint space without a collision.
+
+        Args:
+            q: (M, n) its corners, at least one.
+            hand: whether the bounds that are asked first count the hand against the scene; without,
+                the motion of the hand has been judged otherwise. Drake counts it all the same.
+            carried: instance that the hand carries, if any.
+            moved_W: (M, 3) how far it is from its place at each corner [m]; straight between
+                corners.
+            width: distance between the pads that carry it [m]; NaN if the hand is open.
+        """
+        blocked = self._tree.edges.first_blocked(
+            q, hand=hand, carried=carried, moved_W=moved_W, width=width
+        )
+        return blocked is None
+
+    def shortcut(self, q: Array) -> Array:
+        """A collision-free path (M, n) with the same ends as one from home that is no longer."""
+        return self._tree.shortcut(q)
+
+    def _lifted(self, paths: HandPaths, before: HandVerdicts, height: float) -> list[Reach]:
+        """Verdicts on N grasps with a lift to one height [m]."""
+        max_poses = 12 * GRASPS_PER_BATCH  # Poses of their ways. Bounds the memory to about 130 MB.
+        hand = paths.lifted(before, height)
+        found: dict[int, Reach] = {
+            int(k): hand.refusal(int(k)) for k in np.flatnonzero(hand.blocked)
+        }
+        left = np.flatnonzero(~hand.blocked)
+        if height not in self._searches:
+            self._searches[height] = self._search.lifted(height)
+        size = min(GRASPS_PER_BATCH, max_poses // len(replace(self._lines, lift=height).layers))
+        for k in range(0, len(left), size):
+            part = left[k : k + size]
+            X_WG, clearance = paths.X_both[part], hand.clearance[part]
+            lines = self._searches[height].begin(self._X_AW @ X_WG, clearance)
+            task = GraspBatch(paths.instance[part].tolist(), X_WG, paths.width[part], clearance)
+            verdicts = MotionSearch(task, lines, self._tree, self.settings).run()
+            for index, verdict in zip(part.tolist(), verdicts, strict=True):
+                reached = verdict.outcome is None
+                found[index] = replace(verdict, lift=height) if reached else verdict
+        return [found[k] for k in range(len(hand.blocked))]
+
+
+def _with_swapped_fingers(X_WG: Array, X_AW: Array) -> Array:
+    """(N, 2, 4, 4) grasps in the world and their twins with swapped fingers, in the same order
+    whichever of the two was given."""
+    twins = np.stack([X_WG, swap_fingers(X_WG)], axis=1)
+    closing_A = (X_AW[:3, :3] @ X_WG[:, :3, :1])[..., 0]
+    largest = np.take_along_axis(closing_A, np.abs(closing_A).argmax(axis=1)[:, None], axis=1)
+    swapped = largest[:, 0] <= 0.0
+    twins[swapped] = twins[swapped][:, ::-1]
+    return twins
+
+
+def _line_search(
+    reach: ArmReach,
+    proximity: ArmProximity,
+    lines: LinePoses,
+    home: Array,
+    routine: IkRoutine | None,
+) -> LineSearch:
+    """By the closed form first where the arm has one and it is wanted, else numerically."""
+    arm, settings = reach.kinematics, reach.settings
+    margin = settings.limit_margin
+    if routine is not None:
+        return NumericLineSearch(
+            *(arm, lines, proximity, home, settings),
+            solutions=RoutineSolutions(arm, routine, margin),
+            beyond=RoutineSolutions(arm, routine, margin, limited=False),
+        )
+    ik = PandaIk.of(arm) if settings.closed_form else None
+    if ik is None:
+        return NumericLineSearch(arm, lines, proximity, home, settings)
+    rest = lines, proximity, home
+    few = replace(settings, starts=settings.starts[:1])  # more found nothing more in 3,000 grasps
+    return SuccessiveLineSearch(
+        ClosedFormLineSearch(arm, ik.within(margin), *rest, settings),
+        lambda: NumericLineSearch(arm, *rest, few),
+    )

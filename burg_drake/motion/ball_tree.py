@@ -1,0 +1,391 @@
+"""A tree of balls around each body of the robot, and the balls that cover a convex shape.
+
+The balls at the leaves cover the body and stick out of it by no more than a tolerance.
+
+A ball about an interior point whose radius is the point's depth plus the tolerance sticks out by
+at most the tolerance. Capsules take a row of balls along the axis. Boxes and cylinders are cut
+into cells, and a greedy set cover picks balls. All trees have the same depth and share their
+arrays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import (
+    Box,
+    Capsule,
+    Convex,
+    Cylinder,
+    GeometryId,
+    Mesh,
+    SceneGraphInspector,
+    Sphere,
+)
+from pydrake.multibody.tree import BodyIndex
+
+from burg_drake.core import Array, Indices, InvalidInputError, Single, inverse, transform_points
+from burg_drake.geometry import Polytope
+from burg_drake.motion.arm_links import ArmLinks, LinkPoses
+from burg_drake.station import StationDiagram
+
+
+class BallCoverSettings:
+    """Ball cover settings."""
+
+    cell_size = 1.8  # Size of a cell over the overshoot.
+    max_cells = 2_000  # Cells of a shape. Larger shapes are cut more coarsely.
+    coarsening = 1.1  # Factor by which the overshoot rises until there are few enough cells.
+    max_inner_radius = 0.08  # Metres. Radius of the largest balls inside a shape.
+    rounding = 1e-9  # Metres. Far above the rounding error of a distance.
+
+
+@dataclass(frozen=True, eq=False)
+class Balls:
+    """M balls that cover a shape.
+
+    Attributes:
+        center: (M, 3) [m].
+        outer: (M,) radii with which they cover it [m].
+        inner: (M,) radii of the balls about the same centres inside the shape [m].
+    """
+
+    center: Array
+    outer: Array
+    inner: Array
+
+    def moved(self, X_AB: Array) -> Balls:
+        """The balls given in B, expressed in A: `X_AB` is (4, 4)."""
+        return Balls(transform_points(X_AB, self.center), self.outer, self.inner)
+
+    @classmethod
+    def joined(cls, several: list[Balls]) -> Balls:
+        """All of them."""
+        return cls(
+            np.concatenate([balls.center for balls in several]),
+            np.concatenate([balls.outer for balls in several]),
+            np.concatenate([balls.inner for balls in several]),
+        )
+
+
+def cover_body(
+    inspector: SceneGraphInspector, geometries: list[GeometryId], overshoot: float
+) -> Balls:
+    """Balls that cover the collision geometries of a body, in its frame.
+
+    Args:
+        inspector: of the scene graph.
+        geometries: of one body.
+        overshoot: how far balls should stick out [m]; those of shapes of some decimetres stick out
+            farther. Of a convex mesh the box around it is covered.
+
+    Raises:
+        InvalidInputError: a geometry is of a shape that cannot be covered.
+    """
+    balls = Balls(np.zeros((0, 3)), np.zeros(0), np.zeros(0))
+    by_rows = sorted(geometries, key=lambda g: not isinstance(inspector.GetShape(g), Capsule))
+    for geometry in by_rows:
+        X_BP = inspector.GetPoseInFrame(geometry).GetAsMatrix4()
+        more = _cover(inspector, geometry, overshoot, balls.moved(inverse(X_BP)))
+        balls = Balls.joined([balls, more.moved(X_BP)])
+    return balls
+
+
+def _cover(
+    inspector: SceneGraphInspector, geometry: GeometryId, overshoot: float, given: Balls
+) -> Balls:
+    shape = inspector.GetShape(geometry)
+    match shape:
+        case Sphere():
+            radius = np.array([shape.radius()])
+            return Balls(np.zeros((1, 3)), radius, radius)
+        case Capsule():
+            return _cover_capsule(shape.radius(), shape.length(), overshoot / 2)
+        case Box():
+            return _cover_box(np.asarray(shape.size()) / 2, overshoot, given)
+        case Cylinder():
+            return _cover_cylinder(shape.radius(), shape.length() / 2, overshoot, given)
+        case Convex() | Mesh():
+            hull = inspector.GetConvexHull(geometry)
+            points = np.array([hull.vertex(i) for i in range(hull.num_vertices())])
+            return _cover_hull(points, overshoot, given)
+    raise InvalidInputError(
+        f"collision geometry {inspector.GetName(geometry)!r} of the robot is a"
+        f" {type(shape).__name__}; supported are boxes, capsules, cylinders, spheres and convex"
+        " meshes"
+    )
+
+
+def _cover_capsule(radius: float, length: float, overshoot: float) -> Balls:
+    """A row along z; half way between two centres the larger balls meet on the capsule's side."""
+    step = 2.0 * np.sqrt((radius + overshoot) ** 2 - radius**2)
+    count = int(np.ceil(length / step)) + 1
+    z = np.linspace(-length / 2, length / 2, count)
+    outer = np.hypot(radius, (z[1] - z[0]) / 2)
+    return Balls(np.column_stack([0 * z, 0 * z, z]), np.full(count, outer), np.full(count, radius))
+
+
+def _affordable_cells(cells: Callable[[float], Array], overshoot: float) -> tuple[Array, float]:
+    """(3,) numbers of cells along a shape, and the overshoot that goes with them [m]."""
+    while np.prod(count := cells(overshoot)) > BallCoverSettings.max_cells:
+        overshoot *= BallCoverSettings.coarsening
+    return count.astype(int), overshoot
+
+
+def _cover_box(half: Array, overshoot: float, given: Balls) -> Balls:
+    count, overshoot = _affordable_cells(
+        lambda s: np.ceil(2.0 * half / (BallCoverSettings.cell_size * s)), overshoot
+    )
+    ticks = [np.linspace(-h, h, 2 * n + 1) for h, n in zip(half, count, strict=True)]
+    lattice = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1)
+    centers = _middles_and_inner_corners(lattice)
+    depth = (half - np.abs(centers)).min(axis=1)
+    return _choose_balls(centers, depth, lattice[::2, ::2, ::2], overshoot, given)
+
+
+def _cover_cylinder(radius: float, half_length: float, overshoot: float, given: Balls) -> Balls:
+    """Cells are sectors, whose outer corners lie outside, on a polygon about the circle."""
+    sides = np.array([2.0 * np.pi * radius, radius, 2.0 * half_length])
+    least = np.array([8, 1, 1])  # sectors, rings, layers
+    (sectors, rings, layers), overshoot = _affordable_cells(
+        lambda s: np.maximum(least, np.ceil(sides / (BallCoverSettings.cell_size * s))), overshoot
+    )
+    angle = np.pi * np.arange(2 * sectors + 1) / sectors
+    rho = radius / np.cos(np.pi / sectors) * np.linspace(0.0, 1.0, 2 * rings + 1)
+    z = np.linspace(-half_length, half_length, 2 * layers + 1)
+    r, a, h = np.meshgrid(rho, angle, z, indexing="ij")
+    lattice = np.stack([r * np.cos(a), r * np.sin(a), h], axis=-1)
+    centers = _middles_and_inner_corners(lattice)
+    axial = half_length - np.abs(centers[:, 2])
+    depth = np.minimum(radius - np.hypot(centers[:, 0], centers[:, 1]), axial)
+    return _choose_balls(centers, depth, lattice[::2, ::2, ::2], overshoot, given)
+
+
+def _cover_hull(points: Array, overshoot: float, given: Balls) -> Balls:
+    """The box around it, in whose directions a hull that is a box lies exactly."""
+    polytope = Polytope.from_points(points)
+    X = np.eye(4)
+    if (box := polytope.as_box()) is not None:
+        X, half = box
+    else:
+        X[:3, 3], half = polytope.bounds
+    balls = _cover_box(half, overshoot, given.moved(inverse(X))).moved(X)
+    depth = (polytope.offsets - balls.center @ polytope.normals.T).min(axis=1)
+    return Balls(balls.center, balls.outer, np.minimum(balls.inner, depth))
+
+
+def _middles_and_inner_corners(lattice: Array) -> Array:
+    """(C, 3) of a lattice (2a+1, 2b+1, 2c+1, 3) that halves the cells."""
+    middles, corners = lattice[1::2, 1::2, 1::2], lattice[2:-1:2, 2:-1:2, 2:-1:2]
+    return np.concatenate([middles.reshape(-1, 3), corners.reshape(-1, 3)])
+
+
+def _choose_balls(
+    centers: Array, depth: Array, nodes: Array, overshoot: float, given: Balls
+) -> Balls:
+    """A greedy set cover of cells by balls.
+
+    Args:
+        centers: (C, 3) of the balls to choose from [m]; the cells' middles first.
+        depth: (C,) of the centres in the shape [m].
+        nodes: (a, b, c, 3) corners of the cells [m].
+        overshoot: the balls' radii are their depths plus this [m].
+        given: balls that are there already.
+    """
+    cells = _cell_corners(nodes)
+    depth = np.minimum(depth, BallCoverSettings.max_inner_radius)
+    outer = depth + overshoot
+    reach = np.linalg.norm(cells - centers[: cells.shape[1]], axis=-1).max(axis=0)
+    outer[: len(reach)] = np.maximum(outer[: len(reach)], reach + BallCoverSettings.rounding)
+    left = ~_are_cells_covered(nodes, given.center, given.outer).any(axis=0)
+    covers = _are_cells_covered(nodes, centers, outer)[:, left]
+    picked = []
+    count = covers.sum(axis=1)
+    while covers.shape[1]:
+        best = int(count.argmax())
+        picked.append(best)
+        new = covers[best]
+        count = count - covers[:, new].sum(axis=1)
+        covers = covers[:, ~new]
+    return Balls(centers[picked], outer[picked], depth[picked])
+
+
+def _cell_corners(nodes: Array) -> Array:
+    """(8, cells, 3) corners of the cells between nodes (a, b, c, 3)."""
+    ends = (slice(None, -1), slice(1, None))
+    corners = [nodes[i, j, k] for i in ends for j in ends for k in ends]
+    return np.stack([corner.reshape(-1, 3) for corner in corners])
+
+
+def _are_cells_covered(nodes: Array, centers: Array, radii: Array) -> NDArray[np.bool_]:
+    """(C, cells) whether balls cover cells."""
+    flat = nodes.reshape(-1, 3)
+    square = (centers**2).sum(axis=1)[:, None] + (flat**2).sum(axis=1) - 2.0 * centers @ flat.T
+    covers = (square <= ((radii - BallCoverSettings.rounding / 2) ** 2)[:, None]).reshape(
+        -1, *nodes.shape[:3]
+    )
+    for axis in (1, 2, 3):
+        covers = np.moveaxis(covers, axis, 0)
+        covers = np.moveaxis(covers[:-1] & covers[1:], 0, axis)
+    return covers.reshape(len(centers), np.prod(covers.shape[1:]))
+
+
+MISSING_BALL_RADIUS = -1e3
+"""Metres. Radius in places of a node that hold no ball."""
+
+
+@dataclass(frozen=True, eq=False)
+class BodyBalls:
+    """A body of the robot.
+
+    Attributes:
+        body, frame: the body and the arm's frame in which it is fixed.
+        center, radius: (3,), [m] of a ball around it.
+        balls: that cover it, in the frame.
+        root: the first node of its tree.
+    """
+
+    body: BodyIndex
+    frame: int
+    center: Array
+    radius: float
+    balls: Balls
+    root: int
+
+
+@dataclass(frozen=True, eq=False)
+class BallTrees:
+    """T nodes of up to W balls each, the balls' arrays with one row for each place in a node.
+
+    Attributes:
+        bodies: those of the robot that have collision geometry, ordered by frames.
+        frame: (T,) the arm's frame in which a node is fixed.
+        centers: (3, W, T) [m].
+        outer: (W, T) radii of balls that together contain the node's part of the body [m].
+        inner: (W, T) radii of balls about the same centres inside the body, in leaves [m].
+        child: (W, T) the node within the ball; -1 in leaves and where there is no ball.
+    """
+
+    bodies: tuple[BodyBalls, ...]
+    frame: Indices
+    centers: Single
+    outer: Single
+    inner: Single
+    child: Indices
+
+    @cached_property
+    def _frames(self) -> Indices:
+        return np.array([body.frame for body in self.bodies], dtype=np.intp)
+
+    @cached_property
+    def _centers(self) -> Single:
+        return np.array([body.center for body in self.bodies], dtype=np.float32)
+
+    @classmethod
+    def of(cls, station_diagram: StationDiagram, links: ArmLinks) -> BallTrees:
+        """Covers the robot of a diagram."""
+        arm_overshoot = 8e-3  # Metres that balls stick out of moving links.
+        hand_overshoot = 8e-3  # Metres.
+        base_overshoot = 25e-3  # Metres, of links that do not move. Only the arm can hit them.
+        tree_depth = 3  # Levels of a tree.
+        plant = station_diagram.plant
+        inspector = station_diagram.scene_graph.model_inspector()
+        hand = set(plant.GetBodyIndices(plant.GetModelInstanceByName("hand")))
+        bodies: list[BodyBalls] = []
+        nodes: list[_Node] = []
+        for body in bodies_with_shape(station_diagram, links):
+            geometries = plant.GetCollisionGeometriesForBody(plant.get_body(body))
+            frame = links.frame_of[body]
+            overshoot = hand_overshoot if body in hand else arm_overshoot
+            balls = cover_body(inspector, geometries, overshoot if frame else base_overshoot)
+            balls = balls.moved(links.X_FB[body])
+            root = _append_tree(nodes, balls, frame, tree_depth)
+            bodies.append(BodyBalls(body, frame, *_enclosing_ball(balls), balls, root))
+        width = max(len(node.balls.outer) for node in nodes)
+        centers = np.zeros((3, width, len(nodes)), dtype=np.float32)
+        outer, inner = np.full((2, width, len(nodes)), MISSING_BALL_RADIUS, dtype=np.float32)
+        child = np.full((width, len(nodes)), -1, dtype=np.intp)
+        for t, node in enumerate(nodes):
+            size = len(node.balls.outer)
+            centers[:, :size, t] = node.balls.center.T
+            outer[:size, t], inner[:size, t] = node.balls.outer, node.balls.inner
+            child[: len(node.children), t] = node.children
+        frames = np.array([node.frame for node in nodes], dtype=np.intp)
+        return cls(tuple(bodies), frames, centers, outer, inner, child)
+
+    def roots_placed(self, poses: LinkPoses) -> Single:
+        """(3, B, K) centres of the balls around the bodies."""
+        return poses.place_own(self._frames, self._centers)
+
+    def placed(self, node: Indices, poses: LinkPoses, which: Indices) -> Single:
+        """(3, W, F) centres of the balls of nodes (F,) in configurations `which` (F,)."""
+        centers = self.centers.take(node, axis=2)
+        return poses.place_each(self.frame[node], centers, which)
+
+
+def bodies_with_shape(station_diagram: StationDiagram, links: ArmLinks) -> list[BodyIndex]:
+    """Bodies of the robot that have collision geometry, ordered by frames."""
+    plant = station_diagram.plant
+    return [
+        body
+        for body, _ in sorted(links.frame_of.items(), key=lambda item: (item[1], int(item[0])))
+        if plant.GetCollisionGeometriesForBody(plant.get_body(body))
+    ]
+
+
+@dataclass
+class _Node:
+    frame: int
+    balls: Balls
+    children: list[int]
+
+
+def _append_tree(nodes: list[_Node], balls: Balls, frame: int, depth: int) -> int:
+    """Appends a tree to the nodes; returns the place of its root."""
+    place = len(nodes)
+    node = _Node(frame, balls, [])
+    nodes.append(node)
+    if depth > 1:
+        count = len(balls.outer)
+        parts = _split_balls(balls, int(np.ceil(np.round(count ** (1.0 / depth), 9))))
+        around = [_enclosing_ball(part) for part in parts]
+        centers, radii = np.array([c for c, _ in around]), np.array([r for _, r in around])
+        node.balls = Balls(centers, radii, np.full(len(parts), MISSING_BALL_RADIUS))
+        node.children = [_append_tree(nodes, part, frame, depth - 1) for part in parts]
+    return place
+
+
+def _enclosing_ball(balls: Balls) -> tuple[Array, float]:
+    """A ball around balls, nearly the smallest: its centre steps towards what lies farthest out
+    (Badoiu and Clarkson, "Smaller core-sets for balls", SODA 2003)."""
+    center = (balls.center.min(axis=0) + balls.center.max(axis=0)) / 2
+    best = (center, np.inf)
+    for step in range(20):
+        offsets = balls.center - center
+        distance = np.sqrt((offsets * offsets).sum(axis=1))
+        reach = distance + balls.outer
+        far = int(reach.argmax())
+        if reach[far] < best[1]:
+            best = (center, float(reach[far]))
+        if distance[far] < 1e-9:
+            break
+        center = center + offsets[far] / distance[far] * reach[far] / (step + 2)
+    return best
+
+
+def _split_balls(balls: Balls, count: int) -> list[Balls]:
+    """Cuts the balls into parts of about equal size, again and again across the longest side."""
+    if count <= 1:
+        return [balls]
+    order = np.argsort(balls.center[:, np.ptp(balls.center, axis=0).argmax()], kind="stable")
+    first = count // 2
+    cut = round(len(order) * first / count)
+    parts = []
+    for chosen, share in ((order[:cut], first), (order[cut:], count - first)):
+        part = Balls(balls.center[chosen], balls.outer[chosen], balls.inner[chosen])
+        parts += _split_balls(part, min(share, len(chosen)))
+    return parts

@@ -1,0 +1,354 @@
+"""Chains of the Panda's postures from pregrasp over grasp to the top of the lift.
+
+The redundant joint is swept at some poses of the path (layers). The best chain through the layers
+is refined until the hand goes straight, and checked against bounds of the clearance. A chain in
+collision is rejected, and the next best takes its place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from burg_drake.core import Array, Indices, Outcome
+from burg_drake.motion.line_poses import ClosedFormFiller, DenseRows, NumericFiller, straighten_rows
+from burg_drake.motion.line_search import Chain, Failure
+from burg_drake.motion.posture_grid import (
+    START_COST,
+    GridChain,
+    PostureGrid,
+    PostureGridBuilder,
+    decisive_clearance,
+)
+
+GridPlace = tuple[PostureGrid, int]
+"""A grid, and the number of a grasp in it."""
+
+
+class ChainSearchSettings:
+    """Chain search settings."""
+
+    max_explained = 3  # Postures that a failure names as being in the way.
+    rows_per_layer = 5  # Rows of a chain from one layer to the next; 1 cm apart.
+    doubt_cost = 0.5  # Radians. Cost of a posture that may be in collision.
+    failures_before_measuring = 2  # Failed chains of a grasp before all its postures are measured.
+    max_failures = 12  # Failed chains of a grasp before a finer grid is opened.
+
+
+def explain_failure(
+    search: PostureGridBuilder, X_AG: Array, places: Sequence[GridPlace], farthest: float
+) -> Failure:
+    """Why a grasp has no chain.
+
+    Args:
+        search: where postures are looked for.
+        X_AG: (2, 4, 4) the grasp with its fingers either way.
+        places: its grids, the coarsest first.
+        farthest: the layer that the best of the refused chains got to.
+    """
+    grid, i = places[-1]
+    ends = [0, search.at_grasp]
+    if not grid.exists[ends, i].any(axis=(1, 2, 3)).all():
+        return _limit_failure(search, X_AG)
+    for layer in ends:
+        if not _is_any_free(search, places, layer):
+            return _blocking_postures(search, X_AG, places, Outcome.ARM_COLLISION, layer)
+    last = grid.reached(i) + 1
+    if not 0 < last < grid.poses:
+        # Where there still are chains, they have been given up: the best of them got this far.
+        last = int(np.ceil(farthest))
+    outcome = search.lines.outcome(last)
+    return _blocking_postures(search, X_AG, places, outcome, last)
+
+
+def _is_any_free(search: PostureGridBuilder, places: Sequence[GridPlace], layer: int) -> bool:
+    """Whether any posture at a layer is free as far as is known; if none of those that chains lead
+    over is, all those of the first grid that has any are looked at."""
+    if any(grid.measured_free(layer, i) for grid, i in places):
+        return True
+    grid, i = next((g, i) for g, i in places if g.exists[layer, i].any())
+    search.measure(grid, np.array([layer]), np.array([i]), grid.exists)
+    return grid.measured_free(layer, i)
+
+
+def _blocking_postures(
+    search: PostureGridBuilder,
+    X_AG: Array,
+    places: Sequence[GridPlace],
+    outcome: Outcome,
+    layer: int,
+) -> Failure:
+    """Names the postures at a layer that are nearest to being free; where none is in collision,
+    how far the nearest one is beyond its limits."""
+    for grid, i in places:
+        search.measure(grid, np.array([layer]), np.array([i]), grid.exists)
+        blocked = grid.exists[layer, i] & ~grid.usable(layer, i)
+        if blocked.any():
+            break
+    else:
+        excess = _limit_excess(search, X_AG, layer)
+        return Failure(outcome, excess=excess if 0.0 < excess < np.inf else np.nan)
+    where = np.argwhere(blocked)
+    order = np.argsort(-grid.upper[layer, i][blocked], kind="stable")[
+        : ChainSearchSettings.max_explained
+    ]
+    chosen = tuple(where[order].T)
+    q = grid.q[(slice(None), layer, i, *chosen)].T
+    moved_W = search.lines.carried(X_AG[chosen[0]], search.layers[[layer]])
+    return Failure(outcome, q=q, moved_W=moved_W)
+
+
+def _limit_failure(search: PostureGridBuilder, X_AG: Array) -> Failure:
+    """Whether there are postures beyond the joint limits, and by how much at least."""
+    excess = max(_limit_excess(search, X_AG, layer) for layer in (0, search.at_grasp))
+    if excess == np.inf:
+        return Failure(Outcome.NO_IK)
+    return Failure(Outcome.JOINT_LIMIT, excess=excess)
+
+
+def _limit_excess(search: PostureGridBuilder, X_AG: Array, layer: int) -> float:
+    """How far the best posture at a layer is beyond the joint limits [rad]; infinite if there is
+    none whatever the limits."""
+    ik = search.ik
+    half = np.full(len(ik.lower), np.pi)
+    centre = np.where(np.arange(len(half)) == 5, 0.5 * (ik.lower + ik.upper), 0.0)
+    free = replace(ik, lower=centre - half, upper=centre + half)
+    count = search.settings.redundant[-1]
+    values = np.linspace(-np.pi, np.pi, count, endpoint=False)
+    q = free.solve(search.lines.X_AH(X_AG, search.layers[layer]), values).q
+    beyond = np.maximum(ik.lower - q, q - ik.upper).max(axis=1)
+    return max(0.0, float(beyond.min(initial=np.inf)))
+
+
+class ClosedFormLineSearch(PostureGridBuilder):
+    """Looks for chains of a Panda in a scene; for the arguments see `PostureGridBuilder`."""
+
+    def lifted(self, height: float) -> ClosedFormLineSearch:
+        """See `LineSearch`."""
+        lines = replace(self.lines, lift=height)
+        return ClosedFormLineSearch(
+            *(self.arm, self.ik, lines, self.proximity, self.home, self.settings)
+        )
+
+    def begin(self, X_AG: Array, clearance: Array) -> _ClosedFormBatch:
+        """See `LineSearch`."""
+        return _ClosedFormBatch(self, X_AG, clearance)
+
+    def straight(self, X_AG: Array, corners: Array, at: Array, tolerance: Array) -> DenseRows:
+        """Fills in rows between the postures of chains at the layers; see `straighten_rows`.
+
+        The redundant joint goes straight from layer to layer. Where no postures follow each other
+        that way, at a fold or past the upright upper arm, all joints are solved for together.
+        """
+        every = ClosedFormFiller(self.lines, X_AG, corners, self.layers, self.ik)
+        rows = straighten_rows(every, at, tolerance)
+        broken = np.unique(rows.chain[rows.broken])
+        if not len(broken):
+            return rows
+        bent = NumericFiller(
+            *(self.lines, X_AG[broken], corners[broken], self.layers, self.arm, self.settings)
+        )
+        return rows.replaced(broken, straighten_rows(bent, at, tolerance[broken]))
+
+
+@dataclass(frozen=True, eq=False)
+class _FoundChain:
+    """A chain's place: the grid that it was found in, the grasp's index there, and its postures."""
+
+    grid: PostureGrid
+    index: int
+    place: GridChain
+    layer: Array
+    """(M,) layer of each row; a fraction between two."""
+
+
+class _ClosedFormBatch:
+    """See `line_search.LineSearch`."""
+
+    def __init__(self, search: ClosedFormLineSearch, X_AG: Array, clearance: Array) -> None:
+        self._search, self._X_AG = search, X_AG
+        self._tolerance = clearance
+        n = len(X_AG)
+        self._grids: list[list[GridPlace]] = [[] for _ in range(n)]
+        self._level = np.full(n, -1)
+        self._failed = np.zeros(n, dtype=int)
+        self._farthest = np.zeros(n)
+        self._closed = np.zeros((n, 2), dtype=bool)
+        self._advance(np.arange(n))
+
+    def propose(self, grasps: Sequence[int]) -> list[Chain | None]:
+        """See `LineSearch`."""
+        found: dict[int, Chain | None] = {}
+        left = list(grasps)
+        while left:
+            rows = self._best(left, found)
+            left = [g for g in left if g not in found]
+            if not rows:
+                continue
+            for grasp, chain in self._refine(rows).items():
+                if chain is not None:
+                    found[grasp] = chain
+            left = [g for g in left if g not in found]
+            self._measure_failing(left)
+        return [found[g] for g in grasps]
+
+    def refuse(self, grasp: int, chain: Chain, row: int | None) -> None:
+        """See `LineSearch`."""
+        excluded_values = 2  # Values of the redundant joint to either side that are left out, too.
+        found: _FoundChain = chain.place
+        if row is None:
+            place = found.place
+            k = place.parameter[0]
+            around = slice(max(0, k - excluded_values), k + excluded_values + 1)
+            found.grid.refused[0, found.index, place.flip, place.branch[0], around] = True
+        else:
+            self._exclude(grasp, found, float(found.layer[row]))
+            self._farthest[grasp] = max(self._farthest[grasp], found.layer[row])
+        self._failed[grasp] += 1
+
+    def close(self, grasp: int, flip: int) -> None:
+        """See `LineSearch`."""
+        self._closed[grasp, flip] = True
+        for grid, i in self._grids[grasp]:
+            grid.refused[:, i, flip] = True
+
+    def failure(self, grasp: int) -> Failure:
+        """See `LineSearch`."""
+        places, farthest = self._grids[grasp], float(self._farthest[grasp])
+        return explain_failure(self._search, self._X_AG[grasp], places, farthest)
+
+    def _best(
+        self, grasps: Sequence[int], found: dict[int, Chain | None]
+    ) -> list[tuple[int, PostureGrid, int, GridChain]]:
+        """The cheapest chains; grasps without one go on to more values of the redundant joint."""
+        by_grid: dict[int, tuple[PostureGrid, list[int]]] = {}
+        for g in grasps:
+            grid, _ = self._grids[g][-1]
+            by_grid.setdefault(id(grid), (grid, []))[1].append(g)
+        rows, exhausted = [], []
+        for grid, members in by_grid.values():
+            index = np.array([self._grids[g][-1][1] for g in members])
+            places = grid.best(index, ChainSearchSettings.doubt_cost)
+            for g, i, place in zip(members, index, places, strict=True):
+                if place is None or self._failed[g] >= ChainSearchSettings.max_failures:
+                    exhausted.append(g)
+                else:
+                    rows.append((g, grid, int(i), place))
+        last = len(self._search.settings.redundant) - 1
+        for g in exhausted:
+            if self._level[g] == last:
+                found[g] = None
+        self._advance(np.array([g for g in exhausted if self._level[g] < last], dtype=np.intp))
+        return rows
+
+    def _advance(self, grasps: Indices) -> None:
+        """Opens a finer grid for grasps: finds the postures at pregrasp and grasp, the others where
+        both are reached, and measures at both what chains lead over."""
+        if not len(grasps):
+            return
+        for level in np.unique(self._level[grasps]) + 1:
+            members = grasps[self._level[grasps] == level - 1]
+            grid = self._search.grid(self._X_AG[members], self._search.settings.redundant[level])
+            ends = list(dict.fromkeys([self._search.at_grasp, 0]))
+            alive = np.arange(len(members))
+            for layer in ends:
+                grid.solve(np.array([layer]), alive)
+                alive = alive[grid.exists[layer, alive].any(axis=(1, 2, 3))]
+            others = np.setdiff1d(np.arange(grid.poses), ends)
+            if len(alive) and len(others):
+                grid.solve(others, alive)
+            grid.join()
+            for i, g in enumerate(members.tolist()):
+                for coarse, index in self._grids[g][-1:]:
+                    grid.take_over(i, coarse, index, ends)
+            flip = np.abs(grid.q[:, 0] - self._search.home[:, None, None, None, None]).max(axis=0)
+            grid.start[:] = START_COST * np.nan_to_num(flip)
+            alive = alive[grid.joined[0, alive].any(axis=(1, 2, 3))]
+            for layer in ends:
+                self._search.measure(grid, np.array([layer]), alive, grid.joined)
+                usable = grid.joined[layer, alive] & (grid.upper[layer, alive] > 0.0)
+                alive = alive[usable.any(axis=(1, 2, 3))]
+            for i, g in enumerate(members.tolist()):
+                self._grids[g].append((grid, i))
+                grid.refused[:, i, self._closed[g]] = True
+            self._level[members] = level
+            self._failed[members] = 0
+
+    def _measure_failing(self, grasps: Sequence[int]) -> None:
+        """Measures all postures of grasps whose chains keep failing."""
+        by_grid: dict[int, tuple[PostureGrid, list[int]]] = {}
+        for g in grasps:
+            if self._failed[g] == ChainSearchSettings.failures_before_measuring:
+                grid, i = self._grids[g][-1]
+                by_grid.setdefault(id(grid), (grid, []))[1].append(i)
+        for grid, members in by_grid.values():
+            self._search.measure(grid, np.arange(grid.poses), np.array(members), grid.joined)
+
+    def _refine(
+        self, rows: list[tuple[int, PostureGrid, int, GridChain]]
+    ) -> dict[int, Chain | None]:
+        """Chains whose hand goes straight and that are not in collision as far as is known; None
+        where that is not so, and what keeps it from being so is put out."""
+        search = self._search
+        count = len(search.layers)
+        at = np.linspace(0.0, count - 1.0, (count - 1) * ChainSearchSettings.rows_per_layer + 1)
+        grasp = np.array([g for g, *_ in rows])
+        flip = np.array([place.flip for *_, place in rows])
+        X_AG = self._X_AG[grasp, flip]
+        corners = np.array(
+            [
+                grid.q[:, np.arange(count), i, p.flip, p.branch, p.parameter].T
+                for _, grid, i, p in rows
+            ]
+        )
+        tolerance = np.clip(0.5 * self._tolerance[grasp, flip], *search.settings.deviation)
+        straight = search.straight(X_AG, corners, at, tolerance)
+        bounds = search.proximity.bounds(straight.q, hand=False)
+        upper = decisive_clearance(bounds, search.settings.exact)
+        return {
+            g: self._chain(
+                g, _FoundChain(grid, i, place, np.empty(0)), k, straight, bounds.lower, upper
+            )
+            for k, (g, grid, i, place) in enumerate(rows)
+        }
+
+    def _chain(
+        self, grasp: int, found: _FoundChain, k: int, rows: DenseRows, lower: Array, upper: Array
+    ) -> Chain | None:
+        own = rows.of(k)
+        layer = rows.layer[own]
+        found = replace(found, layer=layer)
+        broken = rows.broken[own] | ~(upper[own] > 0.0)
+        if broken.any():
+            for row in np.flatnonzero(broken):
+                self._exclude(grasp, found, float(layer[row]))
+            self._farthest[grasp] = max(self._farthest[grasp], layer[broken][0])
+            self._failed[grasp] += 1
+            return None
+        length = np.interp(layer, np.arange(len(self._search.layers)), self._search.layers)
+        return Chain(
+            flip=found.place.flip,
+            q=rows.q[own],
+            at_grasp=int(np.searchsorted(layer, self._search.at_grasp)),
+            at_retreated=int(np.searchsorted(layer, self._search.lines.at_retreated)),
+            moved_W=self._search.lines.carried(self._X_AG[grasp, found.place.flip], length),
+            lower=lower[own],
+            place=found,
+        )
+
+    def _exclude(self, grasp: int, found: _FoundChain, layer: float) -> None:
+        """Puts the posture at a layer out of the search, or the step between two.
+
+        Where chains keep failing the neighbours go with it, so that the next chain leads elsewhere.
+        """
+        grid, place = found.grid, found.place
+        widely = self._failed[grasp] >= ChainSearchSettings.failures_before_measuring
+        nearest = round(layer)
+        if layer == nearest or widely:
+            k = place.parameter[nearest]
+            around = slice(max(0, k - widely), k + widely + 1)
+            grid.refused[nearest, found.index, place.flip, place.branch[nearest], around] = True
+        else:
+            grid.cut(found.index, int(layer), place)

@@ -1,0 +1,170 @@
+"""Timing of the motions of a grasp: as fast as the joints allow, with the hand along its lines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from burg_drake.core import Array, InvalidInputError
+from burg_drake.motion.joint_limits import ArmLimits
+from burg_drake.motion.line_timing import HandSpeed, time_line
+from burg_drake.motion.motion_settings import TimingSettings
+from burg_drake.motion.numeric_ik import ArmKinematics
+from burg_drake.motion.plan_files import Plan
+from burg_drake.motion.polyline_timing import IsFree, time_polyline
+from burg_drake.motion.reach_verdict import Witness
+from burg_drake.motion.trajectory import Motion, Trajectory
+from burg_drake.station import GraspMotion
+
+REFERENCE_LIFT_HEIGHT = GraspMotion().lift_height
+"""Metres. Height that `TimingSettings.lift_time` refers to."""
+
+
+@dataclass(frozen=True)
+class PathChecks:
+    """Checks of what leaves the paths of a witness, each of rows (R, n) that the arm moves through
+    straight from row to row.
+
+    Attributes:
+        transfer: with the hand open and empty.
+        approach: the same, near the target.
+        lift, retreat: with the target in the hand.
+    """
+
+    transfer: IsFree | None = None
+    approach: IsFree | None = None
+    lift: IsFree | None = None
+    retreat: IsFree | None = None
+
+
+def time_motion(
+    witness: Witness,
+    limits: ArmLimits,
+    kinematics: ArmKinematics,
+    *,
+    settings: TimingSettings | None = None,
+    checks: PathChecks | None = None,
+    limit_margin: float = 0.0,
+) -> Plan:
+    """Gives the motions of a witness their time; each begins and ends at rest.
+
+    Args:
+        witness: the paths.
+        limits: of the joints; none is exceeded.
+        kinematics: the arm, to measure the path length of the hand.
+        settings: how fast, how close to the paths.
+        checks: of rounded corners and smoothed lines. Without one for the transfer, the arm stops
+            at each corner; without one for a line, it keeps to a spline through the waypoints.
+
+    Returns:
+        The plan, sampled at `settings.rate`.
+
+    Raises:
+        InvalidInputError: a path outside the joint limits, or one that cannot be slowed down to
+            keep the others.
+    """
+    min_straightness = 2e-5  # Metres. The witness is no straighter.
+    unmeasured_clearance = 2e-4  # Metres.
+    settings, checks = settings or TimingSettings(), checks or PathChecks()
+    near = unmeasured_clearance if np.isnan(witness.clearance) else max(0.0, witness.clearance)
+    lines = replace(
+        settings, straightness=max(min_straightness, min(settings.straightness, near / 2.0))
+    )
+    gentle = limits.scaled_down(settings.velocity_share, settings.ramp)
+    transfer = time_polyline(
+        _require_within_limits(witness.transfer, limits, "transfer"),
+        gentle,
+        deviation=settings.corner_deviation,
+        is_free=checks.transfer,
+    )
+    slow = HandSpeed(settings.approach_speed, settings.approach_acceleration, settings.ramp)
+    approach = time_line(
+        _require_within_limits(witness.approach, limits, "approach"),
+        kinematics,
+        gentle,
+        slow,
+        lines,
+        is_free=checks.approach,
+        limit_margin=limit_margin,
+    )
+    lift = time_line(
+        _require_within_limits(witness.lift, limits, "lift"),
+        kinematics,
+        gentle,
+        _lift_speed(_hand_path_length(witness.lift, kinematics), settings),
+        lines,
+        is_free=checks.lift,
+        limit_margin=limit_margin,
+    )
+    retreat = None
+    if witness.retreat is not None:
+        back = time_line(
+            _require_within_limits(witness.retreat, limits, "retreat"),
+            kinematics,
+            gentle,
+            _retreat_speed(settings),
+            lines,
+            is_free=checks.retreat,
+            limit_margin=limit_margin,
+        )
+        retreat = _sample_motion(back, witness.retreat, limits, settings)
+    return Plan(
+        _sample_motion(transfer, witness.transfer, limits, settings),
+        _sample_motion(approach, witness.approach, limits, settings),
+        _sample_motion(lift, witness.lift, limits, settings),
+        retreat=retreat,
+    )
+
+
+def _require_within_limits(q: Array, limits: ArmLimits, name: str) -> Array:
+    outside = ~((q >= limits.lower) & (q <= limits.upper))  # NaN, too
+    if outside.any():
+        row, joint = np.argwhere(outside)[0]
+        raise InvalidInputError(
+            f"{name} of a witness has joint {joint + 1} at {q[row, joint]:.4f} rad in waypoint"
+            f" {row}, outside its limits {limits.lower[joint]:.4f} to {limits.upper[joint]:.4f}"
+        )
+    return q
+
+
+def _lift_speed(height: float, settings: TimingSettings) -> HandSpeed:
+    """Half of the time full acceleration, half of it full braking, as over `REFERENCE_LIFT_HEIGHT`: what the hand
+    holds feels the same load on any height."""
+    time = settings.lift_time * np.sqrt(height / REFERENCE_LIFT_HEIGHT)
+    acceleration = 4.0 * REFERENCE_LIFT_HEIGHT / settings.lift_time**2
+    return HandSpeed(float(acceleration * time / 2.0), acceleration, settings.ramp)
+
+
+def _retreat_speed(settings: TimingSettings) -> HandSpeed:
+    """As slow as on the approach, and accelerated no more than on the lift."""
+    acceleration = min(
+        settings.approach_acceleration, 4.0 * REFERENCE_LIFT_HEIGHT / settings.lift_time**2
+    )
+    return HandSpeed(settings.approach_speed, acceleration, settings.ramp)
+
+
+def _hand_path_length(rows: Array, kinematics: ArmKinematics) -> float:
+    """Distance between the ends of a line [m]."""
+    p = kinematics.forward(rows[[0, -1]])[0][:, :3, 3]
+    return float(np.linalg.norm(p[1] - p[0]))
+
+
+def _sample_motion(
+    motion: Motion, path: Array, limits: ArmLimits, settings: TimingSettings
+) -> Trajectory:
+    """Samples that keep the limits, by their differences, too."""
+    limit_tolerance = 1e-6  # Relative excess of samples over a limit.
+    slowdown_margin = 1.0005  # Samples miss the peaks, so the motion is slowed down a little more.
+    max_slowdowns = 20  # Times that a motion is slowed down.
+    motion, kept = motion.time_scaled(1.0 / settings.speed), limits.slowed(settings.speed)
+    for _ in range(max_slowdowns):
+        trajectory = Trajectory.of(motion, path[0], path[-1], settings.rate)
+        factor = kept.time_scale(trajectory.peaks())
+        if factor <= 1.0 + limit_tolerance:
+            return trajectory
+        motion = motion.time_scaled(slowdown_margin * factor)
+    raise InvalidInputError(
+        f"a motion still exceeds the limits of the arm after it was slowed down {max_slowdowns} times, to"
+        f" {motion.duration:g} s"
+    )

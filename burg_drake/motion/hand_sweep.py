@@ -1,0 +1,447 @@
+"""The hand on its straight segments: approach, retreat and lift of many grasps, without the arm.
+
+What a convex part sweeps along a straight segment is convex (`geometry`), so a segment is checked
+as a whole, not at samples. No result depends on the rest of a batch, not even in its last bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import Context
+
+from burg_drake.core import Array, UnknownNameError, check_pose, rng_from, suggest_names
+from burg_drake.geometry import (
+    Ball,
+    Body,
+    Cylinder,
+    HandScreen,
+    Shape,
+    rotate,
+    swept_body,
+    swept_shape,
+)
+from burg_drake.grasping import filter_hand_pairs, read_shapes, screened_bodies
+from burg_drake.motion.target_sweep import PathBlockers, TargetSweep
+from burg_drake.scene import Scene
+from burg_drake.station import (
+    FloatingHand,
+    GraspMotion,
+    Station,
+    StationDiagram,
+    build_station_diagram,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class HandPart:
+    """Shapes of a hand that are rigid to each other.
+
+    Attributes:
+        shapes: in the grasp frame of the open hand.
+        closing_G: (3,) how far they move when the open hand closes until its pads meet, or are as
+            close as they can be [m]; 0 of the hand's body.
+        opening: smallest and largest distance between the pads [m].
+    """
+
+    shapes: tuple[Shape, ...]
+    closing_G: Array
+    opening: tuple[float, float]
+
+    def placed(self, X_WG: Array, width: Array) -> Array:
+        """Grasp frames of an open hand that has this part where it is at another width.
+
+        Args:
+            X_WG: (N, 4, 4) grasps.
+            width: (N,) distance between the pads [m]; NaN where the hand is open.
+
+        Returns:
+            (N, 4, 4) poses in the world.
+        """
+        low, high = self.opening
+        closed = np.clip((high - np.where(np.isnan(width), high, width)) / (high - low), 0.0, 1.0)
+        moved = X_WG.copy()
+        moved[:, :3, 3] += rotate(X_WG[:, :3, :3], closed[:, None] * self.closing_G)
+        return moved
+
+
+def read_hand_parts(
+    station_diagram: StationDiagram,
+) -> tuple[tuple[HandPart, ...], dict[str, Body]]:
+    """The hand and all bodies that it can collide with.
+
+    Args:
+        station_diagram: a diagram built with `robot="hand"`.
+
+    Returns:
+        The hand's body and its fingers, as far as they have shapes; and the other bodies by name.
+
+    Raises:
+        InvalidInputError: see `read_shapes`.
+    """
+    hand = FloatingHand(station_diagram)
+    plant = station_diagram.plant
+    context = station_diagram.diagram.CreateDefaultContext()
+    plant_context = plant.GetMyMutableContextFromRoot(context)
+    names = screened_bodies(station_diagram)
+    body_of = filter_hand_pairs(station_diagram, context, names)
+    hand.place(plant_context, np.eye(4))
+    graph = station_diagram.scene_graph
+    query = graph.get_query_output_port().Eval(graph.GetMyContextFromRoot(context))
+    shapes, bodies = read_shapes(station_diagram, plant_context, query, body_of, names)
+    inspector, robot = query.inspector(), set(station_diagram.robot_bodies)
+    owners = [
+        body
+        for geometry, body in body_of.items()
+        if body in robot and inspector.GetProximityProperties(geometry) is not None
+    ]
+    links = [
+        {body.index() for body in plant.GetBodiesWeldedTo(plant.get_body(finger))}
+        for finger in hand.fingers
+    ]
+    links.insert(0, robot - links[0] - links[1])
+    paths = [np.zeros(3), *_closing_paths(hand, plant, plant_context)]
+    owned = [
+        tuple(s for s, owner in zip(shapes, owners, strict=True) if owner in own) for own in links
+    ]
+    opening = hand.document.opening
+    parts = [HandPart(o, path, opening) for o, path in zip(owned, paths, strict=True) if o]
+    return tuple(parts), bodies
+
+
+def is_hand_symmetric(parts: Sequence[HandPart]) -> bool:
+    """Whether a hand occupies the same space when it is turned by half a turn about its approach:
+    by how far its shapes reach in `DIRECTIONS` directions."""
+    direction_count = 64  # Directions in which the symmetry of a hand is checked.
+    tolerance = 1e-9  # Metres.
+    rng = rng_from("burg_drake directions")
+    directions = rng.normal(size=(direction_count, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    shapes = [shape for part in parts for shape in part.shapes]
+    reach = np.array([_support_distance(shape, directions) for shape in shapes])
+    turned = np.array(
+        [_support_distance(shape, directions * (-1.0, -1.0, 1.0)) for shape in shapes]
+    )
+    return bool(
+        np.abs(np.sort(reach, axis=0) - np.sort(turned, axis=0)).max(initial=0.0) < tolerance
+    )
+
+
+def _support_distance(shape: Shape, directions: Array) -> Array:
+    """How far a shape reaches along unit vectors (D, 3) from the origin [m]."""
+    d_P = directions @ shape.X_BP[:3, :3]
+    along = directions @ shape.X_BP[:3, 3]
+    if isinstance(shape.convex, (Ball, Cylinder)):
+        components = (d_P[:, 0], d_P[:, 1], d_P[:, 2])
+        return np.asarray(along + shape.convex.reach(components))
+    assert shape.polytope is not None  # all others are polytopes
+    return np.asarray(along + (d_P @ shape.polytope.vertices.T).max(axis=1))
+
+
+def _closing_paths(
+    hand: FloatingHand, plant: MultibodyPlant, plant_context: Context
+) -> list[Array]:
+    """How far each finger moves from open to closed, in the grasp frame (3,) [m]."""
+    ends = []
+    for closed in (0.0, 1.0):
+        hand.place(plant_context, np.eye(4), closed)
+        poses = [plant.EvalBodyPoseInWorld(plant_context, plant.get_body(i)) for i in hand.fingers]
+        ends.append([X_GF.translation() for X_GF in poses])
+    return [np.asarray(end - start) for start, end in zip(*ends, strict=True)]
+
+
+def deepest_overlap_along_path(
+    screen: HandScreen, X_WG: Array, names: NDArray[np.object_], u_W: Array, length: float
+) -> tuple[Array, Array]:
+    """The deepest overlap of each hand with the one body that is known to be in its way.
+
+    Along the way the depth in a convex piece rises to one maximum and falls; a body of several may
+    have several, of which the one about the deepest place of the grid is found.
+
+    Args:
+        screen: the hand, not swept.
+        X_WG: (N, 4, 4) grasps in the world, from which the ways start.
+        names: (N,) of the bodies.
+        u_W: (N, 3) unit vectors along the ways.
+        length: of the ways [m].
+
+    Returns:
+        Depths (N,) and their distances from the start (N,) [m]; depth 0 and NaN where the overlap
+        is so short that no place of the finest grid has it.
+    """
+    steps = (0.02, 0.002)  # Metres. The second step is used where the first finds no overlap.
+    min_step = 0.5e-3  # Metres. Accuracy of the place of the deepest overlap.
+    depth, at = np.zeros(len(X_WG)), np.full(len(X_WG), np.nan)
+    for step in steps:
+        left = np.flatnonzero(depth == 0.0)
+        places = np.linspace(0.0, length, int(np.ceil(length / step)) + 1)
+        s = np.broadcast_to(places, (len(left), len(places)))
+        found = _overlap_depths(screen, X_WG[left], names[left], u_W[left], s)
+        depth[left], at[left] = found.max(axis=1), places[found.argmax(axis=1)]
+    step = steps[0] / 2
+    found_any = np.flatnonzero(depth > 0.0)
+    while step > min_step and len(found_any):
+        i = found_any
+        s = np.clip(at[i, None] + np.array((-step, step)), 0.0, length)
+        found = _overlap_depths(screen, X_WG[i], names[i], u_W[i], s)
+        best, row = found.argmax(axis=1), np.arange(len(i))
+        better = found[row, best] > depth[i]
+        depth[i] = np.where(better, found[row, best], depth[i])
+        at[i] = np.where(better, s[row, best], at[i])
+        step /= 2
+    at[depth == 0.0] = np.nan
+    return depth, at
+
+
+def _overlap_depths(
+    screen: HandScreen, X_WG: Array, names: NDArray[np.object_], u_W: Array, s: Array
+) -> Array:
+    """Depths (N, S) in the named bodies (N,) at distances (N, S) along the ways [m]."""
+    X = np.repeat(X_WG[:, None], s.shape[1], axis=1)
+    X[..., :3, 3] += s[..., None] * u_W[:, None]
+    depth = np.zeros(s.shape)
+    for name in np.unique(names):
+        rows = np.flatnonzero(names == name)
+        _, found = screen.deepest(X[rows].reshape(-1, 4, 4), [str(name)])
+        depth[rows] = found.reshape(len(rows), -1)
+    return depth
+
+
+@dataclass(frozen=True, eq=False)
+class SweepResult:
+    """What is in the way of N hands.
+
+    Attributes:
+        free: (N,) whether nothing is.
+        blocker: (N,) name of the body that is; "" where the way is free.
+        clearance: (N,) smallest signed distance on the way [m]. Where it is free, that of the hand
+            from other bodies: a lower bound, exact where no cylinder is swept across its axis (see
+            `geometry.bodies.SIDES`). Where not, minus the depth of the overlap with the blocker.
+        at: (N,) how far from the grasp that depth is met [m]; NaN where the way is free, or the
+            overlap too short to be found.
+    """
+
+    free: NDArray[np.bool_]
+    blocker: NDArray[np.object_]
+    clearance: Array
+    at: Array
+
+    def __len__(self) -> int:
+        return len(self.free)
+
+    def put(self, rows: NDArray[np.intp], target: PathBlockers) -> None:
+        """Takes over what is in the way of the target on some ways (S,), where anything is."""
+        hit = np.flatnonzero(target.by != "")
+        rows = rows[hit]
+        self.free[rows], self.blocker[rows] = False, target.by[hit]
+        self.clearance[rows], self.at[rows] = -target.depth[hit], target.at[hit]
+
+
+class HandSweep:
+    """Sweeps a station's hand through one scene; objects stand where the document places them.
+
+    Args:
+        scene: what stands there.
+        station: whose hand it is.
+        motion: the ways.
+
+    Attributes:
+        symmetric: whether the hand with its fingers swapped occupies the same space.
+
+    Raises:
+        InvalidInputError: the diagram cannot be built, or a collision geometry is of a shape that
+            the hand's screen does not know.
+    """
+
+    def __init__(self, scene: Scene, station: Station, motion: GraspMotion) -> None:
+        self._motion = motion
+        diagram = build_station_diagram(scene, station, robot="hand")
+        self._instances = tuple(diagram.free)
+        self._order = ("table", *sorted(diagram.fixed), *sorted(diagram.free))
+        self._parts, self._bodies = read_hand_parts(diagram)
+        self.symmetric = is_hand_symmetric(self._parts)
+        shapes = [shape for part in self._parts for shape in part.shapes]
+        self._open = HandScreen(shapes, self._bodies)
+        self._approach = HandScreen(_swept_shapes(shapes, motion.standoff), self._bodies)
+        self._still = [HandScreen(part.shapes, self._bodies) for part in self._parts]
+        self._retreat = [
+            HandScreen(_swept_shapes(part.shapes, motion.retreat), self._bodies)
+            for part in self._parts
+        ]
+        self._against: dict[float, dict[str, Body]] = {}
+        self._lifts: dict[tuple[str, float], list[HandScreen]] = {}
+        self._targets: dict[str, TargetSweep] = {}
+        self._risen: dict[tuple[str, float], PathBlockers] = {}
+
+    def approach(self, instance: str, X_WG: Array) -> SweepResult:
+        """The open hand on its way from the pregrasp to the grasp, both included.
+
+        Args:
+            instance: the target's name in the scene, which decides where several bodies are in the
+                way; "" if there is none.
+            X_WG: (N, 4, 4) grasps in the world.
+
+        Raises:
+            UnknownNameError: there is no such instance.
+            InvalidInputError: `X_WG` are not poses.
+        """
+        X_WG = self._checked(instance, X_WG)
+        order = [*([instance] if instance else ()), *self._others(instance)]
+        names = self._approach.deepest(X_WG, order)[0]
+        clearance, at = np.empty(len(X_WG)), np.full(len(X_WG), np.nan)
+        free, hit = np.flatnonzero(names == ""), np.flatnonzero(names != "")
+        clearance[free] = self._approach.nearest(X_WG[free])[1]
+        back_W = -X_WG[hit, :3, 2]
+        depth, at[hit] = deepest_overlap_along_path(
+            self._open, X_WG[hit], names[hit], back_W, self._motion.standoff
+        )
+        clearance[hit] = -depth
+        return SweepResult(names == "", names, clearance, at)
+
+    def retreat(self, instance: str, X_WG: Array, width: Array) -> SweepResult:
+        """The hand with the target in it on its way straight back along the approach.
+
+        Hand and fingers count against all but the target, and the target against all others: where
+        the hand is free and the target is not, what is in the target's way is the blocker.
+
+        Args:
+            instance: the target's name in the scene; "" if the hand is empty.
+            X_WG: (N, 4, 4) grasps in the world.
+            width: (N,) distance between the pads once they hold the target [m]; the hand is open
+                where it is NaN.
+
+        Raises:
+            UnknownNameError: there is no such instance.
+            InvalidInputError: `X_WG` are not poses.
+        """
+        X_WG, length = self._checked(instance, X_WG), self._motion.retreat
+        back_W = -X_WG[:, :3, 2]
+        found = self._closed(instance, self._retreat, X_WG, width, back_W, length)
+        if instance:
+            free = np.flatnonzero(found.free)
+            found.put(free, self._target(instance).retreat(back_W[free], length))
+        return found
+
+    def lift(
+        self, instance: str, X_WG: Array, width: Array, height: float | None = None
+    ) -> SweepResult:
+        """The hand with the target in it on its lift, which begins where the retreat ends.
+
+        Args:
+            instance, X_WG, width: see `retreat`.
+            height: how far it goes [m]; by the whole lift if None.
+
+        Raises:
+            UnknownNameError: there is no such instance.
+            InvalidInputError: `X_WG` are not poses.
+        """
+        X_WG, motion = self._checked(instance, X_WG), self._motion
+        height = motion.lift_height if height is None else height
+        start_W = -motion.retreat * X_WG[:, :3, 2]
+        X_WR = X_WG.copy()
+        X_WR[:, :3, 3] += start_W
+        along_W = np.broadcast_to(motion.direction_W, (len(X_WG), 3))
+        screens = self._lift_screens(instance, height)
+        found = self._closed(instance, screens, X_WR, width, along_W, height)
+        if instance:
+            free = np.flatnonzero(found.free)
+            found.put(free, self._lifted(instance, start_W[free], height))
+        return found
+
+    def _closed(
+        self,
+        instance: str,
+        screens: Sequence[HandScreen],
+        X_WG: Array,
+        width: Array,
+        u_W: Array,
+        length: float,
+    ) -> SweepResult:
+        """The hand around the target on straight segments from N poses (N, 4, 4).
+
+        Args:
+            instance: the target, which does not count.
+            screens: for each part of the hand what it sweeps, or the others against it.
+            X_WG: where the ways begin.
+            width: (N,) distance between the pads [m].
+            u_W: (N, 3) unit vectors along the ways.
+            length: of the ways [m].
+        """
+        others = self._others(instance)
+        placed = [part.placed(X_WG, np.asarray(width, float)) for part in self._parts]
+        moves = list(zip(screens, placed, strict=True))
+        ranks = np.array([_ranks(screen.deepest(X, others)[0], others) for screen, X in moves])
+        names = np.array([*others, ""], dtype=object)[ranks.min(axis=0)]
+        decisive = ranks.argmin(axis=0)
+        clearance, at = np.full(len(X_WG), np.inf), np.full(len(X_WG), np.nan)
+        free = np.flatnonzero(names == "")
+        for k, (screen, X) in enumerate(moves):
+            clearance[free] = np.minimum(clearance[free], screen.nearest(X[free])[1])
+            hit = np.flatnonzero((names != "") & (decisive == k))
+            depth, at[hit] = deepest_overlap_along_path(
+                self._still[k], X[hit], names[hit], u_W[hit], length
+            )
+            clearance[hit] = -depth
+        return SweepResult(names == "", names, clearance, at)
+
+    def _checked(self, instance: str, X_WG: Array) -> Array:
+        if instance and instance not in self._instances:
+            raise UnknownNameError(
+                f"instance {instance!r} does not exist; {suggest_names(instance, self._instances)}"
+            )
+        return check_pose(X_WG, "X_WG")
+
+    def _others(self, instance: str) -> list[str]:
+        """Names of all bodies but the target, the deciding ones first; see `HandClearance`."""
+        return [name for name in self._order if name in self._bodies and name != instance]
+
+    def _moved_against(self, height: float) -> dict[str, Body]:
+        """All bodies, as they sweep when in place of the hand all else moves: against the lift."""
+        if height not in self._against:
+            shift_W = -height * self._motion.direction_W
+            bodies = self._bodies.items()
+            self._against[height] = {name: swept_body(body, shift_W) for name, body in bodies}
+        return self._against[height]
+
+    def _lift_screens(self, instance: str, height: float) -> list[HandScreen]:
+        """The parts of the hand against what the others sweep."""
+        key = instance, height
+        if key not in self._lifts:
+            swept = self._moved_against(height)
+            others = {name: swept[name] for name in self._others(instance)}
+            self._lifts[key] = [HandScreen(part.shapes, others) for part in self._parts]
+        return self._lifts[key]
+
+    def _target(self, instance: str) -> TargetSweep:
+        if instance not in self._targets:
+            others = {name: self._bodies[name] for name in self._others(instance)}
+            self._targets[instance] = TargetSweep(self._bodies[instance], others)
+        return self._targets[instance]
+
+    def _lifted(self, instance: str, start_W: Array, height: float) -> PathBlockers:
+        """What is in the way of the target on the lift; without a retreat that is the same for all
+        grasps."""
+        shift_W, u_W = self._target(instance), self._motion.direction_W
+        swept = self._moved_against(height)
+        if self._motion.retreat > 0.0:
+            return shift_W.lift(start_W, u_W, height, swept)
+        key = instance, height
+        if key not in self._risen:
+            self._risen[key] = shift_W.lift(np.zeros((1, 3)), u_W, height, swept)
+        return self._risen[key].repeated(len(start_W))
+
+
+def _swept_shapes(shapes: Sequence[Shape], length: float) -> list[Shape]:
+    """What shapes in the grasp frame sweep on a way straight back [m]."""
+    backwards = np.array((0.0, 0.0, -1.0))  # Direction of the retreat, in the grasp frame.
+    return [swept for shape in shapes for swept in swept_shape(shape, length * backwards)]
+
+
+def _ranks(names: NDArray[np.object_], order: Sequence[str]) -> NDArray[np.intp]:
+    """Places (N,) of names in an order; its length for what is not in it."""
+    place = {name: i for i, name in enumerate(order)}
+    return np.array([place.get(name, len(order)) for name in names], dtype=np.intp)

@@ -1,0 +1,164 @@
+"""Checks that the arm's base stands in no solid body and that its home posture is free."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from pydrake.geometry import QueryObject
+
+from burg_drake.core import InvalidInputError
+from burg_drake.motion.arm_collision import ArmCollision
+from burg_drake.station import Arm, Station, StationDiagram
+
+
+@dataclass(frozen=True)
+class HomeClearance:
+    """How near the arm at home is to anything, itself included.
+
+    Attributes:
+        distance: of the nearest pair of bodies [m]; `FAR` if none is nearer.
+        link, other: their names; empty if none is nearer than `FAR`.
+    """
+
+    distance: float
+    link: str = ""
+    other: str = ""
+
+
+@dataclass(frozen=True)
+class BaseOverlap:
+    """A shape of the arm's base that is in something.
+
+    Attributes:
+        name: what it is in.
+        depth: [m].
+        link, shape: names of the base's link and of its collision geometry.
+        upwards: whether the shortest way out leads upwards.
+    """
+
+    name: str
+    depth: float
+    link: str
+    shape: str
+    upwards: bool
+
+
+def require_free_home(station_diagram: StationDiagram, collision: ArmCollision) -> None:
+    """Refuses a station whose arm stands in something, or collides in its home posture.
+
+    Args:
+        station_diagram: the arm among the objects of a scene.
+        collision: its checks.
+
+    Raises:
+        InvalidInputError: one line that names the bodies.
+    """
+    station, scene = station_diagram.station, station_diagram.scene
+    inside = base_overlaps(station_diagram)
+    if inside:
+        raise InvalidInputError(f"{station.path}: {_repair_hint(inside, station)}")
+    at_home = collision.overlaps(np.array(_arm_document(station_diagram).home))
+    if at_home:
+        pairs = ", ".join(dict.fromkeys(f"{o.link} with {o.other}" for o in at_home))
+        raise InvalidInputError(
+            f"{station.path}: at arm.home the arm collides in scene {scene.name!r}: {pairs};"
+            " change arm.home or move the obstacle"
+        )
+
+
+def base_overlaps(station_diagram: StationDiagram) -> tuple[BaseOverlap, ...]:
+    """What the arm's base is in deeper than `BASE_TOLERANCE` and may not be in by `arm.stands_in`;
+    the checks of configurations leave that out, as neither of the two can move.
+
+    Returns:
+        By shapes of the base and what they are in (table, obstacles, fixed instances), the deepest
+        first.
+    """
+    max_base_depth = 5e-3  # Metres. The feet of an arm are modelled roughly.
+    min_upward_z = 0.99  # z of a unit vector that points up.
+    plant, arm = station_diagram.plant, _arm_document(station_diagram)
+    model = plant.GetModelInstanceByName("arm")
+    base = plant.GetFrameByName(arm.base, model).body()
+    parts = [b for b in plant.GetBodiesWeldedTo(base) if b.model_instance() == model]
+    around = {**station_diagram.fixed, "table": station_diagram.table}
+    query = _default_query(station_diagram)
+    shapes = [(part.name(), g) for part in parts for g in plant.GetCollisionGeometriesForBody(part)]
+    found = []
+    for name in around.keys() - set(arm.stands_in):
+        others = plant.GetCollisionGeometriesForBody(plant.get_body(around[name]))
+        for (link, shape), other in product(shapes, others):
+            pair = query.ComputeSignedDistancePairClosestPoints(shape, other)
+            if -pair.distance > max_base_depth:
+                normal = pair.nhat_BA_W if pair.id_A == shape else -pair.nhat_BA_W
+                shape_name = query.inspector().GetName(shape).split("::")[-1]
+                upwards = bool(normal[2] > min_upward_z)
+                depth = float(-pair.distance)
+                found.append(BaseOverlap(name, depth, link, shape_name, upwards))
+    return tuple(sorted(found, key=lambda overlap: (-overlap.depth, str(overlap))))
+
+
+def _repair_hint(inside: Sequence[BaseOverlap], station: Station) -> str:
+    """What the base is in most deeply, with which shapes, and what to do."""
+    max_shapes = 3  # Shapes of the base that are listed.
+    name = inside[0].name
+    shapes = [overlap for overlap in inside if overlap.name == name]
+    depth = 1e3 * shapes[0].depth
+    listed = ", ".join(f"{s.link} {s.shape!r} {1e3 * s.depth:.0f} mm" for s in shapes[:max_shapes])
+    more = f" and {len(shapes) - max_shapes} more" if len(shapes) > max_shapes else ""
+    moves = "move the base or the obstacle"
+    arm = station.document.arm
+    if all(shape.upwards for shape in shapes) and arm is not None:
+        x, y, z = arm.X_WA.translation
+        rise = np.ceil(depth) / 1e3
+        moves = f"raise the base by {1e3 * rise:.0f} mm (arm.X_WA.translation: "
+        moves += f"[{x:g}, {y:g}, {z + rise:g}])"
+    allowed = [*arm.stands_in, name] if arm is not None else [name]
+    stated = name == "table" or name in station.document.background
+    let_in = (
+        f", or write arm.stands_in: [{', '.join(allowed)}] if the base is mounted inside it"
+        if stated
+        else ""
+    )
+    return (
+        f"arm.X_WA puts the arm's base {depth:.0f} mm deep into {name!r} by its collision shapes"
+        f" ({listed}{more}); {moves}{let_in}"
+    )
+
+
+def home_clearance(station_diagram: StationDiagram) -> HomeClearance:
+    """How near the arm at home, its hand open, is to anything; the hand's own parts do not count
+    against each other."""
+    max_distance = 1.0  # Metres. Bodies farther away are ignored.
+    plant = station_diagram.plant
+    inspector = station_diagram.scene_graph.model_inspector()
+    hand = set(plant.GetBodyIndices(plant.GetModelInstanceByName("hand")))
+    robot, names = set(station_diagram.robot_bodies), station_diagram.body_names
+    nearest = HomeClearance(max_distance)
+    for pair in _default_query(station_diagram).ComputeSignedDistancePairwiseClosestPoints(
+        max_distance
+    ):
+        a, b = (
+            plant.GetBodyFromFrameId(inspector.GetFrameId(g)).index()
+            for g in (pair.id_A, pair.id_B)
+        )
+        if a not in robot:
+            a, b = b, a
+        if pair.distance < nearest.distance and a in robot and not {a, b} <= hand:
+            nearest = HomeClearance(float(pair.distance), names[a], names[b])
+    return nearest
+
+
+def _default_query(station_diagram: StationDiagram) -> QueryObject:
+    """Distances in the default context, in which the arm is at home."""
+    context = station_diagram.diagram.CreateDefaultContext()
+    query = station_diagram.diagram.GetOutputPort("geometry_query").Eval(context)
+    return query
+
+
+def _arm_document(station_diagram: StationDiagram) -> Arm:
+    arm = station_diagram.station.document.arm
+    assert arm is not None  # the diagram was built with it
+    return arm

@@ -1,0 +1,287 @@
+"""Collision-free paths from the home posture to goals, which share their work.
+
+Goals are connected to the roadmap. If that fails, trees grow from the goals until one of them
+meets the roadmap. Paths are then shortened.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import dijkstra
+
+from burg_drake.core import Array, rng_from
+from burg_drake.motion.edge_checker import EdgeChecker
+from burg_drake.motion.roadmap import Roadmap
+
+
+def shorten_path(edges: EdgeChecker, path: Array, scale: Array) -> Array:
+    """Straightens a free way.
+
+    Args:
+        edges: judges segments.
+        path: (M, n) its corners.
+        scale: (n,) what a unit of each joint counts in the length of a segment, which is the norm.
+
+    Returns:
+        (L, n) corners of a free way with the same ends, at most as long as `path`.
+    """
+    max_rounds = 2  # Repetitions on the path found.
+    min_gain = 1e-3  # Relative gain in length below which a round is the last one.
+    known: dict[bytes, bool] = {}
+    if len(path) > 2 and _is_segment_free(edges, path[[0, -1]], known):
+        return np.asarray(path[[0, -1]])
+    for _ in range(max_rounds if len(path) > 2 and _path_length(path, scale) > 0.0 else 0):
+        other = _shortest_through(edges, _path_points(path, scale), scale, known)
+        gain = _path_length(path, scale) - _path_length(other, scale)
+        if gain >= 0.0:
+            path = other
+        if gain <= min_gain * _path_length(path, scale):
+            break
+    return path
+
+
+def _path_length(path: Array, scale: Array) -> float:
+    return float(np.sqrt((np.diff(path * scale, axis=0) ** 2).sum(axis=1)).sum())
+
+
+def _path_points(path: Array, scale: Array) -> Array:
+    """The corners and points at even distances between them."""
+    point_count = 10  # Points along the path, beside its corners.
+    steps = np.sqrt((np.diff(path * scale, axis=0) ** 2).sum(axis=1))
+    at = np.concatenate([[0.0], np.cumsum(steps)])
+    wanted = np.unique(np.concatenate([at, np.linspace(0.0, at[-1], point_count)]))
+    return np.column_stack([np.interp(wanted, at, joint) for joint in path.T])
+
+
+def _is_segment_free(edges: EdgeChecker, ends: Array, known: dict[bytes, bool]) -> bool:
+    """Whether a segment (2, n) is free; one that is not so by the best guess is not looked at."""
+    screened = edges.screen(ends[:1], ends[1:], fine=np.inf)
+    free = bool(edges.seem_free(screened, guess=True)[0]) and edges.is_free(*ends)
+    known[ends.tobytes()] = free
+    return free
+
+
+def _shortest_through(
+    edges: EdgeChecker, q: Array, scale: Array, known: dict[bytes, bool]
+) -> Array:
+    """The shortest way from the first to the last of points that follow one another on a free way.
+
+    A few bounds say which segments are worth considering: those that are free by the best guess, as
+    it takes hundreds of checks to be sure of others. Those that a way takes are judged.
+
+    Args:
+        edges: judges segments.
+        q: (N, n) points.
+        scale: see `shorten_path`.
+        known: verdicts on segments by the bytes of their ends; what is found is added.
+    """
+    corner_cost = 1e-9  # Metres. Leaves no corner on a straight line.
+    first, second = np.triu_indices(len(q), 2)
+    length = np.sqrt((((q[:, None] - q) * scale) ** 2).sum(axis=-1)) + corner_cost
+    allowed = np.eye(len(q), k=1, dtype=bool)
+    screened = edges.screen(q[first], q[second], fine=np.inf)
+    allowed[first, second] = edges.seem_free(screened, guess=True)
+    free = np.eye(len(q), k=1, dtype=bool)
+    for pair in zip(first.tolist(), second.tolist(), strict=True):
+        verdict = known.get(q[list(pair)].tobytes())
+        if verdict is not None:
+            free[pair] = allowed[pair] = verdict
+    while True:
+        _, before = dijkstra(np.where(allowed, length, 0.0), indices=0, return_predecessors=True)
+        chain = [len(q) - 1]
+        while chain[-1] != 0:
+            chain.append(int(before[chain[-1]]))
+        chain.reverse()
+        asked = [pair for pair in pairwise(chain) if not free[pair]]
+        blocked = edges.first_blocked_each([q[list(pair)] for pair in asked])
+        for pair, at in zip(asked, blocked, strict=True):
+            free[pair] = allowed[pair] = known[q[list(pair)].tobytes()] = at is None
+        if all(at is None for at in blocked):
+            return np.asarray(q[chain])
+
+
+def search_from_goals(
+    roadmap: Roadmap, edges: EdgeChecker, goals: Array, lower: Array, upper: Array
+) -> tuple[int, Array] | None:
+    """Looks for a way from home to any of (K, n) goals; see `HomeTree.connect`."""
+    max_rounds = 24  # Batches of samples before the search gives up.
+    bounds = edges.proximity.bounds(goals)
+    roots = np.flatnonzero(~bounds.blocked if edges.exact else bounds.likely_free)
+    if not len(roots):
+        return None
+    rng = rng_from("burg_drake goal search", goals)
+    # A goal that is not even likely free says that bounds are too loose around here to guess by.
+    guess = bool(bounds.likely_free[roots].any())
+    trees = _Trees(goals[roots], guess)
+    for _ in range(max_rounds):
+        new = trees.grow(roadmap, edges, _draw_samples(trees.q, lower, upper, rng))
+        for node, entry in _connections(roadmap, edges, trees.q, new, guess):
+            chain = trees.chain(node)
+            corners = np.concatenate([roadmap.q[entry][None], trees.q[chain]])
+            if edges.first_blocked(corners) is not None:
+                continue
+            path = roadmap.path(entry)
+            if path is not None:
+                return int(roots[chain[-1]]), np.concatenate([path, corners[1:]])
+    return None
+
+
+def _draw_samples(q: Array, lower: Array, upper: Array, rng: np.random.Generator) -> Array:
+    """Half uniform, half around nodes of the trees."""
+    batch_size = 32  # Samples in a batch.
+    spread = 0.15  # Standard deviation of half of the samples, over a joint's range.
+    drawn = rng.uniform(lower, upper, (batch_size, len(lower)))
+    around = q[rng.integers(len(q), size=batch_size // 2)]
+    around = around + spread * (upper - lower) * rng.standard_normal(around.shape)
+    drawn[::2] = np.clip(around, lower, upper)
+    return drawn
+
+
+def _connections(
+    roadmap: Roadmap, edges: EdgeChecker, q: Array, new: NDArray[np.intp], guess: bool
+) -> list[tuple[int, int]]:
+    """New nodes and nodes of the roadmap between which the screen finds a free segment, the
+    shortest first."""
+    neighbour_count = 3  # Nodes of the roadmap that a new node is tried with.
+    if not len(new):
+        return []
+    entry = np.concatenate([roadmap.near(q[node], neighbour_count) for node in new])
+    node = np.repeat(new, len(entry) // len(new))
+    screened = edges.screen(roadmap.q[entry], q[node])
+    free = np.flatnonzero(edges.seem_free(screened, guess=guess))
+    order = free[np.argsort(screened.length[free], kind="stable")]
+    return [(int(node[k]), int(entry[k])) for k in order]
+
+
+class _Trees:
+    """Nodes that lead back to a goal.
+
+    Attributes:
+        q: (T, n) configurations, the goals first.
+    """
+
+    def __init__(self, goals: Array, guess: bool) -> None:
+        self.q = goals
+        self._guess = guess
+        self._towards = np.full(len(goals), -1)
+
+    def grow(self, roadmap: Roadmap, edges: EdgeChecker, samples: Array) -> NDArray[np.intp]:
+        """Steps from the nearest nodes towards samples (S, n); indices of the new nodes."""
+        max_step = 0.4  # Metres of displacement. Longest step of a tree.
+        offset = samples[:, None] - self.q
+        distance = (np.abs(offset) * roadmap.scale).sum(axis=-1)
+        nearest = distance.argmin(axis=1)
+        rows = np.arange(len(samples))
+        share = np.minimum(1.0, max_step / np.maximum(distance[rows, nearest], 1e-12))
+        q_a = self.q[nearest]
+        q_b = q_a + share[:, None] * offset[rows, nearest]
+        free = edges.seem_free(edges.screen(q_a, q_b), guess=self._guess)
+        self._towards = np.concatenate([self._towards, nearest[free]])
+        self.q = np.concatenate([self.q, q_b[free]])
+        return np.arange(len(self.q) - int(free.sum()), len(self.q))
+
+    def chain(self, node: int) -> list[int]:
+        """The nodes from one to its goal."""
+        chain = [node]
+        while self._towards[chain[-1]] >= 0:
+            chain.append(int(self._towards[chain[-1]]))
+        return chain
+
+
+class HomeTree:
+    """Leads from home to goals.
+
+    Attributes:
+        edges: judges segments.
+        roadmap: configurations that home leads to.
+    """
+
+    def __init__(
+        self,
+        edges: EdgeChecker,
+        home: Array,
+        lower: Array,
+        upper: Array,
+        *,
+        focus: Array | None = None,
+        seed: object = "",
+        nodes: int = 600,
+    ) -> None:
+        """Lays the roadmap out; for the arguments see there."""
+        self.edges = edges
+        self.roadmap = Roadmap(edges, home, lower, upper, focus=focus, seed=seed, nodes=nodes)
+        self._lower, self._upper = lower, upper
+
+    def connect(self, goals: Array) -> tuple[int, Array] | None:
+        """A free way to one of several goals.
+
+        Args:
+            goals: (K, n) postures in order of preference.
+
+        Returns:
+            Index of the first goal that a segment from home or from a near node of the roadmap
+            leads to, else of one that a search has reached, and (M, n) the corners of the way, home
+            first; None if nothing was found.
+        """
+        goals = np.asarray(goals, dtype=float)
+        for index in range(len(goals)):
+            (path,) = self._by_segments(goals[index : index + 1])
+            if path is not None:
+                return index, path
+        return self._search(goals)
+
+    def connect_each(self, goals: Array) -> list[Array | None]:
+        """A free way to each of several goals (K, n), with few batches of the fast tier; what is
+        found for one does not depend on the others. See `connect`."""
+        goals = np.asarray(goals, dtype=float)
+        paths = self._by_segments(goals)
+        for index in (k for k, path in enumerate(paths) if path is None):
+            found = self._search(goals[index : index + 1])
+            paths[index] = None if found is None else found[1]
+        return paths
+
+    def _search(self, goals: Array) -> tuple[int, Array] | None:
+        return search_from_goals(self.roadmap, self.edges, goals, self._lower, self._upper)
+
+    def _by_segments(self, goals: Array) -> list[Array | None]:
+        """Ways that end with a segment from home or from a near node, for each goal (K, n)."""
+        first_count = 2  # Nearest nodes that a goal is tried with at first.
+        further_count = 8  # Further nodes that are tried, beside home.
+        near = [self.roadmap.near(goal, first_count + further_count) for goal in goals]
+        paths = self._over(goals, [nodes[:first_count] for nodes in near])
+        left = [k for k, way in enumerate(paths) if way is None]
+        rest = [np.append(nodes[first_count:][nodes[first_count:] != 0], 0) for nodes in near]
+        for k, path in zip(left, self._over(goals[left], [rest[k] for k in left]), strict=True):
+            paths[k] = path
+        return paths
+
+    def _over(self, goals: Array, nodes: list[NDArray[np.intp]]) -> list[Array | None]:
+        """Ways over some nodes, for each goal: the shortest segment first among the proven ones."""
+        if not len(goals):
+            return []
+        counts = [len(some) for some in nodes]
+        q_a = self.roadmap.q[np.concatenate(nodes)]
+        q_b = np.repeat(goals, counts, axis=0)
+        screened = self.edges.screen(q_a, q_b)
+        order = np.lexsort((screened.length, ~screened.proven))
+        owner = np.repeat(np.arange(len(goals)), counts)[order]
+        node = np.concatenate(nodes)
+        goals_first = np.unique(owner, return_index=True)[1]
+        self.roadmap.check_ahead(node[order[goals_first]])
+        paths: list[Array | None] = []
+        for k, goal in enumerate(goals):
+            confirmed = (
+                self.roadmap.path(int(node[edge]))
+                for edge in order[owner == k]
+                if self.edges.confirm(q_a, q_b, screened, edge)
+            )
+            path = next((way for way in confirmed if way is not None), None)
+            paths.append(None if path is None else np.concatenate([path, goal[None]]))
+        return paths
+
+    def shortcut(self, path: Array) -> Array:
+        """A way with the same ends that is no longer; see `motion.home_tree`."""
+        return shorten_path(self.edges, path, self.roadmap.scale)

@@ -1,0 +1,292 @@
+"""Hand poses along the straight segments of a grasp, and dense rows of arm positions between."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import Array, Indices, Outcome, inverse
+from burg_drake.geometry import Poses, rotate
+from burg_drake.motion.motion_settings import ReachSettings
+from burg_drake.motion.numeric_ik import ArmKinematics, solve_ik
+from burg_drake.motion.panda_ik import IK_BRANCHES, PandaIk, panda_forward
+from burg_drake.station import GraspMotion
+
+
+@dataclass(frozen=True, eq=False)
+class LinePoses:
+    """The hand's way, by its length from the grasp: negative on the way there, positive after it.
+
+    Attributes:
+        X_GH: (4, 4) hand body in the grasp frame.
+        R_WA: (3, 3) the arm's base in the world.
+        direction_W: (3,) unit vector of the lift.
+        standoff, retreat, lift: lengths of the three straight segments [m].
+    """
+
+    X_GH: Array
+    R_WA: Array
+    direction_W: Array
+    standoff: float
+    retreat: float
+    lift: float
+
+    @classmethod
+    def of(cls, X_HG: Array, R_WA: Array, motion: GraspMotion) -> LinePoses:
+        """With the whole lift.
+
+        Args:
+            X_HG: (4, 4) grasp frame in the hand.
+            R_WA: (3, 3) the arm's base in the world.
+            motion: the ways.
+        """
+        lengths = motion.standoff, motion.retreat, motion.lift_height
+        return cls(inverse(X_HG), R_WA.copy(), motion.direction_W, *lengths)
+
+    @property
+    def layers(self) -> Array:
+        """(L,) lengths at which postures of the arm are looked for, from pregrasp to the top of the
+        lift, at most `LAYER` apart; grasp and end of the retreat are among them [m]."""
+        approach, retreat, lift = map(_layer_distances, (self.standoff, self.retreat, self.lift))
+        return np.concatenate([-approach[:0:-1], retreat, self.retreat + lift[1:]])
+
+    @property
+    def at_grasp(self) -> int:
+        """Which of the layers is the grasp."""
+        return len(_layer_distances(self.standoff)) - 1
+
+    @property
+    def at_retreated(self) -> int:
+        """Which of the layers is the end of the retreat, where the lift begins."""
+        return self.at_grasp + len(_layer_distances(self.retreat)) - 1
+
+    def outcome(self, layer: int) -> Outcome:
+        """What is said of an arm that gets no further than to the layer before this one."""
+        if layer <= self.at_grasp:
+            return Outcome.APPROACH_LINE
+        return Outcome.RETREAT_LINE if layer <= self.at_retreated else Outcome.LIFT_LINE
+
+    def X_AH(self, X_AG: Array, distance: Array) -> Array:
+        """Poses of the hand body.
+
+        Args:
+            X_AG: (..., 4, 4) grasps in the arm's base frame.
+            distance: (...,) lengths [m].
+
+        Returns:
+            (..., 4, 4), with the leading shapes broadcast against each other.
+        """
+        shape = np.broadcast_shapes(X_AG.shape[:-2], distance.shape)
+        X = np.broadcast_to(X_AG, (*shape, 4, 4)).copy()
+        length = np.broadcast_to(distance, shape)[..., None]
+        along = np.minimum(length, 0.0) - np.clip(length, 0.0, self.retreat)
+        X[..., :3, 3] += along * X[..., :3, 2]
+        X[..., :3, 3] += np.maximum(length - self.retreat, 0.0) * (self.direction_W @ self.R_WA)
+        placed = Poses.of(X) @ Poses.of(self.X_GH)
+        X[..., :3, :3], X[..., :3, 3] = placed.R, placed.p
+        return X
+
+    def carried(self, X_AG: Array, distance: Array) -> Array:
+        """How far what the hand holds from the grasp on has been moved in the world.
+
+        Args:
+            X_AG: (..., 4, 4) grasps in the arm's base frame.
+            distance: (...,) lengths [m].
+
+        Returns:
+            (..., 3) [m]; 0 up to the grasp.
+        """
+        length = distance[..., None]
+        approach_W = rotate(self.R_WA, X_AG[..., :3, 2])
+        back = -np.clip(length, 0.0, self.retreat) * approach_W
+        return np.asarray(back + np.maximum(length - self.retreat, 0.0) * self.direction_W)
+
+
+def _layer_distances(length: float) -> Array:
+    """Distances from 0 to `length` [m]; 0 alone if that is 0."""
+    max_spacing = 0.05  # Metres between poses at which postures are looked for.
+    return np.linspace(0.0, length, int(np.ceil(length / max_spacing - 1e-9)) + 1)
+
+
+MAX_JOINT_JUMP = 0.35
+"""Radians between rows. Rows farther apart are on different branches."""
+
+
+@dataclass(frozen=True, eq=False)
+class DenseRows:
+    """Arm positions of m chains, in the order of the chains and their ways.
+
+    Attributes:
+        chain: (K,) indices of the chains.
+        layer: (K,) where a row is between the layers of its chain.
+        q: (K, n) joint positions [rad].
+        broken: (K,) whether there is none, or one that jumps from the row before.
+    """
+
+    chain: Indices
+    layer: Array
+    q: Array
+    broken: NDArray[np.bool_]
+
+    def of(self, chain: int) -> slice:
+        """Rows of one chain."""
+        return slice(*np.searchsorted(self.chain, [chain, chain + 1]))
+
+    def replaced(self, chains: Indices, other: DenseRows) -> DenseRows:
+        """With those of some chains, which are numbered from 0 there, in place of the own ones."""
+        kept = ~np.isin(self.chain, chains)
+        chain = np.append(self.chain[kept], chains[other.chain])
+        order = np.argsort(chain, kind="stable")
+        return DenseRows(
+            chain[order],
+            np.append(self.layer[kept], other.layer)[order],
+            np.concatenate([self.q[kept], other.q])[order],
+            np.append(self.broken[kept], other.broken)[order],
+        )
+
+
+def straighten_rows(every: RowFiller, at: Array, tolerance: Array) -> DenseRows:
+    """Fills in rows between the layers of chains.
+
+    Args:
+        every: the chains.
+        at: (R,) where rows are wanted at least, as layers and fractions between them.
+        tolerance: (m,) how far the hand may be beside the straight segment half-way between two
+            rows [m].
+
+    Returns:
+        The rows.
+    """
+    max_halvings = 6  # From 1 cm down to 0.2 mm.
+    m = len(every.X_AG)
+    chain, layer = np.repeat(np.arange(m), len(at)), np.tile(at, m)
+    q, broken = every.solve(chain, layer)
+    for _ in range(max_halvings):
+        first = np.flatnonzero((chain[1:] == chain[:-1]) & ~broken[1:] & ~broken[:-1])
+        if len(at) < 2 or not len(first):
+            break
+        middle = 0.5 * (layer[first] + layer[first + 1])
+        half_way = 0.5 * (q[first] + q[first + 1])
+        # A row half-way is put in where the hand strays; what has been looked at stays as it is.
+        astray = every.deviation(chain[first], middle, half_way) > tolerance[chain[first]]
+        if not astray.any():
+            break
+        new_chain, new_layer = chain[first][astray], middle[astray]
+        new_q, new_broken = every.solve(new_chain, new_layer)
+        order = np.lexsort((np.append(layer, new_layer), np.append(chain, new_chain)))
+        chain = np.append(chain, new_chain)[order]
+        layer = np.append(layer, new_layer)[order]
+        q = np.concatenate([q, new_q])[order]
+        broken = np.append(broken, new_broken)[order]
+    jump = np.zeros(len(q), dtype=bool)
+    jump[1:] = (np.abs(np.diff(q, axis=0)).max(axis=1) > MAX_JOINT_JUMP) & (chain[1:] == chain[:-1])
+    return DenseRows(chain, layer, q, broken | jump)
+
+
+@dataclass(frozen=True, eq=False)
+class RowFiller(ABC):
+    """Finds arm positions between the layers of chains.
+
+    Attributes:
+        lines: where the hand goes.
+        X_AG: (m, 4, 4) grasps in the arm's base frame.
+        corners: (m, L, n) joint positions at the layers [rad].
+        layers: (L,) their lengths from the grasp [m].
+    """
+
+    lines: LinePoses
+    X_AG: Array
+    corners: Array
+    layers: Array
+
+    @abstractmethod
+    def solve(self, chain: Indices, layer: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """The posture at each of K places that is nearest to what lies between the layers, (K, n),
+        and whether there is none that near (K,); what lies between stands in for it then."""
+
+    @abstractmethod
+    def forward(self, q: Array) -> Array:
+        """Poses of the hand body (K, 4, 4) in the arm's base frame."""
+
+    def deviation(self, chain: Indices, layer: Array, q: Array) -> Array:
+        """How far the hand is from where it should be (K,) [m]."""
+        lever = 0.2  # Metres from H to the finger tips, whose motion a rotation counts as.
+        X, wanted = self.forward(q), self.X_AH(chain, layer)
+        p = X[:, :3, 3] - wanted[:, :3, 3]
+        R = X[:, :3, :3] - wanted[:, :3, :3]
+        distance = np.sqrt((p * p).sum(axis=1))
+        return np.asarray(distance + lever * np.sqrt(0.5 * (R * R).sum(axis=(1, 2))))
+
+    def between(self, chain: Indices, layer: Array) -> Array:
+        """What lies between the layers (K, n)."""
+        below = np.minimum(layer.astype(np.intp), max(0, self.corners.shape[1] - 2))
+        above = np.minimum(below + 1, self.corners.shape[1] - 1)
+        share = (layer - below)[:, None]
+        return np.asarray(
+            (1.0 - share) * self.corners[chain, below] + share * self.corners[chain, above]
+        )
+
+    def X_AH(self, chain: Indices, layer: Array) -> Array:
+        """Wanted poses of the hand body (K, 4, 4) in the arm's base frame."""
+        length = np.interp(layer, np.arange(len(self.layers)), self.layers)
+        return self.lines.X_AH(self.X_AG[chain], length)
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedFormFiller(RowFiller):
+    """By the inverse kinematics of the Panda."""
+
+    ik: PandaIk
+
+    def solve(self, chain: Indices, layer: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """See `RowFiller`; the redundant joint has the value between the layers."""
+        expected = self.between(chain, layer)
+        found = self.ik.solve(self.X_AH(chain, layer), expected[:, -1:])
+        q = np.full((len(chain), IK_BRANCHES, expected.shape[1]), np.inf)
+        q[found.pose, found.branch] = found.q
+        distance = np.abs(q - expected[:, None]).max(axis=-1)
+        nearest = distance.argmin(axis=1)
+        every = np.arange(len(chain))
+        broken = ~(distance[every, nearest] <= MAX_JOINT_JUMP)
+        return np.where(broken[:, None], expected, q[every, nearest]), broken
+
+    def forward(self, q: Array) -> Array:
+        """See `RowFiller`."""
+        return panda_forward(q) @ self.ik.X_FH
+
+
+@dataclass(frozen=True, eq=False)
+class NumericFiller(RowFiller):
+    """By steps from what lies between the layers."""
+
+    arm: ArmKinematics
+    settings: ReachSettings
+
+    def solve(self, chain: Indices, layer: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """See `RowFiller`."""
+        expected = self.between(chain, layer)
+        q, met = solve_ik_near(self.arm, self.X_AH(chain, layer), expected, self.settings)
+        broken = ~met | (np.abs(q - expected).max(axis=1) > MAX_JOINT_JUMP)
+        return np.where(broken[:, None], expected, q), broken
+
+    def forward(self, q: Array) -> Array:
+        """See `RowFiller`."""
+        return self.arm.forward(q)[0]
+
+
+def solve_ik_near(
+    arm: ArmKinematics, X_AH: Array, start: Array, settings: ReachSettings
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Postures (S, n) at hand poses (S, 4, 4) by steps from near postures, and whether they meet
+    them (S,)."""
+    return solve_ik(
+        arm,
+        X_AH,
+        start,
+        iterations=settings.iterations,
+        tolerance=settings.tolerance,
+        margin=settings.limit_margin,
+    )

@@ -1,0 +1,211 @@
+"""Searches for the straight segments of a grasp's motion: their interface, and two in succession.
+
+A chain is a motion of the arm from pregrasp to grasp, back along the approach, and along the lift.
+A search proposes chains, the most promising first. The caller checks them against the scene and
+refuses those in collision.
+
+The closed form searches all values of the redundant joint on a grid, which is too coarse where the
+arm is nearly singular. The numeric search follows few postures, but moves any joint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+
+from burg_drake.core import Array, Outcome
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """Arm positions along the straight parts of a grasp's motion.
+
+    Between two rows the arm moves straight in joint space, and the hand straight, up to a small
+    deviation.
+
+    Attributes:
+        flip: which of the two grasps with fingers swapped it is, 0 or 1.
+        q: (M, n) from the pregrasp over the grasp to the top of the lift.
+        at_grasp: row of the grasp.
+        at_retreated: row at which the retreat ends and the lift begins.
+        moved_W: (M, 3) how far the target has been moved in the world [m]; 0 up to the grasp.
+        lower: (M,) lower bound of the arm's clearance, without the hand [m].
+        place: of the search, to know the chain again.
+    """
+
+    flip: int
+    q: Array
+    at_grasp: int
+    at_retreated: int
+    moved_W: Array
+    lower: Array
+    place: Any = field(default=None, repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Failure:
+    """Why there is no chain.
+
+    Attributes:
+        outcome: `NO_IK`, `JOINT_LIMIT`, `ARM_COLLISION`, `APPROACH_LINE`, `RETREAT_LINE` or
+            `LIFT_LINE`.
+        excess: how far the best configuration is beyond the joint limits that are kept [rad or m];
+            NaN where that is not the reason.
+        q: (K, n) configurations that are in the way of it, the nearest to being free first.
+        moved_W: (K, 3) how far the target has been moved there [m].
+    """
+
+    outcome: Outcome
+    excess: float = np.nan
+    q: Array = field(default_factory=lambda: np.empty((0, 0)))
+    moved_W: Array = field(default_factory=lambda: np.empty((0, 3)))
+
+
+class LineSearchBatch(Protocol):
+    """The search of a batch of N grasps; what it answers about one depends on no other."""
+
+    def propose(self, grasps: Sequence[int]) -> list[Chain | None]:
+        """The most promising chain of each of some grasps among those not refused; None if there
+        is none (left)."""
+        ...
+
+    def refuse(self, grasp: int, chain: Chain, row: int | None) -> None:
+        """Puts out of the search what keeps a chain from being free.
+
+        Args:
+            grasp: index of the grasp.
+            chain: the chain.
+            row: the row at which, or just before which, the arm is in collision; None if the arm
+                does not get to its pregrasp.
+        """
+        ...
+
+    def close(self, grasp: int, flip: int) -> None:
+        """Leaves one way to put the fingers of a grasp out: the hand itself is in the way of
+        something, and no posture of the arm helps."""
+        ...
+
+    def failure(self, grasp: int) -> Failure:
+        """Why there is no chain (left)."""
+        ...
+
+
+class LineSearch(Protocol):
+    """Looks for chains of an arm in a scene."""
+
+    def lifted(self, height: float) -> LineSearch:
+        """The same search with a lift to another height [m]."""
+        ...
+
+    def begin(self, X_AG: Array, clearance: Array) -> LineSearchBatch:
+        """Begins with a batch.
+
+        Args:
+            X_AG: (N, 2, 4, 4) grasps in the arm's base frame, with the fingers either way; which of
+                the two comes first does not depend on how a grasp was given.
+            clearance: (N, 2) of the hand on its way with the fingers either way [m]: the hand may
+                deviate from the straight segment by a fraction of it.
+        """
+        ...
+
+
+RETRIED_OUTCOMES = (Outcome.APPROACH_LINE, Outcome.RETREAT_LINE, Outcome.LIFT_LINE)
+"""Outcomes after which the second search is asked, in order of progress."""
+
+
+class SuccessiveLineSearch:
+    """Looks for chains by two searches; see `LineSearch`.
+
+    Args:
+        first: the search that is asked about every grasp.
+        second: makes the other one, once it is needed.
+    """
+
+    def __init__(self, first: LineSearch, second: Callable[[], LineSearch]) -> None:
+        self._first, self._make = first, second
+
+    @cached_property
+    def second(self) -> LineSearch:
+        """The other search."""
+        return self._make()
+
+    def lifted(self, height: float) -> SuccessiveLineSearch:
+        """See `LineSearch`."""
+        return SuccessiveLineSearch(self._first.lifted(height), lambda: self.second.lifted(height))
+
+    def begin(self, X_AG: Array, clearance: Array) -> _SuccessiveBatch:
+        """See `LineSearch`."""
+        return _SuccessiveBatch(self, self._first.begin(X_AG, clearance), X_AG, clearance)
+
+
+class _SuccessiveBatch:
+    """See `line_search.LineSearch`."""
+
+    def __init__(
+        self, search: SuccessiveLineSearch, first: LineSearchBatch, X_AG: Array, clearance: Array
+    ) -> None:
+        self._search, self._first = search, first
+        self._X_AG, self._clearance = X_AG, clearance
+        self._closed = np.zeros((len(X_AG), 2), dtype=bool)
+        self._failed: dict[int, Failure] = {}
+        self._again: dict[int, tuple[LineSearchBatch, int]] = {}
+
+    def propose(self, grasps: Sequence[int]) -> list[Chain | None]:
+        """See `LineSearchBatch`."""
+        found: dict[int, Chain | None] = dict.fromkeys(grasps)
+        fresh = [g for g in grasps if g not in self._failed]
+        found.update(zip(fresh, self._first.propose(fresh), strict=True))
+        self._switch_search([g for g in fresh if found[g] is None])
+        by_search: dict[int, tuple[LineSearchBatch, list[int]]] = {}
+        for g in grasps:
+            if g in self._again:
+                lines, _ = self._again[g]
+                by_search.setdefault(id(lines), (lines, []))[1].append(g)
+        for lines, members in by_search.values():
+            chains = lines.propose([self._again[g][1] for g in members])
+            found.update(zip(members, chains, strict=True))
+        return [found[g] for g in grasps]
+
+    def refuse(self, grasp: int, chain: Chain, row: int | None) -> None:
+        """See `LineSearchBatch`."""
+        lines, number = self._again.get(grasp, (self._first, grasp))
+        lines.refuse(number, chain, row)
+
+    def close(self, grasp: int, flip: int) -> None:
+        """See `LineSearchBatch`."""
+        self._closed[grasp, flip] = True
+        lines, number = self._again.get(grasp, (self._first, grasp))
+        lines.close(number, flip)
+
+    def failure(self, grasp: int) -> Failure:
+        """See `LineSearchBatch`: what the search says that got farther, or else has more to say."""
+        first = self._failed[grasp] if grasp in self._failed else self._first.failure(grasp)
+        if grasp not in self._again:
+            return first
+        lines, number = self._again[grasp]
+        second = lines.failure(number)
+        return max(first, second, key=_failure_rank)
+
+    def _switch_search(self, grasps: Sequence[int]) -> None:
+        """Leaves grasps to the second search where that may help."""
+        if not grasps:
+            return
+        self._failed |= {g: self._first.failure(g) for g in grasps}
+        left = [g for g in grasps if self._failed[g].outcome in RETRIED_OUTCOMES]
+        if not left:
+            return
+        lines = self._search.second.begin(self._X_AG[left], self._clearance[left])
+        for number, g in enumerate(left):
+            self._again[g] = lines, number
+            for flip in np.flatnonzero(self._closed[g]):
+                lines.close(number, int(flip))
+
+
+def _failure_rank(failure: Failure) -> tuple[int, bool]:
+    """How far a search got, and whether it says why it got no farther."""
+    far = RETRIED_OUTCOMES.index(failure.outcome) if failure.outcome in RETRIED_OUTCOMES else -1
+    return far, bool(len(failure.q)) or bool(np.isfinite(failure.excess))

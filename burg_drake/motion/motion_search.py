@@ -1,0 +1,236 @@
+"""The search for motions of a batch of grasps: chains are proposed, checked, and joined to home.
+
+If no chain remains, what Drake's collision checker found tells why.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from burg_drake.core import Array, Outcome
+from burg_drake.motion.arm_collision import NO_DISPLACEMENT, ArmCollision, Overlap
+from burg_drake.motion.edge_checker import EdgeChecker
+from burg_drake.motion.home_tree import HomeTree
+from burg_drake.motion.line_search import Chain, Failure, LineSearchBatch
+from burg_drake.motion.motion_settings import ReachSettings
+from burg_drake.motion.reach_verdict import Reach, Witness
+
+PROGRESS_ORDER = (
+    Outcome.ARM_COLLISION,
+    Outcome.APPROACH_LINE,
+    Outcome.RETREAT_LINE,
+    Outcome.LIFT_LINE,
+)
+"""Outcomes by how far a motion got."""
+
+
+@dataclass(frozen=True, eq=False)
+class GraspBatch:
+    """Grasps whose hand is free on its way.
+
+    Attributes:
+        instance: N names of the targets; "" without one.
+        X_WG: (N, 2, 4, 4) grasps in the world with their fingers either way.
+        width: (N,) distance between the pads that hold the target [m]; NaN if it is not known.
+        clearance: (N, 2) of the hand on its way [m]; negative where it is not free.
+    """
+
+    instance: Sequence[str]
+    X_WG: Array
+    width: Array
+    clearance: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Refusal:
+    """A row of a chain that Drake has refused.
+
+    Attributes:
+        outcome: one of `PROGRESS_ORDER`: what is said if the search ends here.
+        overlap: the deepest one there; None if what collides lies just before the row.
+    """
+
+    outcome: Outcome
+    overlap: Overlap | None
+
+    @property
+    def rank(self) -> tuple[int, float]:
+        """How near to a motion it was: how far it got, and how little was in the way."""
+        depth = np.inf if self.overlap is None else self.overlap.depth
+        return PROGRESS_ORDER.index(self.outcome), -depth
+
+
+class MotionSearch:
+    """Looks for motions.
+
+    Args:
+        task: the grasps.
+        lines: the search for chains of these grasps.
+        tree: paths from home.
+        settings: when to give a grasp up.
+    """
+
+    def __init__(
+        self, task: GraspBatch, lines: LineSearchBatch, tree: HomeTree, settings: ReachSettings
+    ) -> None:
+        self._task, self._lines, self._tree, self._settings = task, lines, tree, settings
+        self._edges: EdgeChecker = tree.edges
+        self._collision: ArmCollision = tree.edges.collision
+        self._refused = np.zeros(len(task.instance), dtype=int)
+        self._unconnected = np.zeros(len(task.instance), dtype=int)
+        self._nearest: dict[int, Refusal] = {}
+        for grasp, flip in np.argwhere(task.clearance < 0.0):
+            lines.close(int(grasp), int(flip))
+
+    def run(self) -> list[Reach]:
+        """The verdicts."""
+        found: dict[int, Reach] = {}
+        left = list(range(len(self._task.instance)))
+        while left:
+            proposed = dict(zip(left, self._lines.propose(left), strict=True))
+            chains = {grasp: chain for grasp, chain in proposed.items() if chain is not None}
+            found |= self._reached(self._unblocked(chains))
+            for grasp in left:
+                if grasp not in found and (grasp not in chains or self._is_exhausted(grasp)):
+                    found[grasp] = self._refused_reach(grasp)
+            left = [grasp for grasp in left if grasp not in found]
+        return [found[grasp] for grasp in range(len(self._task.instance))]
+
+    def _is_exhausted(self, grasp: int) -> bool:
+        """Whether so much has been tried that no more is."""
+        refused = self._refused[grasp] >= self._settings.chains
+        return bool(refused or self._unconnected[grasp] >= self._settings.starts_tried)
+
+    def _unblocked(self, chains: dict[int, Chain]) -> dict[int, Chain]:
+        """The chains that are free; the others are refused."""
+        blocked = {grasp: self._doubtful_blocked(grasp, chain) for grasp, chain in chains.items()}
+        for lift in (False, True):
+            left = {grasp: chains[grasp] for grasp in chains if blocked[grasp] is None}
+            blocked |= self._first_blocked(left, lift=lift)
+        for grasp, row in blocked.items():
+            if row is not None:
+                self._refuse(grasp, chains[grasp], row)
+        return {grasp: chain for grasp, chain in chains.items() if blocked[grasp] is None}
+
+    def _doubtful_blocked(self, grasp: int, chain: Chain) -> int | None:
+        """Row at which the arm collides, among those whose clearance is not known to be positive:
+        what fails, fails soonest there."""
+        if not self._settings.exact:
+            return None
+        doubtful = np.flatnonzero(chain.lower <= 0.0)
+        for row in doubtful[np.argsort(chain.lower[doubtful], kind="stable")]:
+            carried, moved_W, width = self._load(grasp, chain.moved_W[row])
+            if not self._collision.is_free(
+                chain.q[row], carried=carried, moved_W=moved_W, width=width
+            ):
+                return int(row)
+        return None
+
+    def _load(self, grasp: int, moved_W: Array) -> tuple[str | None, ArrayLike, float]:
+        """What the hand carries once it has moved the target by (3,) [m], how far that has been
+        moved, and its width [m]."""
+        held = bool(moved_W.any())
+        name = self._task.instance[grasp] if held else ""
+        width = float(self._task.width[grasp]) if held else np.nan
+        return (name, moved_W, width) if name else (None, NO_DISPLACEMENT, width)
+
+    def _first_blocked(self, chains: dict[int, Chain], *, lift: bool) -> dict[int, int | None]:
+        """Rows at, or just before, which the arm collides on the approach, or on the lift."""
+        rows = {
+            grasp: slice(chain.at_grasp, len(chain.q)) if lift else slice(0, chain.at_grasp + 1)
+            for grasp, chain in chains.items()
+        }
+        found = self._edges.first_blocked_each(
+            [chain.q[rows[grasp]] for grasp, chain in chains.items()],
+            hand=False,
+            carried=[(self._task.instance[grasp] or None) if lift else None for grasp in chains],
+            moved_W=[chain.moved_W[rows[grasp]] for grasp, chain in chains.items()],
+            width=[float(self._task.width[grasp]) if lift else np.nan for grasp in chains],
+            lower=[chain.lower[rows[grasp]] for grasp, chain in chains.items()],
+        )
+        return {
+            grasp: None if row is None else rows[grasp].start + row
+            for grasp, row in zip(chains, found, strict=True)
+        }
+
+    def _refuse(self, grasp: int, chain: Chain, row: int) -> None:
+        """Puts a chain out; where what collides is rigid with the hand, no other posture helps,
+        and all of this way to put the fingers goes with it."""
+        self._refused[grasp] += 1
+        carried, moved_W, width = self._load(grasp, chain.moved_W[row])
+        overlaps = self._collision.overlaps(
+            chain.q[row], carried=carried, moved_W=moved_W, width=width
+        )
+        with_hand = next((overlap for overlap in overlaps if overlap.carried), None)
+        if with_hand is not None:
+            self._lines.close(grasp, chain.flip)
+        else:
+            self._lines.refuse(grasp, chain, row)
+        if row in (0, chain.at_grasp) or with_hand is not None:
+            outcome = Outcome.ARM_COLLISION
+        else:
+            outcome = PROGRESS_ORDER[1 + (row > chain.at_grasp) + (row > chain.at_retreated)]
+        refusal = Refusal(outcome, with_hand or next(iter(overlaps), None))
+        if grasp not in self._nearest or refusal.rank > self._nearest[grasp].rank:
+            self._nearest[grasp] = refusal
+
+    def _reached(self, chains: dict[int, Chain]) -> dict[int, Reach]:
+        """A yes for each of the free chains that a path leads to; the others are refused."""
+        if not chains:
+            return {}
+        transfers = self._tree.connect_each(np.array([c.q[0] for c in chains.values()]))
+        found = {}
+        for (grasp, chain), transfer in zip(chains.items(), transfers, strict=True):
+            if transfer is None:
+                self._lines.refuse(grasp, chain, None)
+                self._unconnected[grasp] += 1
+                continue
+            at, corner = chain.at_grasp, chain.at_retreated
+            hand = float(self._task.clearance[grasp, chain.flip])
+            witness = Witness(
+                X_WG=self._task.X_WG[grasp, chain.flip],
+                transfer=transfer,
+                approach=chain.q[: at + 1],
+                retreat=chain.q[at : corner + 1] if corner > at else None,
+                lift=chain.q[corner:],
+                clearance=hand,
+            )
+            clearance = max(0.0, min(hand, float(chain.lower.min())))
+            found[grasp] = Reach(None, clearance=clearance, witness=witness)
+        return found
+
+    def _refused_reach(self, grasp: int) -> Reach:
+        """Why there is no motion: what kept the best attempt from being one."""
+        if self._unconnected[grasp]:
+            return Reach(Outcome.NO_PATH)
+        failure, refusal = self._lines.failure(grasp), self._nearest.get(grasp)
+        if refusal is not None and refusal.rank[0] >= _progress_rank(failure.outcome):
+            return _reason_rank(refusal.outcome, refusal.overlap)
+        least = self._least_overlapping(grasp, failure)
+        if least is None:
+            return Reach(failure.outcome, excess=failure.excess)
+        return _reason_rank(failure.outcome, least)
+
+    def _least_overlapping(self, grasp: int, failure: Failure) -> Overlap | None:
+        """What is in the way, of the configuration where that is least."""
+        least: Overlap | None = None
+        for q, place in zip(failure.q, failure.moved_W, strict=True):
+            carried, moved_W, width = self._load(grasp, place)
+            overlaps = self._collision.overlaps(q, carried=carried, moved_W=moved_W, width=width)
+            if overlaps and (least is None or overlaps[0].depth < least.depth):
+                least = overlaps[0]
+        return least
+
+
+def _progress_rank(outcome: Outcome) -> int:
+    return PROGRESS_ORDER.index(outcome) if outcome in PROGRESS_ORDER else -1
+
+
+def _reason_rank(outcome: Outcome, overlap: Overlap | None) -> Reach:
+    if overlap is None:
+        return Reach(outcome)
+    return Reach(outcome, str(overlap), -overlap.depth)

@@ -1,0 +1,490 @@
+"""Chains of postures from pregrasp over grasp to the top of the lift, for any serial arm.
+
+Postures at the grasp come from the arm's inverse kinematics. Each is followed along both straight
+segments, step by step, which makes a chain unless a joint reaches its limit or jumps. The best
+chain is filled in until the hand goes straight, and checked against bounds of the clearance. A
+chain in collision is rejected, and the next best takes its place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.core import Array, Indices, Outcome
+from burg_drake.motion.clearance_bounds import ArmProximity
+from burg_drake.motion.closed_form_lines import ChainSearchSettings
+from burg_drake.motion.ik_solutions import ArmSolutions, NumericSolutions
+from burg_drake.motion.line_poses import (
+    DenseRows,
+    LinePoses,
+    NumericFiller,
+    solve_ik_near,
+    straighten_rows,
+)
+from burg_drake.motion.line_search import Chain, Failure
+from burg_drake.motion.motion_settings import ReachSettings
+from burg_drake.motion.numeric_ik import ArmKinematics
+from burg_drake.motion.posture_grid import START_COST, decisive_clearance
+
+GRASP, APPROACH, RETREAT, LIFT, COMPLETE_CHAIN = range(5)
+"""Where a candidate ended: at the grasp, on the way there, back, or up, or not at all."""
+
+
+@dataclass(eq=False)
+class ChainCandidates:
+    """C postures at a grasp, each with its continuation at L poses of the way.
+
+    Attributes:
+        flip: (C,) which of the two ways to put the fingers.
+        q: (C, L, n) arm positions; NaN where the continuation has not got to.
+        stage: (C,) where it ended.
+        cost: (C,) of those that have not ended.
+        open: (C,) whether it may still be proposed.
+    """
+
+    flip: Indices
+    q: Array
+    stage: Indices
+    cost: Array
+    open: NDArray[np.bool_]
+    _blocked: list[tuple[int, float, Array, Array]] = field(default_factory=list)
+    _closed: set[int] = field(default_factory=set)
+
+    @classmethod
+    def none(cls, poses: int, joints: int) -> Self:
+        """Of a grasp of which nothing is known yet."""
+        index = np.empty(0, np.intp)
+        return cls(index, np.empty((0, poses, joints)), index, np.empty(0), np.empty(0, dtype=bool))
+
+    def __len__(self) -> int:
+        return len(self.flip)
+
+    def add(self, flip: Indices, q: Array, pose: int) -> Indices:
+        """Adds postures at one of the poses, without those that are there already.
+
+        Args:
+            flip: (S,) which way to put the fingers.
+            q: (S, n) arm positions.
+            pose: index of the pose.
+
+        Returns:
+            Indices of what is new.
+        """
+        # Radians or metres between joints of postures that count as the same.
+        posture_tolerance = 0.05
+        first = len(self)
+        if not len(q):
+            return np.empty(0, np.intp)
+        every_flip, every = np.append(self.flip, flip), np.concatenate([self.q[:, pose], q])
+        same = np.abs(every[first:, None] - every).max(axis=-1) <= posture_tolerance
+        same &= every_flip[first:, None] == every_flip
+        kept = np.flatnonzero(same.argmax(axis=1) == np.arange(first, len(every)))
+        count = len(kept)
+        new = np.full((count, *self.q.shape[1:]), np.nan)
+        new[:, pose] = q[kept]
+        self.flip = np.append(self.flip, flip[kept])
+        self.q = np.concatenate([self.q, new])
+        self.stage = np.append(self.stage, np.full(count, GRASP))
+        self.cost = np.append(self.cost, np.full(count, np.inf))
+        self.open = np.append(self.open, np.zeros(count, dtype=bool))
+        return np.arange(first, first + count)
+
+    def complete(self, k: int, q: Array, cost: float) -> None:
+        """Takes the continuation (L, n) of a candidate over, which may be proposed from now on."""
+        self.q[k], self.cost[k], self.stage[k] = q, cost, COMPLETE_CHAIN
+        self.open[k] = self.flip[k] not in self._closed
+
+    def stop(self, k: int, stage: int) -> None:
+        """A candidate ends at a stage, as its continuation does not exist."""
+        self.stage[k], self.open[k] = stage, False
+
+    def block(self, k: int, stage: int, q: Array, moved_W: Array, upper: float) -> None:
+        """A candidate ends at a stage, as it is in collision there.
+
+        Args:
+            k: its index.
+            stage: where it ends.
+            q: (n,) the arm positions in collision.
+            moved_W: (3,) how far the target has been moved there [m].
+            upper: bound of the clearance there [m].
+        """
+        self.stop(k, stage)
+        self._blocked.append((stage, upper, q.copy(), moved_W))
+
+    def close(self, flip: int) -> None:
+        """Proposes nothing any more with the fingers in one way."""
+        self._closed.add(flip)
+        self.open[self.flip == flip] = False
+
+    def best(self) -> int | None:
+        """Index of the cheapest candidate that may be proposed; None if there is none."""
+        which = np.flatnonzero(self.open)
+        return int(which[self.cost[which].argmin()]) if len(which) else None
+
+    def blocking(self, stage: int, count: int) -> tuple[Array, Array]:
+        """Arm positions (K, n) in collision at a stage, the nearest to being free first, and how
+        far the target has been moved there (K, 3) [m]; K is at most `count`."""
+        of = sorted((b for b in self._blocked if b[0] == stage), key=lambda b: -b[1])[:count]
+        q = np.array([b[2] for b in of]).reshape(len(of), self.q.shape[-1])
+        return q, np.array([b[3] for b in of]).reshape(len(of), 3)
+
+
+SolvePostures = Callable[[Array, Array], tuple[Array, NDArray[np.bool_]]]
+"""Postures (S, n) at hand poses (S, 4, 4) by steps from near postures (S, n), and whether they meet
+them."""
+MeasureClearance = Callable[[Array], tuple[Array, Array]]
+"""Bounds of the clearance of postures (S, n): lower, and what has to be positive to count [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class FollowedPostures:
+    """S postures at grasps, and what became of them at L poses of the way.
+
+    Attributes:
+        q: (S, L, n) arm positions; NaN where they have not got to.
+        lower, upper: (S, L) bounds of the clearance [m]; infinite where not measured.
+        stage: (S,) where they ended, `COMPLETE_CHAIN` if they did not.
+    """
+
+    q: Array
+    lower: Array
+    upper: Array
+    stage: Indices
+
+    def blocked(self, s: int) -> int | None:
+        """The pose at which a posture is deepest in collision; None if it is nowhere."""
+        worst = int(self.upper[s].argmin())
+        return None if self.upper[s, worst] > 0.0 else worst
+
+
+@dataclass(frozen=True, eq=False)
+class PostureFollower:
+    """Follows postures; those in collision on the way are not followed any further.
+
+    Attributes:
+        lines: where the hand goes.
+        travel: most that a joint may move from one to the next [rad].
+        solve: solves for postures.
+        measure: measures their clearance.
+    """
+
+    lines: LinePoses
+    travel: float
+    solve: SolvePostures
+    measure: MeasureClearance
+
+    def follow(self, X_AG: Array, q: Array) -> FollowedPostures:
+        """From the grasp to the pregrasp; then, from the grasp, back and up to the top.
+
+        Args:
+            X_AG: (S, 4, 4) grasps in the arm's base frame.
+            q: (S, n) postures there.
+        """
+        count, at_grasp = len(self.lines.layers), self.lines.at_grasp
+        at_retreated = self.lines.at_retreated
+        lower, upper = np.full((2, len(q), count), np.inf)
+        every = np.full((len(q), count, q.shape[1]), np.nan)
+        every[:, at_grasp] = q
+        found = FollowedPostures(every, lower, upper, np.full(len(q), COMPLETE_CHAIN))
+        self._measure(found, [at_grasp], GRASP)
+        for stage, begin, end in (
+            (APPROACH, at_grasp, 0),
+            (RETREAT, at_grasp, at_retreated),
+            (LIFT, at_retreated, count - 1),
+        ):
+            step = -1 if end < begin else 1
+            poses = range(begin + step, end + step, step)
+            for pose in poses:
+                self._step(found, X_AG, pose, step, stage, bent=pose - step == begin)
+            self._measure(found, poses, stage)
+        return found
+
+    def _step(
+        self, found: FollowedPostures, X_AG: Array, pose: int, step: int, stage: int, *, bent: bool
+    ) -> None:
+        """To the next pose, on from the last two; from the last one alone where the way is bent."""
+        alive = np.flatnonzero(found.stage == COMPLETE_CHAIN)
+        before = found.q[alive, pose - step]
+        start = before
+        if not bent:
+            start = 2.0 * before - found.q[alive, pose - 2 * step]
+        X_AH = self.lines.X_AH(X_AG[alive], self.lines.layers[pose])
+        q, met = self.solve(X_AH, start)
+        met &= np.abs(q - before).max(axis=1, initial=0.0) <= self.travel
+        found.q[alive[met], pose] = q[met]
+        found.stage[alive[~met]] = stage
+
+    def _measure(self, found: FollowedPostures, poses: Sequence[int], stage: int) -> None:
+        alive = np.flatnonzero(found.stage == COMPLETE_CHAIN)
+        if not len(alive) or not len(poses):
+            return
+        where = np.ix_(alive, np.array(poses))
+        lower, upper = self.measure(found.q[where].reshape(-1, found.q.shape[-1]))
+        shape = len(alive), len(poses)
+        found.lower[where], found.upper[where] = lower.reshape(shape), upper.reshape(shape)
+        found.stage[alive[~(found.upper[where] > 0.0).all(axis=1)]] = stage
+
+
+SEGMENT_STAGES = (
+    (APPROACH, Outcome.APPROACH_LINE),
+    (RETREAT, Outcome.RETREAT_LINE),
+    (LIFT, Outcome.LIFT_LINE),
+)
+"""The hand's straight segments in order, with the outcome of a failure on each."""
+
+
+class NumericLineSearch:
+    """Looks for chains of a serial arm in a scene.
+
+    Args:
+        arm: the arm on its own.
+        lines: where the hand goes.
+        proximity: bounds of the arm's clearance.
+        home: (n,) home posture; chains that start near it are preferred [rad].
+        settings: how thoroughly to look.
+        solutions: finds postures at hand poses, within the joint limits; numerically if None.
+        beyond: likewise, without regard to the limits.
+    """
+
+    def __init__(
+        self,
+        arm: ArmKinematics,
+        lines: LinePoses,
+        proximity: ArmProximity,
+        home: Array,
+        settings: ReachSettings,
+        *,
+        solutions: ArmSolutions | None = None,
+        beyond: ArmSolutions | None = None,
+    ) -> None:
+        self.arm, self.lines, self.proximity = arm, lines, proximity
+        self.home, self.settings = home, settings
+        margin, starts = settings.limit_margin, settings.starts
+        self.solutions = solutions or NumericSolutions(arm, margin, starts=starts)
+        self.beyond = beyond or NumericSolutions(arm, margin, starts=starts[:1], limited=False)
+        self.layers, self.at_grasp = lines.layers, lines.at_grasp
+        self.follower = PostureFollower(lines, settings.joint_travel, self.solve, self.measure)
+
+    def lifted(self, height: float) -> NumericLineSearch:
+        """See `LineSearch`."""
+        return NumericLineSearch(
+            self.arm,
+            replace(self.lines, lift=height),
+            self.proximity,
+            self.home,
+            self.settings,
+            solutions=self.solutions,
+            beyond=self.beyond,
+        )
+
+    def begin(self, X_AG: Array, clearance: Array) -> _NumericBatch:
+        """See `LineSearch`."""
+        return _NumericBatch(self, X_AG, clearance)
+
+    def solve(self, X_AH: Array, start: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Postures (S, n) at hand poses (S, 4, 4) by steps from near postures, and whether they
+        meet them (S,)."""
+        return solve_ik_near(self.arm, X_AH, start, self.settings)
+
+    def measure(self, q: Array) -> tuple[Array, Array]:
+        """Clearances of postures (S, n): lower bounds, and what has to be positive for a posture to
+        count (S,) [m]: the upper bound where the last word is Drake's, else the best guess."""
+        bounds = self.proximity.bounds(q, hand=False)
+        return bounds.lower, decisive_clearance(bounds, self.settings.exact)
+
+
+class _NumericBatch:
+    """See `line_search.LineSearch`."""
+
+    def __init__(self, search: NumericLineSearch, X_AG: Array, clearance: Array) -> None:
+        self._search, self._X_AG = search, X_AG
+        self._deviation = np.clip(0.5 * clearance, *search.settings.deviation)
+        self._round = np.zeros(len(X_AG), dtype=int)
+        self._of = [ChainCandidates.none(len(search.layers), len(search.home)) for _ in X_AG]
+        self._advance(list(range(len(X_AG))))
+
+    def propose(self, grasps: Sequence[int]) -> list[Chain | None]:
+        """See `LineSearch`."""
+        found: dict[int, Chain | None] = {}
+        left = list(grasps)
+        while left:
+            best = {g: self._of[g].best() for g in left}
+            exhausted = [g for g in left if best[g] is None]
+            finished = [g for g in exhausted if self._round[g] == self._search.solutions.rounds]
+            found.update(dict.fromkeys(finished))
+            self._advance([g for g in exhausted if g not in found])
+            found.update(self._refine([(g, k) for g, k in best.items() if k is not None]))
+            left = [g for g in left if g not in found]
+        return [found[g] for g in grasps]
+
+    def refuse(self, grasp: int, chain: Chain, row: int | None) -> None:
+        """See `LineSearch`."""
+        candidates, k = self._of[grasp], chain.place
+        if row is None:
+            candidates.open[k] = False
+            return
+        ends = chain.at_grasp, chain.at_retreated, len(chain.q)
+        stage = (
+            GRASP
+            if row in (0, chain.at_grasp)
+            else SEGMENT_STAGES[int(np.searchsorted(ends, row))][0]
+        )
+        candidates.block(k, stage, chain.q[row], chain.moved_W[row], 0.0)
+
+    def close(self, grasp: int, flip: int) -> None:
+        """See `LineSearch`."""
+        self._of[grasp].close(flip)
+
+    def failure(self, grasp: int) -> Failure:
+        """See `LineSearch`."""
+        search, candidates = self._search, self._of[grasp]
+        if not len(candidates):
+            return self._beyond_limits(grasp, search.at_grasp)
+        stage = int(candidates.stage[~candidates.open].max(initial=GRASP))
+        if stage == GRASP:
+            return self._explain(Outcome.ARM_COLLISION, candidates, GRASP)
+        if stage == APPROACH:
+            return self._explain_no_approach(grasp)
+        if stage in (RETREAT, LIFT):
+            return self._explain(dict(SEGMENT_STAGES)[stage], candidates, stage)
+        return Failure(Outcome.NO_PATH)
+
+    def _advance(self, grasps: list[int]) -> None:
+        """Goes on to the next round of postures at some grasps, and follows those that are free
+        along both lines."""
+        search = self._search
+        for turn in sorted({int(self._round[g]) for g in grasps}):
+            members = [g for g in grasps if self._round[g] == turn]
+            self._round[members] += 1
+            X_AG = self._X_AG[members].reshape(-1, 4, 4)
+            pose, q = self._postures(X_AG, search.at_grasp, turn)
+            added = [
+                self._of[g].add(pose[own] % 2, q[own], search.at_grasp)
+                for g, own in ((g, pose // 2 == at) for at, g in enumerate(members))
+            ]
+            self._follow(np.repeat(members, [len(k) for k in added]), np.concatenate(added))
+
+    def _postures(self, X_AG: Array, layer: int, turn: int) -> tuple[Indices, Array]:
+        search = self._search
+        X_AH = search.lines.X_AH(X_AG, search.layers[layer])
+        pose, q = search.solutions.solve(X_AH, turn)
+        return pose, search.arm.wrapped_near(q, search.home)
+
+    def _follow(self, grasp: Indices, k: Indices) -> None:
+        """Follows new candidates, by their grasps (S,) and indices (S,), along both lines."""
+        search = self._search
+        places = list(zip(grasp.tolist(), k.tolist(), strict=True))
+        flip = np.array([self._of[g].flip[j] for g, j in places], dtype=np.intp)
+        q = np.array([self._of[g].q[j, search.at_grasp] for g, j in places])
+        q = q.reshape(len(k), len(search.home))
+        found = search.follower.follow(self._X_AG[grasp, flip], q)
+        for s, (g, j) in enumerate(places):
+            stage, blocked = int(found.stage[s]), found.blocked(s)
+            if stage == COMPLETE_CHAIN:
+                self._of[g].complete(j, found.q[s], self._cost(found.q[s], found.lower[s]))
+            elif blocked is None:
+                self._of[g].stop(j, stage)
+            else:
+                moved_W = search.lines.carried(self._X_AG[g, flip[s]], search.layers[blocked])
+                upper = float(found.upper[s, blocked])
+                self._of[g].block(j, stage, found.q[s, blocked], moved_W, upper)
+
+    def _cost(self, q: Array, lower: Array) -> float:
+        """Of a chain: the way of the joint that moves most from layer to layer, its distance from
+        home, and doubts whether it is free."""
+        change = np.abs(np.diff(q, axis=0)).max(axis=1).sum()
+        start = START_COST * np.abs(q[0] - self._search.home).max()
+        return float(change + start + ChainSearchSettings.doubt_cost * (lower <= 0.0).sum())
+
+    def _refine(self, chosen: list[tuple[int, int]]) -> dict[int, Chain]:
+        """Chains whose hand goes straight and that are not in collision as far as is known; those
+        of which that is not so are put out."""
+        if not chosen:
+            return {}
+        search = self._search
+        count = len(search.layers)
+        grasp = np.array([g for g, _ in chosen])
+        flip = np.array([self._of[g].flip[k] for g, k in chosen])
+        corners = np.array([self._of[g].q[k] for g, k in chosen])
+        X_AG = self._X_AG[grasp, flip]
+        filler = NumericFiller(
+            *(search.lines, X_AG, corners, search.layers, search.arm, search.settings)
+        )
+        at = np.linspace(0.0, count - 1.0, (count - 1) * ChainSearchSettings.rows_per_layer + 1)
+        rows = straighten_rows(filler, at, self._deviation[grasp, flip])
+        lower, upper = search.measure(rows.q)
+        chains = {}
+        for i, (g, k) in enumerate(chosen):
+            chain = self._chain(g, k, rows, rows.of(i), lower, upper)
+            if chain is not None:
+                chains[g] = chain
+        return chains
+
+    def _chain(
+        self, grasp: int, k: int, rows: DenseRows, own: slice, lower: Array, upper: Array
+    ) -> Chain | None:
+        search, of = self._search, self._of[grasp]
+        layer, q = rows.layer[own], rows.q[own]
+        length = np.interp(layer, np.arange(len(search.layers)), search.layers)
+        moved_W = search.lines.carried(self._X_AG[grasp, of.flip[k]], length)
+        blocked = ~(upper[own] > 0.0)
+        bad = np.flatnonzero(rows.broken[own] | blocked)
+        if len(bad):
+            ends = search.at_grasp, search.lines.at_retreated, len(search.layers)
+            on = np.searchsorted(ends, layer[bad])  # which of the ways
+            stage, bad = SEGMENT_STAGES[int(on.min())][0], bad[on == on.min()]
+            row = bad[upper[own][bad].argmin()]
+            if blocked[row]:
+                of.block(k, stage, q[row], moved_W[row], float(upper[own][row]))
+            else:
+                of.stop(k, stage)
+            return None
+        return Chain(
+            flip=int(of.flip[k]),
+            q=q,
+            at_grasp=int(np.searchsorted(layer, search.at_grasp)),
+            at_retreated=int(np.searchsorted(layer, search.lines.at_retreated)),
+            moved_W=moved_W,
+            lower=lower[own],
+            place=k,
+        )
+
+    def _explain_no_approach(self, grasp: int) -> Failure:
+        """Whether the arm does not get along the line, or has no place at the pregrasp at all."""
+        search = self._search
+        if search.at_grasp > 0:
+            X_AG, found = self._X_AG[grasp], []
+            for turn in range(search.solutions.rounds):
+                found.append(self._postures(X_AG, 0, turn)[1])
+            q = np.concatenate(found)
+            if not len(q):
+                return self._beyond_limits(grasp, 0)
+            _, upper = search.measure(q)
+            if not (upper > 0.0).any():
+                order = np.argsort(-upper, kind="stable")[: ChainSearchSettings.max_explained]
+                return Failure(Outcome.ARM_COLLISION, q=q[order], moved_W=np.zeros((len(order), 3)))
+        return self._explain(Outcome.APPROACH_LINE, self._of[grasp], APPROACH)
+
+    def _explain(self, outcome: Outcome, candidates: ChainCandidates, stage: int) -> Failure:
+        """Names the postures that were in the way at a stage, the nearest to being free first."""
+        q, moved_W = candidates.blocking(stage, ChainSearchSettings.max_explained)
+        return Failure(outcome, q=q, moved_W=moved_W)
+
+    def _beyond_limits(self, grasp: int, layer: int) -> Failure:
+        """Whether there are postures beyond the joint limits, and by how much at least."""
+        search = self._search
+        X_AH = search.lines.X_AH(self._X_AG[grasp], search.layers[layer])
+        q = np.concatenate(
+            [search.beyond.solve(X_AH, turn)[1] for turn in range(search.beyond.rounds)]
+        )
+        if not len(q):
+            return Failure(Outcome.NO_IK)
+        arm, margin = search.arm, search.settings.limit_margin
+        q = arm.wrapped_near(q, 0.5 * (arm.lower + arm.upper))
+        beyond = np.maximum(arm.lower + margin - q, q - arm.upper + margin).max(axis=1)
+        return Failure(Outcome.JOINT_LIMIT, excess=max(0.0, float(beyond.min())))

@@ -1,0 +1,589 @@
+"""`Plan`, the motions of one grasp, and its files: JSON, or CSV with metadata beside it.
+
+In JSON, `joint_trajectory` is laid out as ROS's message `trajectory_msgs/JointTrajectory`, beside
+the origin of the plan, its limits, its sample rate and the spans of its phases. A CSV table has
+the columns `t` [s], `phase`, `q_JOINT`, `v_JOINT` and `a_JOINT` of each joint, and `width`, the
+wanted distance between the pads [m]: that of the target from when the hand closes, or 0 if it is
+unknown. The metadata follow the standard of CSV on the Web.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import burg_drake
+from burg_drake.core import (
+    READ_ERRORS,
+    TEXT_UNIT,
+    Array,
+    BurgError,
+    Column,
+    DocumentError,
+    FileLimits,
+    InvalidInputError,
+    atomic_write,
+    atomic_write_all,
+    check_pose,
+    csv_metadata,
+    format_rows,
+    load_json,
+    metadata_path,
+    quote_value,
+    read_rows,
+    suppress_numpy_warnings,
+)
+from burg_drake.motion.trajectory import PHASES, PlannedMotion, PlanOrigin, Trajectory
+
+if TYPE_CHECKING:
+    from burg_drake.scene import SceneLike
+    from burg_drake.station import StationLike
+
+PLAN_FORMAT = "burg_drake plan"  # Value of `format` in files of plans.
+PLAN_VERSION = 1  # Version of files of plans.
+NANOSECONDS_PER_SECOND = 1_000_000_000
+
+Spans = dict[str, tuple[int, int]]
+"""First and last sample of each phase; two that follow one another share one."""
+
+
+@dataclass(frozen=True)
+class PlanDescription:
+    """What a file says of a plan beside its samples; see `Plan`."""
+
+    rate: float
+    opening: float
+    width: float
+    close_time: float
+    origin: PlanOrigin | None
+
+
+def is_hand_closed(phase: str) -> bool:
+    """Whether the hand closes, or is closed, in a phase."""
+    return PHASES.index(phase) >= PHASES.index("close")
+
+
+def joint_names(plan: PlannedMotion) -> tuple[str, ...]:
+    """Names of the joints, made up if nobody has said them."""
+    if plan.origin is not None:
+        return plan.origin.joints
+    return tuple(f"joint{i + 1}" for i in range(plan.approach.q.shape[1]))
+
+
+def phase_spans(plan: PlannedMotion) -> Spans:
+    """Where the phases are among the samples of the whole plan."""
+    spans, first = {}, 0
+    for name, phase in plan.phases.items():
+        spans[name] = (first, first + len(phase.t) - 1)
+        first = spans[name][1]
+    return spans
+
+
+def require_writable(plan: PlannedMotion) -> None:
+    """Refuses a plan that could not be read again.
+
+    Raises:
+        InvalidInputError: samples are not evenly spaced, or no finite numbers.
+    """
+    whole, rate = plan.whole, plan.approach.rate
+    if not np.isfinite([whole.q, whole.v, whole.a]).all():
+        raise InvalidInputError("the plan has samples that are not finite, so it cannot be written")
+    for name, phase in plan.phases.items():
+        if not np.allclose(
+            phase.t, np.arange(len(phase.t)) / rate, rtol=0.0, atol=1.0 / NANOSECONDS_PER_SECOND
+        ):
+            raise InvalidInputError(f"phase {name!r} is not sampled at {rate:g} Hz")
+
+
+def plan_metadata(plan: PlannedMotion) -> dict[str, Any]:
+    """JSON values of all of a plan but its samples."""
+    return {
+        "format": PLAN_FORMAT,
+        "version": PLAN_VERSION,
+        "burg_drake": burg_drake.__version__,
+        "origin": _origin_data(plan.origin) if plan.origin else None,
+        "hand": {
+            name: _finite_or_none(getattr(plan, name))
+            for name in ("opening", "width", "close_time")
+        },
+        "rate": plan.approach.rate,
+    }
+
+
+def require_plan_version(data: Any, path: str | Path) -> None:
+    """Refuses what is not a plan, or one of another release.
+
+    Raises:
+        InvalidInputError: it is not.
+    """
+    if not isinstance(data, dict) or data.get("format") != PLAN_FORMAT:
+        raise InvalidInputError(f"{path} is not a plan: its format is not {PLAN_FORMAT!r}")
+    if data.get("version") != PLAN_VERSION:
+        raise InvalidInputError(
+            f"{path} has version {quote_value(data.get('version'))}; this release reads {PLAN_VERSION}"
+        )
+
+
+@contextmanager
+def document_part(document: Mapping[str, Any], name: str) -> Iterator[Any]:
+    """A part of a document, whose errors name it."""
+    try:
+        yield document[name]
+    except BurgError:
+        raise
+    except READ_ERRORS as error:
+        raise InvalidInputError(f"{name!r} is missing or was changed") from error
+
+
+def read_plan_description(document: Mapping[str, Any], joints: tuple[str, ...]) -> PlanDescription:
+    """What `plan_metadata` has written.
+
+    Raises:
+        InvalidInputError: it is damaged, or of other joints.
+    """
+    with document_part(document, "hand") as hand:
+        opening, width = (
+            np.nan if hand[name] is None else float(hand[name]) for name in ("opening", "width")
+        )
+        if min(opening, width) < 0.0 or np.inf in (opening, width):
+            raise ValueError(hand)
+        close_time = float(hand["close_time"])
+    with document_part(document, "rate") as rate:
+        if not 0.0 < rate < np.inf:
+            raise ValueError(rate)
+    origin = None
+    if document.get("origin") is not None:
+        with document_part(document, "origin") as data:
+            origin = _read_origin(data, joints)
+    return PlanDescription(rate, opening, width, close_time, origin)
+
+
+def assemble_plan(
+    description: PlanDescription, t: Array, spans: Spans, rows: Sequence[Array]
+) -> PlannedMotion:
+    """A plan of its samples.
+
+    Args:
+        description: what else is known of it.
+        t: (T,) times of the samples [s].
+        spans: where the phases are.
+        rows: positions, velocities and accelerations, (T, n) each.
+
+    Raises:
+        InvalidInputError: times, phases or positions do not belong together, or are beyond the
+            limits.
+    """
+    time_tolerance = 1.0  # Nanoseconds.
+    exact = np.arange(len(t)) / description.rate
+    apart = ~(np.abs(exact - t) * NANOSECONDS_PER_SECOND <= time_tolerance)
+    if apart.any():
+        k = apart.argmax()
+        raise InvalidInputError(
+            f"point {k} is at {t[k]:.9g} s; with {description.rate:g} samples per second it must"
+            f" be at {exact[k]:.9g} s"
+        )
+    _require_spans(spans, len(t))
+    parts = {
+        name: Trajectory(exact[: last - first + 1], *(x[first : last + 1] for x in rows))
+        for name, (first, last) in spans.items()
+    }
+    plan = PlannedMotion(
+        **{name: trajectory for name, trajectory in parts.items() if name != "close"},
+        close_time=description.close_time,
+        opening=description.opening,
+        width=description.width,
+        origin=description.origin,
+    )
+    _require_rest(parts, plan)
+    if description.origin is not None:
+        _require_limits_kept(plan.whole, description.origin)
+    return plan
+
+
+def _require_spans(spans: Spans, count: int) -> None:
+    """The phases cover all samples without a gap, in their order."""
+    missing = [name for name in PHASES if name not in spans and name != "retreat"]
+    if missing:
+        raise InvalidInputError(f"phase {missing[0]!r} is missing")
+    end = 0
+    for name in (phase for phase in PHASES if phase in spans):
+        first, last = spans[name]
+        complete = name != PHASES[-1] or last == count - 1
+        if not (first == end < last < count and complete):
+            wanted = "to a later one" if name != PHASES[-1] else f"to the last one, {count - 1}"
+            raise InvalidInputError(
+                f"phase {name!r} has points {first} to {last}; it must go from point {end} {wanted}"
+            )
+        end = last
+
+
+def _require_rest(parts: Mapping[str, Trajectory], plan: PlannedMotion) -> None:
+    """The arm rests between the phases, and for as long as the hand closes."""
+    for name, trajectory in parts.items():
+        if np.any([trajectory.v[[0, -1]], trajectory.a[[0, -1]]]):
+            raise InvalidInputError(f"the arm is not at rest at the ends of phase {name!r}")
+    close = parts["close"]
+    if not np.isfinite(plan.close_time) or len(plan.phases["close"].t) != len(close.t):
+        raise InvalidInputError(
+            f"phase 'close' takes {close.duration:g} s, but the hand closes for"
+            f" {plan.close_time:g} s"
+        )
+    if np.any(close.q != close.q[0]):
+        raise InvalidInputError("the arm moves in phase 'close'")
+
+
+def _require_limits_kept(whole: Trajectory, origin: PlanOrigin) -> None:
+    """Every joint keeps its limits."""
+    limit_tolerance = 1e-5  # Radians, or relative. The timing needs less.
+    limits = origin.limits
+    outside = (whole.q < limits.lower - limit_tolerance) | (
+        whole.q > limits.upper + limit_tolerance
+    )
+    if outside.any():
+        row, joint = np.argwhere(outside)[0]
+        raise InvalidInputError(
+            f"point {row} has joint {origin.joints[joint]!r} at {whole.q[row, joint]:.4f}, outside"
+            f" its limits {limits.lower[joint]:.4f} to {limits.upper[joint]:.4f}"
+        )
+    with suppress_numpy_warnings():  # numbers of a damaged file may be huge
+        peaks = whole.peaks()
+    for name, peak in zip(("velocity", "acceleration", "jerk"), peaks, strict=True):
+        limit = getattr(limits, name)
+        if (peak > limit * (1.0 + limit_tolerance)).any():
+            joint = int((peak / limit).argmax())
+            raise InvalidInputError(
+                f"the {name} of joint {origin.joints[joint]!r} reaches {peak[joint]:.4g}, above"
+                f" its limit of {limit[joint]:.4g}"
+            )
+
+
+def _finite_or_none(value: float) -> float | None:
+    """For JSON, which has no infinity and no NaN."""
+    return float(value) if np.isfinite(value) else None
+
+
+def _origin_data(origin: PlanOrigin) -> dict[str, Any]:
+    data: dict[str, Any] = {
+        f.name: getattr(origin, f.name)
+        for f in fields(origin)
+        if f.name not in ("joints", "limits", "X_WG")
+    }
+    limits = {f.name: _finite_values(getattr(origin.limits, f.name)) for f in fields(origin.limits)}
+    return data | {"X_WG": origin.X_WG.tolist(), "limits": limits}
+
+
+def _finite_values(values: Array) -> list[float | None]:
+    return [_finite_or_none(value) for value in values]
+
+
+def _read_origin(data: dict[str, Any], joints: tuple[str, ...]) -> PlanOrigin:
+    from burg_drake.motion.joint_limits import ArmLimits  # imports Drake
+
+    given = {
+        name: np.array([none if value is None else value for value in values], dtype=float)
+        for name, values in data["limits"].items()
+        for none in (-np.inf if name == "lower" else np.inf,)
+    }
+    limits = ArmLimits(**given)
+    if any(len(values) != len(joints) for values in given.values()):
+        raise InvalidInputError(
+            f"origin has limits for another number of joints than the {len(joints)} of the plan"
+        )
+    rest = {name: value for name, value in data.items() if name not in ("limits", "X_WG")}
+    return PlanOrigin(joints=joints, limits=limits, X_WG=check_pose(data["X_WG"], "X_WG"), **rest)
+
+
+def write_json(plan: PlannedMotion, path: str | Path) -> None:
+    """Writes a plan whole, for `load_plan` and others.
+
+    Raises:
+        InvalidInputError: the place cannot be written to, or the samples are not evenly spaced, or
+            no finite numbers.
+    """
+    require_writable(plan)
+    whole = plan.whole
+    stamps = np.rint(whole.t * NANOSECONDS_PER_SECOND).astype(int).tolist()
+    rows = zip(stamps, *(format_rows(x, ", ") for x in (whole.q, whole.v, whole.a)), strict=True)
+    points = ", ".join(
+        f'{{"positions": [{q}], "velocities": [{v}], "accelerations": [{a}],'
+        f' "time_from_start": {{"sec": {time // NANOSECONDS_PER_SECOND}, "nanosec": {time % NANOSECONDS_PER_SECOND}}}}}'
+        for time, q, v, a in rows
+    )
+    document = plan_metadata(plan) | {
+        "phases": {name: list(span) for name, span in phase_spans(plan).items()},
+        "joint_trajectory": {"joint_names": list(joint_names(plan)), "points": []},
+    }
+    text = json.dumps(document, allow_nan=False)
+    atomic_write(path, text.removesuffix("]}}") + points + "]}}\n")
+
+
+def read_json(path: Path) -> PlannedMotion:
+    """Reads what `write_json` has written.
+
+    Raises:
+        InvalidInputError: see `load_plan`.
+    """
+    try:
+        document = load_json(path, FileLimits.grasp_file)
+    except DocumentError as error:
+        raise DocumentError(
+            f"{error}; give a file that Plan.to_json or Plan.to_csv wrote"
+        ) from error
+    require_plan_version(document, path)
+    try:
+        return _plan_from_document(document)
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{path}: the plan is damaged: {error}; write it again") from error
+
+
+def _plan_from_document(document: dict[str, Any]) -> PlannedMotion:
+    with document_part(document, "joint_trajectory") as motion:
+        joints = tuple(str(name) for name in motion["joint_names"])
+        rows = _read_points(motion["points"], len(joints))
+        stamps = [point["time_from_start"] for point in motion["points"]]
+        t = np.array(
+            [stamp["sec"] + stamp["nanosec"] / NANOSECONDS_PER_SECOND for stamp in stamps],
+            dtype=float,
+        )
+    description = read_plan_description(document, joints)
+    with document_part(document, "phases") as phases:
+        spans: Spans = {name: (first, last) for name, (first, last) in phases.items()}
+        if spans.keys() - set(PHASES):
+            raise KeyError(spans)
+        return assemble_plan(description, t, spans, rows)
+
+
+def _read_points(points: list[dict[str, Any]], n: int) -> list[Array]:
+    """Positions, velocities and accelerations, (T, n) each."""
+    found = []
+    for name in ("positions", "velocities", "accelerations"):
+        for k, point in enumerate(points):
+            if len(point[name]) != n or not np.isfinite(point[name]).all():
+                raise InvalidInputError(f"{name} of point {k} must be {n} finite numbers")
+        found.append(np.array([point[name] for point in points], dtype=float))
+    return found
+
+
+CsvRows = Sequence[tuple[int, list[str]]]
+"""Cells of samples, with the line of the file that they are on."""
+JOINT_COLUMNS = {
+    "q": ("rad", "position of joint {}; m of a joint that slides"),
+    "v": ("rad/s", "velocity of joint {}; m/s of a joint that slides"),
+    "a": ("rad/s2", "acceleration of joint {}; m/s2 of a joint that slides"),
+}
+"""Unit and meaning of a joint's columns, by the first letter of their names."""
+
+
+def write_csv(plan: PlannedMotion, path: str | Path) -> None:
+    """Writes the samples of all phases as a table, and what they are for beside it.
+
+    Raises:
+        InvalidInputError: the place cannot be written to, or the samples are not evenly spaced, or
+            no finite numbers.
+    """
+    path, whole = Path(path), plan.whole
+    require_writable(plan)
+    joints = joint_names(plan)
+    meanings = _column_meanings(joints)
+    lines = [",".join(map(_quote_cell, meanings))]
+    times = format_rows(whole.t[:, None])
+    rows = format_rows(np.hstack([whole.q, whole.v, whole.a]))
+    for phase, (first, last) in phase_spans(plan).items():
+        start, end = first if first == 0 else first + 1, f",{_width_cell(plan, phase)}"
+        lines += [f"{times[k]},{phase},{rows[k]}{end}" for k in range(start, last + 1)]
+    described = json.dumps(csv_metadata(path.name, meanings, [plan_metadata(plan)]), indent=1)
+    atomic_write_all({metadata_path(path): described + "\n", path: "\n".join(lines) + "\n"})
+
+
+def read_csv(path: Path) -> PlannedMotion:
+    """Reads what `write_csv` has written; the table alone is a plan that does not tell what it is
+    for.
+
+    Raises:
+        InvalidInputError: see `load_plan`.
+    """
+    rows = read_rows(path, FileLimits.grasp_file)
+    header = rows.pop(0)[1] if rows else []
+    joints = tuple(name[2:] for name in header if name.startswith("q_"))
+    if not joints or header != list(_column_meanings(joints)):
+        raise InvalidInputError(
+            f"{path} is not a plan: it must have the columns t, phase, q_JOINT, v_JOINT, a_JOINT,"
+            " width"
+        )
+    beside = metadata_path(path)
+    try:
+        data = _read_csv_metadata(beside, header) if beside.exists() else None
+        return _plan_from_rows(rows, joints, data)
+    except InvalidInputError as error:
+        if str(beside) in str(error):
+            raise
+        raise InvalidInputError(f"{path}: the plan is damaged: {error}; write it again") from error
+
+
+def _read_csv_metadata(path: Path, header: Sequence[str]) -> dict[str, Any]:
+    """What the file beside a table says of the plan."""
+    document = load_json(path)
+    try:
+        (data,) = document["notes"]
+        titles = [column["titles"] for column in document["tableSchema"]["columns"]]
+    except READ_ERRORS as error:
+        raise InvalidInputError(f"{path} does not describe a plan; write the plan again") from error
+    if titles != list(header):
+        raise InvalidInputError(
+            f"{path} describes a table with other columns; write the plan again"
+        )
+    require_plan_version(data, path)
+    return dict(data)
+
+
+def _plan_from_rows(rows: CsvRows, joints: tuple[str, ...], data: Any) -> PlannedMotion:
+    n = len(joints)
+    for line, row in rows:
+        if len(row) != 3 * n + 3:
+            raise InvalidInputError(f"line {line} has {len(row)} cells; expected {3 * n + 3}")
+    spans = _read_spans(rows)
+    t = np.array([_parse_number(row[0], "t", line) for line, row in rows])
+    names = [f"{kind}_{joint}" for kind in JOINT_COLUMNS for joint in joints]
+    values = np.empty((len(rows), 3 * n))
+    for k, (line, row) in enumerate(rows):
+        try:
+            values[k] = row[2:-1]
+        except ValueError:
+            values[k] = [_parse_number(c, m, line) for c, m in zip(row[2:-1], names, strict=True)]
+    if not np.isfinite(values).all():
+        k, column = np.argwhere(~np.isfinite(values))[0]
+        raise InvalidInputError(f"{names[column]} in line {rows[k][0]} is not a finite number")
+    q, v, a = np.hsplit(values, 3)
+    if data is None:
+        data = _describe_by_rows(rows, t, spans)
+    plan = assemble_plan(read_plan_description(data, joints), t, spans, (q, v, a))
+    _require_widths(plan, rows)
+    return plan
+
+
+def _require_widths(plan: PlannedMotion, rows: CsvRows) -> None:
+    """The hand is open until it closes, and then as wide as the target in all rows."""
+    width_tolerance = 1e-6  # Metres that other programs may round off.
+    for line, (_, phase, *_, text) in rows:
+        wanted = _width_cell(plan, phase)
+        if text == wanted:
+            continue
+        if not (
+            wanted and abs(_parse_number(text, "width", line) - float(wanted)) <= width_tolerance
+        ):
+            raise InvalidInputError(
+                f"width in line {line} is {quote_value(text)}; in phase {phase!r} of this plan it is"
+                f" {quote_value(wanted)}"
+            )
+
+
+def _read_spans(rows: CsvRows) -> dict[str, tuple[int, int]]:
+    """First and last row of each phase."""
+    spans: dict[str, tuple[int, int]] = {}
+    for k, (line, row) in enumerate(rows):
+        name = row[1]
+        if name not in PHASES:
+            raise InvalidInputError(
+                f"line {line} has phase {quote_value(name)}; expected one of {', '.join(PHASES)}"
+            )
+        if name in spans and spans[name][1] != k - 1:
+            raise InvalidInputError(f"phase {name!r} starts a second time in line {line}")
+        spans[name] = (spans[name][0] if name in spans else max(0, k - 1), k)
+    return spans
+
+
+def _describe_by_rows(rows: CsvRows, t: Array, spans: dict[str, tuple[int, int]]) -> dict[str, Any]:
+    """What a table alone tells of its plan."""
+    step = float(t[1]) if len(t) > 1 else 0.0
+    if not step > 0.0:
+        raise InvalidInputError("the times t do not increase from 0")
+    near = round(1.0 / step, 6)
+    first, last = spans.get("close", (0, 0))
+    widths = [_parse_number(r[-1], "width", n) if r[-1] else None for n, r in (rows[0], rows[-1])]
+    rate = near if near and 1.0 / near == step else 1.0 / step
+    hand = {"opening": widths[0], "width": widths[1] or None, "close_time": (last - first) / rate}
+    return {"rate": rate, "hand": hand, "origin": None}
+
+
+def _parse_number(text: str, name: str, line: int) -> float:
+    try:
+        return float(text)
+    except ValueError as error:
+        raise InvalidInputError(
+            f"{name} in line {line} is {quote_value(text)}, which is not a number"
+        ) from error
+
+
+def _width_cell(plan: PlannedMotion, phase: str) -> str:
+    """Commanded distance between the pads [m]; empty if nobody knows how wide an open hand is."""
+    width = plan.width if is_hand_closed(phase) else plan.opening
+    if np.isnan(width):
+        return "0.0" if is_hand_closed(phase) else ""
+    return repr(float(width))
+
+
+def _column_meanings(joints: Sequence[str]) -> dict[str, tuple[str, Column]]:
+    """Datatype, unit and meaning of each column."""
+    moves = {
+        f"{kind}_{joint}": ("double", Column(unit, text.format(joint)))
+        for kind, (unit, text) in JOINT_COLUMNS.items()
+        for joint in joints
+    }
+    return {
+        "t": ("double", Column("s", "time since the plan's beginning")),
+        "phase": ("string", Column(TEXT_UNIT, f"one of {', '.join(PHASES)}")),
+        **moves,
+        "width": ("double", Column("m", "wanted distance between the pads; 0: closed")),
+    }
+
+
+def _quote_cell(text: str) -> str:
+    """A text of the header, quoted where that is needed."""
+    quotes = any(sign in text for sign in ',"\n\r')
+    return '"' + text.replace('"', '""') + '"' if quotes else text
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan(PlannedMotion):
+    """The motions of one grasp; attributes are those of `PlannedMotion`."""
+
+    def to_csv(self, path: str | Path) -> None:
+        """Writes a table that `load_plan` reads; see `csv_file`."""
+        write_csv(self, path)
+
+    def to_json(self, path: str | Path) -> None:
+        """Writes a document that `load_plan` reads; see `json_file`."""
+        write_json(self, path)
+
+
+def load_plan(
+    path: str | Path, *, scene: SceneLike | None = None, station: StationLike | None = None
+) -> Plan:
+    """Reads what `Plan.to_json` or `Plan.to_csv` has written.
+
+    Example::
+
+        plan = burg.load_plan("plan.json", station="panda_tabletop")
+        for name, phase in plan.phases.items():
+            print(name, phase.duration, phase.q[-1])
+
+    Args:
+        path: the file; a name that ends in .csv is that of a table.
+        scene, station: what the plan has to be for, if given.
+
+    Raises:
+        InvalidInputError: there is no such file, it is not a plan, or one that is damaged: with
+            times, phases or positions that do not belong together, or beyond its own limits; or it
+            is for another scene or station, or does not tell.
+    """
+    path = Path(path)
+    read = read_csv if path.suffix.lower() == ".csv" else read_json
+    plan = Plan(**vars(read(path)))
+    plan.require_for(scene, station, name=str(path))
+    return plan

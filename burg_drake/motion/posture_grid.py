@@ -1,0 +1,456 @@
+"""Postures of the Panda on a grid of hand poses and redundant joint values; shortest paths in it.
+
+A posture at one pose is a branch of the inverse kinematics at one value of the redundant joint.
+Postures of neighbouring poses are joined if the redundant joint is near, no joint jumps, and they
+belong to one branch or to two that meet: in a fold, where joint 6 changes sign, or where the upper
+arm is upright. The best chain is found by dynamic programming, for many grasps at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from burg_drake.core import Array, Booleans, Indices, Single
+from burg_drake.motion.clearance_bounds import (
+    ArmProximity,
+    ClearanceBounds,
+    ClearanceBoundsSettings,
+)
+from burg_drake.motion.line_poses import LinePoses
+from burg_drake.motion.motion_settings import ReachSettings
+from burg_drake.motion.numeric_ik import ArmKinematics
+from burg_drake.motion.panda_ik import IK_BRANCHES, PandaIk
+
+IMPOSSIBLE_STEP = np.float32(np.inf)  # Length of steps that do not exist.
+BRANCH_CROSSINGS = np.arange(IK_BRANCHES) ^ np.array([[2], [1]])
+"""(2, 8) branches that meet: in a fold, and where the upper arm is upright."""
+
+
+@dataclass(frozen=True, eq=False)
+class PostureRows:
+    """Some rows of an array indexed by pose, grasp, way, branch and value, ordered by the grasp.
+
+    Attributes:
+        grasp, way, branch: (R,) of each row.
+        other: (2, R) numbers of the rows with the other branches.
+    """
+
+    grasp: Indices
+    flip: Indices
+    branch: Indices
+    other: Indices
+
+    @classmethod
+    def where(cls, wanted: Booleans) -> PostureRows:
+        """Those wanted (n, 2, 8), with all that they can go over into."""
+        for crossing in BRANCH_CROSSINGS:
+            wanted = wanted | wanted[..., crossing]
+        grasp, flip, branch = np.nonzero(wanted)
+        number = np.cumsum(wanted).reshape(wanted.shape) - 1
+        return cls(grasp, flip, branch, number[grasp, flip, BRANCH_CROSSINGS[:, branch]])
+
+    @property
+    def index(self) -> tuple[slice, Indices, Indices, Indices]:
+        """What picks the rows of an array (L, n, 2, 8, Q): as (L, R, Q)."""
+        return slice(None), self.grasp, self.flip, self.branch
+
+    def some(self, chosen: Indices) -> PostureRows:
+        """All the rows of some grasps, by their numbers, rising."""
+        other = np.searchsorted(chosen, self.other[:, chosen])
+        return PostureRows(self.grasp[chosen], self.flip[chosen], self.branch[chosen], other)
+
+    def number(self, grasp: int, flip: int, branch: int) -> int:
+        """The number of a row."""
+        here = (self.grasp == grasp) & (self.flip == flip) & (self.branch == branch)
+        return int(np.flatnonzero(here)[0])
+
+
+@dataclass(frozen=True, eq=False)
+class PostureSteps:
+    """Steps from each posture of R rows at L poses with Q values.
+
+    Attributes:
+        length: (L - 1, S, R, Q) way of the joint that moves most [rad]; infinite where there is no
+            step. The S kinds are those in the row, by the offset of the value, then those that go
+            over into each of the other rows.
+        other: (2, R) the rows that each may go over into.
+        offsets, crossing: by how many values a step may lead up in its row, and to the others;
+            negative ones down.
+    """
+
+    length: Single
+    other: Indices
+    offsets: tuple[int, ...]
+    crossing: tuple[int, ...]
+
+    @classmethod
+    def of(
+        cls,
+        q: Single,
+        other: Indices,
+        *,
+        travel: float,
+        offsets: tuple[int, ...],
+        crossing: tuple[int, ...],
+    ) -> PostureSteps:
+        """Between postures (n, L, R, Q), NaN where there is none, by steps in which no joint moves
+        more than `travel` [rad]."""
+        steps = cls(np.empty(0, dtype=np.float32), other, offsets, crossing)
+        here, after = q[:, :-1], steps._padded(q[:, 1:], np.float32(np.nan))
+        kinds = steps._kinds()
+        length = np.empty((here.shape[1], len(kinds), *here.shape[2:]), dtype=np.float32)
+        for kind, (offset, side) in enumerate(kinds):
+            there = steps._shifted(after, offset)
+            there = there if side is None else there[..., other[side], :]
+            change = np.abs(there[0] - here[0])
+            for joint in range(1, len(q)):
+                np.maximum(change, np.abs(there[joint] - here[joint]), out=change)
+            length[:, kind] = np.where(change <= travel, change, IMPOSSIBLE_STEP)
+        return replace(steps, length=length)
+
+    def some(self, rows: Indices) -> PostureSteps:
+        """Those of some rows, each with its other ones."""
+        other = np.searchsorted(rows, self.other[:, rows])
+        return replace(self, length=self.length[:, :, rows], other=other)
+
+    def cut(self, pose: int, row: int, value: int, offset: int, crossing: int | None) -> None:
+        """Takes a step out; `crossing` is the number of the other row, None in the same row."""
+        self.length[pose, self._kinds().index((offset, crossing)), row, value] = IMPOSSIBLE_STEP
+
+    def onwards(self, cost: Single) -> list[Single]:
+        """Least costs (R, Q) of ways from the postures of each pose to the last pose, with the
+        costs (L, R, Q) of all postures on them."""
+        values = [cost[-1]]
+        for length, here in zip(self.length[::-1], cost[-2::-1], strict=True):
+            values.append(self._onwards(length, values[-1]).min(axis=0) + here)
+        return values[::-1]
+
+    def follow(self, values: list[Single], row: Indices, value: Indices) -> tuple[Indices, Indices]:
+        """Rows and values (m, L) of the least ways from (m,) postures of the first pose."""
+        kinds = self._kinds()
+        offset = np.array([offset for offset, _ in kinds])
+        target = np.array([0 if crossing is None else 1 + crossing for _, crossing in kinds])
+        to = np.concatenate([np.arange(self.other.shape[1])[None], self.other])
+        rows, ks = [row], [value]
+        for length, onwards in zip(self.length, values[1:], strict=True):
+            row, value = rows[-1], ks[-1]
+            there = to[target][:, row].T
+            k = value[:, None] + offset
+            total = (
+                length[:, row, value].T
+                + self._padded(onwards, IMPOSSIBLE_STEP)[there, k + self._margin]
+            )
+            best = total.argmin(axis=1)
+            every = np.arange(len(row))
+            rows.append(there[every, best])
+            ks.append(k[every, best])
+        return np.stack(rows, axis=1), np.stack(ks, axis=1)
+
+    def joined(self, exists: Booleans) -> Booleans:
+        """(L, R, Q) which of the postures that there are lie on ways from the first to the last
+        pose."""
+        onwards = np.isfinite(self.onwards(np.where(exists, np.float32(0.0), IMPOSSIBLE_STEP)))
+        return self.reached(np.asarray(onwards))
+
+    def reached(self, usable: Booleans) -> Booleans:
+        """(L, R, Q) which usable postures are led to from the first pose over usable ones."""
+        led = np.zeros_like(usable)
+        led[0] = usable[0]
+        count, margin = usable.shape[-1], self._margin
+        for pose, length in enumerate(self.length):
+            begun = np.isfinite(length) & led[pose]
+            there = np.zeros((*usable.shape[1:-1], count + 2 * margin), dtype=bool)
+            for kind, (offset, crossing) in enumerate(self._kinds()):
+                shift = margin + offset
+                come = begun[kind] if crossing is None else begun[kind][self.other[crossing]]
+                there[:, shift : shift + count] |= come
+            led[pose + 1] = there[:, margin : margin + count] & usable[pose + 1]
+        return led
+
+    @property
+    def _margin(self) -> int:
+        return max(self.offsets[-1], self.crossing[-1])
+
+    def _kinds(self) -> list[tuple[int, int | None]]:
+        """By how many values a step leads up, and to which of the other rows."""
+        kinds: list[tuple[int, int | None]] = [(k, None) for k in self.offsets]
+        return kinds + [(k, i) for i in range(len(self.other)) for k in self.crossing]
+
+    def _onwards(self, length: Single, value: Single) -> Single:
+        """(S, R, Q) costs of going on by each kind of step."""
+        padded, total = self._padded(value, IMPOSSIBLE_STEP), np.empty_like(length)
+        for kind, (offset, crossing) in enumerate(self._kinds()):
+            there = self._shifted(padded, offset)
+            there = there if crossing is None else there[self.other[crossing]]
+            np.add(length[kind], there, out=total[kind])
+        return total
+
+    def _padded(self, values: Single, outside: np.float32) -> Single:
+        width = [(0, 0)] * (values.ndim - 1) + [(self._margin, self._margin)]
+        return np.pad(values, width, constant_values=outside)
+
+    def _shifted(self, padded: Single, offset: int) -> Single:
+        """The values that are up by an offset, of an array with margins."""
+        count = padded.shape[-1] - 2 * self._margin
+        return padded[..., self._margin + offset : self._margin + offset + count]
+
+
+DEEP_PENETRATION = 0.01
+"""Metres. A posture between two that deep is taken to be in collision."""
+
+
+@dataclass(frozen=True, eq=False)
+class GridChain:
+    """A chain's postures, one at each of L poses.
+
+    Attributes:
+        flip: index of the finger way.
+        branch: (L,) of the inverse kinematics.
+        parameter: (L,) indices of values of the redundant joint.
+    """
+
+    flip: int
+    branch: Indices
+    parameter: Indices
+
+
+class PostureGrid:
+    """Postures of n grasps at L poses each, with the fingers in two ways.
+
+    Arrays are indexed by pose, grasp, way, branch and value of the redundant joint.
+
+    Attributes:
+        q: (7, L, n, 2, 8, Q) joint positions in single precision; NaN where there is none [rad].
+        exists: (L, n, 2, 8, Q) whether there is a posture.
+        joined: (L, n, 2, 8, Q) postures on chains from the first pose to the last; see `join`.
+        lower, upper: (L, n, 2, 8, Q) bounds of the arm's clearance [m]; infinite until measured.
+        refused: (L, n, 2, 8, Q) postures known not to do.
+        start: (n, 2, 8, Q) cost of starting at each posture of the first pose [rad].
+        parameter: (Q,) values of the redundant joint [rad].
+    """
+
+    def __init__(
+        self,
+        ik: PandaIk,
+        X_AH: Array,
+        parameter: Array,
+        *,
+        travel: float,
+        offsets: tuple[int, ...],
+        crossing: tuple[int, ...],
+    ) -> None:
+        """Makes room; see `solve`.
+
+        Args:
+            ik: the inverse kinematics.
+            X_AH: (L, n, 2, 4, 4) hand poses.
+            parameter: (Q,) values of the redundant joint [rad].
+            travel: most that a joint may move from one pose to the next [rad].
+            offsets: by how many values the redundant joint may change there ...
+            crossing: ... and where the branch changes.
+        """
+        shape = (*X_AH.shape[:3], IK_BRANCHES, len(parameter))
+        self._ik, self._X_AH, self.parameter = ik, X_AH, parameter
+        self._travel, self._offsets, self._crossing = travel, offsets, crossing
+        self.q = np.full((len(ik.lower), *shape), np.nan, dtype=np.float32)
+        self.exists = np.zeros(shape, dtype=bool)
+        self.joined = np.zeros(shape, dtype=bool)
+        self.lower = np.full(shape, np.inf, dtype=np.float32)
+        self.upper = np.full(shape, np.inf, dtype=np.float32)
+        self.refused = np.zeros(shape, dtype=bool)
+        self.start = np.zeros(shape[1:], dtype=np.float32)
+        self._rows = PostureRows.where(np.zeros(shape[1:-1], dtype=bool))
+        self._steps = self._steps_of(self._rows)
+
+    @property
+    def poses(self) -> int:
+        """Number of poses along the line."""
+        return int(self.q.shape[1])
+
+    def solve(self, poses: Indices, grasps: Indices) -> None:
+        """Finds the postures at some poses of some grasps."""
+        X = self._X_AH[np.ix_(poses, grasps)]
+        found = self._ik.solve(X.reshape(-1, 4, 4), self.parameter)
+        pose, grasp, flip = np.unravel_index(found.pose, X.shape[:3])
+        where = poses[pose], grasps[grasp], flip, found.branch, found.parameter
+        self.q[(slice(None), *where)] = found.q.T
+        self.exists[where] = True
+
+    def join(self) -> None:
+        """Finds what postures are joined, once all have been found."""
+        here = np.asarray(self.exists.any(axis=-1))
+        for crossing in BRANCH_CROSSINGS:
+            here = here | here[..., crossing]
+        self._rows = PostureRows.where(np.all(here, axis=0))
+        self._steps = self._steps_of(self._rows)
+        self.joined[self._rows.index] = self._steps.joined(self.exists[self._rows.index])
+
+    def take_over(self, grasp: int, coarse: PostureGrid, index: int, poses: list[int]) -> None:
+        """Takes postures of a grasp for as deep in collision as those are that have been measured
+        to either side of them in a coarser grid, where it has the number `index`, if both are
+        deeper than `DEEP_PENETRATION`."""
+        at = np.interp(self.parameter, coarse.parameter, np.arange(len(coarse.parameter)))
+        low, high = np.floor(at).astype(np.intp), np.ceil(at).astype(np.intp)
+        for pose in poses:
+            near = coarse.upper[pose, index]
+            upper = np.maximum(near[..., low], near[..., high])
+            deep = self.exists[pose, grasp] & (upper < -DEEP_PENETRATION)
+            for bounds in (self.lower, self.upper):
+                bounds[pose, grasp][deep] = upper[deep]
+
+    def usable(self, poses: int | slice, grasp: int) -> Booleans:
+        """(..., 2, 8, Q) postures of a grasp that are not known to be in collision."""
+        at = poses, grasp
+        return np.asarray(self.exists[at] & ~self.refused[at] & (self.upper[at] > 0.0))
+
+    def measured_free(self, pose: int, grasp: int) -> bool:
+        """Whether any of the postures that have been measured is usable."""
+        return bool((np.isfinite(self.lower[pose, grasp]) & self.usable(pose, grasp)).any())
+
+    def cut(self, grasp: int, pose: int, place: GridChain) -> None:
+        """Parts the postures of a chain at `pose` and the next one."""
+        (branch, there), k = place.branch[pose : pose + 2].tolist(), int(place.parameter[pose])
+        step = int(place.parameter[pose + 1]) - k
+        row = self._rows.number(grasp, place.flip, branch)
+        crossing = None if there == branch else BRANCH_CROSSINGS[:, branch].tolist().index(there)
+        self._steps.cut(pose, row, k, step, crossing)
+
+    def best(self, grasps: Indices, doubt: float) -> list[GridChain | None]:
+        """The cheapest chain of each of some grasps.
+
+        A chain costs the way of the joint that moves most from pose to pose, the cost of its
+        start, and for each posture a cost that rises to `doubt` as the lower bound of its
+        clearance falls from `COMFORT` to 0.
+
+        Args:
+            grasps: (m,) indices.
+            doubt: cost of a posture whose clearance is not known to be positive [rad].
+
+        Returns:
+            The chains; None where there is none.
+        """
+        preferred_clearance = 0.01  # Metres. Ten times the position error of a controlled arm.
+        rows, steps = self._rows, self._steps
+        if len(grasps) < self.q.shape[2]:
+            chosen = np.flatnonzero(np.isin(rows.grasp, grasps))
+            rows, steps = rows.some(chosen), steps.some(chosen)
+        at = rows.index
+        usable = self.joined[at] & ~self.refused[at] & (self.upper[at] > 0.0)
+        doubts = np.clip(1.0 - self.lower[at] / np.float32(preferred_clearance), 0.0, 1.0)
+        cost = np.where(usable, np.float32(doubt) * doubts, IMPOSSIBLE_STEP)
+        values = steps.onwards(cost)
+        first = values[0] + self.start[at[1:]]
+        ends = np.searchsorted(rows.grasp, np.stack([grasps, grasps + 1]))
+        cheapest = np.full((2, len(grasps)), -1)
+        for g, (begin, end) in enumerate(ends.T.tolist()):
+            if begin < end:
+                row, k = np.unravel_index(first[begin:end].argmin(), (end - begin, first.shape[1]))
+                if np.isfinite(first[begin + row, k]):
+                    cheapest[:, g] = begin + row, k
+        found: list[GridChain | None] = [None] * len(grasps)
+        there = np.flatnonzero(cheapest[0] >= 0)
+        row, k = steps.follow(values, *cheapest[:, there])
+        for g, r, parameter in zip(there.tolist(), row, k, strict=True):
+            found[g] = GridChain(int(rows.flip[r[0]]), rows.branch[r], parameter)
+        return found
+
+    def reached(self, grasp: int) -> int:
+        """The last pose that usable postures of a grasp lead to from the first; -1 if there are
+        none at the first."""
+        usable = self.usable(slice(None), grasp)
+        only = np.zeros(self.q.shape[2:-1], dtype=bool)
+        only[grasp] = usable.any(axis=(0, -1))
+        rows = PostureRows.where(only)
+        led = self._steps_of(rows).reached(usable[:, rows.flip, rows.branch]).any(axis=(1, 2))
+        return int(np.flatnonzero(led).max(initial=-1))
+
+    def _steps_of(self, rows: PostureRows) -> PostureSteps:
+        q = self.q[(slice(None), *rows.index)]
+        return PostureSteps.of(
+            *(q, rows.other), travel=self._travel, offsets=self._offsets, crossing=self._crossing
+        )
+
+
+START_COST = 0.3
+"""Cost of a start for each radian of the joint that is farthest from home."""
+
+
+class PostureGridBuilder:
+    """Opens grids of postures.
+
+    Args:
+        arm: the arm on its own.
+        ik: the inverse kinematics, within the limits that are to be kept.
+        lines: where the hand goes.
+        proximity: bounds of the arm's clearance.
+        home: (7,) home posture; chains that start near it are preferred [rad].
+        settings: how thoroughly to look.
+    """
+
+    def __init__(
+        self,
+        arm: ArmKinematics,
+        ik: PandaIk,
+        lines: LinePoses,
+        proximity: ArmProximity,
+        home: Array,
+        settings: ReachSettings,
+    ) -> None:
+        self.arm, self.ik, self.lines, self.proximity = arm, ik, lines, proximity
+        self.home, self.settings = home, settings
+        self.layers, self.at_grasp = lines.layers, lines.at_grasp
+
+    def parameters(self, count: int) -> Array:
+        """(count,) values of the redundant joint within its limits [rad]."""
+        low, high = self.ik.lower[-1], self.ik.upper[-1]
+        return np.asarray(low + (np.arange(count) + 0.5) / count * (high - low))
+
+    def grid(self, X_AG: Array, count: int) -> PostureGrid:
+        """Room for the postures of grasps (n, 2, 4, 4)."""
+        max_change = 0.75  # Radians of the redundant joint from layer to layer.
+        max_crossing_change = 0.38  # Radians, where the branch changes.
+        X_AH = self.lines.X_AH(X_AG[None], self.layers[:, None, None])
+        values = self.parameters(count)
+        spacing = values[1] - values[0] if count > 1 else np.inf
+        return PostureGrid(
+            *(self.ik, X_AH, values),
+            travel=self.settings.joint_travel,
+            offsets=_grid_offsets(max_change / spacing),
+            crossing=_grid_offsets(max_crossing_change / spacing),
+        )
+
+    def measure(self, grid: PostureGrid, poses: Indices, grasps: Indices, wanted: Booleans) -> None:
+        """Measures the wanted postures at some poses of some grasps that have not been measured."""
+        if not len(grasps):
+            return
+        where = np.ix_(poses, grasps)
+        new = wanted[where] & np.isinf(grid.lower[where])
+        if not new.any():
+            return
+        q = np.stack([joint[where][new] for joint in grid.q], axis=-1)
+        bounds = self.proximity.bounds(q, hand=False)
+        lower, upper = grid.lower[where], grid.upper[where]
+        lower[new], upper[new] = bounds.lower, decisive_clearance(bounds, self.settings.exact)
+        grid.lower[where], grid.upper[where] = lower, upper
+
+
+def _grid_offsets(most: float) -> tuple[int, ...]:
+    """Those of `OFFSETS`, up and down, that are no larger, and 0; rising."""
+    # Values of the redundant joint. Large changes need no fine choice.
+    steps = (1, 2, 4, 8, 16, 24)
+    up = [k for k in steps if k <= most]
+    return (*(-k for k in reversed(up)), 0, *up)
+
+
+def decisive_clearance(bounds: ClearanceBounds, exact: bool) -> Array:
+    """What has to be positive for a posture to count (K,): the upper bound where Drake has the last
+    word; otherwise infinite where it is the best guess, too."""
+    if exact:
+        return bounds.upper
+    return np.where(
+        bounds.likely_free,
+        np.inf,
+        np.minimum(bounds.upper, ClearanceBoundsSettings.likely_free_above),
+    )

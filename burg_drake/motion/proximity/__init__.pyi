@@ -1,5 +1,0 @@
-from .clearance_bounds import (
-    LIKELY as LIKELY,
-    ArmProximity as ArmProximity,
-    ClearanceBounds as ClearanceBounds,
-)

@@ -1,0 +1,190 @@
+"""Map of where an arm grasps from straight above a board; the setup page draws it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from burg_drake.core import (
+    Array,
+    Arrays,
+    Indices,
+    InvalidInputError,
+    cached,
+    content_hash,
+    rot_z,
+    rotation_from_rpy,
+)
+from burg_drake.motion.arm_reach import ArmReach
+from burg_drake.motion.reachability import board_cells, grasps_over_board
+from burg_drake.motion.station_check import empty_scene
+from burg_drake.scene import Board
+from burg_drake.station import Station, StationLike, as_station, world_content
+
+
+@dataclass(frozen=True, eq=False)
+class ReachLayer:
+    """Where an arm grasps from above.
+
+    Attributes:
+        x, y: (X,), (Y,) coordinates of the points in the scene frame [m]: middles of equal cells
+            that cover the board.
+        height: of the grasps, that is of the middle between the pads, above the board [m].
+        yaw: (K,) turns of the hand about the vertical [rad], over half a turn: the other half are
+            the same grasps with the fingers swapped.
+        reached: (Y, X, K) at which the arm can execute a grasp.
+        cell: extents of a cell along x and y [m].
+    """
+
+    x: Array
+    y: Array
+    height: float
+    yaw: Array
+    reached: NDArray[np.bool_] = field(repr=False)
+    cell: tuple[float, float]
+
+    @property
+    def share(self) -> Array:
+        """(Y, X) shares of the turns that are reached."""
+        return np.asarray(self.reached.mean(axis=-1))
+
+    @property
+    def covered(self) -> float:
+        """Share of the board's area over which some turn is reached."""
+        return float(self.reached.any(axis=-1).mean())
+
+    def share_at(self, p_SQ: ArrayLike) -> Array:
+        """(N,) shares at the points that are nearest to points Q (N, 2 or more) of the scene frame
+        [m]; 0 beside the board."""
+        p = np.asarray(p_SQ, dtype=float)[:, :2]
+        size = np.array(self.cell) * (len(self.x), len(self.y))
+        cell = np.floor(p / self.cell).astype(int)
+        i, j = np.clip(cell, 0, (len(self.x) - 1, len(self.y) - 1)).T
+        on_board = ((p >= 0.0) & (p <= size)).all(axis=1)
+        return np.where(on_board, self.share[j, i], 0.0)
+
+
+def reach_from_above(
+    station: StationLike,
+    board: Board | None = None,
+    *,
+    height: float = 0.05,
+    spacing: float = 0.02,
+    yaws: int = 4,
+) -> ReachLayer:
+    """Asks where over an empty board the arm grasps straight from above.
+
+    An answer that was given before comes from the user's cache.
+
+    Args:
+        station: arm, hand, obstacles, and the hand's ways to a grasp and away from it.
+        board: A2 if None.
+        height: of the grasps above the board [m].
+        spacing: largest distance between neighbouring points [m].
+        yaws: turns of the hand, evenly over half a turn.
+
+    Raises:
+        InvalidInputError: the station has no arm, or one that collides at home; or a number is out
+            of its range.
+    """
+    station = as_station(station)
+    if not (0.0 < spacing < np.inf and 0.0 <= height < np.inf and yaws >= 1):
+        raise InvalidInputError(
+            f"spacing is {spacing:g} m, height {height:g} m and yaws {yaws}; spacing must be above"
+            " 0, height at least 0, and yaws at least 1"
+        )
+    require_arm(station)
+    board = board or Board()
+    (x, y), cell = board_cells(board.size, spacing)
+    yaw = np.arange(yaws) * np.pi / yaws
+    R_WG = rotation_from_rpy((np.pi, 0.0, 0.0)) @ np.array([rot_z(angle) for angle in yaw])
+    X_WS = station.document.X_WS.matrix()
+    X_WG = grasps_over_board(X_WS, x, y, np.array([height]), R_WG)
+    X_WG = X_WG.reshape(len(y), len(x), yaws, 4, 4)
+
+    def make() -> Arrays:
+        reach = reach_without_objects(station)
+
+        def ask(j: NDArray[np.intp], i: NDArray[np.intp]) -> NDArray[np.bool_]:
+            found = reach.check_all([""] * (len(j) * yaws), X_WG[j, i].reshape(-1, 4, 4))
+            return np.array([one.outcome is None for one in found]).reshape(-1, yaws)
+
+        return {"reached": answers_by_refinement(len(y), len(x), yaws, ask)}
+
+    asked = content_hash(world_content(empty_scene(), station), vars(station.document.motion), X_WG)
+    return ReachLayer(x, y, height, yaw, cached("reach-layer", asked, make)["reached"], cell)
+
+
+@lru_cache(maxsize=2)
+def reach_without_objects(station: Station) -> ArmReach:
+    """The arm over an empty board, made once a process for the same `Station`: judges grasps of no
+    instance (`""`), with the station's obstacles in place.
+
+    Raises:
+        InvalidInputError: see `ArmReach`.
+    """
+    require_arm(station)
+    return ArmReach(empty_scene(), station)
+
+
+def require_arm(station: Station) -> None:
+    """Refuses a station that cannot reach for anything.
+
+    Raises:
+        InvalidInputError: it has no arm.
+    """
+    if station.document.arm is None:
+        raise InvalidInputError(
+            f"station {station.name!r} ({station.path}) has no arm; add an 'arm:' section"
+        )
+
+
+def answers_by_refinement(
+    rows: int, columns: int, yaws: int, ask: Callable[[Indices, Indices], NDArray[np.bool_]]
+) -> NDArray[np.bool_]:
+    """(Y, X, K) answers, of which `ask` is asked those that do not follow from their neighbours.
+
+    Args:
+        rows, columns: number of points along y and x.
+        yaws: answers a point.
+        ask: of points by their rows (N,) and columns (N,) the answers (N, K).
+    """
+    coarsest_stride = 4  # Grid points between those that are asked first.
+    unknown = -1  # Not asked yet.
+    found = np.full((rows, columns, yaws), unknown, dtype=np.int8)
+    stride = coarsest_stride
+    while stride:
+        on_y, on_x = _coarse_nodes(rows, stride), _coarse_nodes(columns, stride)
+        j, i = (index.ravel() for index in np.meshgrid(on_y, on_x, indexing="ij"))
+        new = found[j, i, 0] == unknown
+        j, i = j[new], i[new]
+        if stride < coarsest_stride:
+            below, above = (
+                _surrounding_nodes(j, rows, 2 * stride),
+                _surrounding_nodes(i, columns, 2 * stride),
+            )
+            corners = np.stack([found[b, a] for b in below for a in above])
+            agreed = (corners == corners[0]).all(axis=(0, 2))
+            found[j[agreed], i[agreed]] = corners[0][agreed]
+            j, i = j[~agreed], i[~agreed]
+        if len(j):
+            found[j, i] = ask(j, i)
+        stride //= 2
+    return found.astype(bool)
+
+
+def _coarse_nodes(count: int, stride: int) -> Indices:
+    """Every so many of some points, and the last."""
+    return np.unique([*range(0, count, stride), count - 1])
+
+
+def _surrounding_nodes(index: Indices, count: int, stride: int) -> tuple[Indices, Indices]:
+    """The nodes on both sides of points; twice the same for a node."""
+    nodes = _coarse_nodes(count, stride)
+    return nodes[np.searchsorted(nodes, index, side="right") - 1], nodes[
+        np.searchsorted(nodes, index)
+    ]

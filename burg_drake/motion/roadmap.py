@@ -1,0 +1,248 @@
+"""A graph of arm configurations around the home posture, and shortest paths in it from there."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
+
+from burg_drake.core import Array, Arrays, cached, content_hash, rng_from
+from burg_drake.motion.arm_links import ArmLinks
+from burg_drake.motion.edge_checker import EdgeChecker
+from burg_drake.station import StationDiagram
+
+
+class ObjectViewLimits:
+    """Object view limits."""
+
+    min_distance = 0.03  # Metres from the grasp frame to the origin of an object.
+    max_distance = 0.30  # Metres from the grasp frame to the origin of an object.
+    min_cosine = 0.6  # Of the angle between the approach and the direction to the object.
+
+
+def random_postures(
+    home: Array, lower: Array, upper: Array, count: int, rng: np.random.Generator
+) -> Array:
+    """(count, n) postures within joint limits, uniform and around home by turns."""
+    spread = 0.25  # Standard deviation around home, over a joint's range.
+    q = rng.uniform(lower, upper, (count, len(home)))
+    around = home + spread * (upper - lower) * rng.standard_normal(q[::2].shape)
+    q[::2] = np.clip(around, lower, upper)
+    return q
+
+
+def postures_over_objects(
+    station_diagram: StationDiagram, links: ArmLinks, home: Array, lower: Array, upper: Array
+) -> Array:
+    """Chooses random postures by where the hand is and where it points.
+
+    Args:
+        station_diagram: says where the scene's free objects are, and what hand there is.
+        links: the arm's kinematics in the world.
+        home: (n,) posture around which half of the postures are drawn.
+        lower, upper: (n,) joint limits [rad or m].
+
+    Returns:
+        (F, n) postures, which may collide; none if the scene has no free object.
+    """
+    draw_count = 40_000  # Postures to choose from: half uniform, half around home.
+    station, plant = station_diagram.station, station_diagram.plant
+    hand = plant.GetBodyByName(station.hand.body, plant.GetModelInstanceByName("hand")).index()
+    X_FG = links.X_FB[hand] @ station.hand.X_HG.matrix()
+    objects = [station_diagram.X_WO(name)[:3, 3] for name in station_diagram.scene.instances]
+    frame = links.frame_of[hand]
+
+    def make() -> Arrays:
+        q = random_postures(
+            home, lower, upper, draw_count, rng_from("burg_drake postures over objects")
+        )
+        return {"q": q[_looks_at_object(links, frame, X_FG, objects, q)]}
+
+    asked = (links.X_before, list(links.turns), frame, X_FG, objects, home, lower, upper)
+    return np.asarray(cached("postures", content_hash(*asked), make)["q"])
+
+
+def _looks_at_object(
+    links: ArmLinks, frame: int, X_FG: Array, objects: list[Array], q: Array
+) -> NDArray[np.bool_]:
+    """(N,) whether the hand looks at one of the objects in postures (N, n)."""
+    block_size = 4096  # Postures whose links are placed at once.
+    looks = np.zeros(len(q), dtype=bool)
+    for start in range(0, len(q), block_size):
+        block = slice(start, start + block_size)
+        poses = links.poses(q[block])
+        points = np.stack([X_FG[:3, 3], X_FG[:3, 3] + X_FG[:3, 2]]).astype(np.float32)
+        p_WG, ahead = poses.place(frame, points).swapaxes(0, 1)
+        approach = ahead - p_WG
+        for p_WO in objects:
+            offset = p_WO.astype(np.float32)[:, None] - p_WG
+            distance = np.sqrt((offset * offset).sum(axis=0))
+            along = (offset * approach).sum(axis=0)
+            near = (distance > ObjectViewLimits.min_distance) & (
+                distance < ObjectViewLimits.max_distance
+            )
+            looks[block] |= near & (along > ObjectViewLimits.min_cosine * distance)
+    return looks
+
+
+class Roadmap:
+    """Configurations around home, and segments between them that nothing speaks against yet.
+
+    Attributes:
+        q: (N, n) configurations, home first.
+        scale: (n,) mean displacement per unit of each joint [m/rad or 1].
+    """
+
+    def __init__(
+        self,
+        edges: EdgeChecker,
+        home: Array,
+        lower: Array,
+        upper: Array,
+        *,
+        focus: Array | None,
+        seed: object,
+        nodes: int,
+    ) -> None:
+        """Lays the graph out.
+
+        Args:
+            edges: judges segments.
+            home: (n,) the posture that all ways begin at.
+            lower, upper: (n,) joint limits [rad or m].
+            focus: (F, n) postures like the goals to come, for two thirds of the nodes.
+            seed: content that the samples follow from, see `core.provenance.rng_from`.
+            nodes: how many configurations to look for; those that home does not lead to are
+                dropped.
+        """
+        self._edges = edges
+        near = np.empty((0, len(home))) if focus is None else focus
+        asked = (edges.content, home, lower, upper, near, seed, nodes)
+        arrays = cached(
+            "roadmap",
+            content_hash(*asked),
+            lambda: _build_roadmap(edges, home, lower, upper, near, seed, nodes),
+        )
+        self.q, self.scale = arrays["q"], arrays["scale"]
+        self._ends, self._length = arrays["ends"], arrays["length"]
+        self._free: set[tuple[int, int]] = set()
+        self._blocked: set[tuple[int, int]] = set()
+        self._search()
+
+    def _search(self) -> None:
+        self.distance, self._before = _shortest_paths(self._ends, self._length, len(self.q))
+
+    def near(self, q: Array, count: int) -> NDArray[np.intp]:
+        """The nodes with the least displacement to `q` (n,), nearest first."""
+        distance = (np.abs(self.q - q) * self.scale).sum(axis=1)
+        return np.argsort(distance, kind="stable")[:count]
+
+    def check_ahead(self, nodes: NDArray[np.intp]) -> None:
+        """Judges the edges of the ways that `path` will look at first, with one batch of the fast
+        tier; the verdicts are the same."""
+        reached = nodes[np.isfinite(self.distance[nodes])]
+        paths = (pairwise(self._chain(int(node))) for node in dict.fromkeys(reached.tolist()))
+        asked = {(min(edge), max(edge)) for path in paths for edge in path}
+        new = np.array(sorted(asked - self._free - self._blocked), dtype=np.intp).reshape(-1, 2)
+        q_a, q_b = self.q[new[:, 0]], self.q[new[:, 1]]
+        screened = self._edges.screen(q_a, q_b)
+        for k, (first, second) in enumerate(new.tolist()):
+            free = self._edges.confirm(q_a, q_b, screened, k)
+            (self._free if free else self._blocked).add((first, second))
+
+    def path(self, node: int) -> Array | None:
+        """The shortest free way to a node: (M, n) corners from home, or None."""
+        while np.isfinite(self.distance[node]):
+            chain = self._chain(node)
+            refuted = next((e for e in pairwise(chain) if not self._is_free(e)), None)
+            if refuted is None:
+                return np.asarray(self.q[chain])
+            keep = (self._ends != sorted(refuted)).any(axis=1)
+            self._ends, self._length = self._ends[keep], self._length[keep]
+            self._search()
+        return None
+
+    def _chain(self, node: int) -> list[int]:
+        """The nodes from home to one, by what is known."""
+        chain = [node]
+        while chain[-1] != 0:
+            chain.append(int(self._before[chain[-1]]))
+        return chain[::-1]
+
+    def _is_free(self, edge: tuple[int, int]) -> bool:
+        first, second = sorted(edge)  # so that the verdict is that of the edge, not of a direction
+        if (first, second) not in self._free and (first, second) not in self._blocked:
+            free = self._edges.is_free(self.q[first], self.q[second])
+            (self._free if free else self._blocked).add((first, second))
+        return (first, second) in self._free
+
+
+def _build_roadmap(
+    edges: EdgeChecker,
+    home: Array,
+    lower: Array,
+    upper: Array,
+    focus: Array,
+    seed: object,
+    nodes: int,
+) -> Arrays:
+    """Nodes and edges of a roadmap; for the arguments see there."""
+    node_clearance = 0.01  # Metres. Lower bound of the clearance of all nodes but home.
+    clearance_margin = 1e-3  # Metres below the clearance at home, where that is small.
+    posture_count = 64  # Random postures over which displacements are averaged.
+    rng = rng_from("burg_drake home tree", seed, nodes)
+    scale = _joint_levers(edges, rng.uniform(lower, upper, (posture_count, len(home))))
+    at_home = float(edges.proximity.bounds(home[None]).lower[0])
+    clearance = min(node_clearance, at_home - clearance_margin)
+    wide = random_postures(home, lower, upper, 2 * nodes, rng)
+    near = _keep_clear(edges, focus, 2 * nodes // 3, clearance)
+    q = np.concatenate([home[None], near, _keep_clear(edges, wide, nodes - len(near), clearance)])
+    ends, length = _connect_neighbours(edges, q, scale)
+    reached = np.isfinite(_shortest_paths(ends, length, len(q))[0])
+    number = np.cumsum(reached) - 1
+    keep = reached[ends[:, 0]]
+    kept_ends = {"ends": number[ends[keep]], "length": length[keep]}
+    return {"q": q[reached], "scale": scale, **kept_ends}
+
+
+def _keep_clear(edges: EdgeChecker, q: Array, count: int, clearance: float) -> Array:
+    """The first `count` configurations with clearance."""
+    q = q[: 3 * count]
+    return q[edges.proximity.bounds(q).lower > clearance][:count]
+
+
+def _connect_neighbours(
+    edges: EdgeChecker, q: Array, scale: Array
+) -> tuple[NDArray[np.intp], Array]:
+    """(E, 2) pairs of near nodes that seem to be connected, and the displacements [m]."""
+    neighbour_count = 6  # Nearest nodes that a node is connected with.
+    scaled = q * scale
+    ranks = np.arange(1, min(neighbour_count + 1, len(q)) + 1)
+    _, near = cKDTree(scaled).query(scaled, k=ranks, p=1.0)
+    pairs = np.stack([np.repeat(np.arange(len(q)), near.shape[1]), near.ravel()], axis=1)
+    pairs = np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0)
+    screened = edges.screen(q[pairs[:, 0]], q[pairs[:, 1]], fine=np.inf)
+    seems = edges.seem_free(screened)
+    return pairs[seems], screened.length[seems]
+
+
+def _joint_levers(edges: EdgeChecker, q: Array) -> Array:
+    """(n,) displacement per unit of each joint, the mean over postures (P, n)."""
+    joint_step = 1e-3  # Radians or metres.
+    q_a = np.repeat(q, q.shape[1], axis=0)
+    q_b = q_a + joint_step * np.tile(np.eye(q.shape[1]), (len(q), 1))
+    moved = edges.proximity.displacement(q_a, q_b).reshape(len(q), -1)
+    return np.asarray(moved.mean(axis=0) / joint_step)
+
+
+def _shortest_paths(
+    ends: NDArray[np.intp], length: Array, nodes: int
+) -> tuple[Array, NDArray[np.int32]]:
+    """(N,) distances from node 0, infinite where no way leads, and the nodes before."""
+    graph = csr_matrix((length, (ends[:, 0], ends[:, 1])), shape=(nodes, nodes))
+    distance, before = dijkstra(graph, directed=False, indices=0, return_predecessors=True)
+    return distance, before

@@ -1,4 +1,0 @@
-from .hand_sweep import (
-    HandSweep as HandSweep,
-    Sweep as Sweep,
-)

@@ -1,0 +1,250 @@
+"""Trajectories of an arm, and the timed motions of one grasp."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from burg_drake.core import Array, InvalidInputError, round_to_grid
+
+if TYPE_CHECKING:
+    from pydrake.trajectories import PiecewisePolynomial
+
+    from burg_drake.motion.joint_limits import ArmLimits
+    from burg_drake.scene import Scene, SceneLike
+    from burg_drake.station import Station, StationLike
+
+
+class Motion(Protocol):
+    """Positions of n joints as functions of time."""
+
+    @property
+    def duration(self) -> float:
+        """Time from start to end [s]."""
+
+    def at(self, time: Array) -> tuple[Array, Array, Array, Array]:
+        """Position, velocity, acceleration and jerk, each (T, n), at times (T,) [s]."""
+
+    def time_scaled(self, factor: float) -> Motion:
+        """The same way in `factor` times the time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Arm positions over time, at rest at both ends.
+
+    Attributes:
+        t: (T,) rising from 0 [s]; T is at least 2.
+        q, v, a: (T, n) positions [rad], velocities [rad/s] and accelerations [rad/s^2].
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    a: Array
+
+    @classmethod
+    def of(cls, motion: Motion, start: Array, end: Array, rate: float) -> Trajectory:
+        """Samples of a motion, rounded to 12 decimals, with which they are quickly written.
+
+        Args:
+            motion: from rest to rest; is stretched to a whole number of samples.
+            start, end: (n,) its ends, to the last bit.
+            rate: samples per second.
+        """
+        count = max(1, int(np.ceil(motion.duration * rate - 1e-6)))
+        t = np.arange(count + 1) / rate
+        motion = motion.time_scaled(t[-1] / motion.duration)
+        q, v, a = (round_to_grid(x) for x in motion.at(t)[:3])
+        q[0], q[-1] = start, end
+        v[[0, -1]] = a[[0, -1]] = 0.0
+        return cls(t, q, v, a)
+
+    @classmethod
+    def rest(cls, q: Array, duration: float, rate: float) -> Trajectory:
+        """Stays at q (n,) for a time [s]."""
+        t = np.arange(max(1, int(np.ceil(duration * rate - 1e-6))) + 1) / rate
+        still = np.zeros((len(t), len(q)))
+        return cls(t, still + q, still, still)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Trajectory]) -> Trajectory:
+        """One after the other; where one ends and the next begins there is one row."""
+        t, rows = [parts[0].t], [slice(None)] + [slice(1, None)] * (len(parts) - 1)
+        for part in parts[1:]:
+            t.append(round_to_grid(t[-1][-1] + part.t[1:]))
+        q, v, a = (
+            np.concatenate([getattr(p, name)[row] for p, row in zip(parts, rows, strict=True)])
+            for name in ("q", "v", "a")
+        )
+        return cls(np.concatenate(t), q, v, a)
+
+    def __repr__(self) -> str:
+        samples, joints = self.q.shape
+        return f"Trajectory({samples} samples of {joints} joints, {self.duration:.2f} s)"
+
+    @property
+    def duration(self) -> float:
+        """Time from start to end [s]."""
+        return float(self.t[-1])
+
+    @property
+    def rate(self) -> float:
+        """Samples per second; where they are evenly spaced, `t` is `arange(T) / rate` bit by bit
+        for rates of up to six decimals."""
+        rate = 1.0 / float(self.t[1])
+        near = round(rate, 6)
+        return near if near and 1.0 / near == self.t[1] else rate
+
+    def at(self, time: float | Array) -> Array:
+        """Positions (..., n) at times (...) [s], by cubic polynomials between the samples; the ends
+        before and after."""
+        when = np.clip(np.asarray(time, dtype=float), 0.0, self.duration)
+        k = np.clip(np.searchsorted(self.t, when, side="right") - 1, 0, len(self.t) - 2)
+        h = (self.t[k + 1] - self.t[k])[..., None]
+        u = (when - self.t[k])[..., None] / h
+        ahead = self.q[k + 1] - self.q[k]
+        start, end = h * self.v[k] - ahead, ahead - h * self.v[k + 1]
+        return np.asarray(self.q[k] + u * (ahead + (1.0 - u) * ((1.0 - u) * start + u * end)))
+
+    def peaks(self) -> tuple[Array, Array, Array]:
+        """(n,) each: largest absolute velocity, acceleration and jerk that the samples show.
+
+        By differences of the samples alone, as a controller sees them: velocities of positions,
+        accelerations of velocities, jerks of accelerations; for the first two the samples of
+        velocity and acceleration count, too.
+        """
+        h = np.diff(self.t)[:, None]
+        rates = [np.abs(np.diff(x, axis=0) / h).max(axis=0) for x in (self.q, self.v, self.a)]
+        velocity = np.maximum(rates[0], np.abs(self.v).max(axis=0))
+        return velocity, np.maximum(rates[1], np.abs(self.a).max(axis=0)), rates[2]
+
+    def to_drake(self) -> PiecewisePolynomial:
+        """The same for Drake's `TrajectorySource`: cubic polynomials between the samples."""
+        from pydrake.trajectories import PiecewisePolynomial
+
+        motion: PiecewisePolynomial = PiecewisePolynomial.CubicHermite(self.t, self.q.T, self.v.T)
+        return motion
+
+
+PHASES = ("transfer", "approach", "close", "retreat", "lift")
+"""What happens one after the other; while the hand closes the arm rests, and without a retreat the
+lift follows at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlanOrigin:
+    """What a plan is for.
+
+    Attributes:
+        joints: names of the n joints, in the order of the trajectories' columns.
+        limits: of these joints.
+        station, scene: names.
+        station_content, scene_content: hashes of what the names stood for.
+        instance: the target in the scene; empty if there is none.
+        X_WG: (4, 4) the grasp in the world with the fingers as the arm puts them.
+    """
+
+    joints: tuple[str, ...]
+    limits: ArmLimits
+    station: str
+    station_content: str
+    scene: str
+    scene_content: str
+    instance: str
+    X_WG: Array
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedMotion:
+    """The motions of one grasp; what people get and store is a `Plan`.
+
+    Attributes:
+        transfer: from the home posture to the pregrasp.
+        approach: straight from there to the grasp.
+        lift: straight along the lift, which begins where the retreat ends.
+        close_time: time that the hand takes to close, after the approach [s].
+        opening: distance between the pads before the hand closes [m] ...
+        width: ... and once it holds the target [m]; NaN if nobody knows.
+        origin: what it is for; None if nobody has said.
+        retreat: straight back from the grasp with what the hand holds; None if the lift begins at
+            the grasp.
+    """
+
+    transfer: Trajectory
+    approach: Trajectory
+    lift: Trajectory
+    close_time: float = 1.0
+    opening: float = np.nan
+    width: float = np.nan
+    origin: PlanOrigin | None = None
+    retreat: Trajectory | None = None
+
+    @property
+    def phases(self) -> dict[str, Trajectory]:
+        """Those of `PHASES` that there are, in their order; each begins with the row that the last
+        one ends with."""
+        close = Trajectory.rest(self.approach.q[-1], self.close_time, self.approach.rate)
+        parts = (self.transfer, self.approach, close, self.retreat, self.lift)
+        return {name: part for name, part in zip(PHASES, parts, strict=True) if part is not None}
+
+    def __repr__(self) -> str:
+        phases = ", ".join(f"{name} {part.duration:.2f} s" for name, part in self.phases.items())
+        of = f"{self.origin.instance!r} of {self.origin.scene!r}: " if self.origin else ""
+        return f"{type(self).__name__}({of}{phases}; {self.approach.q.shape[1]} joints)"
+
+    @property
+    def whole(self) -> Trajectory:
+        """From home to the top of the lift, with the pause in which the hand closes."""
+        return Trajectory.joined(list(self.phases.values()))
+
+    @property
+    def duration(self) -> float:
+        """Time of all phases [s]."""
+        return sum(phase.duration for phase in self.phases.values())
+
+    def to_drake(self) -> PiecewisePolynomial:
+        """`whole` for Drake's `TrajectorySource`."""
+        return self.whole.to_drake()
+
+    def require_for(
+        self,
+        scene: SceneLike | None = None,
+        station: StationLike | None = None,
+        *,
+        name: str = "the plan",
+    ) -> None:
+        """Refuses a plan for another scene or station, by their contents.
+
+        Args:
+            scene, station: what it has to be for; None does not matter.
+            name: what to call the plan.
+
+        Raises:
+            InvalidInputError: it is for another one, or does not tell what it is for.
+        """
+        hash_digits = 12  # Digits of a content hash in messages.
+        from burg_drake.scene import as_scene  # here: a plan alone needs none of it
+        from burg_drake.station import as_station
+
+        wanted: list[tuple[str, Scene | Station]] = []
+        if station is not None:
+            wanted.append(("station", as_station(station)))
+        if scene is not None:
+            wanted.append(("scene", as_scene(scene)))
+        if wanted and self.origin is None:
+            raise InvalidInputError(
+                f"{name} does not say which scene and arm it is for; a CSV plan has this in"
+                " NAME.csv-metadata.json next to it"
+            )
+        for kind, here in wanted:
+            there = getattr(self.origin, kind), getattr(self.origin, f"{kind}_content")
+            if there[1] != here.content:
+                changed = "as it was before a change" if there[0] == here.name else f"{there[0]!r}"
+                raise InvalidInputError(
+                    f"{name} is for {kind} {changed} (content {str(there[1])[:hash_digits]}), not"
+                    f" for {here.name!r} (content {here.content[:hash_digits]}); plan its grasp here"
+                )

@@ -1,0 +1,295 @@
+"""Contact geometry of an object in simulation: a primitive, convex pieces, or a mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from scipy.spatial import cKDTree
+
+from burg_drake.core import Array, MeshError
+from burg_drake.geometry import triangle_distances
+from burg_drake.objects.closed_surfaces import coarser_surfaces, decimate
+from burg_drake.objects.library import ContactGeometry, ContactKind, Fit, ObjectLibrary
+from burg_drake.objects.model_files import write_piece
+from burg_drake.objects.primitives import fit_primitive, nearest_primitive
+from burg_drake.objects.shape_fit import surface_distance, union_mesh
+from burg_drake.objects.symmetry import spread_samples
+
+MAX_CONTACT_DISTANCE = 2.5e-4
+"""Metres between the object's surface and the contact surface, either way."""
+
+MAX_NORMAL_ANGLE = float(np.deg2rad(10.0))
+"""Radians from which a normal counts as turned; 3/4 of the friction cone at 0.24."""
+
+MAX_TURNED_SHARE = 0.05
+"""Share of the area whose normals may be turned, as next to moved edges."""
+
+
+class NormalComparison:
+    """Normal comparison."""
+
+    averaging_radius = 2e-3  # Metres; less than half a pad. Faces of scans vary within it.
+    result_samples = 20_000  # Points on the contact surface.
+    object_samples = 60_000  # Points on the object's surface.
+    candidates = 8  # Faces compared for each point.
+    neighbours = 24  # Points whose normals are averaged.
+
+
+def contact_surface(
+    surface: trimesh.Trimesh,
+    closed: bool,
+    most_distance: float = MAX_CONTACT_DISTANCE,
+    most_angle: float = MAX_NORMAL_ANGLE,
+) -> tuple[trimesh.Trimesh, Fit]:
+    """The coarsest surface that keeps both bounds.
+
+    Args:
+        surface: of the object [m].
+        closed: whether it is watertight, wound outward.
+        most_distance, most_angle: the bounds [m and rad].
+
+    Returns:
+        The surface, closed and wound outward, and how well it fits.
+
+    Raises:
+        MeshError: why there is none.
+    """
+    max_faces = 10_000  # More faces cost more in simulation than they gain.
+    decimals = 7  # Decimals of coordinates in metres.
+    max_mean_to_bound = 0.8  # Mean distance of a surface worth checking, over the bound.
+    min_height = 1e-6  # Metres; Drake finds no normal of a face with a smaller height.
+    if not closed:
+        raise MeshError("its surface is not closed")
+    normals = SurfaceNormals(surface, most_distance)
+    for rung in reversed(coarser_surfaces(surface, max_mean_to_bound * most_distance)):
+        if len(rung.faces) > max_faces:
+            break
+        mesh = trimesh.Trimesh(np.round(rung.vertices, decimals), rung.faces, process=False)
+        if (
+            min_face_height(mesh) < min_height
+            or normals.turned_share(mesh, most_angle) > MAX_TURNED_SHARE
+        ):
+            continue
+        distance = surface_distance(mesh, surface, most_distance)
+        if distance <= most_distance:
+            return mesh, Fit(volume_ratio=float(mesh.volume / surface.volume), hausdorff=distance)
+    raise MeshError(
+        f"its surface cannot be reduced to {max_faces} faces without being more than "
+        f"{1e3 * most_distance:g} mm or {np.rad2deg(most_angle):g} degrees off"
+    )
+
+
+class SurfaceNormals:
+    """The normals of a surface, at each place and in the mean around it.
+
+    Args:
+        surface: [m].
+        reach: how far away a place may be that faces the same way, to count as the nearest [m].
+    """
+
+    def __init__(self, surface: trimesh.Trimesh, reach: float = MAX_CONTACT_DISTANCE) -> None:
+        self.reach = reach
+        self.triangles = np.asarray(surface.triangles)
+        self.normals = np.asarray(surface.face_normals)
+        self.samples, self.owner = spread_samples(surface, NormalComparison.object_samples)
+        self.every = np.concatenate([self.owner, np.arange(len(self.triangles))])
+        self.places = cKDTree(np.vstack([self.samples, self.triangles.mean(axis=1)]))
+        self.even = cKDTree(self.samples)
+        alike = NormalComparison.averaging_radius * self.normals[self.owner]
+        self.alike = cKDTree(np.hstack([self.samples, alike]))
+
+    def turned_share(self, mesh: trimesh.Trimesh, most_angle: float = MAX_NORMAL_ANGLE) -> float:
+        """Share of a mesh's area whose normals are more than an angle [rad] off the
+        surface's, both of the nearest place and of the mean around it."""
+        points, face = spread_samples(mesh, NormalComparison.result_samples)
+        normals = np.asarray(mesh.face_normals)[face]
+        own = self._nearest(points, normals)
+        mean = self._mean(points, own)
+        cosine = np.maximum((own * normals).sum(axis=1), (mean * normals).sum(axis=1))
+        return float((cosine < np.cos(most_angle)).mean())
+
+    def _nearest(self, points: Array, normals: Array) -> Array:
+        """Normals (N, 3) of the surface at the nearest places: within `reach` at those that
+        face the same way, as near a thin wall its other side may be nearer."""
+        _, near = self.places.query(points, min(NormalComparison.candidates, len(self.every)))
+        _, alike = self.alike.query(
+            np.hstack([points, NormalComparison.averaging_radius * normals]),
+            NormalComparison.candidates,
+        )
+        which = np.hstack([self.every[near], self.owner[alike]])
+        apart = triangle_distances(points[:, None], self.triangles[which])
+        facing = (self.normals[which] * normals[:, None]).sum(axis=2) > 0.0
+        apart -= np.where(facing & (apart <= self.reach), self.reach, 0.0)
+        return np.asarray(self.normals[which[np.arange(len(points)), apart.argmin(axis=1)]])
+
+    def _mean(self, points: Array, own: Array) -> Array:
+        """Normals (N, 3) in the mean around points, of what faces the same way as `own`."""
+        distance, around = self.even.query(
+            points,
+            NormalComparison.neighbours,
+            distance_upper_bound=NormalComparison.averaging_radius,
+        )
+        within = np.isfinite(distance)
+        others = self.normals[self.owner[np.where(within, around, 0)]]
+        facing = within & ((others * own[:, None]).sum(axis=2) > 0.0)
+        mean = (others * facing[..., None]).sum(axis=1)
+        length = np.linalg.norm(mean, axis=1, keepdims=True)
+        return np.asarray(mean / np.maximum(length, 1e-300))
+
+
+def max_excess(mesh: trimesh.Trimesh, pieces: Sequence[trimesh.Trimesh]) -> float:
+    """How far a surface stands out of the union of convex pieces, at most [m]."""
+    points = np.vstack([mesh.vertices, spread_samples(mesh, NormalComparison.result_samples)[0]])
+    height = np.full(len(points), np.inf)
+    for piece in pieces:
+        planes = np.asarray(piece.face_normals)
+        offset = (planes * piece.triangles[:, 0]).sum(axis=1)
+        for some in np.array_split(np.arange(len(points)), max(1, len(planes) // 100)):
+            above = (points[some] @ planes.T - offset).max(axis=1)
+            height[some] = np.minimum(height[some], above)
+    return max(0.0, float(height.max()))
+
+
+def min_face_height(mesh: trimesh.Trimesh) -> float:
+    """Smallest height of a face over its longest edge [m]."""
+    t = np.asarray(mesh.triangles)
+    longest = np.linalg.norm(t - np.roll(t, 1, axis=1), axis=2).max(axis=1)
+    return float((2.0 * mesh.area_faces / np.maximum(longest, 1e-300)).min())
+
+
+CONTACT_FILE = "contact.obj"
+"""File name of the mesh of kinds `surface` and `mesh`, in the object's folder."""
+
+CONTACT_MESH_FACES = 2000
+"""Target number of faces of a contact mesh of kind `mesh`."""
+
+
+MESH_REPAIR_HINT = "make the mesh watertight and smooth it"
+"""Advice that gives most objects a surface that the pads can touch."""
+
+
+def contact_geometry(
+    kind: ContactKind | None,
+    surface: trimesh.Trimesh,
+    closed: bool,
+    pieces: Sequence[trimesh.Trimesh],
+    folder: Path,
+) -> tuple[ContactGeometry, tuple[str, ...]]:
+    """What of an object touches others.
+
+    Args:
+        kind: as the user wants it; None: a primitive where one fits, else the surface where it is
+            closed and can be decimated, else the pieces.
+        surface: of the object [m].
+        closed: whether it is watertight, so that its volume can be trusted.
+        pieces: its convex pieces, at least one for a surface.
+        folder: the object's; the mesh of kinds `surface` and `mesh` is written into it.
+
+    Returns:
+        The contact geometry, whose mesh is relative to `folder`, and the files written.
+
+    Raises:
+        MeshError: the object is not near any primitive, not closed, or cannot be decimated, and
+            `kind` needs it.
+    """
+    if kind == "mesh":
+        return _write_contact_mesh(surface, closed, folder), (CONTACT_FILE,)
+    if kind == "surface":
+        try:
+            return _write_contact_surface(surface, closed, pieces, folder), (CONTACT_FILE,)
+        except MeshError as error:
+            raise MeshError(
+                f"contact 'surface': {error}; {MESH_REPAIR_HINT}, or choose 'pieces'"
+            ) from error
+    if kind in ("pieces", "compliant_pieces"):
+        return ContactGeometry(kind=kind), ()
+    volume = float(surface.volume) if closed else float(union_mesh(pieces).volume)
+    found = fit_primitive(surface, volume)
+    if found is not None:
+        primitive, fit = found
+        return ContactGeometry(kind="primitive", primitive=primitive, fit=fit), ()
+    if kind == "primitive":
+        raise MeshError(_primitive_error_message(surface, volume))
+    try:
+        return _write_contact_surface(surface, closed, pieces, folder), (CONTACT_FILE,)
+    except MeshError as error:
+        return ContactGeometry(reason=str(error)), ()
+
+
+def contact_fallback_message(contact: ContactGeometry, pieces: int) -> str:
+    """What to say where pads touch pieces that were not asked for; empty elsewhere.
+
+    Args:
+        contact: of the object.
+        pieces: how many it has.
+    """
+    if not contact.reason:
+        return ""
+    return (
+        f"finger pads touch {_piece_count_text(pieces)}, because {contact.reason}; {MESH_REPAIR_HINT}, or"
+        " accept that by 'contact: pieces' in an objects.yaml"
+    )
+
+
+def describe_pad_contact(library: ObjectLibrary, name: str) -> str:
+    """What of an object gripper pads touch, such as `a cylinder, at most 0.2 mm from the mesh`.
+
+    Raises:
+        UnknownNameError: no such object, or the file of its surface is missing.
+        MeshError: that file is damaged.
+    """
+    entry = library.entry(name)
+    contact = entry.contact
+    if contact.primitive is not None:
+        what = f"a {contact.primitive.shape}"
+    elif contact.mesh:
+        what = f"a surface with {len(library.mesh(contact.mesh).faces)} faces"
+    else:
+        return _piece_count_text(len(entry.pieces))
+    return (
+        what
+        if contact.fit is None
+        else (f"{what}, at most {1e3 * contact.fit.hausdorff:.2g} mm from the mesh")
+    )
+
+
+def _piece_count_text(count: int) -> str:
+    return f"{count} convex piece{'' if count == 1 else 's'}"
+
+
+def _write_contact_surface(
+    surface: trimesh.Trimesh, closed: bool, pieces: Sequence[trimesh.Trimesh], folder: Path
+) -> ContactGeometry:
+    mesh, fit = contact_surface(surface, closed)
+    write_piece(mesh, folder / CONTACT_FILE)
+    return ContactGeometry(
+        kind="surface", mesh=CONTACT_FILE, fit=fit, excess=max_excess(mesh, pieces)
+    )
+
+
+def _write_contact_mesh(surface: trimesh.Trimesh, closed: bool, folder: Path) -> ContactGeometry:
+    if not closed:
+        raise MeshError(
+            "contact 'mesh' needs a closed surface; repair the mesh, or choose 'pieces'"
+        )
+    mesh, _ = decimate(surface, CONTACT_MESH_FACES)
+    write_piece(mesh, folder / CONTACT_FILE)
+    fit = Fit(
+        volume_ratio=float(mesh.volume / surface.volume), hausdorff=surface_distance(surface, mesh)
+    )
+    return ContactGeometry(kind="mesh", mesh=CONTACT_FILE, fit=fit)
+
+
+def _primitive_error_message(surface: trimesh.Trimesh, volume: float) -> str:
+    nearest = nearest_primitive(surface, volume)
+    text = "contact 'primitive': no box, cylinder or sphere comes close to its volume"
+    if nearest is not None:
+        primitive, fit = nearest
+        text = (
+            f"contact 'primitive': the nearest, a {primitive.shape}, is"
+            f" {1e3 * fit.hausdorff:.1f} mm off"
+        )
+    return f"{text}; choose 'pieces', or leave contact out"

@@ -1,0 +1,364 @@
+"""Objects and scenes of other collections: BURG-Toolkit's libraries and scenes, and the YCB set."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+
+from burg_drake.core import (
+    Array,
+    InvalidInputError,
+    Pose,
+    UnknownNameError,
+    make_name,
+    suggest_names,
+)
+from burg_drake.formats import BurgInstance, BurgLibrary, BurgObject, BurgScene, YcbObject
+from burg_drake.objects import ObjectLibrary, SymmetrySearch
+from burg_drake.pipeline.object_source import ObjectSource, check_source, object_name
+from burg_drake.scene import Board, Instance, Markers, SceneDocument
+from burg_drake.station import MODEL_NAMES
+
+
+def burg_sources(
+    library: BurgLibrary,
+    masses: Mapping[str, float] | None = None,
+    *,
+    density: float | None = None,
+    friction: float | None = None,
+    skip: Collection[str] = (),
+) -> list[ObjectSource]:
+    """What to build from an object library of BURG-Toolkit.
+
+    Mesh, scale, mass and friction are taken over. What has no mass stays fixed, as it is there.
+    Convex pieces, URDF, thumbnails and stable poses are made anew; `compare_poses` tells how the
+    listed poses agree with the new ones.
+
+    Args:
+        library: from `formats.burg_toolkit.read_burg_library`.
+        masses: by identifier or object name [kg]; they go before the document's.
+        density: for objects that have no mass, which are fixed otherwise [kg/m^3].
+        friction: coefficient of objects that have none.
+        skip: identifiers or object names to leave out.
+
+    Returns:
+        Sources in the document's order; an object's name is `object_name(identifier)`.
+
+    Raises:
+        UnknownNameError: a mass or `skip` names no object.
+        InvalidInputError: two objects get the same name, or a number is impossible.
+    """
+    names = burg_names(library)
+    given = _by_identifier(masses or {}, names, "a mass")
+    left_out = _by_identifier(dict.fromkeys(skip, 0.0), names, "skip")
+    objects = [o for o in library.objects if o.identifier not in left_out]
+    sources = []
+    for item in objects:
+        mass = given.get(item.identifier, item.mass)
+        source = ObjectSource(
+            name=names[item.identifier],
+            mesh=item.mesh,
+            mass=mass,
+            density=density if mass is None else None,
+            fixed=mass is None and density is None,
+            friction=friction if item.friction is None else item.friction,
+            scale=item.scale,
+            description="" if item.name == item.identifier else item.name,
+        )
+        check_source(source)
+        sources.append(source)
+    return sources
+
+
+def fixed_note(library: BurgLibrary, sources: Iterable[ObjectSource]) -> str:
+    """One line that names all sources that are fixed; empty if there are none."""
+    fixed = [source.name for source in sources if source.fixed]
+    if not fixed:
+        return ""
+    return (
+        f"{library.path}: these objects have mass 0 in BURG-Toolkit and become"
+        f" background, which does not move: {', '.join(fixed)}"
+    )
+
+
+def burg_names(library: BurgLibrary) -> dict[str, str]:
+    """Object names by identifier.
+
+    Raises:
+        InvalidInputError: two objects get the same name, or an identifier makes none.
+    """
+    names: dict[str, str] = {}
+    owner: dict[str, BurgObject] = {}
+    for item in library.objects:
+        name = object_name(item.identifier)
+        if name in owner:
+            raise InvalidInputError(
+                f"{library.path}:{item.line}: {owner[name].identifier!r} and {item.identifier!r}"
+                f" both become object {name!r}; rename one of them"
+            )
+        names[item.identifier] = name
+        owner[name] = item
+    return names
+
+
+def ycb_sources(
+    objects: Iterable[YcbObject],
+    masses: Mapping[str, float] | None = None,
+    *,
+    density: float | None = None,
+    friction: float | None = None,
+) -> list[ObjectSource]:
+    """What to build from meshes of the YCB set.
+
+    Args:
+        objects: from `formats.ycb.find_ycb`.
+        masses: by YCB name or object name [kg]; they go before the published ones.
+        density: for objects that have no mass [kg/m^3]; the pipeline's default if None.
+        friction: coefficient of all.
+
+    Returns:
+        Sources in the given order; an object's name is `object_name(name)`, which is the YCB name
+        but for `065-a_cups` and its like.
+
+    Raises:
+        UnknownNameError: a mass names no object.
+        InvalidInputError: a number is impossible.
+    """
+    objects = list(objects)
+    given = _by_identifier(masses or {}, {o.name: object_name(o.name) for o in objects}, "a mass")
+    sources = []
+    for item in objects:
+        mass = given.get(item.name, item.mass)
+        source = ObjectSource(
+            name=object_name(item.name),
+            mesh=item.mesh,
+            mass=mass,
+            density=density if mass is None else None,
+            friction=friction,
+            description=_ycb_description(item, item.name in given),
+        )
+        check_source(source)
+        sources.append(source)
+    return sources
+
+
+@dataclass(frozen=True)
+class PoseComparison:
+    """How recorded stable poses agree with those of a library.
+
+    Attributes:
+        listed: number of recorded poses.
+        distinct: number of them without near-duplicates, up to the object's symmetry.
+        here: number of the library's poses.
+        unknown: indices of recorded poses that are none of the library's.
+    """
+
+    listed: int
+    distinct: int
+    here: int
+    unknown: tuple[int, ...]
+
+    def sentence(self, file: str) -> str:
+        """For people."""
+        listed = f"{file} lists {_count_text(self.listed, 'stable pose')}"
+        if self.distinct < self.listed:
+            listed += f" ({self.distinct} different)"
+        unknown = ""
+        if self.unknown:
+            was = "was" if len(self.unknown) == 1 else "were"
+            unknown = f"; {len(self.unknown)} of the listed {was} not found"
+        return f"{listed}, {_count_text(self.here, 'pose')} found here{unknown}"
+
+
+def compare_poses(recorded: Sequence[Pose], library: ObjectLibrary, name: str) -> PoseComparison:
+    """Compares stable poses from elsewhere with those of a built object.
+
+    Only the direction down in the object matters: neither a turn about the vertical nor the place
+    or scale do.
+
+    Args:
+        recorded: `X_SO` of each pose, such as those of `BurgObject.stable_poses`.
+        library: has the object.
+        name: of the object in `library`.
+    """
+    entry = library.entry(name)
+    test = _PoseMatcher(library.surface(name), np.array(entry.mass_properties.center_of_mass))
+    listed = [_gravity_direction(X_SO) for X_SO in recorded]
+    here = [_gravity_direction(pose.X_SO) for pose in entry.stable_poses]
+    distinct: list[Array] = []
+    for down in listed:
+        if not any(test.same(down, other) for other in distinct):
+            distinct.append(down)
+    unknown = tuple(
+        i for i, down in enumerate(listed) if not any(test.same(down, other) for other in here)
+    )
+    return PoseComparison(len(listed), len(distinct), len(here), unknown)
+
+
+def _gravity_direction(X_SO: Pose) -> Array:
+    """(3,) direction of gravity in O."""
+    return -X_SO.matrix()[2, :3]
+
+
+class _PoseMatcher:
+    """Whether directions down are near each other, or one pose by the object's symmetry.
+
+    As for `objects.resting_poses`, the centre of mass has to be at one height then.
+    """
+
+    def __init__(self, surface: trimesh.Trimesh, p_OOcm: Array) -> None:
+        search = SymmetrySearch(surface, p_OOcm)
+        self.symmetries, self.tolerance = search.find(), search.tolerance
+        self.points = surface.vertices - p_OOcm
+
+    def same(self, a: Array, b: Array) -> bool:
+        # BURG-Toolkit records the pose after a fall onto V-HACD pieces, not the face.
+        max_angle = np.deg2rad(10.0)
+        if float(a @ b) > np.cos(max_angle):
+            return True
+        rise = abs(float((self.points @ a).max() - (self.points @ b).max()))
+        return rise <= self.tolerance and self.symmetries.same(a, b, max_angle)
+
+
+def _by_identifier(
+    values: Mapping[str, float], names: Mapping[str, str], what: str
+) -> dict[str, float]:
+    """The values by identifier, for keys that are identifiers or object names."""
+    identifiers = {name: identifier for identifier, name in names.items()}
+    identifiers |= {identifier: identifier for identifier in names}
+    for key in values:
+        if key not in identifiers:
+            raise UnknownNameError(
+                f"{what} is given for unknown object {key!r}; {suggest_names(key, names.values())}"
+            )
+    return {identifiers[key]: value for key, value in values.items()}
+
+
+def _ycb_description(item: YcbObject, weighed: bool) -> str:
+    label = item.name.split("_", 1)[1].replace("_", " ")
+    scan = f", {item.variant} scan" if item.variant else ""
+    mass = f"; mass: {item.mass_source}" if item.mass_source and not weighed else ""
+    return f"YCB {item.number} {label}{scan}{mass}"
+
+
+def _count_text(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+@dataclass(frozen=True)
+class ImportedScene:
+    """A scene of another collection.
+
+    Attributes:
+        document: the scene.
+        notes: what became other than it was, one sentence each.
+    """
+
+    document: SceneDocument
+    notes: tuple[str, ...] = ()
+
+
+def import_burg_scene(
+    scene: BurgScene, library: ObjectLibrary, name: str = "", reference: str = ""
+) -> ImportedScene:
+    """The scene document of a scene of BURG-Toolkit.
+
+    Objects are those that `pipeline.collection_imports.burg_sources` makes of the scene's object
+    library, by `object_name(identifier)`. What has no mass there is background, whichever list it
+    is in. Instances have no names in BURG-Toolkit; they get those of their objects, the second one
+    of an object `NAME_2` and so on. One that would be called as something of every station, such as
+    `table`, begins with `NAME_1`. The board is the scene's printout with its markers; without one
+    it has the size of the ground area and the markers of this project.
+
+    Args:
+        scene: from `formats.burg_toolkit.read_burg_scene`.
+        library: has the objects.
+        name: of the document; that of the scene's file if empty.
+        reference: how the document refers to the library; its folder if empty.
+
+    Raises:
+        UnknownNameError: the library lacks objects; the message names file and line of each.
+        InvalidInputError: an identifier makes no object name; the printout's markers do not exist
+            or do not fit.
+    """
+    names = _InstanceNames(scene, library)
+    free, fixed, notes = [], [], []
+    for item in scene.objects:
+        instance = names.instance(item)
+        if library.entry(instance.object).is_fixed:
+            fixed.append(instance)
+            notes.append(
+                f"{scene.path}:{item.line}: {instance.object!r} has no mass, so it"
+                " becomes background, which does not move"
+            )
+        else:
+            free.append(instance)
+    fixed += [names.instance(item) for item in scene.bg_objects]
+    notes += [
+        f"an instance of object {i.object!r} is called {i.name!r}, as every station has"
+        f" something called {i.object!r} already"
+        for i in (*free, *fixed)
+        if i.object in MODEL_NAMES
+    ]
+    document = SceneDocument(
+        name=name or make_name(scene.path.stem),
+        description=f"Imported from BURG-Toolkit's {scene.path.name}",
+        library=reference or str(library.root),
+        board=_import_board(scene),
+        instances=tuple(free),
+        background=tuple(fixed),
+    )
+    return ImportedScene(document, tuple(notes))
+
+
+def _import_board(scene: BurgScene) -> Board:
+    printout = scene.printout
+    if printout is None:
+        return Board(size=scene.ground_area)
+    markers = Markers(
+        dictionary=printout.dictionary,
+        side=printout.side,
+        spacing=printout.spacing,
+        count=printout.count,
+    )
+    board = Board(size=printout.size, markers=markers)
+    try:
+        _ = board.layout
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{scene.path}: printout: {error}") from error
+    return board
+
+
+class _InstanceNames:
+    """Finds objects, and gives names to their instances."""
+
+    def __init__(self, scene: BurgScene, library: ObjectLibrary) -> None:
+        self.scene = scene
+        self.library = library
+        self.count: Counter[str] = Counter()
+        items = sorted((*scene.objects, *scene.bg_objects), key=lambda item: item.line)
+        self.taken = {object_name(item.object_type) for item in items}
+        lacking = [i for i in items if object_name(i.object_type) not in library.objects]
+        if lacking:
+            lines = [f"{scene.path}:{i.line}: {self._require_object(i)}" for i in lacking]
+            raise UnknownNameError("; ".join(lines))
+
+    def _require_object(self, item: BurgInstance) -> str:
+        name = object_name(item.object_type)
+        return (
+            f"object {name!r} ({item.object_type!r}) is not in library {self.library.root};"
+            f" {suggest_names(name, self.library.objects)}"
+        )
+
+    def instance(self, item: BurgInstance) -> Instance:
+        object = object_name(item.object_type)
+        self.count[object] += 1
+        if self.count[object] == 1 and object not in MODEL_NAMES:
+            return Instance(object=object, X_SO=item.X_SO)
+        while f"{object}_{self.count[object]}" in self.taken:  # an object may be called mug_2
+            self.count[object] += 1
+        return Instance(name=f"{object}_{self.count[object]}", object=object, X_SO=item.X_SO)

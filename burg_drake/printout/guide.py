@@ -1,0 +1,625 @@
+"""The instructions of a printout: how to print, assemble, light, view and use the board."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from burg_drake.core import Array, Rgb
+from burg_drake.printout.object_drawings import ObjectDrawing
+from burg_drake.printout.page_tiling import Paper, Tiling
+from burg_drake.printout.sheet import (
+    BOLD_FONT,
+    FAINT,
+    INK,
+    POINT,
+    REGULAR_FONT,
+    WHITE,
+    Pen,
+    rectangle,
+    text_width,
+)
+
+SKETCH_SIZE = (0.080, 0.0255)
+"""Metres, width and height."""
+PLAN_HEIGHT = 0.042
+"""Metres, height of the plan of pages."""
+
+
+class SketchStyle:
+    """Sketch style."""
+
+    good = (0.0, 0.50, 0.30)  # Colour of correct results.
+    bad = (0.75, 0.12, 0.10)  # Colour of mistakes and cuts.
+    paper = (0.95, 0.96, 0.97)  # Colour of paper.
+    shade = (0.80, 0.83, 0.87)  # Colour of shaded areas.
+    label_size = 10.0  # Points.
+    thick_line = 0.5e-3  # Metres.
+
+
+Spot = tuple[float, float]
+
+
+def draw_scale(pen: Pen) -> None:
+    """The board at its true size, and one that was fitted to the page."""
+    for x, share, words, good in ((4e-3, 1.0, "100 %", True), (44e-3, 0.7, "fit to page", False)):
+        _draw_paper(pen, (x, 3e-3), (x + 16e-3, 25e-3))
+        middle = np.array([x + 8e-3, 14e-3])
+        for column in (-1, 0, 1):
+            for row in (-1, 0, 1):
+                at = middle + share * 5.2e-3 * np.array([column, row])
+                half = share * 1.9e-3
+                pen.area([rectangle(at - half, at + half)], INK)
+        _draw_tick_or_cross(pen, (x + 18.5e-3, 15e-3), good=good)
+        pen.text(
+            x + 17.5e-3,
+            7e-3,
+            words,
+            SketchStyle.label_size,
+            font=BOLD_FONT,
+            color=SketchStyle.good if good else SketchStyle.bad,
+        )
+
+
+def draw_measuring(pen: Pen) -> None:
+    """A ruler of steel held to the printed one."""
+    left, right, line = 5e-3, 65e-3, 8e-3
+    pen.area(
+        [rectangle((left - 3e-3, line + 0.6e-3), (right + 9e-3, line + 9e-3))], SketchStyle.shade
+    )
+    pen.outline([rectangle((left - 3e-3, line + 0.6e-3), (right + 9e-3, line + 9e-3))], 0.2e-3, INK)
+    pen.line((left, line), (right, line), width=0.3e-3)
+    for k in range(11):
+        x = left + (right - left) * k / 10
+        long = k % 5 == 0
+        pen.line((x, line), (x, line - (2.6e-3 if long else 1.5e-3)), width=0.3e-3)
+        pen.line((x, line + 0.6e-3), (x, line + (3.2e-3 if long else 2.2e-3)), width=0.2e-3)
+    for x, words in ((left, "0"), (right, "100 mm")):
+        pen.text(x, line - 6.6e-3, words, SketchStyle.label_size, align=0.5)
+        pen.text(x, line + 4.4e-3, words[:3].strip(), SketchStyle.label_size, align=0.5)
+    pen.text(
+        left,
+        line + 11.5e-3,
+        "both printed rulers: 100 mm each",
+        SketchStyle.label_size,
+        font=BOLD_FONT,
+    )
+    _draw_tick_or_cross(pen, (right + 6e-3, line + 13e-3), good=True)
+
+
+def draw_cutting(pen: Pen) -> None:
+    """A page whose left and upper rims are cut off."""
+    low, high = np.array([22e-3, 2e-3]), np.array([60e-3, 25e-3])
+    cut = np.array([low[0] + 6e-3, high[1] - 6e-3])
+    pen.area(
+        [rectangle(low, high), rectangle((cut[0], low[1]), (high[0], cut[1]))], SketchStyle.shade
+    )
+    pen.outline([rectangle(low, high)], 0.2e-3, INK)
+    pen.line(
+        (cut[0], low[1]),
+        (cut[0], high[1]),
+        width=SketchStyle.thick_line,
+        color=SketchStyle.bad,
+        dash=1.5e-3,
+    )
+    pen.line(
+        (low[0], cut[1]),
+        (high[0], cut[1]),
+        width=SketchStyle.thick_line,
+        color=SketchStyle.bad,
+        dash=1.5e-3,
+    )
+    for x, y in ((high[0] - 5e-3, low[1]), (cut[0], low[1] + 5e-3)):
+        end = (x, high[1]) if y == low[1] else (high[0], y)
+        if y == low[1]:
+            pen.line((x, low[1]), (x, cut[1]), width=0.2e-3, color=FAINT, dash=1.2e-3)
+        else:
+            pen.line((cut[0], y), (end[0], y), width=0.2e-3, color=FAINT, dash=1.2e-3)
+    _draw_scissors(pen, (float(high[0]) + 1.5e-3, float(cut[1])))
+    pen.text(
+        float(cut[0]) + 7e-3,
+        float(cut[1]) + 1.6e-3,
+        "CUT",
+        SketchStyle.label_size,
+        font=BOLD_FONT,
+        color=SketchStyle.bad,
+    )
+    pen.text(float(cut[0]) + 7e-3, float(cut[1]) - 8.5e-3, "stays", SketchStyle.label_size)
+
+
+def draw_gluing(pen: Pen, flap: float) -> None:
+    """A page that is laid onto the strip of the one before it.
+
+    Args:
+        pen: draws in the box.
+        flap: width of the strips [m]; 0 if pages are joined edge to edge.
+    """
+    _draw_paper(pen, (8e-3, 4e-3), (38e-3, 23e-3))
+    seam = 31e-3 if flap else 38e-3
+    if flap:
+        for y in np.arange(5e-3, 22.9e-3, 2e-3).tolist():
+            pen.line(
+                (seam + 0.5e-3, y), (37.5e-3, y + 0.8e-3), width=0.25e-3, color=SketchStyle.good
+            )
+    start = seam + 8e-3
+    _draw_paper(pen, (start, 6e-3), (start + 30e-3, 25e-3))
+    for x, y in ((seam, 13.5e-3), (start, 15.5e-3)):
+        pen.circle(x, y, 1.8e-3, INK, 0.25e-3)
+        pen.line((x - 2.8e-3, y), (x + 2.8e-3, y), width=0.25e-3)
+        pen.line((x, y - 2.8e-3), (x, y + 2.8e-3), width=0.25e-3)
+    _draw_sketch_arrow(pen, (start - 1.5e-3, 9.0e-3), (seam + 0.8e-3, 7.0e-3), INK)
+    pen.text(19e-3, 12e-3, "1", 16, font=BOLD_FONT, align=0.5)
+    pen.text(start + 17e-3, 14e-3, "2", 16, font=BOLD_FONT, align=0.5)
+    pen.text(8e-3, 0.2e-3, "glue on the strip" if flap else "edge to edge", SketchStyle.label_size)
+
+
+def draw_plan(
+    pen: Pen, tiling: Tiling, size: tuple[float, float], objects: list[ObjectDrawing]
+) -> None:
+    """The whole board: its pages with their numbers, cuts, and the outlines of its objects."""
+    scale = min(SKETCH_SIZE[0] / size[0], PLAN_HEIGHT / size[1])
+    shift = np.array([(SKETCH_SIZE[0] - scale * size[0]) / 2, 0.0])
+    xs = [0.0, *tiling.x_cuts, size[0]]
+    ys = [size[1], *tiling.y_cuts, 0.0]
+    for tile in tiling.tiles:
+        lower = shift + scale * np.array([xs[tile.column], ys[tile.row + 1]])
+        upper = shift + scale * np.array([xs[tile.column + 1], ys[tile.row]])
+        shade = SketchStyle.paper if (tile.row + tile.column) % 2 else WHITE
+        pen.area([rectangle(lower, upper)], shade)
+        pen.outline([rectangle(lower, upper)], 0.25e-3, INK)
+    for drawing in objects:
+        loops = [shift + scale * loop for loop in (*drawing.outline, *drawing.raised)]
+        pen.outline(loops, 0.3e-3, drawing.outline_color)
+    for tile in tiling.tiles:
+        (left, right), (top, bottom) = xs[tile.column :][:2], ys[tile.row :][:2]
+        middle, height = ((left + right) / 2, (top + bottom) / 2), scale * (top - bottom)
+        points = min(18.0, 0.5 * height / 0.35e-3)
+        at = shift + scale * np.array(middle) - [0.0, 0.12e-3 * points]
+        pen.text(float(at[0]), float(at[1]), str(tile.number), points, font=BOLD_FONT, align=0.5)
+
+
+def draw_flatness(pen: Pen) -> None:
+    """A sheet on a stiff plate, and one that waves."""
+    pen.area([rectangle((2e-3, 8e-3), (36e-3, 12e-3))], SketchStyle.shade)
+    pen.outline([rectangle((2e-3, 8e-3), (36e-3, 12e-3))], 0.2e-3, INK)
+    pen.line((2e-3, 12.5e-3), (36e-3, 12.5e-3), width=0.8e-3)
+    pen.text(19e-3, 2.5e-3, "glued to a plate", SketchStyle.label_size, align=0.5)
+    _draw_tick_or_cross(pen, (17e-3, 17e-3), good=True)
+    x = np.linspace(44e-3, 78e-3, 60)
+    y = 11e-3 + 2.0e-3 * np.sin((x - 44e-3) / 34e-3 * 4 * np.pi)
+    pen.line((44e-3, 8e-3), (78e-3, 8e-3), width=0.3e-3, color=FAINT)
+    pen.line(*zip(x.tolist(), y.tolist(), strict=True), width=0.8e-3)
+    pen.text(61e-3, 2.5e-3, "waves, curls", SketchStyle.label_size, align=0.5)
+    _draw_tick_or_cross(pen, (59e-3, 17e-3), good=False)
+
+
+def draw_lighting(pen: Pen) -> None:
+    """Soft light from a wide source, and a lamp with its shadow and its glare."""
+    lamp_color = (0.98, 0.80, 0.30)  # Colour of lamps.
+    for left in (2e-3, 44e-3):
+        pen.line((left, 6e-3), (left + 34e-3, 6e-3), width=0.6e-3)
+        pen.area([rectangle((left + 14e-3, 6.3e-3), (left + 20e-3, 12e-3))], SketchStyle.shade)
+        pen.outline([rectangle((left + 14e-3, 6.3e-3), (left + 20e-3, 12e-3))], 0.25e-3, INK)
+    pen.area([rectangle((6e-3, 23.5e-3), (32e-3, 25.5e-3))], lamp_color)
+    for x in (8e-3, 15e-3, 22e-3, 29e-3):
+        _draw_sketch_arrow(pen, (x, 22.5e-3), (x, 16e-3), FAINT)
+    pen.text(19e-3, 0.5e-3, "wide, soft light", SketchStyle.label_size, align=0.5)
+    _draw_tick_or_cross(pen, (34.5e-3, 20e-3), good=True)
+    lamp = 48e-3, 22e-3
+    pen.area([_ellipse_outline(lamp, 2.2e-3)], lamp_color)
+    _draw_sketch_arrow(pen, (50e-3, 20.5e-3), (57e-3, 13.5e-3), FAINT)
+    pen.area([rectangle((64e-3, 5.2e-3), (73e-3, 6.0e-3))], INK)
+    pen.text(61e-3, 0.5e-3, "lamp, hard shadow", SketchStyle.label_size, align=0.5)
+    _draw_tick_or_cross(pen, (72e-3, 20e-3), good=False)
+
+
+def draw_camera(pen: Pen, distances: tuple[float, float], tilt_deg: float) -> None:
+    """A camera over the board, and where it may be.
+
+    Args:
+        pen: draws in the box.
+        distances: of the camera from the middle of the board, least and greatest [m].
+        tilt_deg: greatest angle off the vertical [deg].
+    """
+    range_color = (0.86, 0.94, 0.89)  # Colour of the range of camera positions.
+    foot, reach = np.array([40e-3, 3e-3]), 21e-3
+    pen.line((18e-3, 3e-3), (62e-3, 3e-3), width=0.9e-3)
+    around = np.radians(np.linspace(-tilt_deg, tilt_deg, 30))
+    rays = np.column_stack([np.sin(around), np.cos(around)])
+    pen.area([np.concatenate([foot + reach * rays, foot + 0.5 * reach * rays[::-1]])], range_color)
+    pen.line((40e-3, 3e-3), (40e-3, 25e-3), width=0.2e-3, color=FAINT, dash=1e-3)
+    edge = foot + 1.1 * reach * rays[-1]
+    pen.line((40e-3, 3e-3), (float(edge[0]), float(edge[1])), width=0.2e-3, color=FAINT, dash=1e-3)
+    at = foot + 0.78 * reach * rays[8]
+    along = -rays[8]
+    across = np.array([-along[1], along[0]])
+    for shape in (
+        ((-2.0, 2.0), (-2.0, -2.0), (1.0, -2.0), (1.0, 2.0)),
+        ((1.0, 1.0), (1.0, -1.0), (2.6, -1.6), (2.6, 1.6)),
+    ):
+        pen.area([np.array([at + 1e-3 * (a * along + b * across) for a, b in shape])], INK)
+    pen.text(58.5e-3, 17e-3, f"{tilt_deg:g}°", SketchStyle.label_size)
+    pen.text(
+        2e-3,
+        18e-3,
+        f"{distances[0]:.1f} to {distances[1]:.1f} m",
+        SketchStyle.label_size,
+        font=BOLD_FONT,
+    )
+
+
+def draw_placing(pen: Pen) -> None:
+    """An object that is set down on its silhouette."""
+    sheet = np.array([[8e-3, 3e-3], [62e-3, 3e-3], [72e-3, 14e-3], [18e-3, 14e-3]])
+    pen.area([sheet], SketchStyle.paper)
+    pen.outline([sheet], 0.25e-3, INK)
+    shape = _ellipse_outline((40e-3, 8.5e-3), 8e-3, 0.42)
+    pen.area([shape], (0.72, 0.82, 0.90))
+    pen.outline([shape], 0.3e-3, (0.25, 0.45, 0.60))
+    pen.outline([_ellipse_outline((40e-3, 8.5e-3), 6e-3, 0.42)], 0.6e-3, (0.10, 0.28, 0.42))
+    base, top = 15.5e-3, 22.5e-3
+    pen.area([rectangle((34e-3, base), (46e-3, top))], SketchStyle.shade)
+    pen.area([_ellipse_outline((40e-3, base), 6e-3, 0.25)], SketchStyle.shade)
+    pen.area([_ellipse_outline((40e-3, top), 6e-3, 0.25)], WHITE)
+    pen.outline([_ellipse_outline((40e-3, top), 6e-3, 0.25)], 0.25e-3, INK)
+    pen.line((34e-3, top), (34e-3, base), width=0.25e-3)
+    pen.line((46e-3, top), (46e-3, base), width=0.25e-3)
+    _draw_sketch_arrow(pen, (52e-3, 21e-3), (52e-3, 12e-3), SketchStyle.good)
+
+
+def _draw_paper(pen: Pen, lower: Spot, upper: Spot) -> None:
+    pen.area([rectangle(lower, upper)], SketchStyle.paper)
+    pen.outline([rectangle(lower, upper)], 0.25e-3, INK)
+
+
+def _draw_tick_or_cross(pen: Pen, at: Spot, *, good: bool) -> None:
+    """A tick or a cross, 5 mm wide, with its lower left corner at a point."""
+    x, y = at
+    if good:
+        pen.line(
+            (x, y + 2e-3), (x + 1.6e-3, y), (x + 5e-3, y + 5e-3), width=1e-3, color=SketchStyle.good
+        )
+    else:
+        pen.line((x, y), (x + 4.5e-3, y + 4.5e-3), width=1e-3, color=SketchStyle.bad)
+        pen.line((x, y + 4.5e-3), (x + 4.5e-3, y), width=1e-3, color=SketchStyle.bad)
+
+
+def _draw_sketch_arrow(pen: Pen, start: Spot, tip: Spot, color: Rgb) -> None:
+    begin, end = np.array(start), np.array(tip)
+    along = (end - begin) / np.linalg.norm(end - begin)
+    across = np.array([-along[1], along[0]])
+    neck = end - 2.2e-3 * along
+    pen.line(start, (float(neck[0]), float(neck[1])), width=SketchStyle.thick_line, color=color)
+    pen.area([np.array([end, neck + 1.1e-3 * across, neck - 1.1e-3 * across])], color)
+
+
+def _draw_scissors(pen: Pen, at: Spot) -> None:
+    """Open scissors whose blades meet left of a point."""
+    x, y = at
+    for side in (1.0, -1.0):
+        pen.line(
+            (x - 4e-3, y + side * 1.2e-3),
+            (x + 5e-3, y - side * 1.6e-3),
+            width=SketchStyle.thick_line,
+        )
+        pen.circle(x + 6.8e-3, y - side * 2.2e-3, 1.8e-3, INK, SketchStyle.thick_line)
+
+
+def _ellipse_outline(middle: Spot, radius: float, flat: float = 1.0) -> Array:
+    """(40, 2) a circle's outline, or an ellipse's whose height is a share of its width."""
+    around = np.linspace(0.0, 2 * math.pi, 40, endpoint=False)
+    return np.array(middle) + radius * np.column_stack([np.cos(around), flat * np.sin(around)])
+
+
+@dataclass(frozen=True)
+class GuideStep:
+    """One thing to do.
+
+    Attributes:
+        heading: what, in a word or two.
+        words: paragraphs.
+        draw: its sketch, in a box of `sketches.BOX`; None without.
+        height: of the sketch [m].
+    """
+
+    heading: str
+    words: tuple[str, ...]
+    draw: Callable[[Pen], None] | None = None
+    height: float = SKETCH_SIZE[1]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoardFacts:
+    """What the steps depend on.
+
+    Attributes:
+        size: extents of the board [m].
+        side: of a marker [m].
+        margin: that pages leave white [m].
+        measured: what rulers of 100 mm along x and y measured before, for which all is drawn larger
+            [m].
+        tiling: the pages.
+        objects: that are drawn; none if there are only markers.
+        losses: what the margins of printers cut off, a sentence each.
+    """
+
+    size: tuple[float, float]
+    side: float
+    margin: float
+    measured: tuple[float, float]
+    tiling: Tiling
+    objects: list[ObjectDrawing]
+    losses: tuple[str, ...]
+
+
+def guide_steps(facts: BoardFacts) -> list[GuideStep]:
+    """The steps for a board, in their order."""
+    steps = [_print_step(facts), _measure_step(facts)]
+    if len(facts.tiling.tiles) > 1:
+        steps += _assembly_steps(facts)
+    steps += [_flatten_step(), _lighting_step(), _camera_step(facts)]
+    return [*steps, *([_placing_step()] if facts.objects else [])]
+
+
+def _print_step(facts: BoardFacts) -> GuideStep:
+    white = f"The printer may leave {1e3 * facts.margin:g} mm white on each side."
+    lost = facts.losses or ("Nothing is cut off by that.",)
+    scale = "Print at 100 %, on matt paper; not “fit to page”, not “shrink to printable area”."
+    return GuideStep("Print", (scale, " ".join((white, *lost))), draw_scale)
+
+
+def _measure_step(facts: BoardFacts) -> GuideStep:
+    words = "On every page hold a steel ruler to the two printed rulers, along x and along y."
+    remedy = (
+        "Each must be 100 mm long, to 0.2 mm. If not, print again and tell the program what they"
+        " measure: it draws all larger or smaller by as much."
+    )
+    if facts.measured != (0.1, 0.1):
+        x, y = (f"{1e3 * m:g}" for m in facts.measured)
+        remedy = (
+            f"These pages are drawn for a printer that made 100 mm {x if x == y else f'{x} x {y}'}"
+            " mm. " + remedy
+        )
+    return GuideStep("Measure", (words, remedy), draw_measuring)
+
+
+def _assembly_steps(facts: BoardFacts) -> list[GuideStep]:
+    tiling = facts.tiling
+    columns, rows = len(tiling.x_cuts) + 1, len(tiling.y_cuts) + 1
+    plan = GuideStep(
+        "Plan of pages",
+        (
+            f"{len(tiling.tiles)} pages, {columns} side by side in {rows} row"
+            f"{'s' if rows > 1 else ''}. They are numbered from the upper left, row by row.",
+        ),
+        partial(draw_plan, tiling=tiling, size=facts.size, objects=facts.objects),
+        PLAN_HEIGHT,
+    )
+    cut = GuideStep(
+        "Cut",
+        (
+            "Cut each page along the dashed lines that say CUT, on its left and above, with a knife"
+            " and a ruler. What lies beyond the other dashed lines stays.",
+        ),
+        draw_cutting,
+    )
+    strip = "onto the strips of those before it" if tiling.flap else "edge to edge with the others"
+    glue = GuideStep(
+        "Glue",
+        (
+            f"In the order of the numbers: lay each page {strip}, so that the crosses in circles"
+            " meet, and glue. Check every cross before the glue sets.",
+        ),
+        partial(draw_gluing, flap=tiling.flap),
+    )
+    return [plan, cut, glue]
+
+
+def _flatten_step() -> GuideStep:
+    words = (
+        "Glue the sheet, all over, onto a flat, stiff plate of wood, foam or aluminium. A sheet"
+        " that waves moves the pose that a camera finds."
+    )
+    return GuideStep("Keep it flat", (words,), draw_flatness)
+
+
+def _lighting_step() -> GuideStep:
+    words = (
+        "Soft, even light. No lamp or sun whose shadows have hard edges or that shines back from"
+        " the paper; white paper must not be overexposed."
+    )
+    return GuideStep("Light", (words,), draw_lighting)
+
+
+def _camera_step(facts: BoardFacts) -> GuideStep:
+    min_distance = 11.0  # Distance of the camera in sides of a marker: 0.5 m for 45 mm.
+    max_distance = 22.0  # Distance of the camera in sides of a marker: 1 m for 45 mm.
+    max_tilt_deg = 50.0  # Degrees of the camera from the vertical.
+    near, far = (times * facts.side for times in (min_distance, max_distance))
+    words = (
+        f"From {near:.1f} to {far:.1f} m away (with 640 x 480 pixels; twice as far with twice as"
+        f" many), up to {max_tilt_deg:g}° off the vertical. As many markers as possible in sight;"
+        " nothing moves, nothing is blurred."
+    )
+    sketch = partial(draw_camera, distances=(near, far), tilt_deg=max_tilt_deg)
+    return GuideStep("Camera", (words,), sketch)
+
+
+def _placing_step() -> GuideStep:
+    words = (
+        "Each object on its silhouette. The thick line is where it touches the sheet, the thin one"
+        " its outline from above; darker is closer to the sheet. Begin at the far edge. Then let a"
+        " camera check: burg-drake ar, or burg-drake camera placement."
+    )
+    return GuideStep("Place the objects", (words,), draw_placing)
+
+
+class GuideLayout:
+    """Guide layout."""
+
+    heading_size = 12.5  # Points, on A4.
+    body_size = 10.0  # Points, on A4.
+    line_spacing = 1.2  # Distance of lines over the size of the text.
+    edge_gap = 5e-3  # Metres between the text and the page's margin.
+
+
+@dataclass(frozen=True)
+class Guide:
+    """What is told on the first page.
+
+    Attributes:
+        title: of the page.
+        subtitle: one line.
+        steps: in their order.
+    """
+
+    title: str
+    subtitle: str
+    steps: tuple[GuideStep, ...]
+
+
+@dataclass(frozen=True)
+class StepPlace:
+    """Where a step stands.
+
+    Attributes:
+        number: of the step, from 1.
+        step: what it says.
+        page: number of the page, from 0.
+        left, top: its upper left corner, from the lower left one of the page's area of text [m].
+        width: of its column [m].
+    """
+
+    number: int
+    step: GuideStep
+    page: int
+    left: float
+    top: float
+    width: float
+
+
+def draw_guide(pen: Pen, paper: Paper, guide: Guide, *, scale_page: tuple[float, float]) -> int:
+    """Draws the pages of a guide and ends each.
+
+    Args:
+        pen: draws in metres.
+        paper: of the pages.
+        guide: what they say.
+        scale_page: how much larger all is drawn along x and y.
+
+    Returns:
+        How many pages there are.
+    """
+    # Sizes over that on A4; the first that fits on one page is used.
+    scales = (2.0, 1.8, 1.6, 1.4, 1.3, 1.2, 1.1, 1.0)
+    fits = ((s, lay_out_steps(guide, paper, s)) for s in scales)
+    scale, places = next(
+        (found for found in fits if found[1] and found[1][-1].page == 0),
+        (scales[-1], lay_out_steps(guide, paper, scales[-1])),
+    )
+    pages = places[-1].page + 1
+    edge = paper.margin + GuideLayout.edge_gap
+    for page in range(pages):
+        canvas = pen.canvas
+        canvas.scale(*scale_page)
+        canvas.translate(edge / POINT, edge / POINT)
+        canvas.scale(scale, scale)
+        width, height = (side - 2 * edge for side in (paper.width, paper.height))
+        _draw_header(pen, guide, height / scale, width / scale)
+        for place in places:
+            if place.page == page:
+                _draw_step(pen, place)
+        canvas.showPage()
+    return pages
+
+
+def lay_out_steps(guide: Guide, paper: Paper, scale: float) -> list[StepPlace]:
+    """Places the steps column by column, and goes on on another page where there is no room.
+
+    Args:
+        guide: what is to be placed.
+        paper: of the pages.
+        scale: of all; lengths of the places are before it is applied.
+
+    Returns:
+        The places in the order of the steps; empty if no column fits on the page.
+    """
+    column_gap = 8e-3  # Metres.
+    min_column_width = SKETCH_SIZE[0] + 1e-3  # Metres.
+    step_gap = 3.5e-3  # Metres.
+    header_height = 17e-3  # Metres, of title and subtitle.
+    edge = paper.margin + GuideLayout.edge_gap
+    width, height = (paper.width - 2 * edge) / scale, (paper.height - 2 * edge) / scale
+    columns = int((width + column_gap) / (min_column_width + column_gap))
+    if columns < 1:
+        return []
+    each = (width + column_gap) / columns - column_gap
+    places: list[StepPlace] = []
+    page, column, top = 0, 0, height - header_height
+    for number, step in enumerate(guide.steps, start=1):
+        tall = step_height(step, each)
+        if tall > top and top < height - header_height:
+            column, top = column + 1, height - header_height
+            if column == columns:
+                page, column = page + 1, 0
+        places.append(StepPlace(number, step, page, column * (each + column_gap), top, each))
+        top -= tall + step_gap
+    return places
+
+
+def step_height(step: GuideStep, width: float) -> float:
+    """What a step takes of a column [m]."""
+    lines = sum(len(wrap_text(words, width)) for words in step.words)
+    sketch = step.height + 2e-3 if step.draw else 0.0
+    return (
+        GuideLayout.line_spacing
+        * POINT
+        * (GuideLayout.heading_size + 2.0 + lines * GuideLayout.body_size)
+        + sketch
+    )
+
+
+def wrap_text(words: str, width: float, size: float = GuideLayout.body_size) -> list[str]:
+    """Lines of text that are no longer than a width [m], where its words allow that."""
+    lines, line = [], ""
+    for word in words.split():
+        longer = f"{line} {word}" if line else word
+        if line and text_width(longer, size, REGULAR_FONT) > width:
+            lines.append(line)
+            longer = word
+        line = longer
+    return [*lines, line]
+
+
+def _draw_header(pen: Pen, guide: Guide, top: float, right: float) -> None:
+    title_size = 20.0  # Points.
+    pen.text(0.0, top - title_size * POINT, guide.title, title_size, font=BOLD_FONT)
+    size = GuideLayout.body_size * min(
+        1.0, right / max(text_width(guide.subtitle, GuideLayout.body_size), 1e-9)
+    )
+    pen.text(0.0, top - 13e-3, guide.subtitle, max(size, 10.0))
+    pen.line((0.0, top - 15e-3), (right, top - 15e-3), width=0.2e-3, color=FAINT)
+
+
+def _draw_step(pen: Pen, place: StepPlace) -> None:
+    y = place.top - GuideLayout.heading_size * POINT
+    heading = f"{place.number}  {place.step.heading}"
+    pen.text(place.left, y, heading, GuideLayout.heading_size, font=BOLD_FONT, color=INK)
+    y -= 2.0 * GuideLayout.line_spacing * POINT
+    if place.step.draw:
+        y -= place.step.height + 1e-3
+        pen.canvas.saveState()
+        pen.canvas.translate((place.left + (place.width - SKETCH_SIZE[0]) / 2) / POINT, y / POINT)
+        place.step.draw(pen)
+        pen.canvas.restoreState()
+        y -= 1e-3
+    for paragraph in place.step.words:
+        for line in wrap_text(paragraph, place.width):
+            y -= GuideLayout.line_spacing * GuideLayout.body_size * POINT
+            pen.text(
+                place.left, y + 0.25 * GuideLayout.body_size * POINT, line, GuideLayout.body_size
+            )

@@ -1,0 +1,189 @@
+"""Read images and intrinsics from `sensor_msgs` messages of ROS 1 and ROS 2."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from burg_drake.cameras import (
+    ROS_FISHEYE_MODEL,
+    ROS_LENS_MODELS,
+    Intrinsics,
+    decode_image,
+    is_ros_fisheye,
+)
+from burg_drake.core import InvalidInputError, list_names
+from burg_drake.station import HALF_PIXEL
+
+
+@dataclass(frozen=True)
+class Encoding:
+    """How an encoding lays out a pixel.
+
+    Attributes:
+        channels: numbers a pixel.
+        dtype: of the numbers.
+        to_rgb: OpenCV's name of the conversion, without `COLOR_`; none is needed if empty.
+    """
+
+    channels: int
+    to_rgb: str
+    dtype: str = "u1"
+
+
+IMAGE_ENCODINGS = {
+    "rgb8": Encoding(3, ""),
+    "bgr8": Encoding(3, "BGR2RGB"),
+    "8UC3": Encoding(3, "BGR2RGB"),
+    "rgba8": Encoding(4, "RGBA2RGB"),
+    "bgra8": Encoding(4, "BGRA2RGB"),
+    "8UC4": Encoding(4, "BGRA2RGB"),
+    "mono8": Encoding(1, "GRAY2RGB"),
+    "8UC1": Encoding(1, "GRAY2RGB"),
+    "mono16": Encoding(1, "GRAY2RGB", "u2"),
+    "bayer_rggb8": Encoding(1, "BayerRGGB2RGB"),
+    "bayer_bggr8": Encoding(1, "BayerBGGR2RGB"),
+    "bayer_gbrg8": Encoding(1, "BayerGBRG2RGB"),
+    "bayer_grbg8": Encoding(1, "BayerGRBG2RGB"),
+    "yuv422": Encoding(2, "YUV2RGB_UYVY"),
+    "uyvy": Encoding(2, "YUV2RGB_UYVY"),
+    "yuv422_yuy2": Encoding(2, "YUV2RGB_YUYV"),
+    "yuyv": Encoding(2, "YUV2RGB_YUYV"),
+}
+"""Encodings of `sensor_msgs/image_encodings.h`; OpenCV types such as 8UC3 hold BGR."""
+
+
+def decode_image_message(message: Any) -> NDArray[np.uint8]:
+    """Image of a message.
+
+    Args:
+        message: `sensor_msgs/Image`, or `sensor_msgs/CompressedImage` (JPEG, PNG, ...).
+
+    Returns:
+        (H, W, 3) RGB, the caller's own. 16 bits are cut to their upper 8.
+
+    Raises:
+        InvalidInputError: the encoding is none of `IMAGE_ENCODINGS`, or the data are damaged.
+    """
+    return _decode_raw(message) if hasattr(message, "encoding") else _decode_compressed(message)
+
+
+def _decode_raw(message: Any) -> NDArray[np.uint8]:
+    encoding = IMAGE_ENCODINGS.get(message.encoding)
+    if encoding is None:
+        raise InvalidInputError(
+            f"the image encoding {message.encoding!r} is not supported; supported are"
+            f" {list_names(sorted(IMAGE_ENCODINGS))}"
+        )
+    height, width, step = message.height, message.width, message.step
+    dtype = np.dtype(encoding.dtype).newbyteorder(">" if message.is_bigendian else "<")
+    row = width * encoding.channels * dtype.itemsize
+    octets = np.frombuffer(message.data, np.uint8)
+    if min(height, width) < 1 or step < row or len(octets) < height * step:
+        raise InvalidInputError(
+            f"the image is damaged: {len(octets)} bytes in rows of {step} are not {width} x"
+            f" {height} pixels of {message.encoding}"
+        )
+    rows = np.ascontiguousarray(octets[: height * step].reshape(height, step)[:, :row])
+    values = rows.view(dtype).reshape(height, width, encoding.channels)
+    if dtype.itemsize > 1:
+        values = (values >> 8).astype(np.uint8)
+    if not encoding.to_rgb:
+        return values.copy()
+    try:
+        return np.asarray(cv2.cvtColor(values, getattr(cv2, f"COLOR_{encoding.to_rgb}")))
+    except cv2.error as error:
+        raise InvalidInputError(
+            f"an image of {width} x {height} pixels cannot have encoding {message.encoding}:"
+            f" {error.err}"
+        ) from error
+
+
+def _decode_compressed(message: Any) -> NDArray[np.uint8]:
+    if "compressedDepth" in message.format:
+        raise InvalidInputError("the topic publishes depth images; give a topic of colour images")
+    data = bytes(message.data)
+    image = decode_image(data) if data else None
+    if image is None:
+        raise InvalidInputError(
+            f"the image is damaged: its {len(data)} bytes cannot be decoded as {message.format!r}"
+        )
+    return image
+
+
+def jpeg_bytes(image: NDArray[np.uint8]) -> bytes:
+    """An (H, W, 3) RGB image as JPEG."""
+    _, octets = cv2.imencode(".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
+    return bytes(octets.tobytes())
+
+
+def intrinsics_from_camera_info(message: Any, *, rectified: bool = False) -> Intrinsics:
+    """Intrinsics of the images that come with a `camera_info`.
+
+    K and P are those of the full sensor; the images may be a part of it (`roi`), with pixels
+    merged (`binning_x`, `binning_y`). A merged pixel's centre is the centre of what it was merged
+    from, which `image_geometry` leaves out: (b - 1) / 2b pixels for b pixels a side.
+
+    Args:
+        message: `sensor_msgs/CameraInfo`; its matrices are K, D, P in ROS 1, k, d, p in ROS 2.
+        rectified: the images are those of `image_rect`: P instead of K, no distortion. The baseline
+            of a stereo camera in P is left out, so that poses are those of the camera itself.
+
+    Raises:
+        InvalidInputError: the camera is not calibrated, or has another model of its lens.
+    """
+    matrix = _read_field(message, "P" if rectified else "K")
+    columns = 4 if rectified else 3
+    fx, skew, cx = (float(v) for v in matrix[:3])
+    fy, cy = float(matrix[columns + 1]), float(matrix[columns + 2])
+    distortion = () if rectified else _read_distortion(message)
+    if not np.isfinite([fx, fy, cx, cy, skew, *distortion]).all():
+        raise InvalidInputError("camera_info has numbers that are not finite; calibrate the camera")
+    if min(fx, fy) <= 0.0:
+        raise InvalidInputError(
+            f"camera_info has {'P' if rectified else 'K'} = 0, so the camera is not calibrated;"
+            " calibrate it, or give its intrinsics as a file"
+        ).about("intrinsics")
+    if skew:
+        raise InvalidInputError(
+            f"camera_info has skew {skew:g}, which is not supported; calibrate the camera without"
+            " skew"
+        )
+    fisheye = not rectified and is_ros_fisheye(message.distortion_model, distortion)
+    region = message.roi
+    merged_x, merged_y = max(message.binning_x, 1), max(message.binning_y, 1)
+    return Intrinsics(
+        camera=message.header.frame_id,
+        width=(region.width or message.width) // merged_x,
+        height=(region.height or message.height) // merged_y,
+        focal=(fx / merged_x, fy / merged_y),
+        center=(
+            (cx - region.x_offset + HALF_PIXEL) / merged_x - HALF_PIXEL,
+            (cy - region.y_offset + HALF_PIXEL) / merged_y - HALF_PIXEL,
+        ),
+        model="fisheye" if fisheye else "perspective",
+        distortion=distortion,
+    )
+
+
+def _read_distortion(message: Any) -> tuple[float, ...]:
+    coefficients = tuple(float(v) for v in _read_field(message, "D"))
+    if not any(coefficients) and not is_ros_fisheye(message.distortion_model, coefficients):
+        return ()
+    if message.distortion_model not in ROS_LENS_MODELS:
+        raise InvalidInputError(
+            f"camera_info has the distortion model {message.distortion_model!r}; supported are"
+            f" plumb_bob, rational_polynomial and {ROS_FISHEYE_MODEL}: rectify the images (image_proc)"
+            " and start the node for rectified ones"
+        ).about("rectified")
+    return coefficients
+
+
+def _read_field(message: Any, name: str) -> Sequence[float]:
+    values: Sequence[float] = getattr(message, name if hasattr(message, name) else name.lower())
+    return values

@@ -1,0 +1,255 @@
+"""The node in ROS 1 (rospy) and in ROS 2 (rclpy)."""
+
+from __future__ import annotations
+
+import array
+import http.client
+import os
+import threading
+import time
+import xmlrpc.client
+from collections.abc import Mapping
+from typing import Any
+
+from burg_drake.core import InvalidInputError
+from burg_drake.ros.ros_node import NodeNames, Publications, RosNode, message_classes
+
+
+class RosMaster:
+    """Ros master."""
+
+    variable = "ROS_MASTER_URI"  # Environment variable with the address of the ROS master.
+    default_uri = "http://localhost:11311"  # Address of the ROS master if the variable is not set.
+    timeout = 3.0  # Seconds for the master to answer; rospy itself would retry forever.
+
+
+class Ros1Node(RosNode):
+    """A rospy node; see `RosNode`."""
+
+    def __init__(self, names: NodeNames, *, with_camera_info: bool = True) -> None:
+        """
+        Args:
+            names: of node, topics and frames.
+            with_camera_info: listen for the camera's intrinsics, too.
+
+        Raises:
+            InvalidInputError: no master answers.
+            ImportError: rospy or a message package is not installed.
+        """
+        # Bytes per read. With rospy's 65536, images pile up in the socket and arrive late.
+        buffer_size = 1 << 25
+        import rospy
+
+        classes = message_classes(bytes)
+        require_master(os.environ.get(RosMaster.variable, RosMaster.default_uri))
+        self._rospy = rospy
+        rospy.init_node(names.node, argv=["burg-drake"], disable_signals=True)
+        self._news = threading.Condition()
+        self._image: Any | None = None
+        self.publications = Publications(
+            names,
+            classes,
+            lambda topic, message, queue: rospy.Publisher(
+                topic.replace("~/", "~"), message, queue_size=queue
+            ),
+            lambda publisher: int(publisher.get_num_connections()),
+        )
+        self._topics = {
+            names.image: rospy.Subscriber(
+                names.image,
+                classes.CompressedImage if names.compressed else classes.Image,
+                self._take_image,
+                queue_size=1,
+                buff_size=buffer_size,
+            )
+        }
+        if with_camera_info:
+            self._topics[names.info_topic] = rospy.Subscriber(
+                names.info_topic, classes.CameraInfo, self._take_info, queue_size=1
+            )
+
+    def running(self) -> bool:
+        """See `RosNode`."""
+        return not self._rospy.is_shutdown()
+
+    def next_image(self, patience: float) -> Any | None:
+        """See `RosNode`."""
+        with self._news:
+            self._news.wait_for(lambda: self._image is not None, patience)
+            image, self._image = self._image, None
+        return image
+
+    def publishers(self) -> Mapping[str, int]:
+        """See `RosNode`."""
+        return {topic: s.get_num_connections() for topic, s in self._topics.items()}
+
+    def log(self, text: str, *, warning: bool = False) -> None:
+        """See `RosNode`."""
+        log = self._rospy.logwarn if warning else self._rospy.loginfo
+        log("%s", text)
+
+    def close(self) -> None:
+        """See `RosNode`."""
+        self._rospy.signal_shutdown("the node ends")
+
+    def _take_image(self, message: Any) -> None:
+        with self._news:
+            self._image = message
+            self._news.notify()
+
+    def _take_info(self, message: Any) -> None:
+        self.camera_info = message
+
+
+class _TimeoutTransport(xmlrpc.client.Transport):
+    """One that does not wait for ever."""
+
+    def make_connection(self, host: Any) -> http.client.HTTPConnection:
+        connection = super().make_connection(host)
+        connection.timeout = RosMaster.timeout
+        return connection
+
+
+def require_master(uri: str) -> None:
+    """Asks the master for its process id.
+
+    Raises:
+        InvalidInputError: there is none at that address.
+    """
+    try:
+        proxy: Any = xmlrpc.client.ServerProxy(uri, transport=_TimeoutTransport())
+        code = proxy.getPid("/burg_drake")[0]
+        reason = "" if code == 1 else f"it answered {code}"
+    except (
+        OSError,
+        ValueError,
+        TypeError,
+        xmlrpc.client.Error,
+        http.client.HTTPException,
+    ) as error:
+        reason = str(error) or type(error).__name__
+    if reason:
+        raise InvalidInputError(
+            f"no ROS master at {uri} ({reason}); start roscore, or set {RosMaster.variable}"
+        )
+
+
+class Ros2Node(RosNode):
+    """An rclpy node; see `RosNode`."""
+
+    def __init__(self, names: NodeNames, *, with_camera_info: bool = True) -> None:
+        """
+        Args:
+            names: of node, topics and frames.
+            with_camera_info: listen for the camera's intrinsics, too.
+
+        Raises:
+            ImportError: rclpy or a message package is not installed.
+        """
+        import rclpy
+        from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+        from rclpy.qos import QoSProfile
+        from rclpy.signals import SignalHandlerOptions
+
+        classes = message_classes(lambda octets: array.array("B", octets))
+        self._rclpy = rclpy
+        self._ended = ExternalShutdownException
+        # Ctrl-C stays Python's: rclpy's handlers end the context under a publisher that is at work.
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        self._node = rclpy.create_node(names.node)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self._node)
+        self._image: Any | None = None
+        self.publications = Publications(
+            names,
+            classes,
+            lambda topic, message, queue: self._node.create_publisher(
+                message, topic, QoSProfile(depth=queue)
+            ),
+            lambda publisher: int(publisher.get_subscription_count()),
+        )
+        self._topics = {
+            names.image: (
+                classes.CompressedImage if names.compressed else classes.Image,
+                self._take_image,
+            )
+        }
+        if with_camera_info:
+            self._topics[names.info_topic] = (classes.CameraInfo, self._take_info)
+        self._subscriptions: dict[str, Any] = {}
+        self._incompatible: set[str] = set()
+        for topic in self._topics:
+            self._subscribe(topic, reliable=True)
+
+    def _subscribe(self, topic: str, *, reliable: bool) -> None:
+        """Listens to a topic; depth 1 keeps the latest message alone.
+
+        A reliable subscription is asked for first, although it hears reliable publishers alone: an
+        image is sent in hundreds of packets, and with best effort one that is lost costs the image
+        (two of three at 640 x 480, by Fast DDS on one machine).
+        """
+        from rclpy.event_handler import SubscriptionEventCallbacks
+        from rclpy.qos import QoSProfile, ReliabilityPolicy
+
+        if topic in self._subscriptions:
+            self._node.destroy_subscription(self._subscriptions[topic])
+        policy = ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT
+        message_class, take = self._topics[topic]
+        self._subscriptions[topic] = self._node.create_subscription(
+            message_class,
+            topic,
+            take,
+            QoSProfile(depth=1, reliability=policy),
+            event_callbacks=SubscriptionEventCallbacks(
+                incompatible_qos=lambda event: self._incompatible.add(topic)
+            ),
+        )
+
+    def running(self) -> bool:
+        """See `RosNode`."""
+        return bool(self._rclpy.ok())
+
+    def next_image(self, patience: float) -> Any | None:
+        """See `RosNode`."""
+        deadline = time.monotonic() + patience
+        try:
+            while self._image is None and (left := deadline - time.monotonic()) > 0.0:
+                self._executor.spin_once(timeout_sec=left)
+                while self._incompatible:
+                    self._subscribe_with_best_effort(self._incompatible.pop())
+        except self._ended:
+            return None
+        image, self._image = self._image, None
+        return image
+
+    def _subscribe_with_best_effort(self, topic: str) -> None:
+        self.log(
+            f"{topic} is published with best-effort reliability, so an image is lost if one of its"
+            " packets is lost; publish it as reliable to receive more images"
+        )
+        self._subscribe(topic, reliable=False)
+
+    def publishers(self) -> Mapping[str, int]:
+        """See `RosNode`."""
+        return {topic: int(self._node.count_publishers(topic)) for topic in self._topics}
+
+    def log(self, text: str, *, warning: bool = False) -> None:
+        """See `RosNode`."""
+        logger = self._node.get_logger()
+        # rclpy allows one severity a calling line.
+        if warning:
+            logger.warning(text)
+        else:
+            logger.info(text)
+
+    def close(self) -> None:
+        """See `RosNode`."""
+        self._executor.shutdown()
+        self._node.destroy_node()
+        self._rclpy.try_shutdown()
+
+    def _take_image(self, message: Any) -> None:
+        self._image = message
+
+    def _take_info(self, message: Any) -> None:
+        self.camera_info = message

@@ -1,0 +1,176 @@
+"""Footprints, hulls and convex pieces of objects, read once per library."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from burg_drake.core import Array, InvalidInputError, transform_points
+from burg_drake.geometry import convex_hull
+from burg_drake.objects import ObjectLibrary, Primitive, primitive_mesh
+from burg_drake.scene.convex_sweep import ConvexShapes
+from burg_drake.scene.polygons import Footprint, convex_polygon, rotate_polygon, simplify_polygon
+from burg_drake.scene.scene_validation import read_vertices
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """What an object covers of the plane that it rests on, its centre of mass above the origin.
+
+    Attributes:
+        corners: (N + M, 2) of the convex hull, and of a polygon around it that has fewer [m].
+        count: N.
+        height: of its highest point [m].
+    """
+
+    corners: Array
+    count: int
+    height: float
+
+    @cached_property
+    def hull(self) -> Footprint:
+        """Its convex hull."""
+        return Footprint(self.corners[: self.count])
+
+    @cached_property
+    def coarse(self) -> Footprint:
+        """A polygon around the hull that has fewer corners."""
+        return Footprint(self.corners[self.count :])
+
+    def rotated(self, yaw: float) -> Outline:
+        """The same, turned by a yaw [rad] about the origin."""
+        return Outline(rotate_polygon(self.corners, yaw), self.count, self.height)
+
+    def moved(self, offset: Array) -> Outline:
+        """The same, moved by an offset (2,) [m]."""
+        return Outline(self.corners + offset, self.count, self.height)
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectShape:
+    """The shapes of one object, in its frame O.
+
+    Attributes:
+        library: where it is from.
+        name: in the library.
+        corners: (N, 3) corners of the convex hull of all that is seen of it or touches others [m].
+    """
+
+    library: ObjectLibrary
+    name: str
+    corners: Array
+
+    @cached_property
+    def _poses(self) -> dict[int, Array]:
+        return {}
+
+    @cached_property
+    def _outlines(self) -> dict[int, Outline]:
+        return {}
+
+    def X_SO(self, pose: int) -> Array:
+        """(4, 4) in a stable pose, its centre of mass above the board's corner."""
+        if pose not in self._poses:
+            self._poses[pose] = self.library.entry(self.name).X_SO(pose)
+        return self._poses[pose]
+
+    def outline(self, pose: int) -> Outline:
+        """What it covers in a stable pose."""
+        if pose not in self._outlines:
+            self._outlines[pose] = self._outline(self.X_SO(pose))
+        return self._outlines[pose]
+
+    def _outline(self, X_SO: Array) -> Outline:
+        outline_tolerance = 2e-4  # Metres that an outline may exceed the true one.
+        coarse_tolerance = 1.5e-3  # Metres, of the coarse outline.
+        corners = transform_points(X_SO, self.corners)
+        hull = simplify_polygon(convex_polygon(corners[:, :2]), outline_tolerance)
+        coarse = simplify_polygon(hull, coarse_tolerance)
+        return Outline(np.concatenate([hull, coarse]), len(hull), float(corners[:, 2].max()))
+
+    @property
+    def shadows(self) -> tuple[Array, ...]:
+        """The hulls (N, 2) of what it covers, one a stable pose [m]."""
+        count = len(self.library.entry(self.name).stable_poses)
+        return tuple(self.outline(pose).hull.corners for pose in range(count))
+
+    @cached_property
+    def pieces(self) -> ConvexShapes:
+        """What of it touches others."""
+        entry = self.library.entry(self.name)
+        if entry.contact.primitive is not None:
+            return _primitive_shape(entry.contact.primitive)
+        points = _contact_points(self.library, self.name)
+        return ConvexShapes.of(points, [np.zeros((3, 3))] * len(points))
+
+    @cached_property
+    def hull(self) -> ConvexShapes:
+        """Its convex hull."""
+        return ConvexShapes.of([self.corners], [np.zeros((3, 3))])
+
+
+class ObjectShapes:
+    """Shapes of a library's objects, each read when it is first asked for."""
+
+    def __init__(self, library: ObjectLibrary) -> None:
+        self.library = library
+        self._shapes: dict[str, ObjectShape] = {}
+
+    def __getitem__(self, name: str) -> ObjectShape:
+        """The shape of an object.
+
+        Raises:
+            UnknownNameError: there is no such object, or a file of it is missing.
+            MeshError: a file of it is damaged.
+            InvalidInputError: it has no mass, or no stable pose.
+        """
+        if name not in self._shapes:
+            self._shapes[name] = _read_object_shape(self.library, name)
+        return self._shapes[name]
+
+
+def _read_object_shape(library: ObjectLibrary, name: str) -> ObjectShape:
+    entry = library.entry(name)
+    if entry.is_fixed or not entry.stable_poses:
+        why = "no mass" if entry.is_fixed else "no stable pose"
+        raise InvalidInputError(
+            f"object {name!r} of library {library.root} has {why}; leave it out"
+        )
+    points = np.vstack(
+        [_read_mesh_vertices(library, entry.surface or entry.mesh), *_contact_points(library, name)]
+    )
+    return ObjectShape(library, name, points[np.sort(convex_hull(points).vertices)])
+
+
+def _contact_points(library: ObjectLibrary, name: str) -> list[Array]:
+    """Points (N, 3) of each convex piece that touches others, or of the whole surface."""
+    entry = library.entry(name)
+    if entry.contact.primitive is not None:
+        return [np.asarray(primitive_mesh(entry.contact.primitive).vertices)]
+    return [_read_mesh_vertices(library, piece) for piece in entry.pieces] or [
+        _read_mesh_vertices(library, entry.surface or entry.mesh)
+    ]
+
+
+def _primitive_shape(primitive: Primitive) -> ConvexShapes:
+    """A primitive, with its round surface."""
+    size, spread = primitive.size, np.zeros((3, 3))
+    if primitive.shape == "box":
+        points = np.array(list(itertools.product((-0.5, 0.5), repeat=3))) * size
+    elif primitive.shape == "cylinder":
+        points = np.array([(0.0, 0.0, -0.5), (0.0, 0.0, 0.5)]) * size[1]
+        spread = np.diag([size[0], size[0], 0.0])
+    else:
+        points, spread = np.zeros((1, 3)), np.eye(3) * size[0]
+    return ConvexShapes.of([points], [spread]).moved(primitive.X_OP.matrix())
+
+
+def _read_mesh_vertices(library: ObjectLibrary, file: str) -> Array:
+    path = library.path(file)
+    try:
+        return read_vertices(path)
+    except (OSError, ValueError) as error:
+        raise library.damaged(path) from error

@@ -1,0 +1,146 @@
+"""Packing of objects side by side, as densely as possible."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from burg_drake.core import Array
+from burg_drake.scene.object_shapes import ObjectShape
+from burg_drake.scene.occupancy import OccupiedBoard, StandingObject, place_in_stable_pose
+from burg_drake.scene.polygons import (
+    SUPPORT_DIRECTIONS,
+    Footprint,
+    convex_polygon,
+    next_vertices,
+    polygon_area,
+    previous_vertices,
+    support_area,
+)
+
+PACKING_GAP = 3e-4
+"""Metres between footprints, so that rounded poses do not overlap."""
+
+
+def pack_objects(
+    occupied: OccupiedBoard,
+    objects: Sequence[tuple[ObjectShape, int]],
+    quarter: int = 0,
+    needs_all: bool = False,
+) -> list[StandingObject | None]:
+    """Finds places, one object after the other, and adds them to what stands there.
+
+    Args:
+        occupied: the board and what stands there.
+        objects: with the numbers of their stable poses.
+        quarter: turns of 90 degrees of the first one against the board.
+        needs_all: stop at the first one for which there is no room.
+
+    Returns:
+        None for those for which there is no room.
+    """
+    max_yaws = 10  # Yaws tried for each object.
+    found: list[StandingObject | None] = [None] * len(objects)
+    for i, (shape, pose) in enumerate(objects):
+        best, best_area = None, np.inf
+        yaws = _aligned_yaws(shape.outline(pose).hull.corners, occupied.standing)
+        for yaw in yaws[:max_yaws] if occupied.standing else yaws[quarter : quarter + 1]:
+            turned = place_in_stable_pose(shape, pose, yaw)
+            place, place_area = _best_place(occupied, turned)
+            if place is not None and place_area < best_area - 1e-12:
+                best, best_area = place, place_area
+        if best is not None:
+            occupied.add(best)
+            found[i] = best
+        elif needs_all:
+            break
+    return found
+
+
+def packing_density(placed: Sequence[StandingObject]) -> float:
+    """Share of the convex hull of all shadows that they cover."""
+    if not placed:
+        return 0.0
+    hull = convex_polygon(np.concatenate([one.shadow.corners for one in placed]))
+    return sum(polygon_area(one.shadow.corners) for one in placed) / polygon_area(hull)
+
+
+def _aligned_yaws(shadow: Array, others: Sequence[StandingObject]) -> list[float]:
+    """Yaws that lay the longest side of a shadow along a side of something [rad]."""
+    own = _side_headings(shadow)[0]
+    towards = [k * np.pi / 2.0 for k in range(4)]
+    for one in others[::-1]:
+        towards += [heading + np.pi for heading in _side_headings(one.shadow.corners)]
+    found: list[float] = []
+    for heading in towards:
+        yaw = float((heading - own) % (2.0 * np.pi))
+        if all(abs((yaw - other + np.pi) % (2.0 * np.pi) - np.pi) > 0.02 for other in found):
+            found.append(yaw)
+    return found
+
+
+def _side_headings(polygon: Array) -> Array:
+    """Headings of the longest sides of a polygon [rad]."""
+    side_count = 3  # Longest sides of a footprint along which others are laid.
+    along = next_vertices(polygon) - polygon
+    longest = np.argsort(-np.hypot(along[:, 0], along[:, 1]), kind="stable")[:side_count]
+    return np.asarray(np.arctan2(along[longest, 1], along[longest, 0]))
+
+
+def _best_place(
+    occupied: OccupiedBoard, turned: StandingObject
+) -> tuple[StandingObject | None, float]:
+    """The place where the hull of all shadows is smallest, and its area [m^2]."""
+    low, high = -turned.shadow.low, occupied.size - turned.shadow.high
+    if (low > high).any():
+        return None, np.inf
+    there = [one.shadow for one in occupied.standing]
+    coarse = [one.outline.coarse for one in occupied.standing]
+    points = (
+        _touching_positions(turned.outline.coarse, coarse, low, high)
+        if there
+        else ((low + high) / 2.0)[None]
+    )
+    points = points[((points >= low) & (points <= high)).all(axis=1)]
+    points = points[occupied.are_free(turned, points, PACKING_GAP)]
+    if not len(points):
+        return None, np.inf
+    reaches = turned.shadow.reach + points @ SUPPORT_DIRECTIONS.T
+    for shadow in there:
+        reaches = np.maximum(reaches, shadow.reach)
+    areas = support_area(reaches)
+    best = int(areas.argmin())
+    return turned.shifted(points[best]), float(areas[best])
+
+
+def _touching_positions(
+    shadow: Footprint, there: Sequence[Footprint], low: Array, high: Array
+) -> Array:
+    """Places (N, 2) of a shadow's origin at which it touches what is there, once or twice."""
+    around = [_grow_polygon(other.forbids(shadow)) for other in there]
+    starts = np.concatenate(around)
+    ends = np.concatenate([next_vertices(polygon) for polygon in around])
+    frame = np.array([low, (high[0], low[1]), high, (low[0], high[1])])
+    starts = np.concatenate([starts, frame])
+    ends = np.concatenate([ends, next_vertices(frame)])
+    along = ends - starts
+    between = starts[None] - starts[:, None]
+    turn = along[:, None, 0] * along[None, :, 1] - along[:, None, 1] * along[None, :, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = (between[..., 0] * along[None, :, 1] - between[..., 1] * along[None, :, 0]) / turn
+        u = (between[..., 0] * along[:, None, 1] - between[..., 1] * along[:, None, 0]) / turn
+        cross = (t >= 0.0) & (t <= 1.0) & (u >= 0.0) & (u <= 1.0)
+    i, j = np.nonzero(np.triu(cross, 1))
+    return np.concatenate([starts, starts[i] + t[i, j, None] * along[i]])
+
+
+def _grow_polygon(polygon: Array) -> Array:
+    """A polygon that is larger by `PACKING_GAP` all around."""
+    along = next_vertices(polygon) - polygon
+    normal = np.empty_like(along)
+    normal[:, 0], normal[:, 1] = along[:, 1], -along[:, 0]
+    normal /= np.hypot(normal[:, 0], normal[:, 1])[:, None]
+    before = previous_vertices(normal)
+    cosine = before[:, 0] * normal[:, 0] + before[:, 1] * normal[:, 1]
+    return polygon + PACKING_GAP * 1.001 * (before + normal) / (1.0 + cosine)[:, None]

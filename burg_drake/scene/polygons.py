@@ -1,0 +1,216 @@
+"""Convex polygons in the plane: the footprints of objects on the board."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from burg_drake.core import Array
+
+_DIRECTION_ANGLES = 2.0 * np.pi * np.arange(64) / 64  # Radians, all around.
+SUPPORT_DIRECTIONS = np.column_stack([np.cos(_DIRECTION_ANGLES), np.sin(_DIRECTION_ANGLES)])
+"""(64, 2) unit vectors all around."""
+
+
+@dataclass(frozen=True, eq=False)
+class PolygonSides:
+    """A polygon as a walk along its sides.
+
+    Attributes:
+        start: (2,) the lowest corner, the left one of two [m].
+        along: (N, 2) the sides from there on [m].
+        heading: (N,) where they lead to, from 0 to 2 pi [rad].
+    """
+
+    start: Array
+    along: Array
+    heading: Array
+
+    @classmethod
+    def of(cls, polygon: Array) -> PolygonSides:
+        """From corners (N, 2)."""
+        first = int(np.lexsort((polygon[:, 0], polygon[:, 1]))[0])
+        corners = np.concatenate((polygon[first:], polygon[:first]))
+        along = next_vertices(corners) - corners
+        heading = np.arctan2(along[:, 1], along[:, 0]) % (2.0 * np.pi)
+        return cls(corners[0], along, heading)
+
+
+def next_vertices(corners: Array) -> Array:
+    """The corner (N, ...) after each, around a polygon."""
+    return np.concatenate((corners[1:], corners[:1]))
+
+
+def previous_vertices(corners: Array) -> Array:
+    """The corner (N, ...) before each, around a polygon."""
+    return np.concatenate((corners[-1:], corners[:-1]))
+
+
+def convex_polygon(points: Array) -> Array:
+    """The corners (M, 2) of the convex hull of points (N, 2) that span an area [m]."""
+    return np.asarray(points[ConvexHull(points).vertices])
+
+
+def rotate_polygon(polygon: Array, angle: float) -> Array:
+    """A polygon turned counter-clockwise about the origin by an angle [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    x, y = polygon[:, 0], polygon[:, 1]
+    around = np.empty_like(polygon)
+    around[:, 0], around[:, 1] = c * x - s * y, s * x + c * y
+    return around
+
+
+def polygon_area(polygon: Array) -> float:
+    """Area [m^2], by the shoelace formula."""
+    x, y = polygon[:, 0], polygon[:, 1]
+    return float(np.sum(x * next_vertices(y) - y * next_vertices(x)) / 2.0)
+
+
+def no_fit_polygon(still: Array, moving: Array) -> Array:
+    """Where a polygon's origin must not be, so that it does not overlap another one.
+
+    Args:
+        still: (N, 2) the other one.
+        moving: (M, 2) corners relative to the origin that is to be placed.
+
+    Returns:
+        The Minkowski difference (K, 2): the two touch where the origin is on its edge, and are as
+        far apart as the origin is from it.
+    """
+    return no_fit_polygon_of_sides(PolygonSides.of(still), PolygonSides.of(-moving))
+
+
+def no_fit_polygon_of_sides(still: PolygonSides, opposite: PolygonSides) -> Array:
+    """The same of polygons whose sides are known: of the other one, and of the one that is to be
+    placed, turned by half a turn about its origin."""
+    along = np.concatenate((still.along, opposite.along))
+    order = np.argsort(np.concatenate((still.heading, opposite.heading)), kind="stable")
+    along = along[order]
+    return np.asarray(still.start + opposite.start + np.cumsum(along, axis=0) - along)
+
+
+def support_area(reach: Array) -> Array:
+    """Areas (...) of the polygons between lines that are evenly spread around the origin.
+
+    Args:
+        reach: (..., K) largest `direction . point` of a shape along K directions, such as those of
+            `SUPPORT_DIRECTIONS`: the result is the area of its convex hull, and a little above it [m^2].
+    """
+    step = 2.0 * np.pi / reach.shape[-1]
+    before, after = np.roll(reach, 1, axis=-1), np.roll(reach, -1, axis=-1)
+    side = (before + after - 2.0 * np.cos(step) * reach) / np.sin(step)
+    return np.asarray((reach * side).sum(axis=-1) / 2.0)
+
+
+def support_values(polygon: Array) -> Array:
+    """(K,) largest `direction . corner` of a polygon along `SUPPORT_DIRECTIONS` [m]."""
+    return np.asarray((polygon @ SUPPORT_DIRECTIONS.T).max(axis=0))
+
+
+def simplify_polygon(polygon: Array, most: float) -> Array:
+    """A polygon with fewer corners around a polygon: short sides are left out, and their
+    neighbours go on until they meet.
+
+    Args:
+        polygon: (N, 2).
+        most: that it may reach beyond a side that is left out [m].
+    """
+    while len(polygon) > 3:
+        ends = next_vertices(polygon)
+        into, along = polygon - previous_vertices(polygon), ends - polygon
+        out = next_vertices(ends) - ends
+        turn = _cross(into, out)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            tip = polygon + (_cross(along, out) / turn)[:, None] * into
+            beyond = -_cross(along, tip - polygon) / np.hypot(along[:, 0], along[:, 1])
+        beyond = np.where((turn > 0.0) & (beyond >= 0.0), beyond, np.inf)
+        k = int(beyond.argmin())
+        if beyond[k] > most:
+            break
+        polygon = polygon.copy()
+        polygon[k] = tip[k]
+        polygon = np.delete(polygon, (k + 1) % len(polygon), axis=0)
+    return polygon
+
+
+def distances_from_polygon(polygon: Array, points: Array) -> Array:
+    """Distances (M,) of points (M, 2) from a polygon [m], below 0 inside."""
+    side, beside = _distances_and_feet(polygon, points)
+    inside = (side <= 0.0).all(axis=1)
+    return np.asarray(np.where(inside, side.max(axis=1), np.hypot(side, beside).min(axis=1)))
+
+
+def exit_distance(polygon: Array, origin: Array, direction: Array) -> float:
+    """How far a point (2,) inside a polygon has to go along a unit direction (2,) to leave it."""
+    along, to_corner = next_vertices(polygon) - polygon, polygon - origin
+    speed = along[:, 1] * direction[0] - along[:, 0] * direction[1]
+    room = along[:, 1] * to_corner[:, 0] - along[:, 0] * to_corner[:, 1]
+    outward = speed > 0.0
+    return float((room[outward] / speed[outward]).min())
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
+def _distances_and_feet(polygon: Array, points: Array) -> tuple[Array, Array]:
+    """Of points (M, 2) and the edges of a polygon (N, 2): how far the points are outside of the
+    edges' lines (M, N), and how far beyond the edges' ends, seen along them (M, N) [m]."""
+    along = next_vertices(polygon) - polygon
+    length = np.hypot(along[:, 0], along[:, 1])
+    along = along / length[:, None]
+    away = points[:, None] - polygon
+    t = away[..., 0] * along[:, 0] + away[..., 1] * along[:, 1]
+    side = away[..., 0] * along[:, 1] - away[..., 1] * along[:, 0]
+    return side, t - np.clip(t, 0.0, length)
+
+
+@dataclass(frozen=True, eq=False)
+class Footprint:
+    """A convex polygon. What follows from its corners is computed once, when it is first needed.
+
+    Attributes:
+        corners: (N, 2) counter-clockwise [m].
+    """
+
+    corners: Array
+
+    @cached_property
+    def low(self) -> Array:
+        """The lower corner (2,) of the box around it."""
+        lower: Array = self.corners.min(axis=0)
+        return lower
+
+    @cached_property
+    def high(self) -> Array:
+        """The upper corner (2,) of the box around it."""
+        upper: Array = self.corners.max(axis=0)
+        return upper
+
+    @cached_property
+    def middle(self) -> Array:
+        """The mean (2,) of its corners."""
+        center: Array = self.corners.mean(axis=0)
+        return center
+
+    @cached_property
+    def reach(self) -> Array:
+        """How far it reaches along `polygons.DIRECTIONS`."""
+        return support_values(self.corners)
+
+    @cached_property
+    def sides(self) -> PolygonSides:
+        """Its sides."""
+        return PolygonSides.of(self.corners)
+
+    @cached_property
+    def opposite_sides(self) -> PolygonSides:
+        """Its sides when it is turned by half a turn about the origin."""
+        return PolygonSides.of(-self.corners)
+
+    def forbids(self, moving: Footprint) -> Array:
+        """Where another one's origin must not be, see `polygons.no_fit_polygon`."""
+        return no_fit_polygon_of_sides(self.sides, moving.opposite_sides)

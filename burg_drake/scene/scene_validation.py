@@ -1,0 +1,274 @@
+"""Geometric checks of a scene: bounds of the board, contact with the ground, hovering."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from burg_drake.core import Array, InvalidInputError, transform_points
+from burg_drake.objects import ObjectLibrary, support_corners
+from burg_drake.scene.scene_document import Scene, SceneLike, as_scene
+
+IN_BOUNDS_TOLERANCE = 1e-4
+"""Metres that an object may exceed the board's edge, because of rounding."""
+TOUCH_TOLERANCE = 1e-3
+"""Metres that two objects may overlap at the start; they separate within a step."""
+GROUND_TOLERANCE = 1.5e-3
+"""Metres that an object may be in the ground, as the table yields in simulation."""
+OBSTACLE_TOLERANCE = 2.5e-3
+"""Metres that an object may be in an obstacle, as leaning objects sink by up to 2 mm."""
+SUNKEN_TOLERANCE = 1e-3
+"""Metres in the table from which a warning is given; real tables yield by less."""
+HOVER_TOLERANCE = 1e-3
+"""Metres above the board from which a warning is given."""
+
+BOARD_NAME = "board"
+"""Name of the board, where no other object is below."""
+
+IssueKind = Literal[
+    "out_of_bounds", "in_ground", "sunken", "hovering", "overlap", "surface_overlap"
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneIssue:
+    """Something about a scene that its author should know.
+
+    Attributes:
+        instance: name of the instance it is about.
+        kind: what is wrong. `hovering`, `sunken` (in the table, which bears it there) and
+            `surface_overlap` (only the surfaces overlap, not what objects touch others with) are
+            warnings, all else are errors.
+        amount: how far beyond, below, above or into something [m].
+        message: one clear line.
+        other: what it overlaps or hovers above: another instance, the table, the board, or a body
+            of the station.
+    """
+
+    instance: str
+    kind: IssueKind
+    amount: float
+    message: str
+    other: str = ""
+
+    @property
+    def is_error(self) -> bool:
+        """Grasps of this scene would be judged in a world other than the document's."""
+        return self.kind not in ("hovering", "sunken", "surface_overlap")
+
+
+@dataclass(frozen=True, eq=False)
+class Extent:
+    """The box around a placed object, along the axes of the board.
+
+    Attributes:
+        low, high: (3,) its corners in the scene frame [m].
+        support: height of the lowest point of what it rests with, in the scene frame [m].
+    """
+
+    low: Array
+    high: Array
+    support: float
+
+    @classmethod
+    def of(cls, p_SV: Array, p_SC: Array) -> Extent:
+        """The box around points (N, 3) of an object that rests with points (M, 3)."""
+        return cls(p_SV.min(axis=0), p_SV.max(axis=0), float(p_SC[:, 2].min()))
+
+
+def validate_scene(
+    scene: SceneLike, extents: Mapping[str, Extent] | None = None
+) -> tuple[SceneIssue, ...]:
+    """Checks where the instances of a scene stand on the board.
+
+    What hovers above another object goes by the boxes around both, so that nothing is told of what
+    may be in a mug; `SceneCheck` looks at their shapes.
+
+    Args:
+        scene: the scene; fixed background objects may stand anywhere.
+        extents: of all instances, background included, if they are known; read from the library's
+            meshes otherwise.
+
+    Returns:
+        What was found, in the order of the document; nothing if all is well.
+    """
+    scene = as_scene(scene)
+    if extents is None:
+        names = (*scene.instances, *scene.background)
+        extents = {name: _placed_extent(scene, name) for name in names}
+    issues: list[SceneIssue] = []
+    for name in scene.instances:
+        others = {other: extent for other, extent in extents.items() if other != name}
+        found = (
+            _out_of_bounds_issue(scene, name, extents[name]),
+            _ground_issue(scene, name, extents[name])
+            or _hovering_issue(name, extents[name], others),
+        )
+        issues += [issue for issue in found if issue is not None]
+    return tuple(issues)
+
+
+def require_no_errors(scene: Scene, issues: Iterable[SceneIssue]) -> None:
+    """Refuses a scene with errors; warnings pass.
+
+    Raises:
+        InvalidInputError: one line with the first error and the number of further ones.
+    """
+    errors = [issue for issue in issues if issue.is_error]
+    if errors:
+        more = len(errors) - 1
+        rest = f" (and {more} more; burg-drake scene validate lists all)" if more else ""
+        raise InvalidInputError(f"{scene.path}: {errors[0].message}{rest}")
+
+
+def placed_vertices(scene: Scene, instance: str) -> Array:
+    """(N, 3) vertices of an instance's surface in the scene frame [m]."""
+    p_OV = surface_vertices(scene.library, scene.instance(instance).object)
+    return transform_points(scene.X_SO(instance), p_OV)
+
+
+def _placed_extent(scene: Scene, instance: str) -> Extent:
+    p_OC = support_vertices(scene.library, scene.instance(instance).object)
+    return Extent.of(placed_vertices(scene, instance), transform_points(scene.X_SO(instance), p_OC))
+
+
+def support_vertices(library: ObjectLibrary, name: str) -> Array:
+    """(N, 3) points of an object with which it rests on a plane, in the object frame [m]: of its
+    primitive, else of its pieces; of its surface if it has none.
+
+    Raises:
+        UnknownNameError: there is no such object, or one of its files is missing.
+        MeshError: one is damaged.
+    """
+    entry = library.entry(name)
+    if entry.contact.primitive is None and not entry.pieces:
+        return surface_vertices(library, name)
+    return support_corners(library, entry)
+
+
+def surface_vertices(library: ObjectLibrary, name: str) -> Array:
+    """(N, 3) vertices of an object's surface in the object frame [m].
+
+    Raises:
+        UnknownNameError: there is no such object, or its mesh file is missing.
+        MeshError: the mesh file is damaged.
+    """
+    entry = library.entry(name)
+    mesh = library.path(entry.surface or entry.mesh)
+    try:
+        return read_vertices(mesh)
+    except (OSError, ValueError) as error:
+        raise library.damaged(mesh) from error
+
+
+def read_vertices(mesh: Path) -> Array:
+    """(N, 3) vertices of an .obj file as a library holds it.
+
+    Raises:
+        OSError, ValueError: it cannot be read, or holds no vertices.
+    """
+    status = mesh.stat()
+    return _cached_vertices(mesh, status.st_mtime_ns, status.st_size)
+
+
+@functools.lru_cache(maxsize=32)
+def _cached_vertices(mesh: Path, changed: int, size: int) -> Array:
+    """As `read_vertices`, read-only; of files read before, what was in them."""
+    rows = [line.split()[1:4] for line in mesh.read_text().splitlines() if line.startswith("v ")]
+    p_OV = np.array(rows, dtype=float).reshape(-1, 3)
+    if not len(p_OV) or not np.isfinite(p_OV).all():
+        raise ValueError(f"{mesh} has no vertices, or only ones that are not finite")
+    p_OV.flags.writeable = False
+    return p_OV
+
+
+def _out_of_bounds_issue(scene: Scene, name: str, extent: Extent) -> SceneIssue | None:
+    suspect_distance = 5.0  # Metres; a larger coordinate was probably meant in mm.
+    size = scene.board.size
+    lower, upper = extent.low, extent.high
+    beyond = {
+        "left": float(-lower[0]),
+        "right": float(upper[0] - size[0]),
+        "lower": float(-lower[1]),
+        "upper": float(upper[1] - size[1]),
+    }
+    sides = sorted((s for s in beyond if beyond[s] > IN_BOUNDS_TOLERANCE), key=lambda s: -beyond[s])
+    if not sides:
+        return None
+    where = " and ".join(f"{length_text(beyond[s])} over the {s} edge" for s in sides)
+    board = f"{size[0] * 1e3:g} x {size[1] * 1e3:g} mm"
+    hint = ""
+    if np.abs(scene.instance(name).X_SO.translation).max() >= suspect_distance:
+        hint = "; check that translations are in metres"
+    return SceneIssue(
+        instance=name,
+        kind="out_of_bounds",
+        amount=beyond[sides[0]],
+        message=f"{name!r} is off the board: {where} of the board ({board}){hint}",
+    )
+
+
+def _ground_issue(scene: Scene, name: str, extent: Extent) -> SceneIssue | None:
+    surface, support = float(extent.low[2]), extent.support
+    if support < -GROUND_TOLERANCE and reaches_into_ground(surface):
+        height = round(scene.instance(name).X_SO.translation[2] - support, 4) + 0.0
+        return SceneIssue(
+            instance=name,
+            kind="in_ground",
+            amount=-support,
+            message=f"{name!r} reaches {length_text(-support)} below the surface of the board;"
+            f" set z = {height:.4f} to put it on top",
+        )
+    return None
+
+
+def _hovering_issue(name: str, extent: Extent, others: Mapping[str, Extent]) -> SceneIssue | None:
+    support_tolerance = 5e-3  # Metres between boxes of objects that may rest on each other.
+    height = min(float(extent.low[2]), extent.support)
+    if height <= HOVER_TOLERANCE:
+        return None
+    below = BOARD_NAME
+    for other, box in others.items():
+        if (box.low[:2] >= extent.high[:2]).any() or (extent.low[:2] >= box.high[:2]).any():
+            continue
+        if box.low[2] < extent.low[2] and extent.low[2] - box.high[2] < height:
+            height, below = float(extent.low[2] - box.high[2]), other
+    if below != BOARD_NAME and height < support_tolerance:
+        return None
+    return hovering_issue(name, height, below)
+
+
+def hovering_issue(name: str, height: float, below: str) -> SceneIssue:
+    """Says that an instance hovers.
+
+    Args:
+        name: of the instance.
+        height: how far it falls [m].
+        below: name of what it falls on; `BOARD_NAME`, or empty if nothing is below it.
+    """
+    where = "the board" if below == BOARD_NAME else repr(below)
+    hovers = f"hovers {length_text(height)} above {where}" if below else "has nothing below it"
+    return SceneIssue(
+        instance=name,
+        kind="hovering",
+        amount=height,
+        message=f"{name!r} {hovers}; it will fall when simulated",
+        other=below,
+    )
+
+
+def reaches_into_ground(surface: float) -> bool:
+    """Whether a surface whose lowest point is at this height over the ground [m] reaches into it:
+    if not, the object stands there, however far what it rests with in simulation reaches."""
+    rounding_tolerance = 1e-4  # Metres below the ground, because of rounding.
+    return surface < -rounding_tolerance
+
+
+def length_text(length: float) -> str:
+    """A length [m] for people."""
+    return f"{length * 1e3:.1f} mm" if length < 0.1 else f"{length:.3g} m"

@@ -1,0 +1,481 @@
+"""The arm's trial: servos follow a plan to the grasp, the hand closes, the arm lifts and holds.
+
+The arm starts at rest at the pregrasp, or at home if it also executes the transfer. Outcomes and
+margins are those of the hand's trial, and how well the arm followed its command, and what it
+pushed before the hand closed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import lru_cache, partial
+from itertools import pairwise
+
+import numpy as np
+from pydrake.geometry import Meshcat
+from pydrake.multibody.tree import BodyIndex
+
+from burg_drake.core import Array, InvalidInputError, inverse, rotation_angle, swap_fingers
+from burg_drake.grasping import HandClearance
+from burg_drake.motion import ArmKinematics, Plan, Trajectory
+from burg_drake.scene import SceneLike, as_scene
+from burg_drake.simulation.contacts import BodyContact, RobotContactWatch
+from burg_drake.simulation.grasp_trial import MAX_KEPT_WORLDS, DrakeTrial
+from burg_drake.simulation.hand_carrier import ArmLiftClearance
+from burg_drake.simulation.settings import DEFAULT_TRIAL, TrialSettings
+from burg_drake.simulation.trial_execution import Execution, HandSegment
+from burg_drake.simulation.trial_result import TrialResult
+from burg_drake.simulation.trial_world import TrialWorld, check_overrides
+from burg_drake.station import (
+    ENGINES,
+    Engine,
+    MountedHand,
+    StationDiagram,
+    StationLike,
+    as_drake_engine,
+    as_station,
+    build_station_diagram,
+)
+
+
+class CommandSequence:
+    """Trajectories one after the other, by steps of the simulation; the end of the last one from
+    then on.
+
+    A trajectory begins at the step at which the one before it has ended, at most a step late.
+
+    Args:
+        trajectories: at least one; each begins where the one before it ends.
+        step: of the simulation [s].
+        steps_per_check: steps from one look at the contacts to the next.
+        forward: (K, 3) positions of the grasp frame in the world at arm positions (K, n) [m].
+        rest: looks that follow after the end.
+
+    Attributes:
+        steps_per_check: as given.
+        checks: from start to end.
+        desired: (S + 1, 2 n) positions and velocities, by steps since the start.
+        p_WG: (looks + 1, 3) where that leads the grasp frame in the world, by looks [m].
+    """
+
+    def __init__(
+        self,
+        trajectories: Sequence[Trajectory],
+        step: float,
+        steps_per_check: int,
+        forward: Callable[[Array], Array],
+        rest: int = 0,
+    ) -> None:
+        parts = [_desired_states(trajectories[0], np.zeros(1))]
+        for trajectory in trajectories:
+            count = int(np.ceil(trajectory.duration / step - 1e-6))
+            parts.append(_desired_states(trajectory, step * np.arange(1.0, count + 1.0)))
+        self.desired = np.concatenate(parts)
+        self.checks = -(-(len(self.desired) - 1) // steps_per_check) + rest
+        self.steps_per_check = steps_per_check
+        self.p_WG = forward(np.array([self.q_at_check(check) for check in range(self.checks + 1)]))
+
+    def at(self, step: int) -> Array:
+        """(2 n,) positions and velocities to be reached at the end of a step since the start."""
+        desired: Array = self.desired[min(step, len(self.desired) - 1)]
+        return desired
+
+    def q_at_check(self, check: int) -> Array:
+        """(n,) desired positions some looks after the start."""
+        return self.at(check * self.steps_per_check)[: self.desired.shape[1] // 2]
+
+
+def _desired_states(trajectory: Trajectory, time: Array) -> Array:
+    """(T, 2 n) positions and velocities at times (T,)."""
+    v = [np.interp(time, trajectory.t, column) for column in trajectory.v.T]
+    return np.concatenate([trajectory.at(time), np.stack(v, axis=1)], axis=1)
+
+
+class ArmCarrier:
+    """Moves the hand with the arm; see `Carrier`.
+
+    Commands change at every step of the simulation, which is what a real arm's controller gets (a
+    Panda's takes one a millisecond). The servos are part of a step, so that they are told what is
+    wanted at its end.
+
+    Args:
+        world: that of a trial with an arm which has been brought to its start.
+        target: the grasped body.
+        approach: from the pregrasp, or from further back, to the grasp.
+        segments: from there on, at least one; the hand goes straight on each.
+        closed: how far the fingers can close at a grasp (4, 4) in the world before they touch.
+        lift_clearance: gives the check of the path ahead with the target in the hand.
+    """
+
+    def __init__(
+        self,
+        world: TrialWorld,
+        target: BodyIndex,
+        approach: CommandSequence,
+        segments: Sequence[CommandSequence],
+        closed: Callable[[Array], float],
+        lift_clearance: Callable[[], ArmLiftClearance],
+    ) -> None:
+        assert isinstance(world.hand, MountedHand)
+        diagram = world.diagram
+        self._world = world
+        self._closed = closed
+        self._mounted = world.hand
+        self._lift_clearance = lift_clearance
+        self._step = diagram.engine.time_step
+        self._plant_context = diagram.plant.GetMyMutableContextFromRoot(world.context)
+        self._port = diagram.diagram.GetInputPort("arm.desired_state")
+        self._approach, self._commands = approach, tuple(segments)
+        self._gravity = float(np.linalg.norm(diagram.plant.gravity_field().gravity_vector()))
+        interval = segments[-1].steps_per_check * self._step
+        self._loads = _specific_loads(segments[-1].p_WG, interval, self._gravity)
+        speed = np.linalg.norm(np.diff(segments[-1].p_WG, axis=0), axis=1)
+        self._fastest = int(speed.argmax())
+        self._touches = RobotContactWatch(diagram, world.hand.links, target)
+        self._current: CommandSequence | None = None
+        self._number = 0
+        self._start = 0
+        self._arrived = False
+        self.approach_checks = approach.checks
+        self.approach_steps = approach.steps_per_check
+        self.segments = tuple(_hand_segment(segment) for segment in segments)
+        self.lift_time = sum(segment.checks for segment in segments) * interval
+        self.tracking_error = self.tracking_distance = math.nan
+
+    @property
+    def touched(self) -> str:
+        """The first touch that was not planned."""
+        return self._touches.first
+
+    def approach(self) -> None:
+        """Follows the path to the grasp."""
+        self._follow(self._approach)
+
+    def close(self) -> None:
+        """Closes the hand; the fingers begin where they would touch something first, as nothing
+        happens before, unless something has been moved."""
+        self._arrived = True
+        self._follow(None)
+        world = self._world
+        world.command("hand", self._mounted.closing_command())
+        if not self.touched:
+            X_WG = self._mounted.X_WG(self._plant_context)
+            self._mounted.set_fingers(self._plant_context, self._closed(X_WG))
+            world.simulator.Initialize()
+
+    def lift(self, number: int, check: int) -> None:
+        """Follows one segment of the plan."""
+        if check == 0:
+            self._number = number
+            self._follow(self._commands[number])
+
+    def stop(self) -> None:
+        """Stays where the last segment ends."""
+        self._follow(None)
+
+    def advance_to(self, time: float) -> None:
+        """Steps, with a command of its own for each step."""
+        context, simulator = self._world.context, self._world.simulator
+        if self._current is None:
+            simulator.AdvanceTo(time)
+            return
+        done, last = self._steps(context.get_time()), self._steps(time)
+        for step in range(done + 1, last + 1):
+            self._port.FixValue(context, self._current.at(step - self._start))
+            simulator.AdvanceTo(step * self._step)
+
+    def watch(self, contacts: list[BodyContact]) -> str:
+        """Looks at the whole robot's contacts, and at how well it follows its command."""
+        if self._current is not None:
+            self._track(self._current)
+        return self._touches.update(contacts, self._arrived)
+
+    def travelled(self) -> float:
+        """Of the grasp frame since the beginning of a segment as it was commanded [m]."""
+        p_WG = self._mounted.X_WG(self._plant_context)[:3, 3]
+        p_GG_W = p_WG - self._commands[self._number].p_WG[0]
+        return float(p_GG_W @ self.segments[self._number].direction_W)
+
+    def carries_full_load(self, check: int) -> bool:
+        """Compares what gravity and acceleration of the planned motion have loaded and will.
+
+        Not straight up, the load when the hand brakes is another one than when it accelerates, and
+        both count.
+        """
+        load_tolerance = 0.01  # Relative difference of loads.
+        polls = self._world.settings.steady_polls
+        window = self._loads[max(0, check + 1 - polls) : check + 1]
+        ahead = np.append(self._loads[check + 1 :], self._gravity).max()
+        brakes = self.segments[-1].is_straight_up or check >= self._fastest + polls
+        return bool(brakes and ahead <= (1.0 + load_tolerance) * window.max())
+
+    def is_free_ahead(self) -> bool:
+        """Looks along the planned motion."""
+        spacing = 0.01  # Metres of the hand's path between checks of the rest of the lift.
+        commands = self._commands[-1]
+        check = self._checks_done(commands)
+        p_WG = commands.p_WG[check:]
+        gone = np.append(0.0, np.linalg.norm(np.diff(p_WG, axis=0), axis=1).cumsum())
+        marks = np.append(np.arange(spacing, gone[-1], spacing), gone[-1])
+        rows = check + np.searchsorted(gone, marks - 1e-9)
+        q = np.array([commands.q_at_check(row) for row in rows])
+        return self._lift_clearance().is_free(self._world, q)
+
+    def _follow(self, commands: CommandSequence | None) -> None:
+        """Follows a course from now on; without one the last command stays."""
+        self._current = commands
+        self._start = self._steps(self._world.context.get_time())
+
+    def _steps(self, time: float) -> int:
+        return round(time / self._step)
+
+    def _checks_done(self, commands: CommandSequence) -> int:
+        """Looks since the start of the course that is followed."""
+        steps = self._steps(self._world.context.get_time()) - self._start
+        return steps // commands.steps_per_check
+
+    def _track(self, commands: CommandSequence) -> None:
+        check = self._checks_done(commands)
+        q = self._mounted.q(self._plant_context)
+        p_WG = self._mounted.X_WG(self._plant_context)[:3, 3]
+        error = float(np.abs(q - commands.q_at_check(check)).max())
+        distance = float(np.linalg.norm(p_WG - commands.p_WG[check]))
+        self.tracking_error = float(np.fmax(self.tracking_error, error))
+        self.tracking_distance = float(np.fmax(self.tracking_distance, distance))
+
+
+def _hand_segment(commands: CommandSequence) -> HandSegment:
+    """The straight segment along which a course leads the hand."""
+    digits = 3  # A plan may leave its straight segment by half a millimetre.
+    p_GG_W = commands.p_WG[-1] - commands.p_WG[0]
+    direction_W = np.round(p_GG_W / np.linalg.norm(p_GG_W), digits)
+    direction_W /= np.linalg.norm(direction_W)
+    return HandSegment(direction_W, float(p_GG_W @ direction_W), commands.checks)
+
+
+def _specific_loads(p_WG: Array, interval: float, gravity: float) -> Array:
+    """(L,) what gravity and the acceleration of the hand load on a target in it, over its mass
+    [m/s^2], in each interval between positions (L + 1, 3)."""
+    velocity = np.diff(p_WG, axis=0) / interval
+    velocity = np.concatenate([np.zeros((1, 3)), velocity, np.zeros((1, 3))])
+    at_ends = np.diff(velocity, axis=0) / interval
+    at_ends[:, 2] += gravity
+    load = np.linalg.norm(at_ends, axis=1)
+    peak: Array = np.maximum(load[:-1], load[1:])
+    return peak
+
+
+MAX_PLAN_DISTANCE = 1e-3  # Metres between the grasp and the end of a plan's approach.
+MAX_PLAN_ANGLE = 1e-2  # Radians between the grasp and the end of a plan's approach.
+
+
+class ArmTrial(DrakeTrial):
+    """Executes plans in one scene with the whole robot.
+
+    Example::
+
+        scene, station = burg.load_scene("tabletop_six"), burg.load_station("panda_tabletop")
+        X_OG = burg.sample_grasps(scene, station, 1, only=["box"]).X_OG[0]
+        plan = burg.plan(scene, station, "box", X_OG)
+        if isinstance(plan, burg.Plan):
+            print(burg.ArmTrial(scene, station).run("box", X_OG, plan).outcome)
+
+    Args:
+        scene: the scene.
+        station: a station with an arm.
+        engine: time step and contact settings, or the name of a preset.
+        settings: phases of a trial; the hand's paths come from the plan, so that `motion` and
+            `lift_time` do not count.
+        transfer: begin at the home posture, and go to the pregrasp first. As the arm is fast there,
+            its contacts are looked at after every step up to the grasp, and not only at `poll`.
+        clearance: the screen of the open hand in this scene, if there is one already.
+        meshcat: where to show the trials; recording is the caller's.
+
+    Attributes:
+        scene, station, engine, settings, motion, clearance: see `GraspTrial`.
+
+    Raises:
+        InvalidInputError: the station has no arm.
+    """
+
+    def __init__(
+        self,
+        scene: SceneLike,
+        station: StationLike,
+        *,
+        engine: Engine | str = ENGINES["standard"],
+        settings: TrialSettings = DEFAULT_TRIAL,
+        transfer: bool = False,
+        clearance: HandClearance | None = None,
+        meshcat: Meshcat | None = None,
+    ) -> None:
+        scene, station = as_scene(scene), as_station(station)
+        self._plain = build_station_diagram(scene, station, robot="arm")
+        if clearance is None:
+            clearance = HandClearance(build_station_diagram(scene, station, robot="hand"))
+        super().__init__(
+            scene,
+            station,
+            "arm",
+            as_drake_engine(engine),
+            settings=settings,
+            clearance=clearance,
+            meshcat=meshcat,
+        )
+        self._transfer = transfer
+        arm = station.document.arm
+        assert arm is not None
+        self._X_WA = arm.X_WA.matrix()
+        self._kinematics = ArmKinematics.of(self._plain)
+        self.steps_per_check = max(1, round(settings.poll / self.engine.time_step))
+        kept = lru_cache(maxsize=MAX_KEPT_WORLDS)
+        self._lift_clearance = kept(partial(ArmLiftClearance, self._plain))
+
+    @property
+    def hand(self) -> MountedHand:
+        """The hand in `world`."""
+        hand = self.world.hand
+        assert isinstance(hand, MountedHand)
+        return hand
+
+    def run(
+        self,
+        instance: str,
+        X_OG: Array,
+        plan: Plan,
+        *,
+        friction: float | None = None,
+        mass: float | None = None,
+    ) -> TrialResult:
+        """Executes the plan of one grasp.
+
+        Args:
+            instance: name of the target in the scene.
+            X_OG: (4, 4) grasp in the target's frame.
+            plan: leads to that grasp, or to the same one with the fingers swapped.
+            friction: the target's friction coefficient, in place of the library's.
+            mass: the target's mass [kg], in place of the library's; its inertia scales with it.
+
+        Returns:
+            The outcome with its margins. A failure of the simulator is an outcome, too.
+
+        Raises:
+            InvalidInputError: `X_OG` is not a pose, `instance` cannot be grasped, friction is below
+                0, or the mass is not above 0; the plan is for another scene or arm, has gaps, or
+                leads elsewhere.
+        """
+        X_WG = self.X_WG(instance, X_OG)
+        check_overrides(friction, mass)
+        self._check_plan(plan, X_WG)
+        # Which finger is on which side is the plan's; of a hand that is not symmetric that matters.
+        as_planned = self._X_WG_at(plan.approach.q[-1:])[0, :3, :3]
+        if rotation_angle(X_WG[:3, :3].T @ as_planned) > MAX_PLAN_ANGLE:
+            X_WG = swap_fingers(X_WG)
+
+        def begin(world: TrialWorld) -> Execution:
+            return self.begin(instance, plan, friction=friction, mass=mass, world=world)
+
+        return self.execute(instance, X_WG, begin, friction=friction, mass=mass)
+
+    def begin(
+        self,
+        instance: str,
+        plan: Plan,
+        *,
+        friction: float | None = None,
+        mass: float | None = None,
+        world: TrialWorld | None = None,
+    ) -> Execution:
+        """Brings the Context to the start of a trial; nothing of an earlier one remains.
+
+        All objects, the target among them, are locked until something moving touches them.
+
+        Args:
+            instance: the target.
+            plan: where the arm goes.
+            friction, mass: as in `run`.
+            world: in which it runs; by default the complete one.
+        """
+        rest_time = 0.05  # Seconds between arrival and closing.
+        world = self._enter(world)
+        assert isinstance(world.hand, MountedHand)
+        target = world.diagram.free[instance]
+        moving: set[BodyIndex] = set()
+        world.prepare(instance, moving, friction, mass)
+        step = self.engine.time_step
+        to_grasp = [plan.transfer, plan.approach] if self._transfer else [plan.approach]
+        steps = 1 if self._transfer else self.steps_per_check
+        rest = max(1, round(rest_time / (steps * step)))
+        approach = CommandSequence(to_grasp, step, steps, self._p_WG, rest)
+        segments = [
+            CommandSequence([segment], step, self.steps_per_check, self._p_WG)
+            for segment in _phases_with_target(plan)
+        ]
+        plant_context = world.diagram.plant.GetMyMutableContextFromRoot(world.context)
+        world.hand.place(plant_context, approach.q_at_check(0))
+        world.command("arm", approach.at(0))
+        world.command("hand", world.hand.opening_command())
+        world.simulator.Initialize()
+        closed = partial(self.closed_before_contact, instance)
+        lift_clearance = partial(self._lift_clearance, instance)
+        carrier = ArmCarrier(world, target, approach, segments, closed, lift_clearance)
+        return Execution(world, target, moving, carrier)
+
+    def _handle(self, diagram: StationDiagram) -> MountedHand:
+        return MountedHand(diagram)
+
+    def _check_plan(self, plan: Plan, X_WG: Array) -> None:
+        """Whether a plan is one for this scene, arm and grasp; of one without an origin the arm and
+        the grasp are all that can be told.
+
+        Raises:
+            InvalidInputError: it is not.
+        """
+        max_gap = 1e-6  # Radians between trajectories that follow one another.
+        if plan.origin is not None:
+            plan.require_for(self.scene, self.station)
+        joints = len(self._plain.arm_joints)
+        parts = {name: part for name, part in plan.phases.items() if name != "close"}
+        if not self._transfer:
+            del parts["transfer"]
+        if not _phases_with_target(plan):
+            raise InvalidInputError(
+                "the plan does not move the hand while it holds the object; it needs a lift or a"
+                " retreat"
+            )
+        for name, part in parts.items():
+            if part.q.shape[1] != joints:
+                raise InvalidInputError(
+                    f"the plan's {name} has {part.q.shape[1]} joints, but the arm of station"
+                    f" {self.station.name!r} has {joints}"
+                )
+        names = list(parts)
+        for one, other in pairwise(names):
+            gap = float(np.abs(parts[other].q[0] - parts[one].q[-1]).max())
+            if gap > max_gap:
+                raise InvalidInputError(
+                    f"the plan's {other} starts {gap:.2g} rad from the end of its {one}"
+                )
+        X_WG_end = self._X_WG_at(plan.approach.q[-1:])[0]
+        distance = float(np.linalg.norm(X_WG_end[:3, 3] - X_WG[:3, 3]))
+        turns = [(inverse(X) @ X_WG_end)[:3, :3] for X in (X_WG, swap_fingers(X_WG))]
+        angle = min(float(rotation_angle(R)) for R in turns)
+        if distance > MAX_PLAN_DISTANCE or angle > MAX_PLAN_ANGLE:
+            raise InvalidInputError(
+                f"the plan ends {1e3 * distance:.1f} mm and {np.rad2deg(angle):.1f} degrees from"
+                " the grasp; plan this grasp in this scene"
+            )
+
+    def _X_WG_at(self, q: Array) -> Array:
+        """(K, 4, 4) grasp frames in the world at arm positions (K, n)."""
+        return self._X_WA @ self._kinematics.forward(q)[0] @ self.station.hand.X_HG.matrix()
+
+    def _p_WG(self, q: Array) -> Array:
+        return self._X_WG_at(q)[:, :3, 3]
+
+
+def _phases_with_target(plan: Plan) -> list[Trajectory]:
+    """Those of retreat and lift that move the hand."""
+    parts = [plan.retreat, plan.lift]
+    return [part for part in parts if part is not None and (part.q[-1] != part.q[0]).any()]

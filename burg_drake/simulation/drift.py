@@ -1,0 +1,253 @@
+"""How far the objects of a simulated scene move, and a prediction of which will not stay.
+
+Creep in Drake has nearly the same speed whatever the time step: within 2 % in steps of 1 and 10
+ms. 0.2 s tell most objects that stay from the others. Objects that lean on others or rock are
+simulated for up to 2 s, while all else is frozen; that predicts 0.9 to 1.05 times the motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context
+
+from burg_drake.core import Array, InvalidInputError, SimulationError
+from burg_drake.scene import SceneLike, as_scene
+from burg_drake.simulation.contacts import contact_islands, freeze_bodies
+from burg_drake.simulation.falling import is_below
+from burg_drake.simulation.relaxation import resist_rolling
+from burg_drake.simulation.rest_criterion import (
+    BodySpeed,
+    Displacement,
+    body_place,
+    depth_in_table,
+    displacement_from_document,
+    mean_speed,
+)
+from burg_drake.station import (
+    ENGINES,
+    MAX_SINK_DEPTH,
+    Engine,
+    StationDiagram,
+    StationLike,
+    as_station,
+    build_station_diagram,
+    touching_bodies,
+)
+
+
+class StillnessLimits:
+    """Stillness limits."""
+
+    distance = 5e-4  # Metres that an object of a settled scene may move.
+    angle = float(np.deg2rad(0.1))  # Radians that it may turn.
+    duration = 5.0  # Seconds that are simulated to measure it.
+
+
+def stillness(
+    scene: SceneLike,
+    station: StationLike,
+    *,
+    duration: float = StillnessLimits.duration,
+    engine: Engine | str = ENGINES["reference"],
+) -> Mapping[str, Displacement]:
+    """Simulates a scene as it stands, without the robot, and tells how far each object moves.
+
+    The world is that of `build_station_diagram` with this engine, and resists rolling, which
+    trials do not.
+
+    An object that touches nothing but the table may sink straight into it, as far as the table
+    yields to what stands on it: that is no movement. `settle_scene` lifts such objects onto the
+    table, and they sink in again.
+
+    Args:
+        scene: the scene.
+        station: table, pose of the board and obstacles.
+        duration: simulated time [s].
+        engine: how time is stepped.
+
+    Returns:
+        By free instance: how far it is at the end from where the document places it, without how
+        far it has sunk into the table if it stands there alone.
+
+    Raises:
+        InvalidInputError: the duration is not above 0.
+        SimulationError: Drake cannot step the scene.
+    """
+    if not 0.0 < duration < np.inf:
+        raise InvalidInputError(f"duration is {duration:g} s; give more than 0")
+    scene, station = as_scene(scene), as_station(station)
+    built = build_station_diagram(scene, station, robot="none", engine=engine)
+    simulator = Simulator(built.diagram)
+    resist_rolling(built, simulator)
+    try:
+        simulator.AdvanceTo(duration)
+    except (RuntimeError, SystemExit) as error:  # Drake ends some failed checks by SystemExit
+        raise SimulationError(
+            f"{scene.path}: the scene cannot be simulated: {' '.join(str(error).split())}"
+        ) from error
+    context = built.plant.GetMyContextFromRoot(simulator.get_context())
+    beside = touching_bodies(built, [*built.free.values(), *built.fixed.values()])
+    return {
+        name: displacement_from_document(
+            built, name, X_WO if built.free[name] in beside else _without_sinking(built, name, X_WO)
+        )
+        for name, X_WO in free_poses(built, context).items()
+    }
+
+
+def _without_sinking(built: StationDiagram, name: str, X_WO: Array) -> Array:
+    """`X_WO` without how far the instance has sunk straight into the table since the start."""
+    center_of_mass = np.array((*built.scene.entry(name).mass_properties.center_of_mass, 1.0))
+    lowered = float(((built.X_WO(name) - X_WO) @ center_of_mass)[2])
+    sunk = min(lowered, depth_in_table(built.scene, X_WO, name), MAX_SINK_DEPTH)
+    lifted = X_WO.copy()
+    lifted[2, 3] += max(0.0, sunk)
+    return lifted
+
+
+def free_poses(built: StationDiagram, context: Context) -> dict[str, Array]:
+    """Where the free instances are: (4, 4) poses in the world by name.
+
+    Args:
+        built: the scene.
+        context: of its plant.
+    """
+    return {
+        name: built.plant.EvalBodyPoseInWorld(context, built.plant.get_body(index)).GetAsMatrix4()
+        for name, index in built.free.items()
+    }
+
+
+def is_still(displacements: Mapping[str, Displacement]) -> bool:
+    """Whether nothing has moved further than a settled scene may."""
+    return all(map(has_stayed, displacements.values()))
+
+
+def has_stayed(moved: Displacement) -> bool:
+    """Whether an object of a settled scene may move so far in `StillnessLimits.duration`."""
+    return moved.distance < StillnessLimits.distance and moved.angle < StillnessLimits.angle
+
+
+DRIFT_CHECK_TIMES = ((0.1, 0.2, 0.1), (0.2, 0.4, 0.4), (0.5, 1.0, 0.4), (1.0, 2.0, 0.8))
+"""Start and end of each measurement in seconds, and the share of the motion allowed."""
+
+
+@dataclass(frozen=True)
+class DriftPrediction:
+    """What becomes of a scene that is let go.
+
+    Attributes:
+        moving: free objects that would move further in `StillnessLimits.duration` than those of a settled
+            scene may, and their mean speed in that time, by name; none if all is at rest.
+        X_WO: (4, 4) poses in the world of the free objects that are still on the table, by name: at
+            the end for those that were in doubt until then, else as in the document.
+        doubtful: those that were in doubt until the end, and what touches them.
+    """
+
+    moving: Mapping[str, BodySpeed]
+    X_WO: Mapping[str, Array]
+    doubtful: frozenset[str]
+
+    @property
+    def pace(self) -> float:
+        """Of the fastest one, in shares of what a settled scene may go."""
+        shares = [
+            max(moved.speed / StillnessLimits.distance, moved.turning / StillnessLimits.angle)
+            for moved in self.moving.values()
+        ]
+        return StillnessLimits.duration * max(shares, default=0.0)
+
+
+def predict_drift(
+    built: StationDiagram, *, among: Collection[str] | None = None, once: bool = False
+) -> DriftPrediction:
+    """Lets a scene go, from where the documents place everything.
+
+    Args:
+        built: the scene without a robot.
+        among: free objects to look at, with all that touches them; others are known to stay. All if
+            None.
+        once: leave it at the first look by which something does not stay.
+
+    Raises:
+        RuntimeError, SystemExit: from Drake.
+    """
+    watch = _DriftSimulation(built)
+    watch.freeze_all_but(built.free if among is None else among)
+    for start, end, share in DRIFT_CHECK_TIMES:
+        shifts = watch.check_between(start, end)
+        watch.freeze_all_but([n for n, shift in shifts.items() if not _is_within(shift, share)])
+        if not watch.awake or (once and not all(map(has_stayed, shifts.values()))):
+            break
+    doubtful = frozenset(watch.awake)
+    kept = {name: built.X_WO(name) for name in built.free if name not in doubtful}
+    last = DRIFT_CHECK_TIMES[-1][-1]
+    moving = {n: _mean_speed(shifts[n]) for n in watch.awake if not _is_within(shifts[n], last)}
+    return DriftPrediction(moving, kept | watch.on_table(), doubtful)
+
+
+class _DriftSimulation:
+    """A scene that is simulated, and looked at now and then."""
+
+    def __init__(self, built: StationDiagram) -> None:
+        self._built, self._plant = built, built.plant
+        self._simulator = Simulator(built.diagram)
+        self._root = self._simulator.get_mutable_context()
+        self._context = self._plant.GetMyContextFromRoot(self._root)
+        resist_rolling(built, self._simulator)
+
+        self._islands = contact_islands(built)
+        self._names = {index: name for name, index in built.free.items()}
+
+    @property
+    def awake(self) -> list[str]:
+        """Objects that are not frozen."""
+        return [self._names[index] for island in self._islands for index in island]
+
+    def freeze_all_but(self, names: Iterable[str]) -> None:
+        """Freezes all objects but these and what touches them."""
+        chosen = {self._built.free[name] for name in names}
+        for island in self._islands:
+            if chosen.isdisjoint(island):
+                freeze_bodies(self._built, self._root, island)
+        self._islands = [i for i in self._islands if not chosen.isdisjoint(i)]
+
+    def check_between(self, start: float, end: float) -> dict[str, Displacement]:
+        """How far what is awake would move altogether, by its pace from `start` to `end` [s]."""
+        built, context = self._built, self._context
+        bodies = {name: self._plant.get_body(built.free[name]) for name in self.awake}
+        self._simulator.AdvanceTo(start)
+        before = {name: body_place(body, context) for name, body in bodies.items()}
+        self._simulator.AdvanceTo(end)
+        X_WO, left, shifts = free_poses(built, context), StillnessLimits.duration - end, {}
+        for name, body in bodies.items():
+            speed = mean_speed(before[name], body_place(body, context), end - start)
+            now = displacement_from_document(built, name, X_WO[name])
+            shifts[name] = Displacement(
+                now.distance + left * speed.speed, now.angle + left * speed.turning
+            )
+        return shifts
+
+    def on_table(self) -> dict[str, Array]:
+        """Poses in the world of what is awake and still on the table."""
+        built, X_WO = self._built, free_poses(self._built, self._context)
+        above = (n for n in self.awake if not is_below(built, self._context, built.free[n]))
+        return {name: X_WO[name] for name in above}
+
+
+def _is_within(shift: Displacement, share: float) -> bool:
+    """Whether a way is shorter than a share of what a settled scene may go; NaN is not."""
+    return (
+        shift.distance < share * StillnessLimits.distance
+        and shift.angle < share * StillnessLimits.angle
+    )
+
+
+def _mean_speed(shift: Displacement) -> BodySpeed:
+    return BodySpeed(
+        shift.distance / StillnessLimits.duration, shift.angle / StillnessLimits.duration
+    )

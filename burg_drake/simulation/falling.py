@@ -1,0 +1,177 @@
+"""Lets the objects of a scene fall, tumble and roll until all of them are slow.
+
+Two rigid objects meet at a single point per pair of pieces. Objects of many pieces meet at many
+points, which carry them while they fall; a block on a block would tumble off its point, so objects
+of few pieces are compliant.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.multibody.math import SpatialVelocity
+from pydrake.multibody.tree import BodyIndex
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context
+
+from burg_drake.core import Array
+from burg_drake.simulation.contacts import freeze_bodies
+from burg_drake.simulation.rest_criterion import BodySpeed, RestCriterion, settle
+from burg_drake.station import StationDiagram, make_compliant
+
+
+def compliant_while_falling(built: StationDiagram) -> list[str]:
+    """Free objects of few pieces that are in the air or below one that is.
+
+    Args:
+        built: a diagram; all is where the documents place it.
+    """
+    min_height = 0.0005  # Metres above the table of an object that stands on another one or falls.
+    lateral_margin = 0.01  # Metres between bounding boxes, seen from above.
+    max_pieces = 8  # Compliant objects of more pieces take twice the time.
+    bounds = {name: _world_bounds(built, name) for name in built.free}
+    found: set[str] = set()
+    for lower, upper in bounds.values():
+        if lower[2] < min_height:
+            continue
+        for other, (low, high) in bounds.items():
+            near = (lower[:2] - lateral_margin < high[:2]) & (low[:2] - lateral_margin < upper[:2])
+            if near.all():  # also itself: it may meet the background
+                found.add(other)
+    return [
+        name for name in built.free if name in found and _piece_count(built, name) <= max_pieces
+    ]
+
+
+def _piece_count(built: StationDiagram, name: str) -> int:
+    return len(built.plant.GetCollisionGeometriesForBody(built.plant.get_body(built.free[name])))
+
+
+def _world_bounds(built: StationDiagram, name: str) -> tuple[Array, Array]:
+    """Lower and upper corner (3,) of an object's bounding boxes in the world."""
+    body, inspector = built.plant.get_body(built.free[name]), built.scene_graph.model_inspector()
+    X_WO = RigidTransform(built.X_WO(name))
+    corners = []
+    for geometry in built.plant.GetCollisionGeometriesForBody(body):
+        box = inspector.GetObbInGeometryFrame(geometry)
+        X_WB = X_WO @ inspector.GetPoseInFrame(geometry) @ box.pose()
+        reach = np.abs(X_WB.rotation().matrix()) @ box.half_width()
+        corners += [X_WB.translation() - reach, X_WB.translation() + reach]
+    return np.min(corners, axis=0), np.max(corners, axis=0)
+
+
+SLOW_CRITERION = RestCriterion(speed=0.01, turning=0.1, dying=6.0)
+"""Speeds below which an object may come to rest in `relax`."""
+
+
+@dataclass(frozen=True)
+class Fall:
+    """Where a fall ended.
+
+    Attributes:
+        X_WO: (4, 4) poses of what is still on the table, by name.
+        fallen: objects that fell off the table.
+        moving: objects on the table that are not slow, with their speed.
+        duration: simulated time [s].
+    """
+
+    X_WO: Mapping[str, Array]
+    fallen: frozenset[str]
+    moving: Mapping[str, BodySpeed]
+    duration: float
+
+
+def fall(
+    built: StationDiagram,
+    time_limit: float,
+    progress: Callable[[float, int], None] | None = None,
+    *,
+    held: Collection[BodyIndex] = (),
+    before_poll: Callable[[Context, Collection[BodyIndex]], None] | None = None,
+) -> Fall:
+    """Simulates until all objects are slow, or time is up.
+
+    Args:
+        built: the scene without a robot; everything starts where the documents place it.
+        time_limit: simulated time allowed [s].
+        progress: called now and then with the simulated time since the last call [s] and how many
+            objects still move.
+        held: free bodies that stay where they are.
+        before_poll: called now and then with the plant's Context, whose velocities it may change,
+            and what falls.
+
+    Raises:
+        RuntimeError, SystemExit: from Drake, or a pose is not finite.
+    """
+    check_interval = 0.5  # Seconds between checks for objects that fell off the table.
+    make_compliant(built, compliant_while_falling(built))
+    simulator = Simulator(built.diagram)
+    context = built.plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+    freeze_bodies(built, simulator.get_mutable_context(), held)
+    names = {index: name for name, index in built.free.items() if index not in held}
+    fallen: set[str] = set()
+    while True:
+        now = simulator.get_context().get_time()
+        watched = [index for index, name in names.items() if name not in fallen]
+
+        def intervene(watched: list[BodyIndex] = watched) -> None:
+            _brake(built, context, watched, SLOW_CRITERION.poll)
+            if before_poll is not None:
+                before_poll(context, watched)
+
+        settled = settle(
+            simulator,
+            built.plant,
+            watched,
+            min(check_interval, time_limit - now),
+            SLOW_CRITERION,
+            before_poll=intervene,
+        )
+        for index in settled.moving:
+            if is_below(built, context, index):
+                fallen.add(names[index])
+                built.plant.get_body(index).Lock(context)
+        moving = {names[i]: v for i, v in settled.moving.items() if names[i] not in fallen}
+        before, now = now, simulator.get_context().get_time()
+        if progress is not None:
+            progress(now - before, len(moving))
+        if settled.at_rest or now >= time_limit - 1e-9:
+            break
+    X_WO = {
+        name: built.plant.EvalBodyPoseInWorld(context, built.plant.get_body(index)).GetAsMatrix4()
+        for name, index in built.free.items()
+        if name not in fallen
+    }
+    return Fall(X_WO, frozenset(fallen), moving, now)
+
+
+def is_below(built: StationDiagram, context: Context, index: BodyIndex) -> bool:
+    """Whether the centre of mass of a free body is below the table's top.
+
+    Raises:
+        RuntimeError: its pose is not finite.
+    """
+    body = built.plant.get_body(index)
+    p_WOcm = built.plant.EvalBodyPoseInWorld(context, body).multiply(body.default_com())
+    if not np.isfinite(p_WOcm).all():
+        raise RuntimeError(f"the pose of {built.body_names[index]!r} is not finite")
+    return bool(p_WOcm[2] < 0.0)
+
+
+def _brake(
+    built: StationDiagram, context: Context, bodies: list[BodyIndex], interval: float
+) -> None:
+    """Takes from the turning of bodies about their centres of mass what an interval costs."""
+    time_constant = 0.1  # Seconds. Stands for air and rolling resistance, which Drake lacks.
+    plant, lost = built.plant, -math.expm1(-interval / time_constant)
+    for index in bodies:
+        body = plant.get_body(index)
+        V_WO = plant.EvalBodySpatialVelocityInWorld(context, body)
+        R_WO = plant.EvalBodyPoseInWorld(context, body).rotation()
+        w_lost = lost * V_WO.rotational()
+        v_lost = np.cross(w_lost, -(R_WO @ body.default_com()))  # of O, as Ocm keeps its velocity
+        plant.SetFreeBodySpatialVelocity(context, body, V_WO - SpatialVelocity(w_lost, v_lost))

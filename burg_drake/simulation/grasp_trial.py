@@ -1,0 +1,529 @@
+"""Trials of grasps: what all of them share, and the trial of the floating hand.
+
+A trial screens the open hand, chooses the world to run in, executes the phases there, and adds the
+confidence to the result.
+
+The open hand starts at the grasp, or at the pregrasp if `TrialSettings.approach` asks for it.
+After Rudorfer et al., "BURG-Toolkit" (2022): a grasp in collision is rejected before any step; the
+fingers close with a limited force until the grip settles; the hand rises by 0.30 m along world z,
+unless another motion is given, and holds. A trial succeeds if both fingers still hold the target.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import lru_cache, partial
+from typing import Generic, Protocol, TypeVar
+
+import numpy as np
+from pydrake.geometry import Meshcat
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context
+
+from burg_drake.core import Array, InvalidInputError, Outcome, check_pose, make_pose
+from burg_drake.grasping import Clearance, HandClearance
+from burg_drake.scene import Scene, SceneLike, as_scene
+from burg_drake.simulation.contacts import ContactReader, Neighbours
+from burg_drake.simulation.hand_carrier import HandLiftClearance, LiftCarrier, LiftPath, lift_paths
+from burg_drake.simulation.settings import DEFAULT_TRIAL, TrialSettings
+from burg_drake.simulation.trial_execution import Execution, OtherTouched
+from burg_drake.simulation.trial_result import (
+    GripLoad,
+    TrialResult,
+    collision_result,
+    confidence,
+    simulation_failure_result,
+)
+from burg_drake.simulation.trial_world import TrialWorld, check_overrides
+from burg_drake.station import (
+    ENGINES,
+    Engine,
+    FloatingHand,
+    GraspMotion,
+    HandHandle,
+    Robot,
+    Station,
+    StationDiagram,
+    StationLike,
+    as_drake_engine,
+    as_station,
+    build_station_diagram,
+    instance_pose,
+)
+
+MAX_KEPT_WORLDS = 16
+"""Worlds of a target alone that are kept; each takes 20 MB, and 0.1 s to build."""
+
+
+class KeptWorld(Protocol):
+    """A world in which trials begin."""
+
+    @property
+    def time(self) -> float:
+        """Since the start of the trial [s]."""
+        ...
+
+    @property
+    def robot_meets_hull(self) -> bool:
+        """Whether, in a world of a target alone, parts of the robot meet a hull in its place."""
+        ...
+
+    def is_usable(self) -> bool:
+        """Whether trials can begin in it."""
+        ...
+
+    def invalidate(self) -> None:
+        """Has the next trial prepare it from scratch."""
+        ...
+
+
+W = TypeVar("W", bound=KeptWorld)
+
+
+class GraspTrial(ABC, Generic[W]):
+    """Executes grasps in one scene.
+
+    A trial runs in a world in which the target alone can move, which costs less. If it meets
+    another object there, it runs again in the complete world, from its beginning.
+
+    Args:
+        scene: the scene.
+        station: the station.
+        engine: how trials are stepped.
+        settings: phases of a trial.
+        clearance: the screen of the open hand in the scene.
+        motion: where the hand goes, if not as the settings or else the station say.
+        lock: keep objects locked until something moving touches them, and run in worlds of the
+            target alone.
+
+    Attributes:
+        scene, station, engine, settings, clearance: as given.
+        motion: where the hand goes.
+        failures: errors of the simulator; a trial that has one ends as `SIMULATION_FAILED`.
+    """
+
+    failures: tuple[type[BaseException], ...] = (RuntimeError, SystemExit)
+    """Drake ends some failed checks by SystemExit."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        station: Station,
+        engine: Engine,
+        *,
+        settings: TrialSettings,
+        clearance: HandClearance,
+        motion: GraspMotion | None = None,
+        lock: bool = True,
+    ) -> None:
+        self.scene, self.station, self.engine = scene, station, engine
+        self.settings, self.clearance = settings, clearance
+        self.motion = motion or settings.motion or station.document.motion
+        self._lock = lock
+        self._alone: dict[str, W | None] = {}
+        self._complete: W | None = None
+        self._world: W | None = None
+
+    @property
+    def world(self) -> W:
+        """That of the last trial; before the first one the complete world."""
+        return self._world or self.complete_world
+
+    @property
+    def complete_world(self) -> W:
+        """The one in which all objects can move."""
+        if self._complete is None:
+            self._complete = self._build(None)
+        return self._complete
+
+    def X_WG(self, instance: str, X_OG: Array) -> Array:
+        """A grasp (4, 4) of an instance in the world.
+
+        Raises:
+            InvalidInputError: `X_OG` is not a pose, or `instance` cannot be grasped.
+        """
+        if instance not in self.scene.instances:
+            free = ", ".join(self.scene.instances) or "(none)"
+            raise InvalidInputError(
+                f"{instance!r} is not a free instance of scene {self.scene.name!r}; free are {free}"
+            )
+        return instance_pose(self.scene, self.station, instance) @ check_pose(X_OG, "X_OG")
+
+    def execute(
+        self,
+        instance: str,
+        X_WG: Array,
+        begin: Callable[[W], Execution],
+        *,
+        friction: float | None = None,
+        mass: float | None = None,
+        without_hull: bool = False,
+    ) -> TrialResult:
+        """Executes a grasp, if the open hand is clear at it, and where its approach begins.
+
+        Args:
+            instance: the target.
+            X_WG: (4, 4) grasp in the world.
+            begin: brings a world to the start of the trial.
+            friction, mass: with which it begins; the library's if None.
+            without_hull: not in a world in which parts of the robot meet the target's hull.
+
+        Returns:
+            The outcome with its margins. A failure of the simulator is an outcome, too.
+        """
+        screen = self.clearance.check(instance, X_WG)
+        if screen.outcome is not None:
+            return collision_result(screen)
+        start = self._screen_of_start(instance, X_WG)
+        if start is not None and start.outcome is not None:
+            return collision_result(replace(start, outcome=Outcome.HAND_COLLISION_APPROACH))
+        world = self._world_of(instance)
+        if without_hull and world.robot_meets_hull:
+            world = self.complete_world
+        try:
+            try:
+                found = begin(world).run()
+            except OtherTouched:
+                world = self.complete_world
+                found = begin(world).run()
+            margins = replace(found.margins, clearance=screen.clearance)
+            load = self.grip_load(instance, X_WG, friction=friction, mass=mass)
+            held_for = replace(margins, end_time=margins.end_time - found.grip_start)
+            sure = confidence(self.engine, found.outcome, held_for, load)
+            return replace(found, margins=margins, confidence=sure)
+        except self.failures as error:
+            world.invalidate()
+            return simulation_failure_result(error, screen, world.time)
+
+    def _screen_of_start(self, instance: str, X_WG: Array) -> Clearance | None:
+        """The screen of the open hand where a trial begins; None if that is at the grasp, or the
+        plan of an arm tells."""
+        return None
+
+    def grip_load(
+        self,
+        instance: str,
+        X_WG: Array,
+        *,
+        friction: float | None = None,
+        mass: float | None = None,
+    ) -> GripLoad:
+        """What a grip has to carry.
+
+        Args:
+            instance: the target.
+            X_WG: (4, 4) grasp in the world.
+            friction, mass: of the target; the library's if None.
+        """
+        entry = self.scene.entry(instance)
+        X_WO = instance_pose(self.scene, self.station, instance)
+        return GripLoad.of(
+            X_WG,
+            X_WO[:3, :3] @ entry.mass_properties.center_of_mass + X_WO[:3, 3],
+            friction=entry.friction if friction is None else friction,
+            force=self.station.hand.force,
+            mass=entry.mass if mass is None else mass,
+            acceleration=self.settings.acceleration,
+        )
+
+    def closed_before_contact(self, instance: str, X_WG: Array) -> float:
+        """How far the fingers can close, from 0 (open) to 1, before they touch anything: the
+        clearance knows pieces, out of which the target's surface stands a little.
+
+        Args:
+            instance: the target.
+            X_WG: (4, 4) grasp in the world at which the open hand is clear.
+        """
+        travel = min(abs(f.closed - f.open) for f in self.station.hand.fingers)
+        excess = self.scene.entry(instance).contact.excess / travel
+        return max(0.0, self.clearance.free_travel(X_WG) - excess)
+
+    def _enter(self, world: W | None) -> W:
+        """Makes a world, the complete one if None, the present one."""
+        self._world = self.complete_world if world is None else world
+        return self._world
+
+    def _world_of(self, instance: str) -> W:
+        """The cheapest in which a trial of an instance can begin."""
+        if not self._lock:
+            return self.complete_world
+        if instance not in self._alone:
+            world = self._build(instance)
+            self._alone[instance] = world if world.is_usable() else None
+        self._alone[instance] = found = self._alone.pop(instance)  # used last comes last
+        if len(self._alone) > MAX_KEPT_WORLDS:
+            del self._alone[next(iter(self._alone))]
+        return found or self.complete_world
+
+    @abstractmethod
+    def _build(self, alone: str | None) -> W:
+        """A world in which one object alone can move, or the complete one."""
+
+
+class DrakeTrial(GraspTrial[TrialWorld]):
+    """A trial in Drake.
+
+    Args:
+        scene, station, engine, settings, clearance, motion, lock: see `GraspTrial`.
+        robot: what of the station moves.
+        meshcat: where to show the trials.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        station: Station,
+        robot: Robot,
+        engine: Engine,
+        *,
+        settings: TrialSettings,
+        clearance: HandClearance,
+        motion: GraspMotion | None = None,
+        lock: bool = True,
+        meshcat: Meshcat | None = None,
+    ) -> None:
+        super().__init__(
+            scene, station, engine, settings=settings, clearance=clearance, motion=motion, lock=lock
+        )
+        self._robot, self._meshcat = robot, meshcat
+
+    @property
+    def diagram(self) -> StationDiagram:
+        """Of `world`."""
+        return self.world.diagram
+
+    @property
+    def hand(self) -> HandHandle:
+        """The hand in `world`."""
+        return self.world.hand
+
+    @property
+    def contacts(self) -> ContactReader:
+        """Of `world`."""
+        return self.world.contacts
+
+    @property
+    def neighbours(self) -> Neighbours:
+        """Of `world`."""
+        return self.world.neighbours
+
+    @property
+    def simulator(self) -> Simulator:
+        """Of `world`."""
+        return self.world.simulator
+
+    @property
+    def context(self) -> Context:
+        """Of the trial that runs or ran last."""
+        return self.world.context
+
+    def _build(self, alone: str | None) -> TrialWorld:
+        diagram = build_station_diagram(
+            self.scene,
+            self.station,
+            robot=self._robot,
+            engine=self.engine,
+            meshcat=self._meshcat,
+            for_trials=alone or True,
+        )
+        return TrialWorld(diagram, self._handle(diagram), self.settings)
+
+    @abstractmethod
+    def _handle(self, diagram: StationDiagram) -> HandHandle:
+        """The hand in a diagram."""
+
+
+class HandAloneTrial(GraspTrial[W]):
+    """Where the hand alone goes, of whatever engine."""
+
+    def lift_paths(self, X_WG: Array, lift: float | None = None) -> tuple[LiftPath, ...]:
+        """Straight paths of the hand with the target: the retreat, if there is one, and the lift.
+
+        Args:
+            X_WG: (4, 4) grasp in the world.
+            lift: length of the lift [m], in place of the motion's.
+
+        Returns:
+            One or two, each longer than 0.
+
+        Raises:
+            InvalidInputError: the hand would not move, or a length is not one.
+        """
+        return lift_paths(self.motion, X_WG, lift)
+
+    def X_WG_start(self, X_WG: Array) -> Array:
+        """Where (4, 4) the hand begins, of a grasp in the world: there, or at its pregrasp."""
+        return X_WG if self._approach(X_WG) is None else self._pregrasp(X_WG)
+
+    def _screen_of_start(self, instance: str, X_WG: Array) -> Clearance | None:
+        if self._approach(X_WG) is None:
+            return None
+        return self.clearance.check(instance, self._pregrasp(X_WG))
+
+    def _approach(self, X_WG: Array) -> LiftPath | None:
+        """The path of the hand to a grasp (4, 4) in the world; None if it begins there."""
+        if not self.settings.approach or self.motion.standoff <= 0.0:
+            return None
+        return LiftPath(X_WG[:3, 2], self.motion.standoff)
+
+    def _pregrasp(self, X_WG: Array) -> Array:
+        """(4, 4) pregrasp of a grasp in the world."""
+        return make_pose(X_WG[:3, :3], X_WG[:3, 3] - self.motion.standoff * X_WG[:3, 2])
+
+
+class HandTrial(HandAloneTrial[TrialWorld], DrakeTrial):
+    """Executes grasps of one scene with the hand alone.
+
+    The approach is not simulated: the open hand begins at the grasp, and what is in its way there
+    is a collision. With `TrialSettings.approach` it begins at the pregrasp, the standoff back along
+    the approach, and goes straight in with open fingers, as fast as it lifts. What it meets on the
+    way is pushed, or stops it, as in the trial of the whole arm.
+
+    Example::
+
+        trial = burg.HandTrial("tabletop_six", "panda_tabletop")
+        grasps = burg.sample_grasps("tabletop_six", "panda_tabletop", 10, only=["mug"])
+        for X_OG in grasps.X_OG:
+            print(trial.run("mug", X_OG).outcome)
+
+    Args:
+        scene: the scene.
+        station: table, board pose and hand.
+        engine: time step and contact settings, or the name of a preset.
+        settings: phases of a trial.
+        motion: where the hand goes, if not as the settings or else the station say; the standoff
+            counts only if the approach is simulated.
+        lock: keep objects locked until something moving touches them. Without it all free objects
+            are simulated from the start, which costs more and gives the same verdicts.
+        meshcat: where to show the trials; recording is the caller's.
+
+    Attributes:
+        scene, station, engine, settings, motion, clearance: see `GraspTrial`.
+    """
+
+    def __init__(
+        self,
+        scene: SceneLike,
+        station: StationLike,
+        *,
+        engine: Engine | str = ENGINES["standard"],
+        settings: TrialSettings = DEFAULT_TRIAL,
+        motion: GraspMotion | None = None,
+        lock: bool = True,
+        meshcat: Meshcat | None = None,
+    ) -> None:
+        scene, station = as_scene(scene), as_station(station)
+        self._plain = build_station_diagram(scene, station, robot="hand")
+        super().__init__(
+            scene,
+            station,
+            "hand",
+            as_drake_engine(engine),
+            settings=settings,
+            clearance=HandClearance(self._plain),
+            motion=motion,
+            lock=lock,
+            meshcat=meshcat,
+        )
+        kept = lru_cache(maxsize=MAX_KEPT_WORLDS)
+        self._lift_clearance = kept(partial(HandLiftClearance, self._plain))
+
+    @property
+    def hand(self) -> FloatingHand:
+        """The hand in `world`."""
+        hand = self.world.hand
+        assert isinstance(hand, FloatingHand)
+        return hand
+
+    def run(
+        self,
+        instance: str,
+        X_OG: Array,
+        *,
+        friction: float | None = None,
+        mass: float | None = None,
+        lift: float | None = None,
+        without_hull: bool = False,
+    ) -> TrialResult:
+        """Executes one grasp.
+
+        Args:
+            instance: name of the target in the scene.
+            X_OG: (4, 4) grasp in the target's frame.
+            friction: the target's friction coefficient, in place of the library's.
+            mass: the target's mass [kg], in place of the library's; its inertia scales with it.
+            lift: length of the lift [m], in place of the motion's.
+            without_hull: for who goes on in `world`: run where no part of the hand meets a hull in
+                the place of the target.
+
+        Returns:
+            The outcome with its margins. A failure of the simulator is an outcome, too.
+
+        Raises:
+            InvalidInputError: `X_OG` is not a pose, `instance` cannot be grasped, friction is below
+                0, the mass is not above 0, or the lift is of no length.
+        """
+        X_WG = self.X_WG(instance, X_OG)
+        check_overrides(friction, mass)
+        paths = self.lift_paths(X_WG, lift)
+
+        def begin(world: TrialWorld) -> Execution:
+            return self.begin(instance, X_WG, paths, friction=friction, mass=mass, world=world)
+
+        return self.execute(
+            instance, X_WG, begin, friction=friction, mass=mass, without_hull=without_hull
+        )
+
+    def begin(
+        self,
+        instance: str,
+        X_WG: Array,
+        paths: Sequence[LiftPath] | None = None,
+        *,
+        friction: float | None = None,
+        mass: float | None = None,
+        world: TrialWorld | None = None,
+    ) -> Execution:
+        """Brings the Context to the start of a trial; nothing of an earlier one remains.
+
+        The fingers start where they would touch something first: until then nothing happens. Only
+        the target, and what stands so close that it may lean on it, is free to move; others are
+        released when something moving touches them. What nothing touches stays at rest, so that
+        the result is the one with all objects free, at the cost of those that matter. With an
+        approach the fingers start open, and the target is locked like the others.
+
+        Args:
+            instance: the target.
+            X_WG: (4, 4) grasp in the world at which the open hand is clear.
+            paths: of the hand with the target; those of the motion if None.
+            friction, mass: as in `run`.
+            world: in which it runs; by default the complete one.
+        """
+        world = self._enter(world)
+        target = world.diagram.free[instance]
+        everything = set(world.diagram.free.values())
+        approach = self._approach(X_WG)
+        beside_hand = set() if approach else world.neighbours.close_to({target})
+        moving = beside_hand if self._lock else everything
+        world.prepare(instance, moving, friction, mass)
+        paths = self.lift_paths(X_WG) if paths is None else paths
+        plant_context = world.diagram.plant.GetMyMutableContextFromRoot(world.context)
+        assert isinstance(world.hand, FloatingHand)
+        if approach is None:
+            closed = self.closed_before_contact(instance, X_WG)
+            world.hand.place(plant_context, X_WG, closed, direction_W=paths[0].direction_W)
+            world.command("hand", world.hand.closing_command())
+        else:
+            X_WP = self._pregrasp(X_WG)
+            world.hand.place(plant_context, X_WP, direction_W=approach.direction_W)
+            world.command("hand", world.hand.opening_command())
+        world.command("lift", np.zeros(2))
+        world.simulator.Initialize()
+        lift_clearance = partial(self._lift_clearance, instance)
+        carrier = LiftCarrier(world, paths, lift_clearance, approach, target)
+        return Execution(world, target, moving, carrier)
+
+    def _handle(self, diagram: StationDiagram) -> FloatingHand:
+        return FloatingHand(diagram)

@@ -1,0 +1,446 @@
+"""The carrier of the floating hand, and checks that the rest of a lift is free."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from typing import Generic, NamedTuple, Protocol, TypeVar
+
+import numpy as np
+from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, QueryObject
+from pydrake.math import RigidTransform
+from pydrake.multibody.tree import BodyIndex
+from pydrake.systems.framework import Context
+
+from burg_drake.core import Array, InvalidInputError, inverse
+from burg_drake.simulation.contacts import (
+    BodyContact,
+    NamedBodies,
+    RobotContactWatch,
+    touched_bodies,
+)
+from burg_drake.simulation.settings import TrialSettings
+from burg_drake.simulation.trial_execution import HandSegment
+from burg_drake.simulation.trial_world import TrialWorld, collision_geometries
+from burg_drake.station import (
+    ROBOT_MODELS,
+    FloatingHand,
+    GraspMotion,
+    MountedHand,
+    StationDiagram,
+    replace_meshes_by_pieces,
+)
+
+
+class PlacedRobot(Protocol):
+    """A world in its present state, of whatever engine."""
+
+    @property
+    def free(self) -> Mapping[str, BodyIndex]:
+        """What can move, by name."""
+        ...
+
+    def X_WB(self, body: BodyIndex) -> Array:
+        """(4, 4) of a body."""
+        ...
+
+    def robot_positions(self, model: str) -> Array | None:
+        """Of one of `ROBOT_MODELS`, in the order of a station diagram; None if there is none."""
+        ...
+
+
+class HandLiftClearance:
+    """Looks along the straight segment ahead of one target in the hand.
+
+    Args:
+        station_diagram: a diagram built with `robot="hand"`, without contact parts.
+        instance: name of what is in the hand.
+    """
+
+    def __init__(self, station_diagram: StationDiagram, instance: str) -> None:
+        target = station_diagram.free[instance]
+        self._diagram = station_diagram
+        self._plant = plant = station_diagram.plant
+        self._context = station_diagram.diagram.CreateDefaultContext()
+        self._plant_context = plant.GetMyMutableContextFromRoot(self._context)
+        replace_meshes_by_pieces(station_diagram, self._context)
+        self._hand = FloatingHand(station_diagram)
+        carried = {target, *station_diagram.robot_bodies}
+        everything = {station_diagram.table, *station_diagram.free.values()}
+        everything |= set(station_diagram.fixed.values())
+        query = self._query()
+        self._carried = self._boxes(query, carried)
+        self._others = self._boxes(query, everything - carried)
+        manager = station_diagram.scene_graph.collision_filter_manager(
+            station_diagram.scene_graph.GetMyMutableContextFromRoot(self._context)
+        )
+        for side in (self._carried, self._others):
+            declaration = CollisionFilterDeclaration()
+            manager.Apply(declaration.ExcludeWithin(GeometrySet([g for g, _ in side])))
+        start = plant.get_body(target).floating_positions_start() + 4
+        self._places = [start, start + 1, start + 2, self._hand.lift.position_start()]
+
+    def is_free(self, world: PlacedRobot, X_WG: Array, length: float, direction_W: Array) -> bool:
+        """Whether nothing is met on the way.
+
+        Args:
+            world: in its present state.
+            X_WG: (4, 4) grasp at which this way began; it sets the frames of the lift.
+            length: how far there is to go [m].
+            direction_W: (3,) unit vector of the lift.
+        """
+        # Metres between checks. A hand and what it meets are thicker, taken together.
+        spacing = 0.01
+        self._hand.place(self._plant_context, X_WG, direction_W=direction_W)
+        _take_positions(self._diagram, self._plant_context, world)
+        positions = self._plant.GetPositions(self._plant_context)
+        if not self._boxes_meet(length * direction_W):
+            return True
+        for travelled in np.append(np.arange(spacing, length, spacing), length):
+            moved = positions.copy()
+            moved[self._places] += travelled * np.append(direction_W, 1.0)
+            self._plant.SetPositions(self._plant_context, moved)
+            if self._query().HasCollisions():
+                return False
+        return True
+
+    def _boxes_meet(self, p_W: Array) -> bool:
+        """Whether an upright box about what moves, drawn out by a way (3,), meets one of the
+        others."""
+        min_gap = 0.002  # Metres between boxes that are apart.
+        query = self._query()
+        low, high = _box_bounds(query, self._carried)
+        low, high = low + np.minimum(p_W, 0.0), high + np.maximum(p_W, 0.0)
+        other_low, other_high = _box_bounds(query, self._others)
+        apart = (low[:, None] > other_high[None] + min_gap) | (
+            other_low[None] > high[:, None] + min_gap
+        )
+        return not apart.any(axis=2).all()
+
+    def _query(self) -> QueryObject:
+        port = self._diagram.scene_graph.get_query_output_port()
+        return port.Eval(self._diagram.scene_graph.GetMyContextFromRoot(self._context))
+
+    def _boxes(
+        self, query: QueryObject, bodies: set[BodyIndex]
+    ) -> list[tuple[GeometryId, tuple[Array, Array]]]:
+        """Collision geometries with the pose (4, 4) and half size (3,) of a box about each."""
+        inspector = query.inspector()
+        found = []
+        for index in sorted(bodies):
+            for geometry in self._plant.GetCollisionGeometriesForBody(self._plant.get_body(index)):
+                box = inspector.GetObbInGeometryFrame(geometry)
+                assert box is not None  # only half spaces have none
+                found.append((geometry, (box.pose().GetAsMatrix4(), np.asarray(box.half_width()))))
+        return found
+
+
+class ArmLiftClearance:
+    """Looks along the way up of one target in the hand of an arm.
+
+    Args:
+        station_diagram: a diagram built with `robot="arm"`, without contact parts.
+        instance: name of what is in the hand.
+    """
+
+    def __init__(self, station_diagram: StationDiagram, instance: str) -> None:
+        target = station_diagram.free[instance]
+        self._diagram = station_diagram
+        self._plant = plant = station_diagram.plant
+        self._target = plant.get_body(target)
+        self._context = station_diagram.diagram.CreateDefaultContext()
+        self._plant_context = plant.GetMyMutableContextFromRoot(self._context)
+        replace_meshes_by_pieces(station_diagram, self._context)
+        self._hand = MountedHand(station_diagram)
+        carried = {target, *station_diagram.robot_bodies} - self._hand.links
+        others = {station_diagram.table, *station_diagram.free.values()}
+        others |= set(station_diagram.fixed.values())
+        manager = station_diagram.scene_graph.collision_filter_manager(
+            station_diagram.scene_graph.GetMyMutableContextFromRoot(self._context)
+        )
+        for side in (carried, others - {target}):
+            geometries = GeometrySet(collision_geometries(plant, side))
+            manager.Apply(CollisionFilterDeclaration().ExcludeWithin(geometries))
+
+    def is_free(self, world: PlacedRobot, q: Array) -> bool:
+        """Whether nothing is met.
+
+        Args:
+            world: in its present state.
+            q: (K, n) arm positions on the way.
+        """
+        context = self._plant_context
+        _take_positions(self._diagram, context, world)
+        X_WO = self._plant.EvalBodyPoseInWorld(context, self._target).GetAsMatrix4()
+        X_HO = inverse(self._hand.X_WH(context)) @ X_WO
+        graph = self._diagram.scene_graph
+        graph_context = graph.GetMyContextFromRoot(self._context)
+        for row in q:
+            self._hand.set_arm(context, row)
+            X_WO = self._hand.X_WH(context) @ X_HO
+            self._plant.SetFloatingBaseBodyPoseInWorldFrame(
+                context, self._target, RigidTransform(X_WO)
+            )
+            if graph.get_query_output_port().Eval(graph_context).HasCollisions():
+                return False
+        return True
+
+
+def _take_positions(diagram: StationDiagram, plant_context: Context, world: PlacedRobot) -> None:
+    """Puts robot and objects where they are in a world; what cannot move there is in its place."""
+    plant = diagram.plant
+    for model in ROBOT_MODELS:
+        q = world.robot_positions(model)
+        if q is not None:
+            plant.SetPositions(plant_context, plant.GetModelInstanceByName(model), q)
+    for name, index in diagram.free.items():
+        moved = world.free.get(name)
+        X_WO = diagram.X_WO(name) if moved is None else world.X_WB(moved)
+        body = plant.get_body(index)
+        plant.SetFloatingBaseBodyPoseInWorldFrame(plant_context, body, RigidTransform(X_WO))
+
+
+def _box_bounds(
+    query: QueryObject, boxes: list[tuple[GeometryId, tuple[Array, Array]]]
+) -> tuple[Array, Array]:
+    """Lower and upper corners (N, 3) of upright boxes about geometries, in the world."""
+    X_WB = np.array([query.GetPoseInWorld(g).GetAsMatrix4() @ X_GB for g, (X_GB, _) in boxes])
+    half = np.array([half for _, (_, half) in boxes])
+    reach = np.einsum("nij,nj->ni", np.abs(X_WB[:, :3, :3]), half)
+    return X_WB[:, :3, 3] - reach, X_WB[:, :3, 3] + reach
+
+
+class LiftPath(NamedTuple):
+    """A straight segment of the hand's path.
+
+    Attributes:
+        direction_W: (3,) unit vector in the world.
+        length: [m].
+    """
+
+    direction_W: Array
+    length: float
+
+
+class RobotWorld(NamedBodies, Protocol):
+    """Bodies of a world with a robot; see `StationDiagram`."""
+
+    @property
+    def fixed(self) -> Mapping[str, BodyIndex]: ...
+
+
+class HandWorld(PlacedRobot, Protocol):
+    """A world with the floating hand; see `TrialWorld`."""
+
+    @property
+    def settings(self) -> TrialSettings: ...
+    def X_WG(self) -> Array: ...
+
+
+W = TypeVar("W", bound=HandWorld)
+
+
+class FloatingCarrier(ABC, Generic[W]):
+    """What carriers of the floating hand share, of whatever engine: the segments, and what is in
+    the way; see `Carrier`.
+
+    Args:
+        world: that of a trial which has been brought to its start, with the joint along the first
+            of all paths: the floating hand is at the grasp, or where the approach begins.
+        bodies: of that world.
+        time_step: of the engine [s].
+        paths: of the hand from the grasp on, straight, at least one.
+        lift_clearance: gives the check of the path ahead with the target in the hand.
+        approach: the path to the grasp; None if the hand is there.
+        target: the body to be grasped, which the hand may touch once it has come to the grasp.
+    """
+
+    tracking_error = tracking_distance = math.nan
+
+    def __init__(
+        self,
+        world: W,
+        bodies: RobotWorld,
+        time_step: float,
+        paths: Sequence[LiftPath],
+        lift_clearance: Callable[[], HandLiftClearance],
+        approach: LiftPath | None,
+        target: BodyIndex,
+    ) -> None:
+        rest_checks = 1  # Checks between arrival and closing, in which the hand comes to rest.
+        settings = world.settings
+        self._world, self._bodies = world, bodies
+        self._lift_clearance = lift_clearance
+        self._hand = set(bodies.robot_bodies)
+        self.segments = tuple(
+            HandSegment(*path, check_count(path.length, settings) + (number + 1 < len(paths)))
+            for number, path in enumerate(paths)
+        )
+        self.lift_time = sum(settings.time_of(path.length) for path in paths)
+        self._approach = approach
+        self.approach_steps = max(1, round(settings.poll / time_step))
+        self.approach_checks = 0
+        self._touches: RobotContactWatch | None = None
+        if approach is not None:
+            self.approach_checks = check_count(approach.length, settings) + rest_checks
+            self._touches = RobotContactWatch(bodies, (), target)
+        self._number = 0 if approach is None else -1
+        self._is_approaching = self._is_lifting = False
+        self._X_WG_start = world.X_WG()
+
+    @property
+    def touched(self) -> str:
+        """The first touch that was not planned; "" without an approach."""
+        return "" if self._touches is None else self._touches.first
+
+    def watch(self, contacts: list[BodyContact]) -> str:
+        """Looks for fixed bodies that the hand touches; the table is none of them, unless the hand
+        goes down with the target, or presses on it on its way to the grasp."""
+        max_descent = -1e-6  # z of a unit vector. Smaller values go down by more than rounding.
+        if self._touches is not None:
+            stop = self._touches.update(contacts, arrived=not self._is_approaching)
+            if self._is_approaching:
+                return stop
+        fixed = set(self._bodies.fixed.values()) - {self._bodies.table}
+        if self._is_lifting and self.segments[self._number].direction_W[2] < max_descent:
+            fixed.add(self._bodies.table)
+        hit = touched_bodies(contacts, self._hand, fixed)
+        return self._bodies.body_names[min(hit)] if hit else ""
+
+    @abstractmethod
+    def travelled(self) -> float:
+        """Position of the joint [m]."""
+
+    def carries_full_load(self, check: int) -> bool:
+        """See `bears_full_load`."""
+        return bears_full_load(self.segments[-1], check, self._world.settings)
+
+    def is_free_ahead(self) -> bool:
+        """Looks along the joint's axis."""
+        last = self.segments[-1]
+        return self._lift_clearance().is_free(
+            self._world, self._X_WG_start, last.length - self.travelled(), last.direction_W
+        )
+
+    def _enter(self, number: int) -> bool:
+        """Goes on in a segment; whether it begins."""
+        self._is_lifting = True
+        if number == self._number:
+            return False
+        self._number, self._X_WG_start = number, self._world.X_WG()
+        return True
+
+
+class LiftCarrier(FloatingCarrier[TrialWorld]):
+    """Takes the floating hand away from the grasp, and to it if that is asked for; see `Carrier`.
+
+    Where one segment ends and the next begins, the hand comes to rest, and its joint is laid along
+    the new direction.
+
+    Args:
+        world, paths, lift_clearance, approach, target: see `FloatingCarrier`.
+    """
+
+    def __init__(
+        self,
+        world: TrialWorld,
+        paths: Sequence[LiftPath],
+        lift_clearance: Callable[[], HandLiftClearance],
+        approach: LiftPath | None,
+        target: BodyIndex,
+    ) -> None:
+        assert isinstance(world.hand, FloatingHand)
+        self._floating = world.hand
+        time_step = world.diagram.engine.time_step
+        super().__init__(world, world.diagram, time_step, paths, lift_clearance, approach, target)
+        self._plant_context = world.diagram.plant.GetMyMutableContextFromRoot(world.context)
+
+    def approach(self) -> None:
+        """Begins the way to the grasp; the speed is commanded from look to look."""
+        self._is_approaching = True
+
+    def close(self) -> None:
+        """Closes the fingers; without an approach they have been closing from the start."""
+        if self._approach is not None:
+            self._is_approaching = False
+            self._world.command("lift", np.zeros(2))
+            self._world.command("hand", self._floating.closing_command())
+
+    def lift(self, number: int, check: int) -> None:
+        """Commands the speed of the middle of the interval; in one interval more, where another
+        segment follows, the hand comes to rest."""
+        segment = self.segments[number]
+        if self._enter(number):
+            self._floating.set_lift_direction(self._plant_context, segment.direction_W)
+            self._world.simulator.Initialize()
+        self._command_speed(segment.length, check, self._world.settings.poll)
+
+    def stop(self) -> None:
+        """Stands still."""
+        self._world.command("lift", np.zeros(2))
+
+    def advance_to(self, time: float) -> None:
+        """Steps; commands change only from look to look."""
+        if self._is_approaching and self._approach is not None:
+            interval = self.approach_steps * self._world.diagram.engine.time_step
+            check = round(self._world.context.get_time() / interval)
+            self._command_speed(self._approach.length, check, interval)
+        self._world.simulator.AdvanceTo(time)
+
+    def travelled(self) -> float:
+        """Position of the joint [m]."""
+        return self._floating.travelled(self._plant_context)
+
+    def _command_speed(self, length: float, check: int, interval: float) -> None:
+        """Commands the speed of the middle of an interval [s] of a path of a length [m]."""
+        checks = check_count(length, self._world.settings)
+        top_speed = 2 * length / (checks * interval)
+        speed = top_speed * max(0.0, 1 - abs(2 * check + 1 - checks) / checks)
+        self._world.command("lift", np.array([0.0, speed]))
+
+
+def bears_full_load(last: HandSegment, check: int, settings: TrialSettings) -> bool:
+    """Whether the load on a grip was as large as it will ever be, up to an interval of the last
+    segment.
+
+    The hand accelerates in the first half of a segment and brakes in the second. Straight up, the
+    first adds to the weight and the second takes away from it. Otherwise both count, and standing
+    still is in between.
+    """
+    half = check_count(last.length, settings) // 2
+    if last.is_straight_up:
+        return check < half
+    return check >= half + settings.steady_polls
+
+
+def check_count(length: float, settings: TrialSettings) -> int:
+    """Looks on a path of a length [m]: as many to speed up as to brake."""
+    return 2 * max(1, round(settings.time_of(length) / settings.poll / 2))
+
+
+def lift_paths(motion: GraspMotion, X_WG: Array, lift: float | None = None) -> tuple[LiftPath, ...]:
+    """Straight paths of the hand with the target: the retreat, if there is one, and the lift.
+
+    Args:
+        motion: where the hand goes.
+        X_WG: (4, 4) grasp in the world.
+        lift: length of the lift [m], in place of the motion's.
+
+    Returns:
+        One or two, each longer than 0.
+
+    Raises:
+        InvalidInputError: the hand would not move, or a length is not one.
+    """
+    height = motion.lift_height if lift is None else lift
+    if not 0.0 <= height < math.inf or motion.retreat + height <= 0.0:
+        raise InvalidInputError(
+            f"lift is {height:g} m and retreat {motion.retreat:g} m; give a finite lift of 0 or"
+            " more, and above 0 if there is no retreat"
+        )
+    paths = (
+        LiftPath(-X_WG[:3, 2], motion.retreat),
+        LiftPath(motion.direction_W, height),
+    )
+    return tuple(path for path in paths if path.length > 0.0)

@@ -1,0 +1,532 @@
+"""A scene under the hand in MuJoCo: its model, how a trial begins, its commands and its contacts.
+
+The model is compiled once. A trial sets its state, surfaces and pad stiffness, and nothing of an
+earlier one remains.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from pydrake.multibody.tree import BodyIndex
+
+from burg_drake.core import (
+    Array,
+    Indices,
+    InvalidInputError,
+    MissingDependencyError,
+    quaternion_from_rotation,
+)
+from burg_drake.export import (
+    HAND_CARRIER_BODY,
+    HAND_SHAPE_PREFIX,
+    LIFT_JOINT,
+    PAD_BACKING_PREFIX,
+    PAD_SPHERE_PREFIX,
+    Layout,
+    MjcfBodyNames,
+    link_name,
+    pad_contact,
+    trial_mjcf,
+)
+from burg_drake.objects import hull_corners
+from burg_drake.scene import SceneLike, as_scene
+from burg_drake.simulation.contacts import BodyContact
+from burg_drake.simulation.settings import TrialSettings
+from burg_drake.simulation.trial_execution import OtherTouched
+from burg_drake.station import Engine, HandDescription, StationLike, as_station, is_on_table
+
+
+def require_mujoco() -> None:
+    """Says how to install the package, if it is missing.
+
+    Raises:
+        MissingDependencyError: it is.
+    """
+    if importlib.util.find_spec("mujoco") is None:
+        raise MissingDependencyError(
+            "engine mujoco needs the package mujoco; install it with"
+            " pip install 'burg-drake[mujoco]'"
+        )
+
+
+def load_mujoco() -> Any:
+    """The module `mujoco`. What it warns of is read from its data: it writes no log file.
+
+    Raises:
+        MissingDependencyError: it is not installed.
+    """
+    require_mujoco()
+    module = importlib.import_module("mujoco")
+    module.set_mju_user_warning(_ignore)
+    return module
+
+
+def _ignore(message: str) -> None:
+    """Takes a warning."""
+
+
+@dataclass(frozen=True, eq=False)
+class ModelIndex:
+    """Bodies, and geoms, as numbers.
+
+    Attributes:
+        objects: bodies of what can move, by the names of instances.
+        fixed: bodies of what cannot, by name, the table too.
+        geoms: of both, by name.
+        pairs: with the table's plane, by name.
+        carrier, hand, fingers: bodies.
+        spheres: geoms of each finger's pad.
+        finger_geoms: geoms of both fingers.
+        palm: geoms of the hand's body.
+        lift_joint, lift_qpos, lift_dof: of the carrier's joint.
+        lift_place, lift_speed: servos of the carrier.
+        finger_qpos, finger_dofs, finger_servos: of both fingers.
+    """
+
+    objects: dict[str, int]
+    fixed: dict[str, int]
+    geoms: dict[str, Indices]
+    pairs: dict[str, Indices]
+    carrier: int
+    hand: int
+    fingers: tuple[int, int]
+    spheres: tuple[Indices, Indices]
+    finger_geoms: Indices
+    palm: Indices
+    lift_joint: int
+    lift_qpos: int
+    lift_dof: int
+    lift_place: int
+    lift_speed: int
+    finger_qpos: Indices
+    finger_dofs: Indices
+    finger_servos: Indices
+
+    @property
+    def table(self) -> int:
+        """Body of the table's box."""
+        return self.fixed[MjcfBodyNames.table]
+
+    @classmethod
+    def of(cls, model: Any, parts: HandDescription) -> ModelIndex:
+        """Looks them up by their names."""
+        bodies = {model.body(k).name: k for k in range(model.nbody)}
+        geoms = [model.geom(k).name for k in range(model.ngeom)]
+        pairs = [model.pair(k).name for k in range(model.npair)]
+        objects, fixed = (
+            _name_bodies(bodies, word) for word in (MjcfBodyNames.object, MjcfBodyNames.fixed)
+        )
+        named = {name: f"{MjcfBodyNames.object} {name} " for name in objects}
+        named |= {name: f"{MjcfBodyNames.fixed} {name} " for name in fixed}
+        one, other = (finger.name for finger in parts.fingers)
+        joints = [model.joint(link_name(f.joint)) for f in parts.document.fingers]
+        lift = model.joint(LIFT_JOINT.name)
+        of_fingers = [
+            f"{word} {name} "
+            for name in (one, other)
+            for word in (PAD_SPHERE_PREFIX, PAD_BACKING_PREFIX, HAND_SHAPE_PREFIX)
+        ]
+        return cls(
+            objects=objects,
+            fixed=fixed,
+            geoms={name: _numbers_with_prefix(geoms, words) for name, words in named.items()},
+            pairs={name: _numbers_with_prefix(pairs, named[name]) for name in objects},
+            carrier=bodies[HAND_CARRIER_BODY],
+            hand=bodies[link_name(parts.body.name)],
+            fingers=(bodies[link_name(one)], bodies[link_name(other)]),
+            spheres=(
+                _numbers_with_prefix(geoms, f"{PAD_SPHERE_PREFIX} {one} "),
+                _numbers_with_prefix(geoms, f"{PAD_SPHERE_PREFIX} {other} "),
+            ),
+            finger_geoms=np.concatenate(
+                [_numbers_with_prefix(geoms, words) for words in of_fingers]
+            ),
+            palm=_numbers_with_prefix(geoms, f"{HAND_SHAPE_PREFIX} {parts.body.name} "),
+            lift_joint=int(lift.id),
+            lift_qpos=int(lift.qposadr[0]),
+            lift_dof=int(lift.dofadr[0]),
+            lift_place=int(model.actuator(LIFT_JOINT.name).id),
+            lift_speed=int(model.actuator(LIFT_JOINT.speed).id),
+            finger_qpos=np.array([joint.qposadr[0] for joint in joints]),
+            finger_dofs=np.array([joint.dofadr[0] for joint in joints]),
+            finger_servos=np.array(
+                [model.actuator(link_name(f.joint)).id for f in parts.document.fingers]
+            ),
+        )
+
+
+def _name_bodies(bodies: dict[str, int], word: str) -> dict[str, int]:
+    begin = f"{word} "
+    return {name[len(begin) :]: k for name, k in bodies.items() if name.startswith(begin)}
+
+
+def _numbers_with_prefix(names: list[str], words: str) -> Indices:
+    """Numbers of the names that begin so."""
+    return np.array([k for k, name in enumerate(names) if name.startswith(words)], dtype=np.intp)
+
+
+def summarize_contacts(model: Any, data: Any, shares: Array, table: int) -> list[BodyContact]:
+    """What touches, one a pair of bodies.
+
+    Args:
+        model, data: MuJoCo's, after a step with elliptic cones.
+        shares: (geoms,) area that a geom stands for where it touches; 0 of those without [m^2].
+        table: body that the world's own geoms count as.
+    """
+    found = data.contact
+    near = np.flatnonzero(found.dist < 0.0)
+    if not len(near):
+        return []
+    geoms = np.asarray(found.geom)[near]
+    bodies = model.geom_bodyid[geoms]
+    bodies[bodies == 0] = table
+    swapped = bodies[:, 0] > bodies[:, 1]
+    f_W = _forces(data, near) * np.where(swapped, -1.0, 1.0)[:, None]
+    bodies = np.sort(bodies, axis=1)
+    pairs, pair = np.unique(bodies, axis=0, return_inverse=True)
+    force = np.zeros((len(pairs), 3))
+    np.add.at(force, pair.reshape(-1), f_W)
+    area = np.zeros(len(pairs))
+    share = shares[geoms]
+    soft = share.max(axis=1)
+    for k in np.unique(pair.reshape(-1)[soft > 0.0]):
+        mine = np.flatnonzero((pair.reshape(-1) == k) & (soft > 0.0))
+        one = np.take_along_axis(geoms[mine], share[mine].argmax(axis=1)[:, None], axis=1)
+        area[k] = shares[np.unique(one)].sum()
+    return [
+        BodyContact(BodyIndex(int(a)), BodyIndex(int(b)), force[k], float(area[k]))
+        for k, (a, b) in enumerate(pairs)
+    ]
+
+
+def _forces(data: Any, contacts: Indices) -> Array:
+    """(N, 3) force of contacts on the second geom in the world; 0 where there is none."""
+    address = np.asarray(data.contact.efc_address)[contacts]
+    solved = address >= 0
+    frame = np.asarray(data.contact.frame)[contacts[solved]].reshape(-1, 3, 3)
+    in_frame = np.asarray(data.efc_force)[address[solved, None] + np.arange(3)]
+    f_W = np.zeros((len(contacts), 3))
+    f_W[solved] = np.einsum("nij,ni->nj", frame, in_frame)
+    return f_W
+
+
+class MujocoWorld:
+    """The world of trials in one scene.
+
+    Bodies are called by their numbers in the model as Drake's are. What can move does so from the
+    start: all objects, or `alone` one of them.
+
+    Args:
+        scene, station: what stands where.
+        layout: the same in the world.
+        hand: the station's.
+        engine: has the time step.
+        settings: phases of a trial.
+        alone: the one object that can move, if not all can.
+        shown: called at each look.
+
+    Attributes:
+        model, data: MuJoCo's.
+        engine: as given.
+        settings: as given, but for `STEADY_TIME`.
+        free, standing, fixed: bodies by name: what moves, what could but does not, and what never
+            does; the table is a fixed one.
+        table: its body.
+        robot, robot_bodies: bodies of the hand.
+        fingers: of these the fingers.
+        body_names: what people call all of these.
+        hand_document: the hand.
+        robot_meets_hull: no hull is in the place of a target.
+
+    Raises:
+        InvalidInputError: MuJoCo refuses the model.
+    """
+
+    robot_meets_hull = False
+
+    def __init__(
+        self,
+        scene: SceneLike,
+        station: StationLike,
+        layout: Layout,
+        hand: HandDescription,
+        *,
+        engine: Engine,
+        settings: TrialSettings,
+        alone: str | None = None,
+        shown: Callable[[MujocoWorld], None] | None = None,
+    ) -> None:
+        min_steady_time = 0.1  # Seconds. Half of it wrongly decides 1 of 60 grasps early.
+        scene, station = as_scene(scene), as_station(station)
+        self._mj = mj = load_mujoco()
+        self._scene, self._station, self._parts = scene, station, hand
+        self._shown = shown
+        steady_time = max(settings.steady_time, min_steady_time)
+        self.settings = replace(settings, steady_time=steady_time)
+        self.engine, step = engine, engine.time_step
+        self.hand_document = hand.document
+        on_table = {name for name in scene.instances if is_on_table(scene, station, name)}
+        xml = trial_mjcf(layout, hand, step=step, on_table=on_table, alone=alone)
+        try:
+            self.model: Any = mj.MjModel.from_xml_string(xml)
+        except ValueError as error:
+            raise InvalidInputError(
+                f"{scene.path}: MuJoCo cannot load the scene: {' '.join(str(error).split())}"
+            ) from error
+        self.data: Any = mj.MjData(self.model)
+        self._scratch: Any = mj.MjData(self.model)
+        self._index = index = ModelIndex.of(self.model, hand)
+        could_move = {name: index.objects[name] for name in scene.instances}
+        moving = (alone,) if alone is not None else tuple(scene.instances)
+        self.free = {name: BodyIndex(could_move[name]) for name in moving}
+        self.standing = {n: BodyIndex(k) for n, k in could_move.items() if n not in moving}
+        self.fixed = {name: BodyIndex(k) for name, k in index.fixed.items()}
+        self.table = BodyIndex(index.table)
+        self.fingers = (BodyIndex(index.fingers[0]), BodyIndex(index.fingers[1]))
+        self.robot_bodies = (BodyIndex(index.hand), *self.fingers)
+        self.robot = frozenset(self.robot_bodies)
+        self._mass, self._inertia = self.model.body_mass.copy(), self.model.body_inertia.copy()
+        self._shares = np.zeros(self.model.ngeom)
+        for finger, spheres in zip(hand.fingers, index.spheres, strict=True):
+            self._shares[spheres] = finger.front.area / len(spheres)
+        self._friction_of_palm = np.array([s.friction for s in hand.body.shapes])
+        self._standing = frozenset(self.standing.values())
+        named = {**self.free, **self.standing, **self.fixed}
+        links = [hand.body.name, *(finger.name for finger in hand.fingers)]
+        self.body_names = {index: name for name, index in named.items()}
+        self.body_names |= dict(zip(self.robot_bodies, links, strict=True))
+        self._corners: dict[BodyIndex, Array] = {}
+        self._usable = not self.standing or not self._leans(moving[0])
+
+    def is_usable(self) -> bool:
+        """Whether trials can begin in it: not if the target may lean on what stands here."""
+        return self._usable
+
+    def invalidate(self) -> None:
+        """Every trial prepares it from scratch."""
+
+    def prepare(
+        self,
+        instance: str,
+        X_WG: Array,
+        closed: float | None,
+        direction_W: Array,
+        *,
+        friction: float | None,
+        mass: float | None,
+    ) -> None:
+        """Brings everything to the start of a trial: first the model, then the state.
+
+        Args:
+            instance: the target.
+            X_WG: (4, 4) of the grasp frame in the world.
+            closed: how far the fingers are closed, from 0 (open) to 1 (pads together), and go on
+                closing; None if they are open and stay so.
+            direction_W: (3,) unit vector in which the hand will go at first.
+            friction, mass: of the target, if not the library's.
+        """
+        model, data, hand = self.model, self.data, self._station.hand
+        target = self._index.objects[instance]
+        model.body_mass[:], model.body_inertia[:] = self._mass, self._inertia
+        if mass is not None:
+            model.body_inertia[target] *= mass / self._mass[target]
+            model.body_mass[target] = mass
+        X_WH = hand.X_AH(X_WG)
+        model.body_quat[self._index.hand] = quaternion_from_rotation(X_WH[:3, :3])
+        self._lay_lift(X_WH[:3, 3], direction_W)
+        self._mj.mj_resetData(model, data)
+        for at, finger in zip(self._index.finger_qpos, hand.fingers, strict=True):
+            data.qpos[at] = finger.open + (closed or 0.0) * (finger.closed - finger.open)
+        self._command_fingers(-1.0 if closed is None else 1.0)
+        if closed is not None:
+            data.qvel[self._index.finger_dofs] = data.ctrl[self._index.finger_servos]
+        own = self._scene.entry(instance).friction
+        self._set_surfaces(instance, own if friction is None else friction)
+        self._set_pads(target)
+        self._mj.mj_forward(model, data)
+
+    def close_hand(self) -> None:
+        """Closes the fingers."""
+        self._command_fingers(1.0)
+
+    def turn_lift(self, direction_W: Array) -> None:
+        """Has the carrier's joint go in another direction (3,) from where the hand is, at rest
+        there; all else moves on."""
+        data, index = self.data, self._index
+        self._mj.mj_kinematics(self.model, data)
+        place = np.array(data.xpos[index.hand])
+        self._lay_lift(place, direction_W)
+        data.qpos[index.lift_qpos] = data.qvel[index.lift_dof] = 0.0
+        self.command_lift(0.0, 0.0, 0.0)
+
+    def command_lift(self, travelled: float, speed: float, acceleration: float) -> None:
+        """Where the carrier's joint shall be [m] and how fast it shall go [m/s] after the next
+        step, and how it gets there [m/s^2]."""
+        index = self._index
+        inertia = self.model.dof_armature[index.lift_dof]
+        inertia += self.model.body_subtreemass[index.carrier]
+        self.data.qfrc_applied[index.lift_dof] = inertia * acceleration
+        self.data.ctrl[self._index.lift_place] = travelled
+        self.data.ctrl[self._index.lift_speed] = speed
+
+    def advance(self, steps: int) -> None:
+        """Steps with the present commands."""
+        self._mj.mj_step(self.model, self.data, nstep=steps)
+
+    @property
+    def time(self) -> float:
+        """Since the start of the trial [s]."""
+        return float(self.data.time)
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether the state is one."""
+        return bool(np.isfinite(self.data.qpos).all() and np.isfinite(self.data.qvel).all())
+
+    def look(self) -> list[BodyContact]:
+        """All that touch, by pairs of bodies; areas are those of the pads.
+
+        Raises:
+            OtherTouched: what moves meets what could, too: that is for the complete world.
+        """
+        contacts = summarize_contacts(self.model, self.data, self._shares, int(self.table))
+        if any(c.body_A in self._standing or c.body_B in self._standing for c in contacts):
+            raise OtherTouched
+        if self._shown is not None:
+            self._shown(self)
+        return contacts
+
+    def state(self) -> Array:
+        """What `go_back` goes back to."""
+        kind = self._mj.mjtState.mjSTATE_INTEGRATION
+        state = np.zeros(self._mj.mj_stateSize(self.model, kind))
+        self._mj.mj_getState(self.model, self.data, state, kind)
+        return state
+
+    def go_back(self, time: float, state: Array) -> None:
+        """Is again as at a time [s], which the state has."""
+        self._mj.mj_setState(self.model, self.data, state, self._mj.mjtState.mjSTATE_INTEGRATION)
+        self._mj.mj_forward(self.model, self.data)
+
+    def close_to(self, bodies: Iterable[BodyIndex]) -> set[BodyIndex]:
+        """The bodies: all of them move anyway."""
+        return set(bodies)
+
+    def release(self, released: set[BodyIndex], still: set[BodyIndex]) -> None:
+        """Nothing is locked."""
+
+    def finger_speed(self) -> float:
+        """Speed of the faster finger [m/s]."""
+        return float(np.abs(self.data.qvel[self._index.finger_dofs]).max())
+
+    def robot_positions(self, model: str) -> Array | None:
+        """Of `hand` and `lift`, as a station diagram has them."""
+        if model == "lift":
+            return np.array([self.travelled()])
+        fingers = np.array(self.data.qpos[self._index.finger_qpos])
+        return fingers[list(self._parts.plant_order)] if model == "hand" else None
+
+    def travelled(self) -> float:
+        """Position of the carrier's joint [m]."""
+        return float(self.data.qpos[self._index.lift_qpos])
+
+    def X_WH(self) -> Array:
+        """(4, 4) hand body."""
+        return self.X_WB(BodyIndex(self._index.hand))
+
+    def X_WG(self) -> Array:
+        """(4, 4) grasp frame."""
+        X_WG: Array = self.X_WH() @ self._station.hand.X_HG.matrix()
+        return X_WG
+
+    def X_WB(self, body: BodyIndex) -> Array:
+        """(4, 4) of a body."""
+        X_WB, k = np.eye(4), int(body)
+        X_WB[:3, :3] = self.data.xmat[k].reshape(3, 3)
+        X_WB[:3, 3] = self.data.xpos[k]
+        return X_WB
+
+    def center(self, body: BodyIndex) -> Array:
+        """Centre of mass (3,) of a body in the world [m]."""
+        return np.array(self.data.xipos[int(body)])
+
+    def corners(self, body: BodyIndex) -> Array:
+        """(N, 3) corners of the convex hull of a free object in its frame [m]; read once."""
+        if body not in self._corners:
+            entry = self._scene.entry(self.body_names[body])
+            self._corners[body] = hull_corners(self._scene.library, entry)
+        return self._corners[body]
+
+    def _command_fingers(self, closing: float) -> None:
+        """Closes (1), or opens (-1) and presses against the stops."""
+        hand = self._station.hand
+        speeds = [np.sign(f.closed - f.open) * hand.closing_speed for f in hand.fingers]
+        self.data.ctrl[self._index.finger_servos] = closing * np.array(speeds)
+
+    def _lay_lift(self, p_WH: Array, direction_W: Array) -> None:
+        """Places the carrier, with its joint along a direction."""
+        self.model.body_pos[self._index.carrier] = p_WH
+        self.model.jnt_axis[self._index.lift_joint] = direction_W
+        self._mj.mj_setConst(self.model, self._scratch)
+
+    def _set_surfaces(self, instance: str, mu: float) -> None:
+        """Gives contacts Drake's coefficients 2ab/(a+b): all of target and hand, and those with the
+        table. What others have with each other is what they have with the target."""
+        # MuJoCo takes surfaces of the geom with the higher priority; the target has 0.
+        hand_priority = 1
+        others_priority = 2  # Of free objects other than the target.
+        fixed_priority = 3  # Of bodies that do not move.
+        model, index = self.model, self._index
+        for geoms in (index.finger_geoms, index.palm):
+            model.geom_priority[geoms] = hand_priority
+        model.geom_friction[index.finger_geoms, 0] = mu
+        model.geom_friction[index.palm, 0] = [
+            combined_friction(mu, f) for f in self._friction_of_palm
+        ]
+        table = self._station.document.table.friction
+        for name, geoms in index.geoms.items():
+            known = name in self._scene.instances or name in self._scene.background
+            own = self._scene.entry(name).friction if known else table
+            own = mu if name == instance else own
+            others = fixed_priority if name in index.fixed else others_priority
+            model.geom_priority[geoms] = 0 if name == instance else others
+            model.geom_friction[geoms, 0] = combined_friction(own, mu)
+            if name in index.pairs:
+                model.pair_friction[index.pairs[name], :2] = combined_friction(own, table)
+
+    def _set_pads(self, target: int) -> None:
+        """Gives the pads their stiffness, which in MuJoCo depends on what they touch."""
+        model = self.model
+        for finger, body, spheres in zip(
+            self._parts.fingers, self._index.fingers, self._index.spheres, strict=True
+        ):
+            mobility = float(model.body_invweight0[[body, target], 0].sum())
+            solref, impedance = pad_contact(finger.front, mobility, self.engine.time_step)
+            model.geom_solimp[spheres, :2] = impedance
+            model.geom_solref[spheres] = solref
+
+    def _leans(self, instance: str) -> bool:
+        """Whether the target may lean on what could move, where it stands."""
+        leaning_distance = 0.001  # Metres.
+        model, data, mj = self.model, self._scratch, self._mj
+        mj.mj_resetData(model, data)
+        mj.mj_kinematics(model, data)
+        fromto = np.zeros(6)
+        others = [g for name in self.standing for g in self._index.geoms[name]]
+        return any(
+            mj.mj_geomDistance(model, data, int(one), int(other), leaning_distance, fromto)
+            < leaning_distance
+            for one in self._index.geoms[instance]
+            for other in others
+        )
+
+
+def combined_friction(a: float, b: float) -> float:
+    """Drake's coefficient for two surfaces."""
+    return 2.0 * a * b / (a + b) if a + b > 0.0 else 0.0

@@ -1,0 +1,182 @@
+"""When objects count as at rest, and how far they are from where their document places them."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import BodyIndex, RigidBody
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context
+
+from burg_drake.core import Array, inverse, rotation_angle
+from burg_drake.scene import Scene, support_vertices
+from burg_drake.station import StationDiagram
+
+
+@dataclass(frozen=True, kw_only=True)
+class RestCriterion:
+    """When a body counts as at rest.
+
+    Speeds are means over the poll interval: at large time steps the momentary velocity of an object
+    at rest alternates from step to step.
+
+    Attributes:
+        speed: of its centre of mass, below this [m/s] ...
+        turning: ... and of its rotation, below this [rad/s] ...
+        duration: ... for this long [s]: something that rocks stands still twice a period.
+        poll: interval at which poses are looked at [s].
+        dying: what gets slower from poll to poll rests below so many times these speeds.
+    """
+
+    speed: float = 0.005
+    turning: float = 0.02
+    duration: float = 0.12
+    poll: float = 0.04
+    dying: float = 1.0
+
+    def is_rest(self, now: BodySpeed, before: BodySpeed | None) -> bool:
+        """Whether a body is at rest that has this speed, and had another one a poll before."""
+        slower = before is not None and now.speed < before.speed and now.turning < before.turning
+        factor = self.dying if slower else 1.0
+        return now.speed < factor * self.speed and now.turning < factor * self.turning
+
+
+@dataclass(frozen=True)
+class BodySpeed:
+    """How fast a body moves.
+
+    Attributes:
+        speed: of its centre of mass [m/s].
+        turning: of its rotation [rad/s].
+    """
+
+    speed: float
+    turning: float
+
+
+@dataclass(frozen=True)
+class Settled:
+    """How settling ended.
+
+    Attributes:
+        duration: simulated time that it took [s].
+        moving: bodies that still moved shortly before the end, with their last speed; none if all
+            came to rest.
+    """
+
+    duration: float
+    moving: dict[BodyIndex, BodySpeed] = field(default_factory=dict)
+
+    @property
+    def at_rest(self) -> bool:
+        """Everything came to rest within the time allowed."""
+        return not self.moving
+
+
+def settle(
+    simulator: Simulator,
+    plant: MultibodyPlant,
+    bodies: Iterable[BodyIndex],
+    time_limit: float,
+    criterion: RestCriterion = RestCriterion(),
+    before_poll: Callable[[], None] | None = None,
+) -> Settled:
+    """Advances a simulator until bodies are at rest, or time is up.
+
+    Args:
+        simulator: of a diagram with `plant` in it; its context is advanced.
+        plant: a finalized plant.
+        bodies: to be at rest, all of them.
+        time_limit: simulated time allowed [s].
+        criterion: what counts as rest.
+        before_poll: called at the beginning of each poll interval; may change the state.
+
+    Raises:
+        RuntimeError, SystemExit: from Drake.
+    """
+    context = plant.GetMyContextFromRoot(simulator.get_context())
+    watched = [plant.get_body(index) for index in bodies]
+    start = simulator.get_context().get_time()
+    steps = max(1, round(time_limit / criterion.poll))
+    needed = max(1, round(criterion.duration / criterion.poll))
+    recent: deque[dict[BodyIndex, BodySpeed]] = deque(maxlen=needed)
+    before = [body_place(body, context) for body in watched]
+    speeds: dict[BodyIndex, BodySpeed] = {}
+    for step in range(1, steps + 1):
+        if before_poll is not None:
+            before_poll()
+        simulator.AdvanceTo(start + step * criterion.poll)
+        after = [body_place(body, context) for body in watched]
+        moving = {}
+        for body, old, new in zip(watched, before, after, strict=True):
+            speed = mean_speed(old, new, criterion.poll)
+            if not criterion.is_rest(speed, speeds.get(body.index())):  # nor is NaN
+                moving[body.index()] = speed
+            speeds[body.index()] = speed
+        before = after
+        recent.append(moving)
+        if len(recent) == needed and not any(recent):
+            break
+    moved = {index: speed for moving in recent for index, speed in moving.items()}
+    return Settled(simulator.get_context().get_time() - start, moved)
+
+
+def body_place(body: RigidBody, context: Context) -> tuple[Array, Array]:
+    """Rotation (3, 3) and centre of mass (3,) in the world."""
+    X_WO = body.EvalPoseInWorld(context)
+    p_WOcm = X_WO @ body.CalcCenterOfMassInBodyFrame(context)
+    return X_WO.rotation().matrix(), p_WOcm
+
+
+def mean_speed(
+    before: tuple[Array, Array], after: tuple[Array, Array], interval: float
+) -> BodySpeed:
+    """Between two places of a body an interval [s] apart."""
+    turn = before[0].T @ after[0]
+    # chordal distance; exact for small turns, where the cosine is not
+    angle = 2.0 * np.arcsin(min(1.0, np.linalg.norm(turn - np.eye(3)) / np.sqrt(8.0)))
+    travel = np.linalg.norm(after[1] - before[1])
+    return BodySpeed(float(travel / interval), float(angle / interval))
+
+
+@dataclass(frozen=True)
+class Displacement:
+    """How far an object was moved.
+
+    Attributes:
+        distance: of its centre of mass [m].
+        angle: of its rotation [rad].
+    """
+
+    distance: float
+    angle: float
+
+
+def displacement_from_document(built: StationDiagram, name: str, X_WO: Array) -> Displacement:
+    """How far an instance is from its place in the document.
+
+    Args:
+        built: the diagram.
+        name: of the instance.
+        X_WO: (4, 4) where it is.
+    """
+    X_OO = inverse(built.X_WO(name)) @ X_WO
+    p_OOcm = np.array(built.scene.entry(name).mass_properties.center_of_mass)
+    moved = X_OO[:3, :3] @ p_OOcm + X_OO[:3, 3] - p_OOcm
+    return Displacement(float(np.linalg.norm(moved)), float(rotation_angle(X_OO[:3, :3])))
+
+
+def depth_in_table(scene: Scene, X_WO: Array, name: str) -> float:
+    """How far what an instance rests with, at `X_WO`, is below the table's top [m].
+
+    Args:
+        scene: the scene.
+        X_WO: (4, 4) where the instance is.
+        name: of the instance.
+    """
+    p_OC = support_vertices(scene.library, scene.instance(name).object)
+    return -float((p_OC @ X_WO[2, :3]).min() + X_WO[2, 3])

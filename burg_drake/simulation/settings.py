@@ -1,0 +1,188 @@
+"""Settings of trials, of robustness tests, and of settling; no simulator is loaded for them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from burg_drake.core import InvalidInputError, Ranges, Units, require_ranges, setting
+from burg_drake.station import GraspMotion
+
+MAX_PHASE_DURATION = 30.0
+"""Seconds. 60 times what the phases take by default."""
+
+REFERENCE_LIFT_LENGTH = 0.30
+"""Metres. Length that `lift_time` refers to."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrialSettings:
+    """Phases of a trial.
+
+    Attributes:
+        motion: where the hand goes; None if as the station says.
+        lift_time: duration of a straight segment of 0.30 m with the target [s]: half of it
+            accelerates and half of it brakes, as they do, as hard, on a shorter way.
+        hold_time: how long the target must be held at the end of the way [s].
+        creep_speed: a target that moves in the hand slower than this sticks to the pads [m/s] ...
+        creep_distance: ... and one that does not get faster may go on by this much [m]; both decide
+            trials early, see `Engine.whole_trial`.
+        steady_time: how long that, and free air, and the rest of all others, must last [s].
+        poll: interval at which contacts are looked at [s].
+        settled_speed: the fingers have closed when they are slower than this [m/s] ...
+        settled_time: ... for this long [s].
+        close_timeout: closing ends after this time in any case [s]; for a slow hand, after twice
+            the time that it takes to close.
+        disturbance: others that are moved by more than this count as disturbed [m].
+        tilt_limit: a target that has turned in the hand by more than this since the grip does not
+            count as lifted, though it is held [rad]; pi: it may turn as it likes.
+        slip_limit: likewise of one that has slid [m]; infinite: it may slide as it likes.
+        approach: whether the hand alone begins at the pregrasp, and not at the grasp.
+    """
+
+    RANGES: ClassVar[Ranges] = {
+        "lift_time": (1e-2, MAX_PHASE_DURATION),
+        "hold_time": (0.0, MAX_PHASE_DURATION),
+        "creep_speed": (0.0, 10.0),
+        "creep_distance": (0.0, 10.0),
+        "steady_time": (0.0, MAX_PHASE_DURATION),
+        "poll": (1e-4, 1.0),
+        "settled_speed": (0.0, 10.0),
+        "settled_time": (0.0, MAX_PHASE_DURATION),
+        "close_timeout": (0.0, MAX_PHASE_DURATION),
+        "disturbance": (0.0, 10.0),
+        "tilt_limit": (0.0, math.pi),
+        "slip_limit": (0.0, math.inf),
+    }
+    """Values with which a trial ends, within minutes at the shortest steps, and is a trial."""
+
+    motion: GraspMotion | None = None
+    lift_time: float = 1.25
+    hold_time: float = 0.5
+    creep_speed: float = 0.0003
+    creep_distance: float = 0.002
+    steady_time: float = 0.05
+    poll: float = 0.01
+    settled_speed: float = 0.002
+    settled_time: float = 0.03
+    close_timeout: float = 2.0
+    disturbance: float = 0.01
+    tilt_limit: float = math.radians(30)
+    slip_limit: float = 0.02
+    approach: bool = False
+
+    def __post_init__(self) -> None:
+        require_ranges(self, "a trial")
+
+    @property
+    def acceleration(self) -> float:
+        """Of the hand on its straight segments with the target [m/s^2]."""
+        return 4.0 * REFERENCE_LIFT_LENGTH / self.lift_time**2
+
+    def time_of(self, length: float) -> float:
+        """Duration of a straight segment with the target [s], by its length [m]."""
+        return self.lift_time * math.sqrt(length / REFERENCE_LIFT_LENGTH)
+
+    @property
+    def steady_polls(self) -> int:
+        """Looks in `steady_time`."""
+        return max(1, round(self.steady_time / self.poll))
+
+
+NO_GRIP_LIMITS = {"tilt_limit": math.pi, "slip_limit": math.inf}
+"""Settings with which a held target counts as lifted, however it lies in the hand."""
+DEFAULT_TRIAL = TrialSettings()
+"""Phases that `evaluate` and `replay` use."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadSettings:
+    """How a grip is loaded.
+
+    Attributes:
+        smallest, largest: accelerations that are tried [g].
+        tolerance: relative distance between the largest that is borne and the next that is not.
+        slide: the target has left its place when its point at the grasp has moved in the hand by
+            more than this [m]; it has left, too, when a finger does not touch it.
+        tug_rise: a tug grows to its full force in this time [s], which it then keeps ...
+        tug_time: ... for this long [s]; less if the target is at rest under it.
+        frequency: of shaking [Hz].
+        periods: of shaking; the amplitude grows during the first one.
+    """
+
+    smallest: float = 0.05
+    largest: float = 50.0
+    tolerance: float = 0.03
+    slide: float = 0.005
+    tug_rise: float = 0.05
+    tug_time: float = 0.2
+    frequency: float = 5.0
+    periods: int = 3
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.smallest < self.largest:
+            raise InvalidInputError(
+                f"loads are from {self.smallest:g} to {self.largest:g} g; the smallest must be"
+                " above 0, the largest above the smallest"
+            )
+        for name in ("tolerance", "slide", "tug_rise", "tug_time", "frequency", "periods"):
+            if not getattr(self, name) > 0:
+                raise InvalidInputError(f"{name} is {getattr(self, name):g}; give more than 0")
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrictionSettings:
+    """Which coefficients are tried.
+
+    Attributes:
+        smallest, largest: coefficients.
+        tolerance: relative distance between the smallest that lifts and the next that does not.
+    """
+
+    smallest: float = 0.02
+    largest: float = 2.0
+    tolerance: float = 0.02
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.smallest < self.largest:
+            raise InvalidInputError(
+                f"friction is from {self.smallest:g} to {self.largest:g}; the smallest must be"
+                " above 0, the largest above the smallest"
+            )
+        if not self.tolerance > 0.0:
+            raise InvalidInputError(f"tolerance is {self.tolerance:g}; give more than 0")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Noise:
+    """Standard deviations.
+
+    Attributes:
+        translation: of the grasp in the target, along each axis [m].
+        rotation: of the grasp in the target, about each axis [rad].
+        mass: of the target, relative.
+        friction: of the target's coefficient, relative.
+    """
+
+    translation: float = setting(
+        0.005, "noise of the grasp along each axis", unit=Units.millimetres, low=0
+    )
+    rotation: float = setting(
+        math.radians(5.0), "noise of the grasp about each axis", unit=Units.degrees, low=0
+    )
+    mass: float = setting(0.1, "noise of the object's mass", unit=Units.percent, low=0)
+    friction: float = setting(
+        0.2, "noise of the object's friction coefficient", unit=Units.percent, low=0
+    )
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not 0.0 <= value < math.inf:
+                raise InvalidInputError(f"noise of the {name} is {value:g}; give 0 or more")
+
+
+SETTLING_TIME = 10.0
+"""Seconds of simulated time in which a scene must come to rest."""
+SETTLING_ENGINE = "screening"
+"""Preset used while objects fall; they come to rest with time steps of their own."""

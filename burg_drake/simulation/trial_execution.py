@@ -1,0 +1,496 @@
+"""Phases of one trial: approach, close, lift, hold, and the outcome with its margins.
+
+They run in any stepped world, with any carrier of the hand.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Set as AbstractSet
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from pydrake.multibody.tree import BodyIndex
+
+from burg_drake.core import Array, Margins, Outcome, inverse
+from burg_drake.simulation.contacts import (
+    NO_FINGER_CONTACT,
+    BodyContact,
+    finger_contact,
+    is_touched_from_outside,
+    touched_bodies,
+)
+from burg_drake.simulation.object_motions import GripMotion, MotionTracker
+from burg_drake.simulation.settings import TrialSettings
+from burg_drake.simulation.trial_result import TrialResult
+from burg_drake.station import Engine, Hand
+
+
+@dataclass(frozen=True, eq=False)
+class HandSegment:
+    """A straight segment of the hand with the target, from rest to rest.
+
+    Attributes:
+        direction_W: (3,) unit vector in the world.
+        length: [m].
+        checks: at the contacts, up to its end.
+    """
+
+    direction_W: Array
+    length: float
+    checks: int
+
+    @property
+    def is_straight_up(self) -> bool:
+        """Whether nothing but its acceleration upwards loads a grip beside the weight."""
+        return bool(self.direction_W[2] > 1.0 - 1e-9)
+
+
+class Carrier(Protocol):
+    """Brings the hand to the grasp and away from it, and watches what is met on the way.
+
+    Attributes:
+        approach_checks: looks at the contacts on the way to the grasp; 0 if the hand starts there.
+        approach_steps: of the simulation from one of these looks to the next.
+        segments: of the way with the target, at least one: the retreat, if there is one, and the
+            lift.
+        lift_time: how long they take [s].
+        tracking_error, tracking_distance: see `Margins`; NaN if not measured.
+    """
+
+    approach_checks: int
+    approach_steps: int
+    segments: tuple[HandSegment, ...]
+    lift_time: float
+    tracking_error: float
+    tracking_distance: float
+
+    @property
+    def touched(self) -> str:
+        """See `TrialResult`."""
+        ...
+
+    def approach(self) -> None:
+        """Commands the way to the grasp."""
+        ...
+
+    def close(self) -> None:
+        """Commands the fingers to close, with the hand standing at the grasp."""
+        ...
+
+    def lift(self, number: int, check: int) -> None:
+        """Commands the way in one of the segments, counted from 0, from one look, counted from 0
+        where the segment begins, to the next."""
+        ...
+
+    def stop(self) -> None:
+        """Commands the hand to stand where the last segment ends."""
+        ...
+
+    def advance_to(self, time: float) -> None:
+        """Steps the simulation; going back and forth again gives the same."""
+        ...
+
+    def watch(self, contacts: list[BodyContact]) -> str:
+        """Takes down what contacts and state say at a look.
+
+        Returns:
+            Name of what is in the way, for `TrialResult.blocker`; "" if nothing is.
+        """
+        ...
+
+    def travelled(self) -> float:
+        """How far the hand has gone in the present segment [m]."""
+        ...
+
+    def carries_full_load(self, check: int) -> bool:
+        """Whether the load on the grip was as large as it will ever be during the last looks, up to
+        the end of interval `check` of the last segment."""
+        ...
+
+    def is_free_ahead(self) -> bool:
+        """Whether nothing would be met on the rest of the last segment, with the target as it is in
+        the hand: geometry, no time steps."""
+        ...
+
+
+MIN_LIFT_SHARE = 0.5
+"""Share of the hand's path that a lifted target must follow."""
+
+
+class OtherTouched(Exception):
+    """In a world of the target alone, target or robot meet something else that could move."""
+
+
+class SteppedWorld(Protocol):
+    """A world that is stepped, by whatever engine, as far as the phases have to know it.
+
+    Attributes:
+        settings: phases of a trial.
+        engine: how it is stepped.
+        free, standing: bodies by name: what can move, and what could in another world.
+        robot: all bodies of the robot.
+        fingers: of these the fingers.
+        hand_document: the hand.
+    """
+
+    settings: TrialSettings
+
+    @property
+    def engine(self) -> Engine: ...
+    @property
+    def free(self) -> Mapping[str, BodyIndex]: ...
+    @property
+    def standing(self) -> Mapping[str, BodyIndex]: ...
+    @property
+    def robot(self) -> AbstractSet[BodyIndex]: ...
+    @property
+    def fingers(self) -> tuple[BodyIndex, BodyIndex]: ...
+    @property
+    def hand_document(self) -> Hand: ...
+
+    @property
+    def time(self) -> float:
+        """Since the start of the trial [s]."""
+        ...
+
+    def finger_speed(self) -> float:
+        """Speed of the faster finger [m/s]."""
+        ...
+
+    def X_WG(self) -> Array:
+        """(4, 4) grasp frame."""
+        ...
+
+    def X_WB(self, body: BodyIndex) -> Array:
+        """(4, 4) of a body."""
+        ...
+
+    def center(self, body: BodyIndex) -> Array:
+        """Centre of mass (3,) of a body in the world [m]."""
+        ...
+
+    def corners(self, body: BodyIndex) -> Array:
+        """(N, 3) corners of the convex hull of a free object in its frame [m]."""
+        ...
+
+    def look(self) -> list[BodyContact]:
+        """All that touch.
+
+        Raises:
+            OtherTouched: what happens now is for the complete world to say.
+        """
+        ...
+
+    def state(self) -> Any:
+        """What `go_back` goes back to."""
+        ...
+
+    def go_back(self, time: float, state: Any) -> None:
+        """Is again as at a time [s]."""
+        ...
+
+    def close_to(self, bodies: Iterable[BodyIndex]) -> set[BodyIndex]:
+        """The bodies, and all that stand so close to one of them that they may lean on it."""
+        ...
+
+    def release(self, released: set[BodyIndex], still: set[BodyIndex]) -> None:
+        """Lets locked objects move; those in `still` stay locked."""
+        ...
+
+
+class Execution:
+    """Runs a trial in a world that has been brought to its start.
+
+    Locked objects are released when something moving touches them, and with them those close to
+    them: the trial goes back to the look before, where they were apart, and goes on from there.
+
+    Args:
+        world: in which the trial runs.
+        target: the grasped body.
+        moving: the free objects that are not locked.
+        carrier: what brings the hand to the grasp and away from it.
+
+    Attributes:
+        contact: of the fingers with the target at the last look.
+    """
+
+    def __init__(
+        self, world: SteppedWorld, target: BodyIndex, moving: set[BodyIndex], carrier: Carrier
+    ) -> None:
+        self._world = world
+        self._carrier = carrier
+        self._settings = world.settings
+        self._target = target
+        self._itself = {name: index for name, index in world.free.items() if index == target}
+        self._others = {name: index for name, index in world.free.items() if index != target}
+        self._still = set(world.free.values()) - moving
+        self._path_length = sum(segment.length for segment in carrier.segments)
+        self._direction = carrier.segments[0].direction_W
+        self._center_start = self._center()
+        self._followed = 0.0
+        self._moved = self._displacements(self._others.values())
+        self._pushed: dict[str, float] = {}
+        self.contact = NO_FINGER_CONTACT
+        self._in_hand = GripMotion(self._settings, self.X_GO())
+        self._touched = False
+        self._blocker = ""
+        self._steps = 0
+        self._steps_per_check = max(1, round(self._settings.poll / world.engine.time_step))
+        self._in_free_air = 0.0
+        self._path_is_blocked = False
+        self._left_to_go = 0.0
+        self._grip_start = 0.0
+
+    def run(self) -> TrialResult:
+        """Runs all phases.
+
+        Raises:
+            RuntimeError: the simulation failed.
+            OtherTouched: it has to run in the complete world.
+        """
+        for phase in (self.approach, self.close, self.lift, self.hold):
+            outcome = phase()
+            if outcome is not None:
+                return self.result(outcome)
+        return self.result(self.held())
+
+    def approach(self) -> Outcome | None:
+        """Brings the hand to the grasp; None if nothing fixed is in its way."""
+        carrier = self._carrier
+        if not carrier.approach_checks:
+            return None
+        target = self._displacements(self._itself.values())
+        carrier.approach()
+        for _ in range(carrier.approach_checks):
+            self.advance(carrier.approach_steps)
+            target.update(self._still)
+            if self._blocker:
+                break
+        self._pushed = self._of_others(self._moved.farthest) | _by_name(
+            self._itself, target.farthest
+        )
+        return Outcome.BLOCKED if self._blocker else None
+
+    def close(self) -> Outcome | None:
+        """Closes until the fingers rest; None if both hold the target then."""
+        settings = self._settings
+        self._grip_start = before = self._world.time
+        self._carrier.close()
+        slow_since, met = math.inf, False
+        timeout = max(settings.close_timeout, 2.0 * self._world.hand_document.closing_time)
+        timeout += self._world.time
+        while self._world.time < timeout:
+            now = self.advance()
+            if self.contact.any and not met:
+                self._grip_start, met = before, True
+            before = now
+            if self._world.finger_speed() > settings.settled_speed:
+                slow_since = math.inf
+            else:
+                slow_since = min(slow_since, now)
+                if now - slow_since >= settings.settled_time - 1e-9:
+                    break
+        if self.contact.both:
+            self._in_hand.grip()
+            return None
+        if self.contact.any:
+            return Outcome.ONE_FINGER
+        return Outcome.CLOSED_EMPTY if self._touched else Outcome.NO_CONTACT
+
+    def lift(self) -> Outcome | None:
+        """Takes the target away, along the retreat and the lift; None if it is held at the end of
+        the way and has to prove itself there."""
+        carrier = self._carrier
+        last = len(carrier.segments) - 1
+        for number, segment in enumerate(carrier.segments):
+            self._turn(segment)
+            for check in range(segment.checks):
+                carrier.lift(number, check)
+                self.advance()
+                if self._blocker:
+                    return Outcome.BLOCKED
+                if not self.contact.any:
+                    return Outcome.SLIPPED
+                if (
+                    number == last
+                    and carrier.carries_full_load(check)
+                    and self._is_decided(segment)
+                ):
+                    return self.held()
+        carrier.stop()
+        if self.contact.both and self.followed() >= MIN_LIFT_SHARE * self._path_length:
+            return None
+        return Outcome.SLIPPED
+
+    def hold(self) -> Outcome | None:
+        """Waits; None if the target is held at the end.
+
+        Unless the whole trial is asked for, the end is early when the grip is steady.
+        """
+        settings = self._settings
+        self._in_hand.begin_again()
+        for _ in range(max(1, round(settings.hold_time / settings.poll))):
+            self.advance()
+            if self._blocker:
+                return Outcome.BLOCKED
+            if not self.contact.any:
+                return Outcome.DROPPED
+            if self._world.engine.whole_trial:
+                continue
+            if self._in_hand.is_steady and self._in_hand.stays_on_one_side(settings.hold_time):
+                break
+        return None if self.contact.both else Outcome.DROPPED
+
+    def held(self) -> Outcome:
+        """The outcome of a target that is held to the end."""
+        if self._in_hand.is_beyond_limits:
+            return Outcome.LIFTED_TURNED
+        disturbed = _largest(self._moved.farthest) > self._settings.disturbance
+        return Outcome.LIFTED_DISTURBED if disturbed else Outcome.LIFTED
+
+    def _turn(self, segment: HandSegment) -> None:
+        """From now on the way of the target counts along a segment."""
+        if segment.direction_W is not self._direction:
+            self._followed, self._center_start = self.followed(), self._center()
+            self._direction = segment.direction_W
+
+    def _is_decided(self, last: HandSegment) -> bool:
+        """Whether the target will be held to the end, as nothing is left that could change it.
+
+        While the hand accelerates upwards, the load on the grip is largest. Friction that does not
+        carry it lets the target go ever faster; so what sticks to the pads then, or, where friction
+        is viscous, creeps and does not get faster, in free air and with all others at rest, is held
+        to the end, too.
+        """
+        if self._world.engine.whole_trial or self._path_is_blocked:
+            return False
+        time = self._carrier.lift_time + self._settings.hold_time
+        in_hand = self._in_hand
+        creeps = self._world.engine.creeps and in_hand.is_coming_to_rest(time)
+        if not self.contact.both or not (in_hand.is_steady or creeps):
+            return False
+        if self._in_free_air < self._settings.steady_time - 1e-9:
+            return False
+        left = last.length - self._carrier.travelled()
+        if self.followed() + left < MIN_LIFT_SHARE * self._path_length:
+            return False
+        if not in_hand.stays_on_one_side(time):
+            return False
+        self._path_is_blocked = not self._carrier.is_free_ahead()
+        if not self._path_is_blocked:
+            self._left_to_go = left
+        return not self._path_is_blocked
+
+    def advance(self, steps: int | None = None) -> float:
+        """Steps to the next look at the contacts; returns the time [s].
+
+        Args:
+            steps: how many; by default those in `poll`.
+
+        Raises:
+            RuntimeError: the simulation failed.
+            OtherTouched: the trial has to run in the complete world.
+        """
+        before = self._time()
+        self._steps += self._steps_per_check if steps is None else steps
+        time = self._time()
+        while True:
+            state = self._world.state() if self._still else None
+            self._carrier.advance_to(time)
+            if not math.isfinite(self._center()[2]):
+                raise RuntimeError(f"the state is not finite at {time:.3f} s")
+            contacts = self._world.look()
+            moving = self._world.robot | (set(self._world.free.values()) - self._still)
+            found = touched_bodies(contacts, moving, self._still)
+            if not found:
+                break
+            self._world.go_back(before, state)
+            found = self._world.close_to(found) & self._still
+            self._still -= found
+            self._world.release(found, self._still)
+        self._record_contacts(contacts)
+        return time
+
+    def _time(self) -> float:
+        """Time of the last look [s]: a whole number of steps, rounded as Drake's own steps are."""
+        return self._steps * self._world.engine.time_step
+
+    def _record_contacts(self, contacts: list[BodyContact]) -> None:
+        """Takes down what the contacts and poses say."""
+        settings, target = self._settings, self._target
+        self.contact = finger_contact(contacts, self._world.fingers, target)
+        self._touched = self._touched or self.contact.any
+        others_rest = self._moved.update(self._still) <= settings.settled_speed * settings.poll
+        self._in_hand.look(self.X_GO(), others_rest=others_rest)
+        self._blocker = self._carrier.watch(contacts)
+        free = not is_touched_from_outside(contacts, self._world.robot | {target})
+        self._in_free_air = self._in_free_air + settings.poll if free else 0.0
+
+    def followed(self) -> float:
+        """How far the target's centre of mass has gone along the segments of the hand's way, that
+        is, risen in a lift straight up [m]."""
+        return self._followed + float((self._center() - self._center_start) @ self._direction)
+
+    def X_GO(self) -> Array:
+        """(4, 4) target in the grasp frame."""
+        X_GO: Array = inverse(self._world.X_WG()) @ self._world.X_WB(self._target)
+        return X_GO
+
+    def _center(self) -> Array:
+        """The target's centre of mass (3,) in the world [m]."""
+        return self._world.center(self._target)
+
+    def _displacements(self, bodies: Iterable[BodyIndex]) -> MotionTracker:
+        """Of bodies, from where they are now."""
+        return MotionTracker(self._world, bodies)
+
+    def _of_others(self, values: Mapping[BodyIndex, float]) -> dict[str, float]:
+        """Motions of the others by name; what can only stand has none."""
+        standing = dict.fromkeys(self._world.standing, 0.0)
+        return standing | _by_name(self._others, values)
+
+    def result(self, outcome: Outcome) -> TrialResult:
+        """The outcome with the margins at this moment."""
+        force = area = math.nan
+        slip, tilt = self._in_hand.since_grip
+        if not math.isnan(slip):
+            closing = self._world.X_WG()[:3, 0]
+            force = float(np.abs(self.contact.force @ closing).min())
+            area = float(self.contact.area.min())
+        margins = Margins(
+            overlap=0.0,
+            slip=slip,
+            tilt=tilt,
+            pad_force=force,
+            patch_area=area,
+            lift=self.followed() + self._left_to_go,
+            others_moved=_largest(self._moved.farthest),
+            others_turned=_largest(self._moved.turned),
+            end_time=self._world.time,
+            tracking_error=self._carrier.tracking_error,
+            tracking_distance=self._carrier.tracking_distance,
+            pushed=max(self._pushed.values(), default=math.nan),
+        )
+        return TrialResult(
+            outcome=outcome,
+            grip_start=self._grip_start,
+            margins=margins,
+            blocker=self._blocker if outcome is Outcome.BLOCKED else "",
+            displacements=self._of_others(self._moved.farthest),
+            turned=self._of_others(self._moved.turned),
+            toppled=", ".join(self._moved.toppled(self._others)),
+            pushed=self._pushed,
+            touched=self._carrier.touched,
+        )
+
+
+def _by_name(
+    bodies: Mapping[str, BodyIndex], values: Mapping[BodyIndex, float]
+) -> dict[str, float]:
+    return {name: values[index] for name, index in bodies.items()}
+
+
+def _largest(values: Mapping[BodyIndex, float]) -> float:
+    return max(values.values(), default=0.0)

@@ -1,0 +1,249 @@
+"""What a trial returns: its outcome, its margins, and the confidence in that outcome.
+
+The confidence comes from an additive logistic model of the margins and of the load on the grip.
+
+Confidence is the probability that trials with other friction, hand pose, object size or lift time,
+and an independent oracle, answer alike whether the target is held. Each engine has curves of its
+own for what it holds and for what it loses. `benchmarks/confidence.py` fits them on some objects,
+writes `calibration.json`, and tests them on the others.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from burg_drake.core import Array, Margins as Margins, Outcome, TrialFindings
+from burg_drake.grasping import Clearance
+from burg_drake.station import ENGINES, Engine
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrialResult(TrialFindings):
+    """One executed trial.
+
+    Attributes:
+        outcome: why it ended.
+        margins: those that a trial measures, see `Margins.of_trial`.
+        grip_start: simulated time at the last look before the closing fingers met the target [s].
+    """
+
+    outcome: Outcome
+    margins: Margins
+    grip_start: float = 0.0
+
+
+def collision_result(screen: Clearance) -> TrialResult:
+    """The result of a trial that did not start, as the open hand is not clear at the grasp,
+    or where its approach begins."""
+    assert screen.outcome is not None
+    margins = Margins(overlap=screen.overlap, clearance=screen.clearance, end_time=0.0)
+    return TrialResult(outcome=screen.outcome, margins=margins, blocker=screen.blocker)
+
+
+def simulation_failure_result(
+    error: BaseException, screen: Clearance, end_time: float
+) -> TrialResult:
+    """The result of a trial that the simulator could not step.
+
+    Args:
+        error: what it said.
+        screen: of the open hand at the grasp.
+        end_time: when that was [s].
+    """
+    return TrialResult(
+        outcome=Outcome.SIMULATION_FAILED,
+        margins=Margins(overlap=0.0, clearance=screen.clearance, end_time=end_time),
+        reason=" ".join(str(error).split()),
+    )
+
+
+PAD_FRICTION_LEVER = 0.0066
+"""Metres. Lever of a pad's friction torque; the confidence curves are fitted with it."""
+MAX_LIMIT_DISTANCE = 0.4
+"""Largest distance from the friction limit, as a logarithm to base 10, that counts."""
+
+
+@dataclass(frozen=True)
+class GripLoad:
+    """What a grip has to carry, and with what.
+
+    Attributes:
+        friction: coefficient between pads and target.
+        force: of each finger [N].
+        mass: of the target [kg].
+        acceleration: of the lift [m/s^2].
+        lever: distance of the centre of mass from the closing axis, seen along the vertical, across
+            that axis [m].
+    """
+
+    friction: float
+    force: float
+    mass: float
+    acceleration: float
+    lever: float
+
+    @classmethod
+    def of(
+        cls,
+        X_WG: Array,
+        p_WCm: Array,
+        *,
+        friction: float,
+        force: float,
+        mass: float,
+        acceleration: float,
+    ) -> GripLoad:
+        """Of a target where it stands.
+
+        Args:
+            X_WG: (4, 4) grasp in the world.
+            p_WCm: (3,) centre of mass in the world [m].
+            friction, force, mass, acceleration: see the attributes.
+        """
+        weight = np.array([0.0, 0.0, -1.0])
+        moment = np.cross(p_WCm - X_WG[:3, 3], weight) @ X_WG[:3, 0]
+        return cls(friction, force, mass, acceleration, abs(float(moment)))
+
+    @property
+    def carried(self) -> float:
+        """The load over what the friction of two pads carries."""
+        return self._share(self.mass * (9.81 + self.acceleration))
+
+    @property
+    def turned(self) -> float:
+        """The moment of the load about the closing axis over what friction carries of it."""
+        return self._share(self.mass * (9.81 + self.acceleration) * self.lever / PAD_FRICTION_LEVER)
+
+    @property
+    def limit(self) -> float:
+        """How far the load is from what friction carries at most: size of the logarithm of their
+        ratio, to the base of 10, `MAX_LIMIT_DISTANCE` at most. At its limit a load that hangs straight below the
+        pads slides down; one that turns more than it pulls comes to hang below them, and is held.
+        """
+        if self.turned > self.carried:
+            return MAX_LIMIT_DISTANCE
+        return min(
+            MAX_LIMIT_DISTANCE, abs(math.log10(max(math.hypot(self.carried, self.turned), 1e-3)))
+        )
+
+    def _share(self, force: float) -> float:
+        max_share = 20.0  # Larger shares tell nothing more.
+        limit = 2.0 * self.friction * self.force
+        return min(max_share, force / limit) if limit > 0.0 else max_share
+
+
+def grip_signs(margins: Margins, load: GripLoad) -> Mapping[str, float]:
+    """Signs of a verdict, by name; logarithms are to the base of 10.
+
+    Args:
+        margins: of a trial, with its end counted from where the fingers met the target.
+        load: of its grip.
+
+    Returns:
+        `carried`, `turned`: logarithms of the load's shares in what friction carries; `limit`: see
+        `GripLoad.limit`; `slip`, `tilt`: logarithms of the motion in the hand [m, rad];
+        `pad_force`: share of the weaker pad's force in that of the hand; `patch_area`: square root
+        [m]; `lift`: how far the target went with the hand [m]; `end_time`: how long after the
+        fingers met the target it was decided [s]. What was not measured, as there was no grip, is
+        0.
+    """
+
+    min_slip = 1e-7  # Metres. Below this the target sticks.
+    min_tilt = 1e-5  # Radians. Below this the target sticks.
+
+    def measured(value: float) -> float:
+        return value if math.isfinite(value) else 0.0
+
+    return {
+        "carried": math.log10(max(load.carried, 1e-3)),
+        "turned": math.log10(max(load.turned, 1e-3)),
+        "limit": load.limit,
+        "slip": math.log10(max(measured(margins.slip), min_slip)),
+        "tilt": math.log10(max(measured(margins.tilt), min_tilt)),
+        "pad_force": measured(margins.pad_force) / load.force,
+        "patch_area": math.sqrt(measured(margins.patch_area)),
+        "lift": measured(margins.lift),
+        "end_time": measured(margins.end_time),
+    }
+
+
+CALIBRATION_FILE = Path(__file__).with_name("calibration.json")
+"""Curves that `benchmarks/confidence.py` has fitted."""
+OUTCOMES_WITHOUT_VERDICT = (Outcome.SIMULATION_FAILED,)
+"""Outcomes that are no verdict of a trial, so that confidence has no meaning."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A piecewise linear term of the logit, constant beyond its ends.
+
+    Attributes:
+        knots: values of the sign, rising.
+        logits: of the term there.
+    """
+
+    knots: Sequence[float]
+    logits: Sequence[float]
+
+    def at(self, value: float) -> float:
+        """The term for a value of the sign."""
+        return float(np.interp(value, self.knots, self.logits))
+
+
+Curves = Mapping[str, Curve]
+"""Terms by sign; their sum is the logit of the confidence."""
+
+
+def confidence(engine: Engine, outcome: Outcome, margins: Margins, load: GripLoad) -> float | None:
+    """Confidence in the verdict of a trial.
+
+    Args:
+        engine: that has executed it.
+        outcome: how it ended.
+        margins: of the trial, with its end counted from where the fingers met it.
+        load: of its grip.
+
+    Returns:
+        Probability; None if no trial decided, or the engine is no preset that is calibrated.
+    """
+    if ENGINES.get(engine.name) != engine:
+        return None
+    return confidence_from_signs(engine.name, outcome, grip_signs(margins, load))
+
+
+def confidence_from_signs(
+    engine: str, outcome: Outcome, signs: Mapping[str, float]
+) -> float | None:
+    """Confidence in a verdict by its signs, see `grip_signs`; None where there is no calibration.
+
+    Args:
+        engine: name of the preset that has executed it.
+        outcome: how it ended.
+        signs: by name.
+    """
+    curves = calibration().get((engine, outcome.held))
+    if curves is None or outcome in OUTCOMES_WITHOUT_VERDICT:
+        return None
+    logit = sum(curve.at(signs[name]) for name, curve in curves.items())
+    return 1.0 / (1.0 + math.exp(-logit))
+
+
+@lru_cache(maxsize=1)
+def calibration(path: Path = CALIBRATION_FILE) -> Mapping[tuple[str, bool], Curves]:
+    """The curves by name of the engine, and by whether it holds the target to the end."""
+    content = json.loads(path.read_text(encoding="utf-8"))
+    return {
+        (engine, held == "held"): {
+            sign: Curve(tuple(curve["knots"]), tuple(curve["logits"]))
+            for sign, curve in curves.items()
+        }
+        for engine, parts in content["engines"].items()
+        for held, curves in parts.items()
+    }

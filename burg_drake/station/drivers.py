@@ -1,0 +1,461 @@
+"""Drivers of arm and hand: they follow a plan, or else position commands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import ModelInstanceIndex
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem, State
+from pydrake.trajectories import PiecewisePolynomial
+
+from burg_drake.core import Array, InvalidInputError
+from burg_drake.scene import Scene
+from burg_drake.station.hand_document import Hand
+from burg_drake.station.hand_model import STALL_FORCE_RATIO
+from burg_drake.station.station_document import Station
+
+
+class SampledMotion(Protocol):
+    """Joint positions over time: `t` (T,) rising from 0 [s], `q` and `v` (T, n)."""
+
+    @property
+    def t(self) -> Array: ...
+
+    @property
+    def q(self) -> Array: ...
+
+    @property
+    def v(self) -> Array: ...
+
+
+@runtime_checkable
+class PlayablePlan(Protocol):
+    """Phases by name, one after the other; the distance between the pads of the open hand [m]; what
+    the plan is for, with the names of its `joints`, or None; and whether that is this scene and
+    station, which is not asked without an origin."""
+
+    @property
+    def phases(self) -> Mapping[str, SampledMotion]: ...
+
+    @property
+    def opening(self) -> float: ...
+
+    @property
+    def origin(self) -> Any: ...
+
+    def require_for(self, scene: Scene, station: Station) -> None: ...
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedCommand:
+    """What a plan wants at some time.
+
+    Attributes:
+        q, v: (n,) positions and velocities of the arm [rad, rad/s].
+        closed: whether the hand closes or holds.
+        opening: distance between the pads if not [m].
+    """
+
+    q: Array
+    v: Array
+    closed: bool
+    opening: float
+
+
+@dataclass(frozen=True, eq=False)
+class _PlannedSamples:
+    q: PiecewisePolynomial
+    duration: float
+    switches: tuple[tuple[float, bool], ...]
+    opening: float
+
+
+class PlanPlayer:
+    """Plays plans that were made for one arm in one scene.
+
+    Args:
+        joints: names of the arm's n joints, in order.
+        scene, station: what plans have to be for.
+    """
+
+    def __init__(self, joints: tuple[str, ...], scene: Scene, station: Station) -> None:
+        self._joints, self._scene, self._station = joints, scene, station
+        self._plan: object = None
+        self._samples: _PlannedSamples | None = None
+
+    def command(self, plan: object, time: float) -> PlannedCommand | None:
+        """What arm and hand are to do.
+
+        Args:
+            plan: a `PlayablePlan`, or None.
+            time: since its start [s].
+
+        Returns:
+            The command; None without a plan and before its start. After its end a plan stays where
+            it ends.
+
+        Raises:
+            InvalidInputError: it is not a plan, or one for another arm, scene or station; or the
+                time is not a number.
+        """
+        if plan is None:
+            return None
+        if self._samples is None or plan is not self._plan:
+            self._samples, self._plan = self._checked(plan), plan
+        if np.isnan(time):
+            raise InvalidInputError(
+                "plan.start_time is nan; give the time in seconds at which the plan begins"
+            )
+        if time < 0.0:
+            return None
+        samples = self._samples
+        when = min(time, samples.duration)
+        q = samples.q.value(when)[:, 0]
+        v = samples.q.EvalDerivative(when, 1)[:, 0] if time < samples.duration else np.zeros(len(q))
+        closed = [closing for start, closing in samples.switches if start <= time]
+        return PlannedCommand(q, v, bool(closed and closed[-1]), samples.opening)
+
+    def _checked(self, plan: object) -> _PlannedSamples:
+        if not isinstance(plan, PlayablePlan):
+            got = type(plan).__name__
+            if hasattr(plan, "outcome"):  # a planner's answer where it found no plan
+                got += f" ({plan.outcome})"
+            raise InvalidInputError(f"port 'plan' got a {got}; give a burg_drake Plan")
+        if plan.origin is not None:
+            self._check_joints(plan.origin.joints)
+            plan.require_for(self._scene, self._station)
+        opening = plan.opening
+        if np.isnan(opening):
+            opening = self._station.hand.opening[1]
+        return _sample_plan(plan.phases, len(self._joints), opening)
+
+    def _check_joints(self, joints: Sequence[str]) -> None:
+        if tuple(joints) != self._joints:
+            raise InvalidInputError(
+                f"the plan moves the joints {', '.join(joints)}; the arm of station"
+                f" {self._station.name!r} has {', '.join(self._joints)}"
+            )
+
+
+def _sample_plan(
+    phases: Mapping[str, SampledMotion], joints: int, opening: float
+) -> _PlannedSamples:
+    """Joins phases to one trajectory, and notes when the hand closes and opens."""
+    max_gap = 1e-6  # Radians between the end of a phase and the start of the next.
+    times, positions, velocities = [np.zeros(1)], list[Array](), list[Array]()
+    switches, end, before = [], 0.0, ""
+    for name, phase in phases.items():
+        if phase.q.shape[1] != joints:
+            raise InvalidInputError(
+                f"the plan's {name} moves {phase.q.shape[1]} joints; the arm has {joints}"
+            )
+        if not positions:
+            positions.append(phase.q[:1])
+            velocities.append(phase.v[:1])
+        gap = float(np.abs(phase.q[0] - positions[-1][-1]).max())
+        if gap > max_gap:
+            raise InvalidInputError(
+                f"the plan's {name} begins {gap:.2g} rad from where its {before} ends"
+            )
+        if name in ("close", "open"):
+            switches.append((end, name == "close"))
+        times.append(end + phase.t[1:])
+        positions.append(phase.q[1:])
+        velocities.append(phase.v[1:])
+        end, before = float(times[-1][-1]), name
+    if not positions:
+        raise InvalidInputError("the plan has no phases")
+    t, q, v = (np.concatenate(rows) for rows in (times, positions, velocities))
+    return _PlannedSamples(
+        PiecewisePolynomial.CubicHermite(t, q.T, v.T), end, tuple(switches), opening
+    )
+
+
+class ArmDriver(LeafSystem):
+    """Follows a plan that has begun, else a position or a desired state; without any of them it
+    holds what was commanded last.
+
+    The velocity that goes with a position is its difference from that of one step before, and 0 in
+    the first step. Drake's `StateInterpolatorWithDiscreteDerivative` does the same a step later.
+
+    Ports:
+        position: (n) [rad].
+        desired_state: (2 n) positions and velocities.
+        plan, plan.start_time: see `PlanPlayer`; the time [s] is 0 if not connected.
+        state: (2 n) where the arm is; read when a simulation begins.
+        command: (2 n) positions and velocities (output).
+    """
+
+    def __init__(
+        self, joints: tuple[str, ...], home: Array, period: float, ahead: float, player: PlanPlayer
+    ) -> None:
+        """Declares ports, state and events.
+
+        Args:
+            joints: names of the n joints.
+            home: (n,) what is held before a simulation has begun [rad].
+            period: of the simulation's steps [s].
+            ahead: plans are commanded for so much later [s].
+            player: of plans for this arm.
+        """
+        super().__init__()
+        n = len(joints)
+        self._joints, self._period, self._ahead, self._player = joints, period, ahead, player
+        self._position = self.DeclareVectorInputPort("position", n)
+        self._desired_state = self.DeclareVectorInputPort("desired_state", 2 * n)
+        self._plan = self.DeclareAbstractInputPort("plan", Value[object]())
+        self._start = self.DeclareVectorInputPort("plan.start_time", 1)
+        self._state = self.DeclareVectorInputPort("state", 2 * n)
+        # The last command, and whether there has been one.
+        self._last = self.DeclareDiscreteState(np.append(home, 0.0))
+        self.DeclareInitializationDiscreteUpdateEvent(self._begin)
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._remember)
+        self._command = self.DeclareVectorOutputPort("command", 2 * n, self._calc)
+
+    def _begin(self, context: Context, values: DiscreteValues) -> None:
+        n = len(self._joints)
+        values.set_value(self._last, np.append(self._state.Eval(context)[:n], 0.0))
+
+    def _remember(self, context: Context, values: DiscreteValues) -> None:
+        q = self._command.Eval(context)[: len(self._joints)]
+        if self._planned(context) is not None:
+            self._check_jump(q - context.get_discrete_state(self._last).value()[:-1])
+        values.set_value(self._last, np.append(q, 1.0))
+
+    def _check_jump(self, jump: Array) -> None:
+        max_jump = 0.05  # Radians from the last command; the fastest arms move 0.015 in a step.
+        worst = int(np.abs(jump).argmax())
+        if abs(jump[worst]) > max_jump:
+            raise InvalidInputError(
+                f"the plan starts with {self._joints[worst]} at an angle "
+                f"{abs(jump[worst]):.2g} rad away from the present one; bring the arm to"
+                " the start of the plan, or set plan.start_time"
+            )
+
+    def _calc(self, context: Context, output: BasicVector) -> None:
+        last = context.get_discrete_state(self._last).value()
+        source, q, v = "the last command", last[:-1], np.zeros(len(self._joints))
+        position, desired_state = (
+            port.HasValue(context) for port in (self._position, self._desired_state)
+        )
+        if position and desired_state:
+            raise InvalidInputError(
+                "ports arm.position and arm.desired_state are both connected; connect one of them"
+            )
+        planned = self._planned(context)
+        if planned is not None:
+            source, q, v = "the plan", planned.q, planned.v
+        elif desired_state:
+            source = "arm.desired_state"
+            q, v = np.split(self._desired_state.Eval(context), 2)
+        elif position:
+            source, before, q = "arm.position", q, self._position.Eval(context)
+            v = (q - before) / self._period if last[-1] else v
+        if not np.isfinite([q, v]).all():
+            joint = int(np.argmin(np.isfinite(q) & np.isfinite(v)))
+            raise InvalidInputError(
+                f"{source} asks {self._joints[joint]} for {q[joint]:g} rad and "
+                f"{v[joint]:g} rad/s; give finite numbers"
+            )
+        output.SetFromVector(np.concatenate([q, v]))
+
+    def _planned(self, context: Context) -> PlannedCommand | None:
+        """What the plan wants now; None without one, and before it starts."""
+        if not self._plan.HasValue(context):
+            return None
+        start = self._start.Eval(context)[0] if self._start.HasValue(context) else 0.0
+        time = context.get_time() - start
+        ahead = self._ahead if time >= 0.0 else 0.0
+        return self._player.command(self._plan.Eval(context), time + ahead)
+
+
+@dataclass(frozen=True, eq=False)
+class Fingers:
+    """The two fingers in the order of their actuators.
+
+    Attributes:
+        hand: the document.
+        q, v: where they are in the hand's positions, and in its positions and velocities.
+        dofs: where they are among all velocities of the plant.
+        closed, open: (2,) positions [m].
+    """
+
+    hand: Hand
+    q: Array
+    v: Array
+    dofs: Array
+    closed: Array
+    open: Array
+
+    @classmethod
+    def of(cls, plant: MultibodyPlant, model: ModelInstanceIndex, hand: Hand) -> Fingers:
+        """Finds them in a finalized plant."""
+        actuators = map(plant.get_joint_actuator, plant.GetJointActuatorIndices(model))
+        joints = [actuator.joint() for actuator in actuators]
+        by_name = {finger.joint: finger for finger in hand.fingers}
+        fingers = [by_name[joint.name()] for joint in joints]
+        positions = plant.GetPositionsFromArray(model, np.arange(plant.num_positions()))
+        velocities = plant.GetVelocitiesFromArray(model, np.arange(plant.num_velocities()))
+        q = [int(np.flatnonzero(positions == j.position_start())[0]) for j in joints]
+        v = [int(np.flatnonzero(velocities == j.velocity_start())[0]) for j in joints]
+        return cls(
+            hand=hand,
+            q=np.array(q),
+            v=len(positions) + np.array(v),
+            dofs=np.array([joint.velocity_start() for joint in joints]),
+            closed=np.array([finger.closed for finger in fingers]),
+            open=np.array([finger.open for finger in fingers]),
+        )
+
+    @property
+    def towards_closed(self) -> Array:
+        """(2,) signs of the joints' velocities while the hand closes."""
+        return np.sign(self.closed - self.open)
+
+    def at(self, distance: float) -> Array:
+        """(2,) positions with the pads at a distance [m]."""
+        low, high = self.hand.opening
+        return self.closed + (distance - low) / (high - low) * (self.open - self.closed)
+
+    def distance(self, q: Array) -> float:
+        """Distance between the pads [m] at positions (2,)."""
+        low, high = self.hand.opening
+        share = (q - self.closed) / (self.open - self.closed)
+        return float(low + share.mean() * (high - low))
+
+
+@dataclass(frozen=True, eq=False)
+class _FingerCommand:
+    """Positions that the fingers go to, (2,) [m], and with which velocities now, (2,) [m/s]."""
+
+    q: Array
+    v: Array
+
+
+class HandDriver(LeafSystem):
+    """Follows a plan that has begun, else a distance between the pads or a desired state; without
+    any of them it holds what was commanded last.
+
+    The fingers' servos follow a velocity with the document's force at most. A limit below that is
+    kept by a force against the motion that makes up the difference, and that the servos are told
+    of: free fingers are as fast as without it, and what they press on feels the limit.
+
+    Ports:
+        position: (1) distance between the pads [m].
+        force_limit: (1) force of each pad [N], the document's if not connected.
+        desired_state: (4) as the servos take it; they follow its velocities.
+        plan, plan.start_time: see `PlanPlayer`; the time [s] is 0 if not connected.
+        state: (2 k) of the hand's model.
+        command: (4) for the servos (output).
+        brake: (v) generalized force on the whole plant that limits the fingers' (output).
+        braked: (2) what of it acted in the last step [N] (output).
+    """
+
+    def __init__(
+        self, plant: MultibodyPlant, model: ModelInstanceIndex, fingers: Fingers, player: PlanPlayer
+    ) -> None:
+        """Declares ports, state and events; the arguments are those of the diagram."""
+        super().__init__()
+        hand = fingers.hand
+        self._fingers, self._player, self._size = fingers, player, plant.num_velocities()
+        self._damping = STALL_FORCE_RATIO * hand.force / hand.closing_speed
+        self._position = self.DeclareVectorInputPort("position", 1)
+        self._force_limit = self.DeclareVectorInputPort("force_limit", 1)
+        self._desired_state = self.DeclareVectorInputPort("desired_state", 4)
+        self._plan = self.DeclareAbstractInputPort("plan", Value[object]())
+        self._start = self.DeclareVectorInputPort("plan.start_time", 1)
+        self._state = self.DeclareVectorInputPort("state", plant.num_multibody_states(model))
+        # Where the fingers are held, and the brake of the last step.
+        self._held = self.DeclareDiscreteState(fingers.open)
+        self._braked = self.DeclareDiscreteState(np.zeros(2))
+        self.DeclareInitializationDiscreteUpdateEvent(self._begin)
+        # A discrete update would come after the plant's step, which is an unrestricted one, and
+        # would remember the brake of the step to come.
+        self.DeclarePeriodicUnrestrictedUpdateEvent(plant.time_step(), 0.0, self._remember)
+        self.DeclareVectorOutputPort("command", 4, self._calc_command)
+        self._brake = self.DeclareVectorOutputPort("brake", self._size, self._calc_brake)
+        self.DeclareStateOutputPort("braked", self._braked)
+
+    def _begin(self, context: Context, values: DiscreteValues) -> None:
+        values.set_value(self._held, self._state.Eval(context)[self._fingers.q])
+        values.set_value(self._braked, np.zeros(2))
+
+    def _remember(self, context: Context, state: State) -> None:
+        values = state.get_mutable_discrete_state()
+        wanted = self._finger_command(context)
+        values.set_value(self._held, wanted.q)
+        values.set_value(self._braked, self._brake.Eval(context)[self._fingers.dofs])
+
+    def _calc_command(self, context: Context, output: BasicVector) -> None:
+        wanted = self._finger_command(context)
+        eased = wanted.v - self._against(context, wanted.v) / self._damping
+        output.SetFromVector([*wanted.q, *eased])
+
+    def _calc_brake(self, context: Context, output: BasicVector) -> None:
+        brake = np.zeros(self._size)
+        brake[self._fingers.dofs] = self._against(context, self._finger_command(context).v)
+        output.SetFromVector(brake)
+
+    def _against(self, context: Context, speed: Array) -> Array:
+        """(2,) force against the motion that is wanted [N]."""
+        most = self._fingers.hand.force
+        limit = most
+        if self._force_limit.HasValue(context):
+            limit = float(self._force_limit.Eval(context)[0])
+            if not 0.0 < limit <= most:
+                raise InvalidInputError(
+                    f"hand.force_limit is {limit:g} N; give more than 0 and at most the"
+                    f" {most:g} N of {self._fingers.hand.name!r}"
+                )
+        return np.asarray(-np.sign(speed) * (most - limit))
+
+    def _finger_command(self, context: Context) -> _FingerCommand:
+        position_gain = 50.0  # Finger speed over distance from the goal, 1/s.
+        position, desired_state = (
+            port.HasValue(context) for port in (self._position, self._desired_state)
+        )
+        if position and desired_state:
+            raise InvalidInputError(
+                "ports hand.position and hand.desired_state are both connected; connect one of them"
+            )
+        fingers, fastest = self._fingers, self._fingers.hand.closing_speed
+        q, planned = self._state.Eval(context)[self._fingers.q], self._planned(context)
+        if planned is not None and planned.closed:
+            return _FingerCommand(fingers.closed, fingers.towards_closed * fastest)
+        if planned is None and desired_state:
+            speeds = self._desired_state.Eval(context)[2:]
+            if not np.isfinite(speeds).all():
+                raise InvalidInputError(
+                    f"hand.desired_state asks for finger speeds of {speeds.tolist()} m/s;"
+                    " give finite numbers"
+                )
+            return _FingerCommand(q, speeds)
+        goal = context.get_discrete_state(self._held).value()
+        if planned is not None:
+            goal = fingers.at(self._distance(planned.opening, "the plan's opening"))
+        elif position:
+            wanted = float(self._position.Eval(context)[0])
+            goal = fingers.at(self._distance(wanted, "hand.position"))
+        return _FingerCommand(goal, np.clip(position_gain * (goal - q), -fastest, fastest))
+
+    def _planned(self, context: Context) -> PlannedCommand | None:
+        """What the plan wants now; None without one, and before it starts."""
+        if not self._plan.HasValue(context):
+            return None
+        start = self._start.Eval(context)[0] if self._start.HasValue(context) else 0.0
+        return self._player.command(self._plan.Eval(context), context.get_time() - start)
+
+    def _distance(self, wanted: float, source: str) -> float:
+        tolerance = 1e-3  # Metres beyond the range of the hand.
+        low, high = self._fingers.hand.opening
+        if not low - tolerance <= wanted <= high + tolerance:
+            raise InvalidInputError(
+                f"{source} is {wanted:g} m; the pads of {self._fingers.hand.name!r} can"
+                f" be {low:g} to {high:g} m apart"
+            )
+        return float(np.clip(wanted, low, high))

@@ -1,0 +1,497 @@
+"""The hand in a plant: servos, force limits, coupling, and a check of document against model."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from pydrake.geometry import Convex, GeometryId, Mesh, SceneGraphInspector, VolumeMesh
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import (
+    JointActuator,
+    ModelInstanceIndex,
+    PdControllerGains,
+    PrismaticJoint,
+    RigidBody,
+)
+from pydrake.planning import RobotDiagramBuilder
+from pydrake.systems.analysis import Simulator
+
+from burg_drake.core import (
+    NO_PACKAGES,
+    Array,
+    InvalidInputError,
+    Packages,
+    content_hash,
+    inverse,
+    referenced_files,
+    referenced_packages,
+    suggest_names,
+    transform_points,
+)
+from burg_drake.formats import Gripper, GripperJoint
+from burg_drake.station.hand_document import Finger, Hand
+from burg_drake.station.model_file import add_models, require_free_model, without_hydroelastic
+from burg_drake.station.station_document import Station
+
+STALL_FORCE_RATIO = 1.25
+"""Servo force at standstill over grip force; above 1, the finger presses with the limit."""
+
+
+@dataclass(frozen=True, eq=False)
+class HandModel:
+    """A hand in a plant.
+
+    Attributes:
+        instance: its model instance.
+        body: the link that the arm carries.
+        fingers, joints, pads: of the two fingers, in the order of the document.
+    """
+
+    instance: ModelInstanceIndex
+    body: RigidBody
+    fingers: tuple[RigidBody, RigidBody]
+    joints: tuple[PrismaticJoint, PrismaticJoint]
+    pads: tuple[GeometryId, GeometryId]
+
+
+def add_hand(
+    builder: RobotDiagramBuilder,
+    hand: Hand,
+    path: Path,
+    packages: Packages = NO_PACKAGES,
+    *,
+    simulated: bool = True,
+) -> HandModel:
+    """Adds a hand with its servos.
+
+    Args:
+        builder: its plant is not finalized.
+        hand: the document.
+        path: the model file.
+        packages: what a station says of packages.
+        simulated: whether contact will be simulated.
+
+    Raises:
+        InvalidInputError: the model cannot be loaded, is fixed in the world, lacks what the
+            document names, or is weaker or slower than the document says.
+    """
+    plant = builder.plant()
+    constraints = plant.num_constraints()
+    try:
+        edit = None if simulated else without_hydroelastic
+        (instance,) = add_models(builder.parser(), path, packages, edit=edit)
+    except InvalidInputError:
+        raise
+    except (RuntimeError, ValueError) as error:
+        raise InvalidInputError(
+            f"hand {hand.name!r}: {path} cannot be loaded as one model"
+            f" ({' '.join(str(error).split())})"
+        ) from error
+    require_free_model(plant, instance, path)
+    found = find_hand(plant, builder.scene_graph().model_inspector(), hand, instance)
+    for finger, joint in zip(hand.fingers, found.joints, strict=True):
+        _add_servo(plant, hand, finger, joint)
+    driven = [a.joint().name() for a in _all_actuators(plant) if a.model_instance() == instance]
+    if len(driven) != 2:
+        raise InvalidInputError(
+            f"hand {hand.name!r}: {hand.model} has actuators for "
+            f"{', '.join(sorted(driven))}; only the joints of the two fingers may have"
+            " one"
+        )
+    if hand.coupled and plant.num_constraints() == constraints:
+        first, second = hand.fingers
+        ratio = (first.open - first.closed) / (second.open - second.closed)
+        offset = first.closed - ratio * second.closed
+        plant.AddCouplerConstraint(*found.joints, ratio, offset)
+    return found
+
+
+def find_hand(
+    plant: MultibodyPlant,
+    inspector: SceneGraphInspector,
+    hand: Hand,
+    instance: ModelInstanceIndex,
+) -> HandModel:
+    """Looks up what a document names in a plant.
+
+    Raises:
+        InvalidInputError: the model has no such link, joint or pad.
+    """
+    bodies = {b.name(): b for b in map(plant.get_body, plant.GetBodyIndices(instance))}
+    joints = {j.name(): j for j in map(plant.get_joint, plant.GetJointIndices(instance))}
+    sliding = {name: j for name, j in joints.items() if isinstance(j, PrismaticJoint)}
+
+    def pad(index: int, finger: Finger, body: RigidBody) -> GeometryId:
+        geometries = {
+            inspector.GetName(g).split("::")[-1]: g
+            for g in plant.GetCollisionGeometriesForBody(body)
+        }
+        _require_known_name(hand, f"fingers[{index}].pad", finger.pad, geometries)
+        return geometries[finger.pad]
+
+    _require_known_name(hand, "body", hand.body, bodies)
+    for i, finger in enumerate(hand.fingers):
+        _require_known_name(hand, f"fingers[{i}].body", finger.body, bodies)
+        if finger.joint in joints and finger.joint not in sliding:
+            kind = joints[finger.joint].type_name()
+            raise InvalidInputError(
+                f"hand {hand.name!r}: fingers[{i}].joint {finger.joint!r} is {kind} in its model"
+                f" {hand.model}; fingers have to be on prismatic joints: model a hand whose fingers"
+                " turn by two that slide, with the pads of the real one"
+                " (https://burg-drake.github.io/burg_drake/reference/hands.html)"
+            )
+        _require_known_name(hand, f"fingers[{i}].joint", finger.joint, sliding)
+    one, other = hand.fingers
+    return HandModel(
+        instance=instance,
+        body=bodies[hand.body],
+        fingers=(bodies[one.body], bodies[other.body]),
+        joints=(sliding[one.joint], sliding[other.joint]),
+        pads=(pad(0, one, bodies[one.body]), pad(1, other, bodies[other.body])),
+    )
+
+
+def _require_known_name(hand: Hand, key: str, name: str, known: Iterable[str]) -> None:
+    if name not in known:
+        raise InvalidInputError(
+            f"hand {hand.name!r}: {key} {name!r} is not in its model {hand.model};"
+            f" {suggest_names(name, known)}"
+        )
+
+
+def _add_servo(plant: MultibodyPlant, hand: Hand, finger: Finger, joint: PrismaticJoint) -> None:
+    """Gives a finger its velocity servo, and an actuator where the model has none."""
+    actuator = _find_actuator(plant, joint)
+    if hand.force > actuator.effort_limit():
+        raise InvalidInputError(
+            f"hand {hand.name!r}: force is {hand.force:g} N, but the effort limit of"
+            f" joint {finger.joint!r} in {hand.model} is {actuator.effort_limit():g} N"
+        )
+    fastest = float(joint.velocity_upper_limits()[0])
+    if hand.closing_speed > fastest:
+        raise InvalidInputError(
+            f"hand {hand.name!r}: closing_speed is {hand.closing_speed:g} m/s, but the"
+            f" velocity limit of joint {finger.joint!r} in {hand.model} is {fastest:g}"
+            " m/s"
+        )
+    gain = STALL_FORCE_RATIO * hand.force / hand.closing_speed
+    actuator.set_controller_gains(PdControllerGains(p=0.0, d=gain))
+    actuator.set_effort_limit(hand.force)
+
+
+def _all_actuators(plant: MultibodyPlant) -> list[JointActuator]:
+    return [plant.get_joint_actuator(index) for index in plant.GetJointActuatorIndices()]
+
+
+def _find_actuator(plant: MultibodyPlant, joint: PrismaticJoint) -> JointActuator:
+    for actuator in _all_actuators(plant):
+        if actuator.joint().index() == joint.index():
+            return actuator
+    return plant.AddJointActuator(joint.name(), joint)
+
+
+class HandCheck:
+    """Hand check."""
+
+    length_tolerance = 5e-4  # Metres between lengths of document and model.
+    time_step = 1e-3  # Seconds.
+    steps = 20  # Steps in which released fingers show whether they are coupled.
+    rest_tolerance = 1e-6  # Metres that a finger at rest moves in these steps.
+    displacement = 2e-3  # Metres by which one finger is displaced.
+
+
+@dataclass(frozen=True)
+class HandFigures:
+    """What a hand measures.
+
+    Attributes:
+        opening: smallest and largest distance between the pads [m].
+        pad_bounds: smallest and largest coordinates of the first pad in the grasp frame G [m];
+            those along x depend on how far the hand is open.
+        pad_modulus: hydroelastic modulus of the first pad [Pa].
+    """
+
+    opening: tuple[float, float]
+    pad_bounds: tuple[tuple[float, float, float], tuple[float, float, float]]
+    pad_modulus: float
+
+    @property
+    def pad_size(self) -> tuple[float, float, float]:
+        """Extents of the first pad in G [m]."""
+        (x0, y0, z0), (x1, y1, z1) = self.pad_bounds
+        return x1 - x0, y1 - y0, z1 - z0
+
+
+def check_hand(
+    hand: Hand, path: Path, document: Path | None = None, packages: Packages = NO_PACKAGES
+) -> HandFigures:
+    """Holds a hand document against its model file; a pair that was found right is remembered.
+
+    Args:
+        hand: the document.
+        path: the model file.
+        document: the document's file, for messages.
+        packages: what a station says of packages.
+
+    Raises:
+        InvalidInputError: they do not fit; one line says where.
+    """
+    try:
+        found = tuple(sorted(referenced_packages(path, packages).items()))
+        return _check_document(
+            hand, path, content_hash([path, *referenced_files(path, packages)]), found
+        )
+    except InvalidInputError as error:
+        if document is None:
+            raise
+        raise InvalidInputError(f"{document}: {error}") from error
+
+
+@lru_cache(maxsize=16)
+def _check_document(
+    hand: Hand, path: Path, content: str, found: tuple[tuple[str, Path], ...]
+) -> HandFigures:
+    bench = _HandBench(hand, path, Packages(dict(found)))
+    bench.check_limits()
+    bench.check_pads()
+    bench.check_closing_direction()
+    largest, smallest = bench.check_opening("open"), bench.check_opening("closed")
+    bench.check_approach()
+    bench.check_coupling()
+    (x0, y0, z0), (x1, y1, z1) = bench.bounds(0).tolist()
+    bounds = (x0, y0, z0), (x1, y1, z1)
+    return HandFigures((smallest, largest), bounds, bench.pad_modulus())
+
+
+class _HandBench:
+    """The hand alone, its body held fast, without gravity."""
+
+    def __init__(self, hand: Hand, path: Path, packages: Packages) -> None:
+        self._hand = hand
+        builder = RobotDiagramBuilder(time_step=HandCheck.time_step)
+        self._plant = plant = builder.plant()
+        with (
+            _silence_drake_log()
+        ):  # what the parser warns of is said when the hand is added to a scene
+            instance = add_hand(builder, hand, path, packages).instance
+        body = plant.GetBodyByName(hand.body, instance)
+        plant.WeldFrames(plant.world_frame(), body.body_frame(), RigidTransform())
+        plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, 0.0])
+        plant.Finalize()
+        self._diagram = builder.Build()
+        self._inspector = self._diagram.scene_graph().model_inspector()
+        self._model = find_hand(plant, self._inspector, hand, instance)
+        self._simulator = Simulator(self._diagram)
+        self._plant_context = plant.GetMyMutableContextFromRoot(
+            self._simulator.get_mutable_context()
+        )
+
+    def check_limits(self) -> None:
+        """`closed` and `open` are within the joints' limits."""
+        for i, (finger, joint) in enumerate(
+            zip(self._hand.fingers, self._model.joints, strict=True)
+        ):
+            low, high = joint.position_lower_limits()[0], joint.position_upper_limits()[0]
+            for key in ("closed", "open"):
+                q = getattr(finger, key)
+                if not low - HandCheck.length_tolerance <= q <= high + HandCheck.length_tolerance:
+                    raise self._error(
+                        f"fingers[{i}].{key} is {q:g} m, but joint {finger.joint!r} goes"
+                        f" from {low:g} to {high:g} m"
+                    )
+
+    def check_pads(self) -> None:
+        """The pads have an elastic volume, without which rigid objects touch them in points."""
+        for i, pad in enumerate(self._model.pads):
+            if not isinstance(self._inspector.maybe_get_hydroelastic_mesh(pad), VolumeMesh):
+                raise self._error(
+                    f"fingers[{i}].pad {self._hand.fingers[i].pad!r} is not compliant; give it"
+                    " drake:compliant_hydroelastic and a drake:hydroelastic_modulus (1e7 for"
+                    " rubber) in its drake:proximity_properties"
+                )
+
+    def check_closing_direction(self) -> None:
+        """The fingers move apart along x of G, in either order."""
+        gaps = []
+        for closed in (0.0, 1.0):
+            self._put(self._at(closed))
+            one, other = (self.bounds(i).mean(axis=0) for i in (0, 1))
+            gaps.append(one - other)
+        gap = gaps[0] - gaps[1]
+        if np.hypot(gap[1], gap[2]) > HandCheck.length_tolerance:
+            x, y, z = np.round(gap / np.linalg.norm(gap), 2) + 0.0
+            raise self._error(
+                "x of G is not the closing direction: the fingers open along"
+                f" ({x:.2f}, {y:.2f}, {z:.2f}) of G; turn X_HG"
+            )
+
+    def check_opening(self, end: Literal["open", "closed"]) -> float:
+        """With the fingers at one end of their ways the pads are to both sides of G, as far apart
+        as the document says; returns their distance [m]."""
+        opening = self._hand.opening[1 if end == "open" else 0]
+        self._put(self._at(0.0 if end == "open" else 1.0))
+        one, other = self.bounds(0), self.bounds(1)
+        if one[:, 0].mean() < other[:, 0].mean() - HandCheck.length_tolerance:
+            raise self._error(
+                "the first finger is on the side of -x of G; exchange the fingers, or turn X_HG by"
+                " 180 deg about its z"
+            )
+        distance, middle = one[0, 0] - other[1, 0], (one[0, 0] + other[1, 0]) / 2
+        if abs(distance - opening) > HandCheck.length_tolerance:
+            raise self._error(
+                f"with both fingers {end} the pads are {_format_mm(distance)} apart along x of"
+                f" G, but opening says {_format_mm(opening)}"
+            )
+        if abs(middle) > HandCheck.length_tolerance:
+            raise self._error(
+                f"with both fingers {end} the middle between the pads is at x = "
+                f"{_format_mm(middle)} of G; it must be at 0"
+            )
+        for i, bounds in enumerate((one, other)):
+            for name, (low, high) in zip("yz", bounds.T[1:], strict=True):
+                if not low - HandCheck.length_tolerance <= 0.0 <= high + HandCheck.length_tolerance:
+                    raise self._error(
+                        f"G is not between the pads: with both fingers {end} the pad of"
+                        f" fingers[{i}] reaches from {_format_mm(low)} to {_format_mm(high)} along {name} of G"
+                    )
+        return float(distance)
+
+    def check_approach(self) -> None:
+        """The hand's body lies behind G, seen along its +z."""
+        X_GH = inverse(self._hand.X_HG.matrix())
+        geometries = self._plant.GetCollisionGeometriesForBody(self._model.body)
+        heights = [self._points(X_GH, geometry)[:, 2].mean() for geometry in geometries]
+        if heights and max(heights) > 0.0:
+            raise self._error(
+                f"+z of G, the approach direction, points towards {self._hand.body!r}; turn X_HG"
+            )
+
+    def check_coupling(self) -> None:
+        """Fingers that the document places stay; of one that is put aside the other one follows,
+        if they are coupled."""
+        one, other = self._at(0.5)
+        aside = one + HandCheck.displacement * np.sign(
+            self._hand.fingers[0].open - self._hand.fingers[0].closed
+        )
+        follows = self._moves((aside, other))
+        if follows and not self._hand.coupled:
+            raise self._error(
+                "coupled is false, but in the model one finger follows the other; write"
+                " coupled: true"
+            )
+        if not follows and self._hand.coupled:
+            raise self._error(
+                "coupled is true, but no constraint of the model couples the fingers; write"
+                " coupled: false"
+            )
+        for closed in (0.25, 0.75):
+            if self._moves(self._at(closed)):
+                raise self._error(
+                    "the mimic joint of the model moves the fingers in another"
+                    " proportion than closed and open of the two fingers say"
+                )
+
+    def bounds(self, index: int) -> Array:
+        """(2, 3) smallest and largest coordinates of a finger's pad in G [m], as it stands."""
+        X_HB = self._plant.CalcRelativeTransform(
+            self._plant_context,
+            self._model.body.body_frame(),
+            self._model.fingers[index].body_frame(),
+        )
+        X_GB = inverse(self._hand.X_HG.matrix()) @ X_HB.GetAsMatrix4()
+        p_GV = self._points(X_GB, self._model.pads[index])
+        return np.stack([p_GV.min(axis=0), p_GV.max(axis=0)])
+
+    def pad_modulus(self) -> float:
+        """Hydroelastic modulus of the first pad [Pa]."""
+        properties = self._inspector.GetProximityProperties(self._model.pads[0])
+        return float(properties.GetProperty("hydroelastic", "hydroelastic_modulus"))
+
+    def _points(self, X_GB: Array, geometry: GeometryId) -> Array:
+        """(N, 3) corners of a geometry of body B in G [m]; those of the smallest box about it if it
+        is round."""
+        X_BC = self._inspector.GetPoseInFrame(geometry).GetAsMatrix4()
+        shape = self._inspector.GetShape(geometry)
+        if isinstance(shape, (Mesh, Convex)):
+            hull = self._inspector.GetConvexHull(geometry)
+            p_CV = np.array([hull.vertex(i) for i in range(hull.num_vertices())])
+            return transform_points(X_GB @ X_BC, p_CV)
+        box = self._inspector.GetObbInGeometryFrame(geometry)
+        corners = np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, -1).T * box.half_width()
+        return transform_points(X_GB @ X_BC @ box.pose().GetAsMatrix4(), corners)
+
+    def _at(self, closed: float) -> tuple[float, float]:
+        """Joint positions of the document, from open (0) to closed (1) [m]."""
+        one, other = (f.open + closed * (f.closed - f.open) for f in self._hand.fingers)
+        return one, other
+
+    def _put(self, positions: tuple[float, float]) -> None:
+        for joint, position in zip(self._model.joints, positions, strict=True):
+            joint.set_translation(self._plant_context, position)
+            joint.set_translation_rate(self._plant_context, 0.0)
+
+    def _moves(self, positions: tuple[float, float]) -> bool:
+        """Whether the second finger leaves its place when both are let go."""
+        self._simulator.get_mutable_context().SetTime(0.0)
+        self._put(positions)
+        self._simulator.Initialize()
+        self._simulator.AdvanceTo(HandCheck.steps * HandCheck.time_step)
+        q = self._model.joints[1].get_translation(self._plant_context)
+        return bool(abs(q - positions[1]) > HandCheck.rest_tolerance)
+
+    def _error(self, message: str) -> InvalidInputError:
+        return InvalidInputError(f"hand {self._hand.name!r}: {message} ({self._hand.model})")
+
+
+@contextmanager
+def _silence_drake_log() -> Iterator[None]:
+    """Keeps Drake's warnings off the screen."""
+    logger = logging.getLogger("drake")
+    level = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
+
+
+def _format_mm(length: float) -> str:
+    return f"{round(1e3 * length, 1) + 0.0:.1f} mm"
+
+
+def gripper_of(
+    hand: Hand, path: Path, document: Path | None = None, packages: Packages = NO_PACKAGES
+) -> Gripper:
+    """A hand as `formats` knows it; its tips are where the pads of its model end.
+
+    Args:
+        hand: the document.
+        path: the model file.
+        document: the document's file, for messages.
+        packages: what a station says of packages.
+
+    Raises:
+        InvalidInputError: the document does not fit the model.
+    """
+    figures = check_hand(hand, path, document, packages)
+    return Gripper(
+        name=hand.name,
+        body=hand.body,
+        X_HG=hand.X_HG.matrix(),
+        tip=figures.pad_bounds[1][2],
+        opening=hand.opening,
+        joints=tuple(GripperJoint(f.joint, f.closed, f.open) for f in hand.fingers),
+    )
+
+
+def station_gripper(station: Station) -> Gripper:
+    """The hand of a station; see `gripper_of`."""
+    return gripper_of(station.hand, station.hand_model, station.hand_path, station.packages)

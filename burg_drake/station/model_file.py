@@ -1,0 +1,377 @@
+"""SDF and URDF files of models: checked for invalid numbers, and added to a plant."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
+from xml.parsers import expat
+
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import ModelInstanceIndex, RotationalInertia
+
+from burg_drake.core import (
+    NO_PACKAGES,
+    FileLimits,
+    InvalidInputError,
+    Packages,
+    data_root,
+    quote_value,
+    read_bytes,
+    referenced_files,
+    referenced_packages,
+)
+
+
+class NumberRule:
+    """Number rule."""
+
+    finite = "finite"  # Any finite number.
+    not_zero = "finite and not 0"  # Any finite number but 0.
+    not_negative = "finite and at least 0"  # A finite number of at least 0.
+    positive = "finite and above 0"  # A finite number above 0.
+    limit = "a number, or inf where there is no limit"  # A number, or infinity.
+
+
+INERTIA_NAMES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")  # Moments and products of inertia.
+SDF_NUMBER_RULES = {
+    **dict.fromkeys(("pose", "xyz", "rpy", "multiplier"), NumberRule.finite),
+    **dict.fromkeys(INERTIA_NAMES, NumberRule.finite),
+    **dict.fromkeys(("scale", "gear_ratio"), NumberRule.not_zero),
+    **dict.fromkeys(
+        ("mass", "damping", "stiffness", "friction", "mu", "mu2"), NumberRule.not_negative
+    ),
+    **dict.fromkeys(
+        ("mu_static", "mu_dynamic", "hunt_crossley_dissipation"), NumberRule.not_negative
+    ),
+    **dict.fromkeys(
+        ("relaxation_time", "hydroelastic_margin", "rotor_inertia"), NumberRule.not_negative
+    ),
+    "acceleration": NumberRule.not_negative,
+    **dict.fromkeys(
+        ("hydroelastic_modulus", "mesh_resolution_hint", "density"), NumberRule.positive
+    ),
+    **dict.fromkeys(
+        ("point_contact_stiffness", "size", "radius", "length", "radii"), NumberRule.positive
+    ),
+    **dict.fromkeys(("lower", "upper", "effort", "velocity"), NumberRule.limit),
+}
+"""Rules by the name of an element or attribute without the prefix `drake:`."""
+URDF_NUMBER_RULES = SDF_NUMBER_RULES | dict.fromkeys(
+    ("effort", "velocity"), NumberRule.not_negative
+)
+"""In SDF, negative limits mean no limit."""
+_CHECKED_MODELS: set[tuple[Path, bytes]] = set()
+"""Paths and hashes of models that were checked."""
+
+
+@dataclass
+class _XmlElement:
+    name: str
+    attributes: dict[str, str]
+    line: int
+    children: list[_XmlElement] = field(default_factory=list)
+    text: str = ""
+
+    def values(self) -> Iterator[tuple[str, str]]:
+        """Names and texts; the attribute `value` goes by the name of the element."""
+        if self.text.strip() and not self.children:
+            yield self.name, self.text.strip()
+        for key, text in self.attributes.items():
+            yield self.name if key == "value" else key.removeprefix("drake:"), text
+
+    def figures(self) -> dict[str, str]:
+        """The values of the element and of those in it, by name."""
+        return dict(value for element in (self, *self.children) for value in element.values())
+
+    def walk(self, *outer: _XmlElement) -> Iterator[tuple[_XmlElement, tuple[_XmlElement, ...]]]:
+        """What is in the element, then the element, each with what it is in, outermost first."""
+        # Elements for other programs.
+        foreign_elements = ("gazebo", "light", "plugin", "ros2_control", "sensor")
+        for child in self.children:
+            if child.name not in foreign_elements:
+                yield from child.walk(*outer, self)
+        yield self, outer
+
+
+def require_valid_numbers(path: Path) -> None:
+    """Refuses a model with a mass, inertia, limit, contact parameter, size or pose that is not a
+    number, or that no body has. What is not valid XML is left to Drake's own message.
+
+    Args:
+        path: SDF or URDF file.
+
+    Raises:
+        InvalidInputError: it cannot be read, or has such a number; the message names file, line,
+            link or joint, and the value.
+    """
+    text = read_bytes(path, FileLimits.document.size)
+    checked = (path, hashlib.sha256(text).digest())
+    if checked not in _CHECKED_MODELS:
+        _check_numbers(text, path)
+        _CHECKED_MODELS.add(checked)
+
+
+def _check_numbers(text: bytes, path: Path) -> None:
+    # Elements that a message names.
+    named_elements = ("link", "joint", "frame", "collision", "visual", "transmission")
+    root = _parse_model(text, path)
+    if root is None:
+        return
+    rules = URDF_NUMBER_RULES if root.name == "robot" else SDF_NUMBER_RULES
+    massless = _massless_links(root)
+    for element, outer in root.walk():
+        named = [e for e in (*outer, element) if e.name in named_elements]
+        try:
+            for key, value in element.values():
+                if key in rules:
+                    _require_rule(key, value, rules[key])
+            if element.name == "axis":
+                _require_axis_direction(element.figures())
+            if element.name == "limit":
+                _require_ordered_limits(element.figures())
+            if element.name == "inertial" and named:
+                _require_link_inertia(
+                    element, massless=named[-1].attributes.get("name") in massless
+                )
+        except ValueError as error:
+            where = ", ".join(
+                f"{e.name} {quote_value(e.attributes.get('name', ''))}" for e in named
+            )
+            raise InvalidInputError(
+                f"{path}:{element.line}: {where}{': ' if where else ''}{error}"
+            ) from error
+
+
+def _parse_model(text: bytes, path: Path) -> _XmlElement | None:
+    """The root of a model; None if it is not XML.
+
+    Raises:
+        InvalidInputError: it is nested deeper than `MAX_DEPTH`.
+    """
+    max_depth = 200  # Nested elements; Drake's parser refuses more than 500.
+    parser = expat.ParserCreate()
+    parser.buffer_text = True
+    opened = [_XmlElement("", {}, 0)]
+
+    def start(name: str, attributes: dict[str, str]) -> None:
+        if len(opened) > max_depth:
+            raise InvalidInputError(
+                f"{path}:{parser.CurrentLineNumber}: more than {max_depth} nested elements"
+            )
+        element = _XmlElement(name.removeprefix("drake:"), attributes, parser.CurrentLineNumber)
+        opened[-1].children.append(element)
+        opened.append(element)
+
+    def characters(text: str) -> None:
+        opened[-1].text += text
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = lambda _: opened.pop()
+    parser.CharacterDataHandler = characters
+    try:
+        parser.Parse(text, True)
+    except expat.ExpatError:
+        return None
+    return opened[0].children[0]
+
+
+def _massless_links(root: _XmlElement) -> set[str]:
+    """Names of links that need no mass, as they may be mere frames: those at fixed joints, and,
+    where there are joints, those that are no joint's child, which the station welds."""
+    links, fixed, children = set(), set(), set()
+    for element, outer in root.walk():
+        if element.name == "link":
+            links.add(element.attributes.get("name", ""))
+        elif element.name in ("parent", "child") and outer and outer[-1].name == "joint":
+            link = element.attributes.get("link", element.text.strip())
+            if outer[-1].attributes.get("type") == "fixed":
+                fixed.add(link)
+            if element.name == "child":
+                children.add(link.rpartition("::")[2])
+    return fixed | (links - children if children else set())
+
+
+def _require_rule(key: str, text: str, rule: str) -> None:
+    for word in text.split():
+        try:
+            value = float(word)
+        except ValueError:
+            raise ValueError(f"{key} is {quote_value(text)}; it must be {rule}") from None
+        finite = math.isfinite(value)
+        sound = {
+            NumberRule.finite: finite,
+            NumberRule.not_zero: finite and value != 0.0,
+            NumberRule.not_negative: finite and value >= 0.0,
+            NumberRule.positive: finite and value > 0.0,
+            NumberRule.limit: not math.isnan(value),
+        }
+        if not sound[rule]:
+            raise ValueError(f"{key} is {text}; it must be {rule}")
+
+
+def _require_axis_direction(axis: dict[str, str]) -> None:
+    direction = axis.get("xyz", "1 0 0")
+    if not any(map(float, direction.split())):
+        raise ValueError(f"axis is {direction}; it must be a direction that is not zero")
+
+
+def _require_ordered_limits(limit: dict[str, str]) -> None:
+    lower, upper = float(limit.get("lower", "-inf")), float(limit.get("upper", "inf"))
+    if "upper" in limit and lower > upper:
+        raise ValueError(f"lower is {lower:g}, which is above upper, {upper:g}; exchange them")
+
+
+def _require_link_inertia(inertial: _XmlElement, massless: bool) -> None:
+    """Checks that a link has a mass, and moments of inertia that some distribution of it has.
+
+    Args:
+        inertial: of the link.
+        massless: whether mass and moments may be 0.
+    """
+    if inertial.attributes.get("auto") == "true":  # of SDF: by density
+        return
+    figures = {k: v for e in inertial.children for k, v in e.figures().items()}
+    mass = float(figures.get("mass", "1"))
+    unstated = dict(zip(INERTIA_NAMES, (1.0, 1.0, 1.0, 0.0, 0.0, 0.0), strict=True))
+    inertia = RotationalInertia(*(float(figures.get(k, moment)) for k, moment in unstated.items()))
+    principal = inertia.CalcPrincipalMomentsOfInertia()
+    if massless and mass == principal.max() == 0.0:
+        return
+    if mass == 0.0:
+        raise ValueError(
+            "mass is 0; it must be above 0 unless a fixed joint or the station holds the link"
+        )
+    if not inertia.CouldBePhysicallyValid() or principal.max() == 0.0:
+        moments = ", ".join(f"{moment:g}" for moment in principal)
+        raise ValueError(
+            f"inertia has the principal moments {moments} kg m^2, which no body has: each"
+            " must be above 0 and at most the sum of the other two"
+        )
+
+
+RELATIVE_URI = re.compile(r"<uri>\s*((?![A-Za-z]+:)[^<]*?)\s*</uri>")
+"""A file that is named by its path; relative ones start at the model's folder."""
+HYDROELASTIC_TAG = re.compile(r"<drake:(?:rigid|compliant)_hydroelastic\s*/>")
+"""Tag of hydroelastic contact."""
+COLLISION_ELEMENT = re.compile(r"<collision\b.*?</collision>", re.DOTALL)
+"""Element of a collision geometry."""
+
+
+def add_models(
+    parser: Parser,
+    path: Path,
+    packages: Packages = NO_PACKAGES,
+    *,
+    edit: Callable[[str], str] | None = None,
+) -> list[ModelInstanceIndex]:
+    """As `parser.AddModels(path)`, sooner, and with the packages that `core.paths` finds.
+
+    Args:
+        parser: from now on it knows the packages that this model names, in place of others of the
+            same names, and no model that would be fetched from the network.
+        path: SDF or URDF file.
+        packages: what a station says of packages.
+        edit: of an SDF's text, such as `without_hydroelastic`.
+
+    Raises:
+        InvalidInputError: it cannot be read, is too large, or has a mass, an inertia or another
+            number that no body has.
+        UnknownNameError: it names a package that is nowhere.
+        RuntimeError, ValueError: those of `AddModels`.
+    """
+    set_packages(parser, referenced_packages(path, packages))
+    try:
+        text = read_bytes(path, FileLimits.document.size).decode()
+    except UnicodeDecodeError:
+        text = ""
+    require_valid_numbers(path)
+    if "<include" in text:
+        for file in referenced_files(path, packages):
+            if file.suffix in (".sdf", ".urdf"):
+                require_valid_numbers(file)
+    if path.suffix != ".sdf" or not text or "<include" in text:
+        return list(parser.AddModels(path))
+    if edit is not None:
+        text = edit(text)
+    folder = Path(escape(str(path.parent.resolve()), quote=False))
+    whole = RELATIVE_URI.sub(lambda found: f"<uri>file://{folder / found[1]}</uri>", text)
+    try:
+        return list(parser.AddModelsFromString(whole, "sdf"))
+    except (RuntimeError, ValueError) as error:
+        raise type(error)(str(error).replace("<literal-string>.sdf", str(path))) from error
+
+
+def without_hydroelastic(text: str) -> str:
+    """A model (SDF) for point queries alone: Drake makes no meshes for hydroelastic contact then,
+    which it would copy into each context; a collision checker is there in two thirds of the time.
+    """
+    return HYDROELASTIC_TAG.sub("", text)
+
+
+def without_collisions(text: str) -> str:
+    """A model (SDF) that nothing touches."""
+    return COLLISION_ELEMENT.sub("", text)
+
+
+def set_packages(parser: Parser, found: Mapping[str, Path]) -> None:
+    """Lets a parser know packages by their folders, and that of the installed data; it forgets
+    Drake's own models, which it would fetch from the network."""
+    known = parser.package_map()
+    for name in {"drake_models", *found}:
+        if known.Contains(name):
+            known.Remove(name)
+    for name, folder in {**found, "burg_drake": data_root()}.items():
+        known.Add(name, folder)
+
+
+def require_free_model(plant: MultibodyPlant, model: ModelInstanceIndex, path: Path) -> None:
+    """Refuses a model that a joint of its own connects to the world, as in URDFs with a link
+    `world`.
+
+    Args:
+        plant: not finalized.
+        model: of one file.
+        path: the file.
+
+    Raises:
+        InvalidInputError: it is; the message names joint and link.
+    """
+    for joint in map(plant.get_joint, plant.GetJointIndices(model)):
+        if joint.parent_body().index() == plant.world_body().index():
+            raise InvalidInputError(
+                f"{path}: joint {joint.name()!r} fixes {joint.child_body().name()!r} to"
+                " the world; remove it, as the station says where the robot stands"
+            )
+
+
+@contextmanager
+def buffer_drake_log() -> Iterator[list[logging.LogRecord]]:
+    """Keeps back what Drake logs, such as its doubts about a model.
+
+    Yields:
+        What is kept back, and grows meanwhile; hand on with `logging.getLogger("drake").handle`.
+    """
+    logger, buffered = logging.getLogger("drake"), list[logging.LogRecord]()
+
+    def hold(record: logging.LogRecord) -> bool:
+        buffered.append(record)
+        return False
+
+    logger.addFilter(hold)
+    try:
+        yield buffered
+    finally:
+        logger.removeFilter(hold)
+
+
+def file_uri(path: Path) -> str:
+    """The URI of a file as Drake reads it: it does not decode `%20`."""
+    return f"file://{path.resolve()}"

@@ -1,0 +1,209 @@
+"""Contact of objects in a station diagram: pairs that meet, compliance, pieces for meshes."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Mapping
+
+import numpy as np
+from pydrake.geometry import (
+    AddCompliantHydroelasticProperties,
+    AddContactMaterial,
+    CollisionFilterDeclaration,
+    Convex,
+    GeometryId,
+    GeometryInstance,
+    GeometrySet,
+    ProximityProperties,
+    Role,
+    RoleAssign,
+)
+from pydrake.math import RigidTransform
+from pydrake.multibody.tree import BodyIndex
+from pydrake.systems.framework import Context
+
+from burg_drake.station.object_bodies import ROLLING_GEOMETRY, has_mesh_contact, is_ball
+from burg_drake.station.station_diagram import StationDiagram
+from burg_drake.station.surroundings import SurroundingsProperties
+
+
+def filter_contact_pairs(station_diagram: StationDiagram, context: Context | None = None) -> None:
+    """Has each geometry of an object meet what it is for, and nothing else.
+
+    The hand meets the patches of balls and the own surfaces of objects; the table meets the spheres
+    that balls roll by and the feet of objects; all others meet these spheres, and the pieces, or
+    the hull where there is one.
+
+    Args:
+        station_diagram: a built diagram.
+        context: in this Context of the diagram alone; by default in all that are created from now
+            on.
+    """
+    graph = station_diagram.diagram.mutable_scene_graph()
+    objects = {**station_diagram.free, **station_diagram.standing, **station_diagram.fixed}
+    geometries = {name: _geometries_of(station_diagram, [index]) for name, index in objects.items()}
+    robot = _geometries_of(station_diagram, station_diagram.robot_bodies)
+    table = _geometries_of(station_diagram, [station_diagram.table])
+    surroundings = [g for one in geometries.values() for g in one] + table
+    declaration = CollisionFilterDeclaration()
+    patches, rolling = _ball_geometries(station_diagram, geometries)
+    _exclude_pairs(declaration, patches, surroundings)
+    _exclude_pairs(declaration, rolling, robot)
+    parts = station_diagram.parts
+    surfaces, feet, hulls = set(parts.surfaces), set(parts.feet), set(parts.hulls)
+    soft = [g for g in robot if _is_hydroelastic(station_diagram, g)]
+    hard = [g for g in robot if g not in set(soft)]
+    _exclude_pairs(declaration, surfaces, surroundings + hard)
+    _exclude_pairs(declaration, feet, [g for g in surroundings if g not in set(table)] + robot)
+    _exclude_pairs(declaration, hulls, table + soft)
+    for one in geometries.values():
+        pieces = [g for g in one if g not in surfaces | feet | hulls]
+        if surfaces & set(one):
+            _exclude_pairs(declaration, pieces, soft)
+        if feet & set(one):
+            _exclude_pairs(declaration, pieces, table)
+        if hulls & set(one):
+            _exclude_pairs(declaration, pieces, [g for g in surroundings if g not in set(table)])
+    manager = (
+        graph.collision_filter_manager()
+        if context is None
+        else graph.collision_filter_manager(graph.GetMyMutableContextFromRoot(context))
+    )
+    manager.Apply(declaration)
+
+
+def _exclude_pairs(
+    declaration: CollisionFilterDeclaration,
+    some: Collection[GeometryId],
+    others: Collection[GeometryId],
+) -> None:
+    if some and others:
+        declaration.ExcludeBetween(GeometrySet(list(some)), GeometrySet(list(others)))
+
+
+def _geometries_of(
+    station_diagram: StationDiagram, bodies: Iterable[BodyIndex]
+) -> list[GeometryId]:
+    plant = station_diagram.plant
+    return [g for i in bodies for g in plant.GetCollisionGeometriesForBody(plant.get_body(i))]
+
+
+def _ball_geometries(
+    station_diagram: StationDiagram, geometries: dict[str, list[GeometryId]]
+) -> tuple[list[GeometryId], list[GeometryId]]:
+    """Patches of balls, and the spheres that they roll by."""
+    inspector = station_diagram.scene_graph.model_inspector()
+    patches: list[GeometryId] = []
+    rolling: list[GeometryId] = []
+    for name, own in geometries.items():
+        if is_ball(station_diagram.scene, name):
+            for geometry in own:
+                by_point = inspector.GetName(geometry).endswith(ROLLING_GEOMETRY)
+                (rolling if by_point else patches).append(geometry)
+    return patches, rolling
+
+
+def _is_hydroelastic(station_diagram: StationDiagram, geometry: GeometryId) -> bool:
+    inspector = station_diagram.scene_graph.model_inspector()
+    properties = inspector.GetProximityProperties(geometry)
+    return bool(properties.HasProperty("hydroelastic", "compliance_type"))
+
+
+LEANING_DISTANCE = 0.001
+"""Metres between objects that may lean on each other; poses in scenes are rounded."""
+
+
+def touching_bodies(
+    station_diagram: StationDiagram, bodies: Collection[BodyIndex]
+) -> Mapping[BodyIndex, frozenset[BodyIndex]]:
+    """Which bodies are closer to each other than `LEANING_DISTANCE`, where the documents place them.
+
+    Args:
+        station_diagram: a built diagram.
+        bodies: among these.
+
+    Returns:
+        The others that touch it, of each body that touches any.
+    """
+    plant, graph = station_diagram.plant, station_diagram.scene_graph
+    body_of: dict[GeometryId, BodyIndex] = {
+        geometry: index
+        for index in bodies
+        for geometry in plant.GetCollisionGeometriesForBody(plant.get_body(index))
+    }
+    beside: dict[BodyIndex, set[BodyIndex]] = defaultdict(set)
+    if len(bodies) > 1:
+        context = station_diagram.diagram.CreateDefaultContext()
+        query = graph.get_query_output_port().Eval(graph.GetMyContextFromRoot(context))
+        for pair in query.ComputeSignedDistancePairwiseClosestPoints(LEANING_DISTANCE):
+            one, other = body_of.get(pair.id_A), body_of.get(pair.id_B)
+            if one is not None and other is not None and one != other:
+                beside[one].add(other)
+                beside[other].add(one)
+    return {body: frozenset(others) for body, others in beside.items()}
+
+
+def make_touching_compliant(station_diagram: StationDiagram) -> None:
+    """Makes free objects that touch other objects of the scene compliant, in all Contexts that are
+    created from now on."""
+    scene = station_diagram.scene
+    fixed = [station_diagram.fixed[name] for name in scene.background]
+    beside = touching_bodies(station_diagram, {*station_diagram.free.values(), *fixed})
+    make_compliant(
+        station_diagram, [n for n, index in station_diagram.free.items() if index in beside]
+    )
+
+
+def make_compliant(station_diagram: StationDiagram, names: Iterable[str]) -> None:
+    """Makes free objects compliant, in all Contexts that are created from now on. Rigid meshes and
+    balls stay as they are: those cannot be, and these meet everything at a point."""
+    plant, scene = station_diagram.plant, station_diagram.scene
+    for name in names:
+        if not has_mesh_contact(scene, name) and not is_ball(scene, name):
+            body = plant.get_body(station_diagram.free[name])
+            for geometry in list(plant.GetCollisionGeometriesForBody(body)):
+                if geometry in station_diagram.parts.all:
+                    continue
+                _make_geometry_compliant(station_diagram, geometry)
+
+
+def _make_geometry_compliant(station_diagram: StationDiagram, geometry: GeometryId) -> None:
+    modulus = 5e7  # Pascal; at 1e7 an edge sinks into another object by more than 1 mm.
+    graph = station_diagram.diagram.mutable_scene_graph()
+    inspector = graph.model_inspector()
+    rigid = inspector.GetProximityProperties(geometry)
+    half_width = inspector.GetObbInGeometryFrame(geometry).half_width()
+    hint = rigid.GetPropertyOrDefault("hydroelastic", "resolution_hint", float(np.min(half_width)))
+    properties = ProximityProperties()
+    AddCompliantHydroelasticProperties(hint, modulus, properties)
+    AddContactMaterial(
+        dissipation=SurroundingsProperties.dissipation,
+        friction=rigid.GetProperty("material", "coulomb_friction"),
+        properties=properties,
+    )
+    source = station_diagram.plant.get_source_id()
+    graph.AssignRole(source, geometry, properties, RoleAssign.kReplace)
+
+
+def replace_meshes_by_pieces(station_diagram: StationDiagram, context: Context) -> None:
+    """In a Context, puts pieces in the place of the objects' meshes; all else stays.
+
+    Args:
+        station_diagram: the diagram.
+        context: of the whole diagram; not to be simulated with afterwards.
+    """
+    plant, graph = station_diagram.plant, station_diagram.scene_graph
+    source = plant.get_source_id()
+    graph_context = graph.GetMyMutableContextFromRoot(context)
+    for name, index in {**station_diagram.free, **station_diagram.fixed}.items():
+        if not has_mesh_contact(station_diagram.scene, name):
+            continue
+        body = plant.get_body(index)
+        frame = plant.GetBodyFrameIdOrThrow(index)
+        for geometry in plant.GetCollisionGeometriesForBody(body):
+            graph.RemoveRole(graph_context, source, geometry, Role.kProximity)
+        for i, path in enumerate(station_diagram.scene.entry(name).pieces):
+            shape = Convex(str(station_diagram.scene.library.path(path)))
+            instance = GeometryInstance(RigidTransform(), shape, f"{name}_piece_{i:03d}")
+            instance.set_proximity_properties(ProximityProperties())
+            graph.RegisterGeometry(graph_context, source, frame, instance)

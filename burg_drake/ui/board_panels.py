@@ -1,0 +1,367 @@
+"""Panels of the board and the display: board size, picture of the real board, colours, viewpoint."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import viser
+
+from burg_drake.compose import BOARD_SIZES, SessionView, SetBoard, board_size, board_size_name
+from burg_drake.core import BurgError, InvalidInputError
+from burg_drake.ui.board_view import BoardLayers, BoardOverlay
+from burg_drake.ui.buttons import plain_button, upload_button
+from burg_drake.ui.page_actions import PageActions
+from burg_drake.ui.panel_html import count_with_noun, join_html, paragraph, secondary_text
+from burg_drake.ui.scene_view import Coloring
+from burg_drake.ui.viewpoints import PageViews
+
+if TYPE_CHECKING:
+    from burg_drake.cameras import BoardPicture, Image
+    from burg_drake.scene import Board
+
+CUSTOM_SIZE = "own size"  # Choice for a size that no paper has.
+LANDSCAPE = "across"  # Choice for a board whose long side lies along x.
+PORTRAIT = "upright"  # Choice for a board whose long side lies along y.
+
+
+class BoardPanel:
+    """Chooses the board.
+
+    Args:
+        gui: of viser, in whose container the panel goes.
+        actions: what it may do.
+    """
+
+    def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
+        max_side_mm = 100_000.0  # Millimetres.
+        self._actions = actions
+        self._own = False
+        with gui.add_folder("Board"):
+            self._size = actions.chosen(
+                gui.add_dropdown("Size", (*BOARD_SIZES, CUSTOM_SIZE)), self._choose
+            )
+            self._orientation = actions.chosen(
+                gui.add_dropdown("Lies", (LANDSCAPE, PORTRAIT)), self._turn
+            )
+            self._extents = actions.typed(
+                gui.add_vector2(
+                    "Width, depth [mm]",
+                    (594.0, 420.0),
+                    min=(1.0, 1.0),
+                    max=(max_side_mm, max_side_mm),
+                    step=0.1,
+                ),
+                self._resize,
+            )
+
+    def show(self, view: SessionView) -> None:
+        """Brings the panel to a view."""
+        size = view.document.board.size
+        name = board_size_name(size)
+        self._own = self._own or name is None
+        self._size.value = CUSTOM_SIZE if self._own or name is None else name
+        self._orientation.value = PORTRAIT if size[1] > size[0] else LANDSCAPE
+        self._orientation.visible = not self._own
+        self._extents.handle.visible = self._own
+        self._extents.show(tuple(round(1e3 * side, 3) for side in size))
+
+    def _choose(self, name: str) -> None:
+        self._own = name == CUSTOM_SIZE
+        if self._own:
+            self.show(self._actions.session.view)
+            return
+        width, depth = self._actions.session.view.document.board.size
+        self._set(board_size(name, upright=depth > width))
+
+    def _turn(self, orientation: str) -> None:
+        short, long = sorted(self._actions.session.view.document.board.size)
+        self._set((short, long) if orientation == PORTRAIT else (long, short))
+
+    def _resize(self, extents_mm: tuple[float, float]) -> None:
+        width, depth = (round(1e-3 * side, 6) for side in extents_mm)
+        self._set((width, depth), field="board")
+
+    def _set(self, size: tuple[float, float], field: str = "") -> None:
+        session = self._actions.session
+        session.do(SetBoard(replace(session.view.document.board, size=size)), field=field)
+
+
+CAMERA_RELEASE_TIMEOUT = 10.0
+"""Seconds until a closed camera can be opened by others."""
+
+
+class LivePicture:
+    """Looks at a board in a thread of its own until it is closed.
+
+    Args:
+        camera: as of `cameras.sources.open_source`.
+        board: that it sees.
+        show: gets each picture, or one line that says why there is none.
+        after: another one that is closed, and may have the camera yet; it is waited for.
+
+    Attributes:
+        camera, board: as given.
+    """
+
+    def __init__(
+        self,
+        camera: str,
+        board: Board,
+        show: Callable[[BoardPicture | str], None],
+        after: LivePicture | None = None,
+    ) -> None:
+        self.camera, self.board = camera, board
+        self._show = show
+        self._over = threading.Event()
+        self._thread = threading.Thread(
+            target=self._run, args=(after,), name="live-picture", daemon=True
+        )
+        self._thread.start()
+
+    def close(self) -> None:
+        """Ends it; the camera is free for others soon afterwards."""
+        self._over.set()
+
+    def wait(self, timeout: float) -> None:
+        """Waits for the last picture of a source that has an end [s]."""
+        self._thread.join(timeout)
+
+    def _run(self, after: LivePicture | None) -> None:
+        interval = 0.5  # Seconds between pictures; each sends some hundred kilobytes to every page.
+        from burg_drake.cameras import BoardRectifier, open_source
+
+        if after is not None:
+            after.wait(CAMERA_RELEASE_TIMEOUT)
+        try:
+            rectifier = BoardRectifier(self.board)
+            with open_source(self.camera) as source:
+                while not self._over.is_set():
+                    try:
+                        frame = source.read()
+                        if frame is None:
+                            return
+                        self._report(rectifier.picture(frame.image))
+                    except BurgError as error:  # the board is hidden, or the camera unplugged
+                        self._report(str(error))
+                    self._over.wait(interval)
+        except BurgError as error:
+            self._report(str(error))
+
+    def _report(self, what: BoardPicture | str) -> None:
+        if not self._over.is_set():
+            self._show(what)
+
+
+CAMERA_NUMBERS = ("0", "1", "2", "3")
+"""Cameras of this machine that the page may open; it can name no other device."""
+
+
+class BackdropPanel:
+    """Lays a picture of the real board under the objects.
+
+    Args:
+        gui: of viser, in whose container the panel goes.
+        actions: what it may do.
+        layers: of the board.
+    """
+
+    def __init__(self, gui: viser.GuiApi, actions: PageActions, layers: BoardLayers) -> None:
+        self._actions, self._layers = actions, layers
+        self._sheet: BoardOverlay | None = None
+        self._live: LivePicture | None = None
+        icon = viser.Icon
+        with gui.add_folder("Real board"):
+            self._text = gui.add_html("")
+            upload = upload_button(gui, "Photo of the board", icon=icon.PHOTO, mime_type="image/*")
+            upload.on_upload(self._uploaded)
+            self._camera = gui.add_dropdown("Camera", CAMERA_NUMBERS)
+            actions.clicked(
+                plain_button(gui, "Take a picture", icon=icon.CAMERA), self._take_picture
+            )
+            self._on = actions.chosen(
+                gui.add_checkbox("Live", False, hint="Show what the camera sees, again and again"),
+                self._watch,
+            )
+            self._opacity = actions.chosen(
+                gui.add_slider("Opacity", 0.0, 1.0, 0.05, 0.8),
+                self._set_opacity,
+                key="backdrop",
+            )
+            self._remove = actions.clicked(
+                plain_button(gui, "Remove the picture", icon=icon.X), self._clear
+            )
+            self._show_sheet(None, "")
+
+    def show(self, view: SessionView) -> None:
+        """Brings the panel to a view; a picture stays as it is."""
+        if self._live is not None and self._live.board != view.document.board:
+            self._watch(True)
+        self._remove.visible = self._opacity.visible = self._sheet is not None
+
+    def close(self) -> None:
+        """Lets go of the camera."""
+        live, self._live = self._live, None
+        if live is not None:
+            live.close()
+
+    def _clear(self) -> None:
+        self.close()
+        self._on.value = False
+        self._show_sheet(None, "")
+
+    async def _uploaded(self, event: Any) -> None:
+        file = event.target.value
+        self._actions.submit(lambda: self._use_file(file.content, file.name), event.client)
+
+    def _use_file(self, data: bytes, name: str) -> None:
+        from burg_drake.cameras import decode_image
+
+        self._use_image(decode_image(data), name)
+
+    def _take_picture(self) -> None:
+        """Takes a picture with a camera of this machine.
+
+        Raises:
+            InvalidInputError: it is not one of `CAMERA_NUMBERS`, or does not show the board.
+            CameraLost: it gives no picture.
+        """
+        from burg_drake.cameras import open_source
+
+        number, live = self._chosen_camera(), self._live
+        if live is not None:
+            self._watch(False)
+            self._on.value = False
+            live.wait(CAMERA_RELEASE_TIMEOUT)
+        with open_source(number) as source:
+            frame = source.read()
+        self._use_image(None if frame is None else frame.image, f"camera {number}")
+
+    def _chosen_camera(self) -> str:
+        number = str(self._camera.value)
+        if number not in CAMERA_NUMBERS:
+            raise InvalidInputError(
+                f"camera {number!r} does not exist; give one of {', '.join(CAMERA_NUMBERS)}"
+            )
+        return number
+
+    def _use_image(self, image: Image | None, name: str) -> None:
+        if image is None:
+            raise InvalidInputError(f"{name} cannot be read as an image; give PNG or JPEG")
+        from burg_drake.cameras import board_picture
+
+        self._show_picture(board_picture(image, self._actions.session.view.document.board), name)
+
+    def _show_picture(self, found: BoardPicture, name: str) -> None:
+        words = f"{name}: {count_with_noun(len(found.ids), 'marker')}, off by {1e3 * found.error:.1f} mm"
+        sheet = BoardOverlay(found.image, found.lower, found.upper, float(self._opacity.value))
+        self._show_sheet(sheet, f"{words}. {found.note}" if found.note else words)
+
+    def _watch(self, on: bool) -> None:
+        """Shows what a camera sees from now on, or no more."""
+        before = self._live
+        self.close()
+        if on:
+            camera, board = self._chosen_camera(), self._actions.session.view.document.board
+            self._live = LivePicture(camera, board, self._on_live_picture, before)
+
+    def _on_live_picture(self, what: BoardPicture | str) -> None:
+        """Called by the live picture's thread."""
+        live = self._live
+
+        def lay() -> None:
+            if live is None or live is not self._live:
+                return
+            if isinstance(what, str):
+                self._show_line(what)
+            else:
+                self._show_picture(what, f"camera {live.camera}")
+
+        self._actions.submit(lay, key="live picture", wait_for_typing=True)
+
+    def _set_opacity(self, opacity: float) -> None:
+        if self._sheet is not None:
+            self._sheet = replace(self._sheet, opacity=min(max(float(opacity), 0.0), 1.0))
+            self._layers.show("backdrop", self._sheet)
+
+    def _show_sheet(self, sheet: BoardOverlay | None, words: str) -> None:
+        self._sheet = sheet
+        self._layers.show("backdrop", sheet)
+        self._show_line(words or "Lay a picture of the printed board under the objects.")
+        self.show(self._actions.session.view)
+
+    def _show_line(self, line: str) -> None:
+        self._text.content = join_html(paragraph(secondary_text(line)))
+
+
+COLORINGS: dict[str, Coloring] = {
+    "as they look": "objects",
+    "by status": "status",
+    "random": "random",
+}
+"""Ways to colour objects, by the text of the choice."""
+
+
+class DisplayPanel:
+    """Chooses how the scene is drawn.
+
+    Args:
+        gui: of viser, in whose container the panel goes.
+        actions: what it may do.
+        views: of all pages.
+        on_change: called when something is to be drawn differently.
+    """
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        actions: PageActions,
+        views: PageViews,
+        on_change: Callable[[], None],
+    ) -> None:
+        self._views = views
+        self._on_change = on_change
+        icon = viser.Icon
+        with gui.add_folder("Display"):
+            self._colors: Any = gui.add_dropdown("Objects", tuple(COLORINGS))
+            self._markers = gui.add_checkbox("Markers", True)
+            for field in (self._colors, self._markers):
+                actions.chosen(field, lambda value: on_change())
+            actions.clicked_by(
+                plain_button(gui, "From above", width=6, icon=icon.ARROW_BAR_DOWN, hint="View (T)"),
+                self.look_from_above,
+            )
+            actions.clicked_by(
+                plain_button(
+                    gui, "From the front", width=6, icon=icon.PERSPECTIVE, hint="View (F)"
+                ),
+                self.look_from_front,
+            )
+
+    @property
+    def coloring(self) -> Coloring:
+        """Which colours objects have."""
+        return COLORINGS.get(self._colors.value, "objects")
+
+    @property
+    def markers(self) -> bool:
+        """Whether markers are drawn on the board."""
+        return bool(self._markers.value)
+
+    def next_colors(self) -> None:
+        """Goes on to the next colours."""
+        names = tuple(COLORINGS)
+        self._colors.value = names[(names.index(self._colors.value) + 1) % len(names)]
+        self._on_change()
+
+    def look_from_above(self, client: viser.ClientHandle | None) -> None:
+        """Brings a page's camera above the board."""
+        if client is not None:
+            self._views.look(client, above=True)
+
+    def look_from_front(self, client: viser.ClientHandle | None) -> None:
+        """Brings a page's camera in front of the board."""
+        if client is not None:
+            self._views.look(client, above=False)

@@ -1,0 +1,183 @@
+"""Panels that put objects on the board: one by one from the library, or many at random."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import viser
+
+from burg_drake.compose import (
+    MAX_RANDOM_OBJECTS,
+    AddObject,
+    Clear,
+    RandomConfiguration,
+    SessionView,
+)
+from burg_drake.objects import ObjectLibrary
+from burg_drake.scene import LAYOUTS
+from burg_drake.ui.background_pictures import ObjectPictures
+from burg_drake.ui.buttons import (
+    ask_for_confirmation,
+    picture_button,
+    plain_button,
+    set_button_picture,
+)
+from burg_drake.ui.page_actions import PageActions
+from burg_drake.ui.panel_html import (
+    count_with_noun,
+    join_html,
+    paragraph,
+    secondary_text,
+    title_html,
+)
+from burg_drake.visualization import element
+
+
+class LibraryPanel:
+    """Shows a library's objects; a click puts one on the board.
+
+    Args:
+        gui: of viser, in whose container the panel goes.
+        actions: what it may do.
+    """
+
+    def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
+        self._gui = gui
+        self._actions = actions
+        self._library: ObjectLibrary | None = None
+        self._pictures: ObjectPictures | None = None
+        self._buttons: dict[str, Any] = {}
+        self._title = gui.add_html("")
+        self._search = actions.chosen(
+            gui.add_text(
+                "Search", "", hint="Shows objects whose name or description has all words"
+            ),
+            lambda words: self._filter(words),
+            key="search",
+        )
+        self._objects = gui.add_folder(None)
+
+    def show(self, view: SessionView, pictures: ObjectPictures) -> None:
+        """Brings the panel to a view.
+
+        Args:
+            view: of the session.
+            pictures: of the view's library.
+        """
+        if pictures is not self._pictures:
+            self._library, self._pictures = view.library, pictures
+            self._fill(view.library)
+        self._draw()
+
+    def draw(self) -> None:
+        """Shows the pictures that are there by now."""
+        self._draw()
+
+    def _fill(self, library: ObjectLibrary) -> None:
+        for button in self._buttons.values():
+            button.remove()
+        self._buttons = {}
+        with self._objects:
+            for name, entry in library.objects.items():
+                hint = entry.description or name
+                weight = "background only" if entry.is_fixed else f"{1e3 * entry.mass:.0f} g"
+                button = picture_button(self._gui, name, None, hint=f"{hint} ({weight})")
+                self._actions.clicked(button, partial(self._actions.session.do, AddObject(name)))
+                self._buttons[name] = button
+        self._filter(self._search.value)
+
+    def _filter(self, words: str) -> None:
+        if self._library is None:
+            return
+        wanted = words.lower().split()
+        found = 0
+        for name, button in self._buttons.items():
+            text = f"{name} {self._library.entry(name).description}".lower()
+            button.visible = all(word in text for word in wanted)
+            found += button.visible
+        self._show_count(found)
+
+    def _show_count(self, found: int) -> None:
+        library = self._library
+        assert library is not None
+        total = len(library.objects)
+        count = f"{found} of {count_with_noun(total, 'object')}"
+        if found == total:
+            count = count_with_noun(total, "object")
+        why = self._pictures.missing if self._pictures else ""
+        content = join_html(
+            paragraph(
+                title_html(library.name),
+                element("span", f" {count}; click one to add it", class_="bd-quiet"),
+                secondary_text(why) if why else None,
+            )
+        )
+        if self._title.content != content:
+            self._title.content = content
+
+    def _draw(self) -> None:
+        assert self._pictures is not None
+        for name, button in self._buttons.items():
+            set_button_picture(button, self._pictures.get(name))
+        self._show_count(sum(button.visible for button in self._buttons.values()))
+
+
+MAX_SEED = 2**31 - 1  # Largest seed of a random configuration.
+
+
+class FillPanel:
+    """Puts objects on the board at random, or takes all away.
+
+    Args:
+        gui: of viser, in whose container the panel goes.
+        actions: what it may do.
+    """
+
+    def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
+        self._actions = actions
+        icon = viser.Icon
+        with gui.add_folder("Random configuration"):
+            self._count = gui.add_number(
+                "Objects",
+                0,
+                min=0,
+                max=MAX_RANDOM_OBJECTS,
+                step=1,
+                hint="0: those that are on the board",
+            )
+            self._layout = gui.add_dropdown("Layout", LAYOUTS)
+            self._seed: Any = gui.add_number(
+                "Seed", 1, min=0, max=MAX_SEED, step=1, hint="Of the next configuration"
+            )
+            actions.clicked(
+                plain_button(gui, "Shuffle", width=6, icon=icon.ARROWS_SHUFFLE), self._shuffle
+            )
+            self._clear = actions.clicked_by(
+                plain_button(gui, "Clear scene", width=6, icon=icon.TRASH), self._ask_to_clear
+            )
+
+    def show(self, view: SessionView) -> None:
+        """Brings the panel to a view."""
+        self._clear.disabled = not view.instances
+
+    def _ask_to_clear(self, client: viser.ClientHandle | None) -> None:
+        session = self._actions.session
+        count = len(session.view.instances)
+        if client is not None and count:
+            ask_for_confirmation(
+                self._actions,
+                client,
+                "Clear the scene?",
+                f"This takes {count_with_noun(count, 'object')} off the board. Undo (Ctrl+Z) brings"
+                " everything back.",
+                "Clear it",
+                lambda: session.do(Clear()),
+            )
+
+    def _shuffle(self) -> None:
+        seed = self._seed.value
+        self._seed.value = min(seed + 1, MAX_SEED)  # also if there is no room this time
+        self._actions.session.do(
+            RandomConfiguration(seed, self._count.value or None, self._layout.value)
+        )

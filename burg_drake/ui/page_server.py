@@ -1,0 +1,191 @@
+"""Serves a page to this machine, or to a browser that opens the one-time address."""
+
+from __future__ import annotations
+
+import errno
+import http.client
+import ipaddress
+import socket
+from dataclasses import dataclass
+from http import HTTPStatus
+from importlib.util import find_spec
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+from burg_drake.core import (
+    InvalidInputError,
+    MissingDependencyError,
+    address_in_use_error,
+    page_url,
+)
+
+if TYPE_CHECKING:
+    import viser
+
+    from burg_drake.ui.admission import Admission
+
+
+@dataclass(frozen=True)
+class ServedPage:
+    """An open door; closed by `close` or at the end of a `with`.
+
+    Attributes:
+        server: viser's, to build the page on.
+        host: the address that is listened on.
+        port: likewise.
+        admission: who may come in.
+    """
+
+    server: viser.ViserServer
+    host: str
+    port: int
+    admission: Admission
+
+    @property
+    def address(self) -> str:
+        """Of the page, for browsers that were let in."""
+        return page_url(self.host, self.port)
+
+    @property
+    def url(self) -> str:
+        """Address of the page for the next browser; with a token, good for this one alone, if
+        other machines can reach it."""
+        token = self.admission.token
+        return f"{self.address}?token={token}" if token else self.address
+
+    def close(self) -> None:
+        """Stops serving; browsers see that the connection is lost."""
+        from burg_drake.ui.guarded_viser import stop_server
+
+        stop_server(self.server)
+
+    def __enter__(self) -> ServedPage:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def require_viser() -> None:
+    """Raises what is missing.
+
+    Raises:
+        MissingDependencyError: viser, or what the door needs besides, is not installed.
+    """
+    for name in ("viser", "websockets", "msgspec"):
+        if find_spec(name) is None:
+            raise MissingDependencyError(f"the page needs {name}: pip install 'burg-drake[ui]'")
+
+
+def serve_page(
+    host: str = "127.0.0.1", port: int | None = None, *, title: str = "burg_drake"
+) -> ServedPage:
+    """Opens the door to an empty page.
+
+    Args:
+        host: address to listen on; only this machine can reach the default.
+        port: to listen on; the first free one from `FIRST_PORT` on if None, any if 0.
+        title: of the page.
+
+    Raises:
+        InvalidInputError: the port is taken, or the address is not this machine's.
+        MissingDependencyError: viser is not installed, or is one that cannot be guarded.
+    """
+    require_viser()
+    from burg_drake.ui.admission import Admission
+    from burg_drake.ui.guarded_viser import guarded_server, stop_server
+
+    listener = open_listener(host, port)
+    address, bound = listener.getsockname()[:2]
+    local = ipaddress.ip_address(address).is_loopback
+    admission = Admission(host, bound, title=title, by_token=not local)
+    server = guarded_server(listener, admission)
+    try:
+        require_guarded(address, bound)
+    except BaseException:
+        stop_server(server)
+        raise
+    server.gui.configure_theme(show_share_button=False, show_logo=False)
+    return ServedPage(server, host, bound, admission)
+
+
+def open_listener(host: str, port: int | None) -> socket.socket:
+    """A socket that listens.
+
+    Args:
+        host: address to listen on.
+        port: as of `serve_page`.
+
+    Raises:
+        InvalidInputError: the port is taken, or the address is not this machine's.
+    """
+    first_port = 7200  # First port that is tried; the live camera view starts at 7100.
+    port_count = 50  # Ports that are tried.
+    ports = range(first_port, first_port + port_count) if port is None else range(port, port + 1)
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    for candidate in ports:
+        try:
+            return socket.create_server(
+                (host, candidate), family=family, dualstack_ipv6=host == "::"
+            )
+        except OSError as error:
+            failure = error
+            if error.errno != errno.EADDRINUSE:
+                raise InvalidInputError(
+                    f"the page cannot be served on {host}: {error.strerror or error}"
+                ) from error
+    raise InvalidInputError(
+        address_in_use_error(host, ports, any_of_them=port is None)
+    ) from failure
+
+
+def require_guarded(address: str, port: int) -> None:
+    """Connects as a foreign site would.
+
+    Args:
+        address: that is listened on.
+        port: likewise.
+
+    Raises:
+        MissingDependencyError: what is foreign was let in.
+    """
+    foreign_host = "foreign.invalid"  # Name that no page of ours has.
+    # Headers of a websocket handshake.
+    handshake = {
+        "Connection": "Upgrade",
+        "Upgrade": "websocket",
+        "Sec-WebSocket-Version": "13",
+        "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==",
+    }
+    near = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(address, address)
+    own = f"[{near}]:{port}" if ":" in near else f"{near}:{port}"
+    foreign = (
+        {"Host": own, "Origin": f"http://{foreign_host}", **handshake},
+        {"Host": f"{foreign_host}:{port}", "Origin": f"http://{foreign_host}:{port}", **handshake},
+        {"Host": own, **handshake},
+        {"Host": f"{foreign_host}:{port}"},
+        {"Host": own, "Origin": f"http://{foreign_host}"},
+    )
+    for headers in foreign:
+        if _response_status(near, port, headers) != HTTPStatus.FORBIDDEN:
+            raise MissingDependencyError(
+                "the page was not opened, because other web sites could reach it with this"
+                " version of viser; install another one: pip install 'burg-drake[ui]'"
+            )
+
+
+def _response_status(address: str, port: int, headers: dict[str, str]) -> int:
+    connection = http.client.HTTPConnection(address, port, timeout=10.0)
+    try:
+        connection.putrequest("GET", "/", skip_host=True, skip_accept_encoding=True)
+        for name, value in headers.items():
+            connection.putheader(name, value)
+        connection.endheaders()
+        return connection.getresponse().status
+    finally:
+        connection.close()

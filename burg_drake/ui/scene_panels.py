@@ -1,0 +1,237 @@
+"""Panels of the scene as a whole: its name and state with undo and redo, and its files."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import viser
+
+from burg_drake.compose import FileChanged, SessionView, UnsavedChanges
+from burg_drake.printout import PAPERS, PrintSettings
+from burg_drake.ui.buttons import ask_for_confirmation, plain_button, primary_button
+from burg_drake.ui.page_actions import PageActions
+from burg_drake.ui.panel_html import (
+    STATUS_STYLES,
+    join_html,
+    notice_html,
+    paragraph,
+    secondary_text,
+    status_chip,
+    title_html,
+)
+from burg_drake.ui.shortcuts import KeysDialog
+from burg_drake.visualization import Html, element
+
+
+class SummaryPanel:
+    """Says how the scene is, and takes steps back.
+
+    Args:
+        gui: of viser, in whose container the panel goes.
+        actions: what it may do.
+        keys: the list of mouse and keys.
+    """
+
+    def __init__(self, gui: viser.GuiApi, actions: PageActions, keys: KeysDialog) -> None:
+        icon, session = viser.Icon, actions.session
+        self._text = gui.add_html("")
+        self._dismiss = actions.clicked(plain_button(gui, "I have read this"), self._read)
+        self._undo = actions.clicked(
+            plain_button(gui, "Undo", width=4, icon=icon.ARROW_BACK_UP), session.undo
+        )
+        self._redo = actions.clicked(
+            plain_button(gui, "Redo", width=4, icon=icon.ARROW_FORWARD_UP), session.redo
+        )
+        actions.clicked_by(
+            plain_button(gui, "Keys", width=4, icon=icon.KEYBOARD, hint="Mouse and keys (H)"),
+            keys.toggle,
+        )
+        self._session = session
+
+    def show(self, view: SessionView) -> None:
+        """Brings the panel to a view."""
+        text = join_html(paragraph(*_summary_html(view)))
+        if self._text.content != text:
+            self._text.content = text
+        self._dismiss.visible = bool(view.notices)
+        for button, label, verb in (
+            (self._undo, view.undo_label, "Undo"),
+            (self._redo, view.redo_label, "Redo"),
+        ):
+            _set_enabled(button, label, verb)
+
+    def _read(self) -> None:
+        for line in self._session.view.notices:
+            self._session.dismiss(line)
+
+
+def _set_enabled(button: Any, label: str | None, verb: str) -> None:
+    button.disabled = label is None
+    button.hint = f"{verb}: {label}" if label else f"Nothing to {verb.lower()}"
+
+
+def _summary_html(view: SessionView) -> list[Html]:
+    count: Counter[str] = Counter(view.status.values())
+    state = "saved" if view.saved else "not saved"
+    where = view.path.name if view.path else "no file yet"
+    chips = [status_chip(status, count[status]) for status in STATUS_STYLES if count[status]]
+    return [
+        title_html(view.document.name),
+        secondary_text(f"{where}, {state}"),
+        element("div", *(chips or [secondary_text("The board is empty.")])),
+        *(notice_html(line) for line in view.notices),
+    ]
+
+
+_LIBRARY_KEY = re.compile(rb"^library:", re.MULTILINE)  # Line by which a file is known as a scene.
+
+
+def scene_names(folder: Path) -> tuple[str, ...]:
+    """Names of the scene files of a folder, without their suffix, in alphabetical order.
+
+    Args:
+        folder: that was opened; what is in it may be unreadable, and is left out then.
+    """
+    max_files = 500  # Files that are read.
+    head_bytes = 4096  # Bytes at the start of a file in which a scene names its library.
+    found = []
+    try:
+        files = sorted(folder.glob("*.yaml"))
+    except OSError:
+        return ()
+    for path in files[:max_files]:
+        try:
+            with path.open("rb") as file:
+                if _LIBRARY_KEY.search(file.read(head_bytes)):
+                    found.append(path.stem)
+        except OSError:
+            continue
+    return tuple(found)
+
+
+NO_SCENES = "(none in the folder)"  # Choice while the folder has no scenes.
+Client = viser.ClientHandle | None
+
+
+class FilePanel:
+    """Saves, loads and prints scenes.
+
+    Args:
+        gui: of viser, in whose container the panel goes.
+        actions: what it may do.
+    """
+
+    def __init__(self, gui: viser.GuiApi, actions: PageActions) -> None:
+        self._actions = actions
+        self._shown_name = self._shown_library = ""
+        icon = viser.Icon
+        with gui.add_folder("Save"):
+            self._name: Any = gui.add_text("Name", "", hint="Of the file")
+            actions.clicked_by(
+                primary_button(gui, "Save scene", icon=icon.DEVICE_FLOPPY), self.save
+            )
+        with gui.add_folder("Load"):
+            self._scene = gui.add_dropdown("Scene", (NO_SCENES,))
+            actions.clicked_by(plain_button(gui, "Load scene", icon=icon.FOLDER_OPEN), self._load)
+            self._library: Any = gui.add_dropdown("Library", actions.session.libraries())
+            actions.clicked_by(
+                plain_button(
+                    gui, "New scene", width=6, icon=icon.FILE_PLUS, hint="With this library"
+                ),
+                self._begin,
+            )
+            actions.clicked(
+                plain_button(
+                    gui,
+                    "Use library",
+                    width=6,
+                    icon=icon.PACKAGE,
+                    hint="Take the objects of this scene, and new ones, from this library",
+                ),
+                lambda: actions.session.use_library(self._library.value),
+            )
+        with gui.add_folder("Print"):
+            self._page = gui.add_dropdown("Page size", tuple(PAPERS), initial_value="A4")
+            actions.clicked_by(
+                plain_button(gui, "Save printout", icon=icon.PRINTER, hint="Download it as PDF"),
+                self.print_out,
+            )
+
+    def show(self, view: SessionView) -> None:
+        """Brings the panel to a view; nothing of it changes while something is dragged."""
+        if view.dragging:
+            return
+        name = view.path.stem if view.path else view.document.name
+        if name != self._shown_name:
+            self._shown_name = self._name.value = name
+        names = scene_names(self._actions.session.folder) or (NO_SCENES,)
+        if names != self._scene.options:
+            self._scene.options = names
+        libraries = self._actions.session.libraries()
+        if libraries != self._library.options:
+            self._library.options = libraries
+        library = view.document.library
+        if library != self._shown_library and library in libraries:
+            self._shown_library = self._library.value = library
+
+    def save(self, client: Client) -> None:
+        """Writes the scene to the file of the name that stands in the field."""
+        session, name = self._actions.session, self._name.value.strip()
+        view = session.view
+        own = view.path is not None and name in ("", view.path.stem)
+        try:
+            view = session.save(None if own else name or None)
+        except FileChanged as error:
+            if client is None:
+                raise
+            ask_for_confirmation(
+                self._actions,
+                client,
+                "Overwrite the file?",
+                str(error),
+                "Overwrite",
+                lambda: session.save(None if own else name or None, overwrite=True),
+            )
+            return
+        assert view.path is not None
+        self._actions.show_message(client, str(view.path), "Saved")
+
+    def _open(self, open: Callable[..., Any], name: str, client: Client) -> None:
+        """Goes over to another scene, and asks first if something would be lost."""
+        try:
+            open(name)
+        except UnsavedChanges as error:
+            if client is None:
+                raise
+            ask_for_confirmation(
+                self._actions,
+                client,
+                "Discard changes?",
+                str(error),
+                "Discard them",
+                lambda: open(name, discard=True),
+            )
+
+    def print_out(self, client: Client) -> None:
+        """Sends the printout of the board to a page."""
+        session = self._actions.session
+        printout = session.printout(PrintSettings(page=self._page.value, instructions=True))
+        for warning in printout.warnings:
+            self._actions.show_warning(client, warning, "On the printout")
+        if client is not None:
+            client.send_file_download(
+                f"{session.view.document.name}_{self._page.value}.pdf",
+                printout.pdf,
+                save_immediately=True,
+            )
+
+    def _load(self, client: Client) -> None:
+        if self._scene.value != NO_SCENES:
+            self._open(self._actions.session.load, self._scene.value, client)
+
+    def _begin(self, client: Client) -> None:
+        self._open(self._actions.session.new, self._library.value, client)

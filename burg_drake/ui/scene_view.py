@@ -1,0 +1,410 @@
+"""Objects in the browser: their meshes, outlines, settling proposal and height above the support."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import trimesh
+import viser
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
+
+from burg_drake.compose import (
+    SessionView,
+    SettlingProposal,
+    instance_bounds,
+    instance_name,
+    names_of_moved_instances,
+)
+from burg_drake.core import (
+    Array,
+    BurgError,
+    MeshError,
+    distinct_colors,
+    quaternion_from_rotation,
+    suppress_numpy_warnings,
+    transform_points,
+)
+from burg_drake.geometry import hull_mesh
+from burg_drake.objects import ObjectLibrary
+from burg_drake.ui.panel_html import FIXED_COLOR, Rgb8, status_style
+from burg_drake.visualization import linear_light
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectMesh:
+    """An object to look at.
+
+    Attributes:
+        glb: it looks, as a binary glTF whose axes are those of the object frame.
+        vertices: (N, 3) of its plain shape in the object frame [m].
+        faces: (M, 3) of its plain shape.
+    """
+
+    glb: bytes
+    vertices: NDArray[np.float32]
+    faces: NDArray[np.uint32]
+
+    @property
+    def bounds(self) -> Array:
+        """(2, 3) lower and upper corner in the object frame [m]."""
+        return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)], dtype=float)
+
+
+class ObjectMeshes:
+    """Shapes by object.
+
+    Args:
+        library: where the objects are.
+    """
+
+    def __init__(self, library: ObjectLibrary) -> None:
+        self.library = library
+        self._known: dict[str, ObjectMesh] = {}
+
+    def __getitem__(self, name: str) -> ObjectMesh:
+        """The shape of an object.
+
+        Raises:
+            UnknownNameError: no such object, or its file is missing.
+            MeshError: its file is damaged.
+        """
+        if name not in self._known:
+            self._known[name] = _read_mesh(self.library, name)
+        return self._known[name]
+
+
+def _read_mesh(library: ObjectLibrary, name: str) -> ObjectMesh:
+    path = library.path(library.entry(name).mesh)
+    try:
+        with suppress_numpy_warnings():
+            scene = trimesh.load_scene(path, process=False)
+            parts = [g for g in scene.geometry.values() if isinstance(g, trimesh.Trimesh)]
+            for part in parts:
+                _make_matte(part)
+            glb = scene.export(file_type="glb", include_normals=True)
+        plain = trimesh.util.concatenate([_geometry_only(part) for part in parts])
+    except Exception as error:  # the reader raises whatever it stumbles over
+        raise library.damaged(path) from error
+    if not len(plain.faces):
+        raise MeshError(f"{path} has no faces")
+    plain.merge_vertices(merge_tex=True, merge_norm=True)
+    return ObjectMesh(
+        bytes(glb),
+        np.asarray(plain.vertices, dtype=np.float32),
+        np.asarray(plain.faces, dtype=np.uint32),
+    )
+
+
+def _make_matte(part: trimesh.Trimesh) -> None:
+    """Gives a part a surface that does not shine like metal, which glTF takes for the default."""
+    roughness = 0.75  # Roughness of paper, paint and plastic.
+    max_texture = 1024  # Pixels along each side; larger textures are reduced.
+    material = getattr(part.visual, "material", None)
+    if material is None:
+        return
+    if hasattr(material, "to_pbr"):
+        material = material.to_pbr()
+    material.metallicFactor, material.roughnessFactor = 0.0, roughness
+    if material.baseColorFactor is not None:  # of colours as files have them; glTF has light
+        r, g, b, a = np.asarray(material.baseColorFactor, dtype=float) / 255.0
+        material.baseColorFactor = [*(float(linear_light(c)) for c in (r, g, b)), a]
+    image = material.baseColorTexture
+    if image is not None and max(image.size) > max_texture:
+        small = image.copy()
+        small.thumbnail((max_texture, max_texture), reducing_gap=2.0)
+        material.baseColorTexture = small
+    part.visual.material = material
+
+
+def _geometry_only(part: trimesh.Trimesh) -> trimesh.Trimesh:
+    return trimesh.Trimesh(np.asarray(part.vertices), np.asarray(part.faces), process=False)
+
+
+Coloring = Literal["objects", "random", "status"]
+
+OBJECTS_NODE = "/objects"  # Path of the objects in viser's scene.
+OUTLINE_LINE_WIDTH = 2.0  # Pixels.
+
+
+@dataclass(frozen=True, eq=False)
+class ShownInstance:
+    """An instance as it is to be shown.
+
+    Attributes:
+        object: its name in the library.
+        X_SO: (4, 4) pose.
+        status: see `status_colors`.
+        selected: whether it is.
+        fixed: whether it is background.
+    """
+
+    object: str
+    X_SO: Array
+    status: str = "ok"
+    selected: bool = False
+    fixed: bool = False
+
+
+@dataclass(eq=False)
+class _InstanceNodes:
+    """What stands for an instance in the browser."""
+
+    object: str
+    frame: viser.FrameHandle
+    mesh: Any
+    p_OV: Array
+    outline: viser.LineSegmentsHandle
+    color: Rgb8
+    tint: viser.MeshHandle | None = None
+    drawn: tuple[bytes, str, bool] | None = None
+
+
+class SceneView:
+    """Shows instances and tells which one the pointer is on.
+
+    Args:
+        scene: viser's, in whose world the scene frame is the origin.
+        shapes: of the library's objects.
+        attach: called with each new handle that pointers may touch, and its instance.
+    """
+
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        shapes: ObjectMeshes,
+        attach: Callable[[Any, str], None],
+    ) -> None:
+        self._scene = scene
+        self._shapes = shapes
+        self._attach = attach
+        self._nodes: dict[str, _InstanceNodes] = {}
+        self._coloring: Coloring = "objects"
+        self._made = 0
+
+    def use(self, shapes: ObjectMeshes) -> None:
+        """Shows objects of another library from now on."""
+        if shapes is not self._shapes:
+            self.show({}, self._coloring)
+            self._shapes = shapes
+
+    def show(self, instances: Mapping[str, ShownInstance], coloring: Coloring) -> None:
+        """Brings the browser to a scene; only what is not yet so is sent."""
+        self._coloring = coloring
+        for name in list(self._nodes):
+            if name not in instances or instances[name].object != self._nodes[name].object:
+                self._remove(name)
+        for name, shown in instances.items():
+            if name not in self._nodes:
+                self._nodes[name] = self._add(name, shown)
+            self._update(self._nodes[name], name, shown)
+
+    def _remove(self, name: str) -> None:
+        nodes = self._nodes.pop(name)
+        nodes.outline.remove()
+        nodes.frame.remove()
+
+    def _add(self, name: str, shown: ShownInstance) -> _InstanceNodes:
+        missing_color = (200, 60, 200)  # sRGB of the ball that replaces an unreadable shape.
+        ball_radius = 0.03  # Metres.
+        frame = self._scene.add_frame(f"{OBJECTS_NODE}/{name}", show_axes=False)
+        mesh: Any
+        try:
+            shape = self._shapes[shown.object]
+        except BurgError:  # what is wrong with it is told elsewhere; here is where it stands
+            mesh = self._scene.add_icosphere(
+                f"{OBJECTS_NODE}/{name}/look", radius=ball_radius, color=missing_color
+            )
+            p_OV = ball_radius * np.vstack([np.eye(3), -np.eye(3)])
+        else:
+            mesh = self._scene.add_glb(f"{OBJECTS_NODE}/{name}/look", shape.glb)
+            p_OV = hull_mesh(shape.vertices.astype(float)).vertices
+        self._attach(mesh, name)
+        outline = self._scene.add_line_segments(
+            f"/outlines/{name}",
+            np.zeros((1, 2, 3)),
+            FIXED_COLOR,
+            thickness=OUTLINE_LINE_WIDTH,
+            thickness_units="screen",
+        )
+        self._made += 1
+        red, green, blue = distinct_colors(self._made)[-1]
+        color = (round(255 * red), round(255 * green), round(255 * blue))
+        return _InstanceNodes(shown.object, frame, mesh, np.asarray(p_OV), outline, color)
+
+    def _update(self, nodes: _InstanceNodes, name: str, shown: ShownInstance) -> None:
+        outline_height = 4e-4  # Metres over the board; at its own height outlines would flicker.
+        selected_width = 6.0  # Pixels.
+        nodes.frame.position = shown.X_SO[:3, 3]
+        nodes.frame.wxyz = quaternion_from_rotation(shown.X_SO[:3, :3])
+        self._paint(nodes, name, shown)
+        drawn = (shown.X_SO.tobytes(), shown.status, shown.selected)
+        if drawn != nodes.drawn:
+            nodes.drawn = drawn
+            line = footprint(nodes.p_OV, shown.X_SO, outline_height)
+            nodes.outline.points = line.astype(np.float32)
+            nodes.outline.colors = np.array(_status_color(shown), dtype=np.uint8)
+            nodes.outline.thickness = selected_width if shown.selected else OUTLINE_LINE_WIDTH
+
+    def _paint(self, nodes: _InstanceNodes, name: str, shown: ShownInstance) -> None:
+        if self._coloring == "objects":
+            nodes.mesh.visible = True
+            if nodes.tint is not None:
+                nodes.tint.visible = False
+            return
+        color = nodes.color if self._coloring == "random" else _status_color(shown)
+        if nodes.tint is None:
+            nodes.tint = self._tinted(name, shown.object, color)
+        elif nodes.tint is not None:
+            nodes.tint.color = color
+        if nodes.tint is not None:
+            nodes.tint.visible = True
+            nodes.mesh.visible = False
+
+    def _tinted(self, name: str, object: str, color: Rgb8) -> viser.MeshHandle | None:
+        try:
+            shape = self._shapes[object]
+        except BurgError:
+            return None
+        tint = self._scene.add_mesh_simple(
+            f"{OBJECTS_NODE}/{name}/tint", shape.vertices, shape.faces, color=color, side="double"
+        )
+        self._attach(tint, name)
+        return tint
+
+
+def _status_color(shown: ShownInstance) -> Rgb8:
+    return FIXED_COLOR if shown.fixed and shown.status == "ok" else status_style(shown.status).color
+
+
+def footprint(p_OV: Array, X_SO: Array, height: float, margin: float = 0.004) -> Array:
+    """The outline of an object's convex hull from above.
+
+    Args:
+        p_OV: (N, 3) vertices of the object [m].
+        X_SO: (4, 4) its pose.
+        height: z of the outline in S [m].
+        margin: by which it is larger than the object [m].
+
+    Returns:
+        (M, 2, 3) segments of a closed line in S [m].
+    """
+    corner_points = 6  # Points of a rounded corner.
+    p_SV = transform_points(X_SO, p_OV)[:, :2]
+    around = np.linspace(0.0, 2.0 * np.pi, 4 * corner_points, endpoint=False)
+    disc = margin * np.stack([np.cos(around), np.sin(around)], axis=-1)
+    points = (_convex_hull(p_SV)[:, None] + disc).reshape(-1, 2)
+    line = _convex_hull(points)
+    line = np.column_stack([line, np.full(len(line), height)])
+    return np.stack([line, np.roll(line, -1, axis=0)], axis=1)
+
+
+def _convex_hull(points: Array) -> Array:
+    """(M, 2) corners of a planar hull, counter-clockwise; all points where it is flat."""
+    try:
+        return np.asarray(points[ConvexHull(points).vertices])
+    except QhullError:
+        return points
+
+
+class ProposalView:
+    """Shows a proposal of the session.
+
+    Args:
+        scene: of viser.
+    """
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        self._scene = scene
+        self._shown: SettlingProposal | None = None
+        self._handles: list[Any] = []
+
+    def show(self, proposal: SettlingProposal | None, shapes: ObjectMeshes) -> None:
+        """Brings the browser to a proposal, or to none.
+
+        Args:
+            proposal: of the view.
+            shapes: of the library's objects.
+        """
+        min_motion = 2e-3  # Metres; the shade of an object that moves less would flicker within it.
+        min_turn_deg = 2.0  # Degrees, for the same reason.
+        if proposal is self._shown:
+            return
+        self._shown = proposal
+        for handle in self._handles:
+            handle.remove()
+        self._handles = []
+        if proposal is None:
+            return
+        moved = names_of_moved_instances(proposal, min_motion, min_turn_deg)
+        for instance in proposal.document.instances:
+            if instance_name(instance) in moved:
+                self._add(instance_name(instance), instance.object, instance.X_SO.matrix(), shapes)
+
+    def _add(self, name: str, object: str, X_SO: Any, shapes: ObjectMeshes) -> None:
+        try:
+            shape = shapes[object]
+        except BurgError:  # what is wrong with it is told elsewhere
+            return
+        self._handles.append(
+            self._scene.add_mesh_simple(
+                f"/ghosts/{name}",
+                shape.vertices,
+                shape.faces,
+                color=(245, 159, 0),
+                opacity=0.5,
+                side="double",
+                cast_shadow=False,
+                position=X_SO[:3, 3],
+                wxyz=quaternion_from_rotation(X_SO[:3, :3]),
+            )
+        )
+
+
+@dataclass(eq=False)
+class _GapLine:
+    """A line and its label."""
+
+    line: viser.LineSegmentsHandle
+    label: viser.LabelHandle
+
+
+class HeightView:
+    """Shows how far selected objects are above what is below them.
+
+    Args:
+        scene: of viser.
+    """
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        self._scene = scene
+        self._shown: dict[str, _GapLine] = {}
+
+    def show(self, view: SessionView) -> None:
+        """Brings the browser to a view."""
+        for name in [name for name in self._shown if name not in view.gaps]:
+            self._shown.pop(name).line.remove()  # and the label below it
+        for name, gap in view.gaps.items():
+            lower, upper = instance_bounds(view.state, name)
+            x, y = (lower[:2] + upper[:2]) / 2.0
+            ends = np.array([[x, y, lower[2]], [x, y, lower[2] - gap]])
+            shown = self._shown.get(name) or self._made(name, ends)
+            self._shown[name] = shown
+            shown.line.points = ends[None].astype(np.float32)
+            shown.label.position = ends.mean(axis=0)
+            shown.label.text = f"{1e3 * gap:.1f} mm"
+
+    def _made(self, name: str, ends: Array) -> _GapLine:
+        gap_color = (64, 140, 230)  # sRGB, as the status of what hovers.
+        line = self._scene.add_line_segments(
+            f"/heights/{name}",
+            ends[None],
+            gap_color,
+            thickness=2.0,
+            thickness_units="screen",
+        )
+        label = self._scene.add_label(f"/heights/{name}/label", "", anchor="center-left")
+        return _GapLine(line, label)

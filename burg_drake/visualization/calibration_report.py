@@ -1,0 +1,262 @@
+"""The page about a calibration: residuals, coverage, lens distortion, and uncertainty."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from burg_drake.cameras import (
+    BOUND_SIGMAS,
+    COVERAGE_GRID,
+    Calibration,
+    corner_coverage,
+    image_grid,
+    pixel_uncertainty,
+)
+from burg_drake.core import Array, atomic_write
+from burg_drake.visualization.html_page import Html, element, html_document, join
+
+FIGURE_WIDTH = 460.0
+"""Width of a drawing of the image, in CSS pixels."""
+
+
+class CalibrationColors:
+    """Calibration colors."""
+
+    ink = "#1f2630"  # Text and points.
+    frame = "#c4cad4"  # The border of the image.
+    accent = "#b3261e"  # Residuals, uncertainty and advice.
+    shade = "#2f6db5"  # Bars, coverage and distortion.
+
+
+CALIBRATION_STYLE = f"""
+body {{ font: 15px/1.5 system-ui, sans-serif; color: {CalibrationColors.ink}; max-width: 62rem; margin: 2rem auto;
+  padding: 0 1rem; }}
+h1 {{ font-size: 1.4rem; }} h2 {{ font-size: 1.05rem; margin: 1.8rem 0 .4rem; }}
+table {{ border-collapse: collapse; font-variant-numeric: tabular-nums; }}
+td, th {{ padding: .15rem .9rem .15rem 0; text-align: right; border-bottom: 1px solid #e4e7ec; }}
+td:first-child, th:first-child {{ text-align: left; }}
+figure {{ display: inline-block; margin: 0 1.5rem 1rem 0; vertical-align: top; }}
+figcaption {{ font-size: .85rem; max-width: {FIGURE_WIDTH:.0f}px; }}
+.advice {{ color: {CalibrationColors.accent}; }}
+svg {{ max-width: 100%; height: auto; }}
+@media (max-width: 30rem) {{ td, th {{ padding-right: .5rem; font-size: .85rem; }}
+  td > svg {{ display: none; }} }}
+"""
+
+
+def write_calibration_report(calibration: Calibration, advice: list[str], path: str) -> None:
+    """Writes the page, which needs no other file and no network.
+
+    Args:
+        calibration: what it is about.
+        advice: sentences about what would be better.
+        path: file to write.
+
+    Raises:
+        InvalidInputError: the place cannot be written to.
+    """
+    k = calibration.intrinsics
+    body = join(
+        element("h1", "Calibration of a camera"),
+        element(
+            "p",
+            f"{k.width} x {k.height} pixels; {len(calibration.views)} views; lens model"
+            f" {calibration.model}; residual {calibration.rms:.3f} pixels (root mean square);"
+            f" the target bulges by {1e3 * calibration.bulge:.2f} mm",
+        ),
+        element("p", f"In 19 of 20 cases the camera is {calibration.promise}."),
+        *(element("p", line, class_="advice") for line in advice),
+        element("h2", "Camera"),
+        _parameter_table(calibration),
+        element("h2", "Over the image"),
+        _figure_element(_residual_figure(calibration)),
+        _figure_element(_coverage_figure(calibration)),
+        _figure_element(_uncertainty_figure(calibration)),
+        _figure_element(_distortion_figure(calibration)),
+        element("h2", "Views"),
+        _view_table(calibration),
+        _rejected_views(calibration),
+    )
+    page = html_document("Calibration of a camera", CALIBRATION_STYLE, body)
+    atomic_write(path, f"{page}\n")
+
+
+def _parameter_table(calibration: Calibration) -> Html:
+    rows = [
+        element("tr", *(element("td", text) for text in (name, f"{value:.6g}", f"{deviation:.2g}")))
+        for name, (value, deviation) in calibration.parameters.items()
+    ]
+    heads = ("parameter", "value", "standard deviation")
+    return element("table", element("tr", *(element("th", head) for head in heads)), *rows)
+
+
+def _view_table(calibration: Calibration) -> Html:
+    largest = max(used.rms for used in calibration.views)
+    rows = []
+    for used in calibration.views:
+        bar = element(
+            "rect",
+            x=0,
+            y=4,
+            width=f"{120.0 * used.rms / largest:.1f}",
+            height=9,
+            fill=CalibrationColors.shade,
+        )
+        texts = (
+            used.view.name,
+            str(len(used.view.ids)),
+            f"{math.degrees(used.tilt):.0f}",
+            f"{used.view.blur:.2f}",
+            f"{used.rms:.3f}",
+        )
+        drawn = element("svg", bar, width=122, height=16)
+        rows.append(element("tr", *(element("td", text) for text in texts), element("td", drawn)))
+    heads = ("image", "corners", "tilt (degrees)", "blur (pixels)", "residual (pixels)", "")
+    return element("table", element("tr", *(element("th", head) for head in heads)), *rows)
+
+
+def _rejected_views(calibration: Calibration) -> Html:
+    if not calibration.rejected:
+        return Html()
+    lines = (element("li", f"{name} {why}".strip()) for name, why in calibration.rejected)
+    return join(element("h2", "Left out"), element("ul", *lines))
+
+
+def _figure_element(drawn: tuple[Html, str]) -> Html:
+    return element("figure", drawn[0], element("figcaption", drawn[1]))
+
+
+def _image_svg(calibration: Calibration, *shapes: Html) -> Html:
+    """An SVG in pixels of the image, with its frame."""
+    k = calibration.intrinsics
+    frame = element(
+        "rect", x=-0.5, y=-0.5, width=k.width, height=k.height, fill="none", stroke=CalibrationColors.frame,
+        stroke_width=_line_width(calibration),
+    )  # fmt: skip
+    return element(
+        "svg",
+        *shapes,
+        frame,
+        width=FIGURE_WIDTH,
+        height=FIGURE_WIDTH * k.height / k.width,
+        viewBox=f"-0.5 -0.5 {k.width} {k.height}",
+    )
+
+
+def _line_width(calibration: Calibration) -> float:
+    """Width of a line that is one pixel of the screen wide [pixels of the image]."""
+    return round(calibration.intrinsics.width / FIGURE_WIDTH, 3)
+
+
+def _draw_arrows(calibration: Calibration, start: Array, vectors: Array, color: str) -> list[Html]:
+    ends = np.concatenate([start, start + vectors], axis=1).round(1)
+    path = "".join(f"M{a:g} {b:g}L{c:g} {d:g}" for a, b, c, d in ends.tolist())
+    width = _line_width(calibration)
+    dots = "".join(f"M{a:g} {b:g}h0" for a, b, _, _ in ends.tolist())
+    return [
+        element("path", d=path, stroke=color, stroke_width=width, fill="none"),
+        element(
+            "path",
+            d=dots,
+            stroke=CalibrationColors.ink,
+            stroke_width=2 * width,
+            stroke_linecap="round",
+            fill="none",
+        ),
+    ]
+
+
+def _residual_figure(calibration: Calibration) -> tuple[Html, str]:
+    corners = np.concatenate([used.view.corners for used in calibration.views])
+    residuals = np.concatenate([used.residuals for used in calibration.views])
+    scale = _floor_to_one_digit(0.03 * calibration.intrinsics.width / max(calibration.rms, 1e-6))
+    arrows = _draw_arrows(calibration, corners, scale * residuals, CalibrationColors.accent)
+    return (
+        _image_svg(calibration, *arrows),
+        f"Residuals of all corners, {scale:g} times as long. Where neighbours agree, the lens model"
+        " is too simple or the target is bent.",
+    )
+
+
+def _draw_cells(calibration: Calibration, shades: Array, words: list[str], color: str) -> Html:
+    """A grid over the image: shades (rows, columns) from 0 to 1, and what each cell says."""
+    k = calibration.intrinsics
+    rows, columns = shades.shape
+    width, height = k.width / columns, k.height / rows
+    shapes = []
+    for index, word in enumerate(words):
+        row, column = divmod(index, columns)
+        x, y = column * width - 0.5, row * height - 0.5
+        opacity = round(float(0.85 * shades[row, column]), 3)
+        shapes.append(
+            element("rect", x=x, y=y, width=width, height=height, fill=color, fill_opacity=opacity)
+        )
+        place = {"x": x + width / 2, "y": y + 0.6 * height, "text_anchor": "middle"}
+        ink = "#ffffff" if opacity > 0.5 else CalibrationColors.ink
+        shapes.append(element("text", word, **place, font_size=0.026 * k.width, fill=ink))
+    return _image_svg(calibration, *shapes)
+
+
+def _coverage_figure(calibration: Calibration) -> tuple[Html, str]:
+    size = (calibration.intrinsics.width, calibration.intrinsics.height)
+    counts = corner_coverage([used.view for used in calibration.views], size)
+    shades = np.sqrt(counts / max(1, counts.max()))
+    drawn = _draw_cells(
+        calibration, shades, [str(n) for n in counts.ravel().tolist()], CalibrationColors.shade
+    )
+    return (
+        drawn,
+        "Corners seen in each part of the image. Where there are none, the lens is a guess.",
+    )
+
+
+def _uncertainty_figure(calibration: Calibration) -> tuple[Html, str]:
+    max_error = 10.0  # Pixels. Larger errors have the same shade.
+    rows, columns = COVERAGE_GRID
+    k = calibration.intrinsics
+    u = (np.arange(columns) + 0.5) * k.width / columns - 0.5
+    v = (np.arange(rows) + 0.5) * k.height / rows - 0.5
+    places = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
+    bounds = np.nan_to_num(
+        BOUND_SIGMAS * pixel_uncertainty(calibration, places), posinf=1e9, nan=1e9
+    )
+    shades = np.clip(bounds / max(1.0, min(bounds.max(), max_error)), 0.0, 1.0).reshape(
+        COVERAGE_GRID
+    )
+    words = [
+        f"{value:.2f}" if value < max_error else f">{max_error:g}" for value in bounds.tolist()
+    ]
+    drawn = _draw_cells(calibration, shades, words, CalibrationColors.accent)
+    return drawn, (
+        "How far the camera model may be off in the middle of each part, in 19 of 20 cases"
+        " [pixels]; towards the corners of the image it is more. It counts the scatter of the"
+        " residuals, how far the views disagree, and how far lens models differ that fit as well."
+        " Where it is large, show more of the target."
+    )
+
+
+def _distortion_figure(calibration: Calibration) -> tuple[Html, str]:
+    k = calibration.intrinsics
+    seen = image_grid(k, 17, 13)
+    moved, straight = seen - k.undistort(seen), "a straight image"
+    if k.is_fisheye:
+        rays = k.rays(seen)
+        angle = np.arccos(rays[:, 2:])
+        even = rays[:, :2] / np.maximum(np.sin(angle), 1e-9) * angle
+        moved, straight = seen - (even * k.focal + k.center), "an image of even angles"
+    longest = float(np.linalg.norm(moved, axis=1).max())
+    scale = _floor_to_one_digit(min(1.0, 0.08 * k.width / max(longest, 1e-6)))
+    arrows = _draw_arrows(calibration, seen - scale * moved, scale * moved, CalibrationColors.shade)
+    return (
+        _image_svg(calibration, *arrows),
+        f"Where the lens moves points of {straight} to (dots: from), {scale:g} times as long;"
+        f" {longest:.1f} pixels at most.",
+    )
+
+
+def _floor_to_one_digit(value: float) -> float:
+    """One digit of a number, rounded down."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return float(f"{math.floor(value / power) * power:.1g}")

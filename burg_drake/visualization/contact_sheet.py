@@ -1,0 +1,213 @@
+"""A library on one page: a card with pictures and figures for each object."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+import burg_drake
+from burg_drake.core import atomic_write
+from burg_drake.objects import ContactGeometry, ObjectEntry, ObjectLibrary, StablePose
+from burg_drake.visualization.html_page import Child, Html, element, html_document, page_style
+from burg_drake.visualization.thumbnails import ObjectRenderer, Thumbnail
+
+CONTACT_KIND_NAMES = {
+    "surface": "surface to pads, convex pieces to others",
+    "pieces": "convex pieces, rigid",
+    "compliant_pieces": "convex pieces, compliant",
+    "mesh": "surface mesh, rigid",
+    "primitive": "primitive",
+}
+"""Names of `ContactGeometry.kind` for people."""
+
+
+def write_contact_sheet(
+    library: ObjectLibrary,
+    path: str | Path,
+    names: Iterable[str] | None = None,
+    *,
+    remarks: Mapping[str, Sequence[str]] | None = None,
+) -> None:
+    """Writes the page.
+
+    Args:
+        library: what to show.
+        path: file to write.
+        names: of objects, in this order; all if None.
+        remarks: sentences on objects that deserve attention, by name.
+
+    Raises:
+        UnknownNameError: no such object, or one of its files is missing.
+        InvalidInputError: an object cannot be shown, or the page cannot be written.
+        MissingDependencyError: a system library of the renderer is missing.
+    """
+    chosen = list(library.objects if names is None else names)
+    renderer = ObjectRenderer(library, chosen)
+    cards = [object_card(library, name, renderer, (remarks or {}).get(name, ())) for name in chosen]
+    atomic_write(path, _sheet_page(library, chosen, cards))
+
+
+def object_card(
+    library: ObjectLibrary, name: str, renderer: ObjectRenderer, remarks: Sequence[str] = ()
+) -> Html:
+    """The card of one object."""
+    pose_size = (160, 120)  # Pixels.
+    entry = library.entry(name)
+    count = len(entry.pieces)
+    poses = [
+        _picture_figure(
+            renderer.portrait(name, pose_size, stable_pose=k),
+            f"{name} in stable pose {k}",
+            element("b", percent_text(pose.probability)),
+            element("small", note) if (note := pose_note(pose)) else None,
+        )
+        for k, pose in enumerate(entry.stable_poses)
+    ]
+    notes = [element("li", text, class_="remark") for text in remarks]
+    notes += [element("li", text) for text in surface_notes(library, name)]
+    return element(
+        "article",
+        element(
+            "div",
+            _picture_figure(renderer.portrait(name), f"{name} as it looks"),
+            _picture_figure(
+                renderer.pieces(name), f"convex pieces of {name}", _count_text(count, "piece")
+            ),
+            class_="views",
+        ),
+        element(
+            "div",
+            element("h2", name),
+            element("p", entry.description) if entry.description else None,
+            class_="text",
+        ),
+        element("dl", *_object_figures(entry)),
+        element("div", *poses, class_="poses") if poses else None,
+        element("ul", *notes),
+        element("div", source_line(entry), class_="file"),
+        id=f"object-{name}",
+    )
+
+
+def surface_notes(library: ObjectLibrary, name: str) -> list[str]:
+    """What was repaired, and whether the surface is closed, as sentences."""
+    repairs = list(dict.fromkeys(library.entry(name).source.repairs))
+    closed = bool(library.surface(name).is_watertight)
+    state = "The surface is closed." if closed else "The surface is open."
+    if not repairs:
+        return [f"{state} Nothing had to be repaired."]
+    return [f"{state} Repairs: {'; '.join(repairs)}."]
+
+
+def percent_text(probability: float) -> str:
+    """A probability in percent, with as many digits as it takes to see that it is not zero."""
+    percent = 100.0 * probability
+    return f"{percent:.0f} %" if percent >= 9.95 else f"{percent:.1f} %"
+
+
+def pose_note(pose: StablePose) -> str:
+    """What is known of a pose besides its probability."""
+    notes = ["rolls"] if pose.rolls else []
+    if pose.residual is not None:
+        notes.append(f"tilt {math.degrees(pose.residual):.1f}°")
+    return ", ".join(notes)
+
+
+def contact_name(contact: ContactGeometry) -> str:
+    """What touches others, in words."""
+    if contact.primitive is None:
+        return CONTACT_KIND_NAMES[contact.kind]
+    lengths = " x ".join(_length_text(s) for s in contact.primitive.size)
+    return f"{contact.primitive.shape} {lengths} mm"
+
+
+def source_line(entry: ObjectEntry) -> str:
+    """Where the object came from."""
+    file = entry.source.file or "made by code"
+    scaled = "" if entry.source.scale == 1.0 else f", times {entry.source.scale:g}"
+    return file + scaled
+
+
+def _object_figures(entry: ObjectEntry) -> list[Html]:
+    mass = entry.mass_properties
+    size = [b - a for a, b in zip(entry.lower, entry.upper, strict=True)]
+    pieces = entry.contact.kind in ("surface", "pieces", "compliant_pieces")
+    fit = entry.fit if pieces else entry.contact.fit
+    about = "" if mass.source == "given" else "~"
+    wall = mass.wall_thickness
+    rows: list[tuple[str, str, bool]] = [
+        ("Size [mm]", " × ".join(_length_text(s) for s in size), False),
+        ("Mass", about + mass_text(mass.mass), False),
+        ("Density", f"{_three_digits(mass.mass / mass.volume)} kg/m³", False),
+        ("Contact", contact_name(entry.contact), False),
+        ("Volume ratio", f"{fit.volume_ratio:.2f}" if fit else "not measured", False),
+        ("Hausdorff distance", f"{1e3 * fit.hausdorff:.1f} mm" if fit else "not measured", False),
+        ("Friction", f"{entry.friction:g}", False),
+        ("Volume", f"{_three_digits(1e6 * mass.volume)} cm³", False),
+        ("Body", "solid" if wall is None else f"hollow, wall {1e3 * wall:.1f} mm", False),
+    ]
+    if mass.overridden:
+        given = " and ".join(what.replace("_", " ") for what in mass.overridden)
+        rows.append(("Given by the user", given, True))
+    return [
+        element("div", element("dt", name), element("dd", value), class_="wide" if wide else None)
+        for name, value, wide in rows
+    ]
+
+
+def mass_text(mass: float) -> str:
+    """A mass [kg] for people."""
+    return f"{_three_digits(mass)} kg" if mass >= 0.9995 else f"{_three_digits(1e3 * mass)} g"
+
+
+def _three_digits(value: float) -> str:
+    """A number with three significant digits, without exponent."""
+    digits = 2 - math.floor(math.log10(value)) if value > 0.0 else 0
+    return f"{round(value, digits):.{max(digits, 0)}f}"
+
+
+def _length_text(length: float) -> str:
+    return f"{1e3 * length:.0f}" if length >= 0.00995 else f"{1e3 * length:.1f}"
+
+
+def _count_text(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def _picture_figure(picture: Thumbnail, alt: str, *caption: Child) -> Html:
+    height, width = picture.pixels.shape[:2]
+    data = base64.b64encode(picture.png()).decode()
+    image = element("img", src=f"data:image/png;base64,{data}", alt=alt, width=width, height=height)
+    given = [child for child in caption if child is not None]
+    return element("figure", image, element("figcaption", *given) if given else None)
+
+
+def _sheet_page(library: ObjectLibrary, names: Sequence[str], cards: Sequence[Html]) -> str:
+    footnote = (
+        "Sizes are those of the box around the mesh, along its axes. A ~ marks a mass that follows from"
+        " a density. Volume ratio and Hausdorff distance say how well the shape that touches others"
+        " stands for the surface: its volume over that inside the surface, and the largest distance"
+        " between the two. The share below a pose is that of drops from random orientations that end in"
+        " it; the tilt, that at which it came to rest at most, having been dropped and pushed."
+    )
+    sheet = page_style("burg_drake.visualization", "contact_sheet.css")
+    poses = sum(len(library.entry(name).stable_poses) for name in names)
+    about = f"{_count_text(len(names), 'object')}, {_count_text(poses, 'stable pose')}"
+    if library.document.description:
+        about = f"{library.document.description} {about}."
+    links = [element("a", name, href=f"#object-{name}") for name in names]
+    return html_document(
+        f"Object library {library.name}",
+        sheet,
+        element(
+            "header",
+            element("p", "Object library", class_="kind"),
+            element("h1", library.name),
+            element("p", about, class_="about"),
+            element("nav", *links) if len(names) > 6 else None,
+        ),
+        element("main", *cards),
+        element("footer", f"{footnote} Written by burg_drake {burg_drake.__version__}."),
+    )

@@ -1,0 +1,213 @@
+"""Grasp frames of file formats in Meshcat: an open hand for each, with our frame G and theirs, F."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pydrake.geometry import Box, Mesh, Meshcat, Rgba
+from pydrake.math import RigidTransform
+
+from burg_drake.core import Array, make_pose, rot_z, transform_points
+from burg_drake.formats import GraspFormat, Gripper, convention_of, group_by_convention
+from burg_drake.station import Hand
+from burg_drake.visualization.gltf import label_mesh
+from burg_drake.visualization.hand_visual import HandVisual, hand_visuals
+from burg_drake.visualization.legend import LegendEntry
+from burg_drake.visualization.library_gallery import GALLERY_FIELD_OF_VIEW_DEG
+from burg_drake.visualization.meshcat_drawing import VIEW_ASPECT, TriadStyle, aim_at, draw_triad
+from burg_drake.visualization.object_drawing import camera_rotation
+
+FRAMES_PATH = "/drake/frames"  # Path of the grasp frames in Meshcat's tree.
+R_WC = camera_rotation(np.deg2rad(22.0))
+"""(3, 3) the camera."""
+OWN_TRIAD = TriadStyle(length=0.066, radius=0.0009, head=0.007)
+"""Style of our grasp frame G: thin and long."""
+FORMAT_TRIAD = TriadStyle(length=0.044, radius=0.0026, head=0.013)
+"""Style of a format's grasp frame F: thick and short, visible where it coincides with G."""
+
+
+class FrameCell:
+    """Frame cell."""
+
+    letter_height = 0.017  # Metres.
+    caption_height = 0.0155  # Metres from line to line.
+    caption_lines = 4  # Lines of a caption.
+    gap = 0.035  # Metres between neighbours.
+
+
+@dataclass(frozen=True)
+class FrameGrid:
+    """A grid of cells in the picture.
+
+    Attributes:
+        columns, rows: numbers of cells.
+        width, height: of a cell [m].
+        foot, head: of a cell's contents, from G upwards [m].
+    """
+
+    columns: int
+    rows: int
+    width: float
+    height: float
+    foot: float
+    head: float
+
+    def place(self, index: int) -> tuple[float, float]:
+        """Where in the picture G of a hand is, to the right and up [m]."""
+        row, column = divmod(index, self.columns)
+        return self.width * column, -self.height * row
+
+    def bounds(self) -> Array:
+        """(2, 2) lower and upper corner in the picture [m]."""
+        left, right = -0.5 * self.width, self.width * (self.columns - 0.5)
+        return np.array([[left, self.foot - self.height * (self.rows - 1)], [right, self.head]])
+
+
+def show_frames(
+    hand: Hand, model: Path, gripper: Gripper, formats: Sequence[GraspFormat], meshcat: Meshcat
+) -> tuple[LegendEntry, ...]:
+    """Shows a hand for each format, or for several of the same convention, with both frames.
+
+    Args:
+        hand: its document.
+        model: its model file.
+        gripper: what formats know of it.
+        formats: at least one.
+        meshcat: where; what it showed below `/drake/frames` before is removed.
+
+    Returns:
+        Switches for frames, hands and objects.
+
+    Raises:
+        InvalidInputError: the hand's model cannot be loaded.
+    """
+    meshcat.Delete(FRAMES_PATH)
+    visuals = hand_visuals(hand, model, opacity=0.36)
+    groups = group_by_convention(formats, gripper)
+    captions = [_format_caption(group, gripper) for group in groups]
+    sheet = _fit_grid(len(groups), *_hand_bounds(visuals, hand), max(w for _, w in captions))
+    for k, (group, caption) in enumerate(zip(groups, captions, strict=True)):
+        name, (u, v) = group[0].name, sheet.place(k)
+        X_WG = pose_in_picture_plane(u, v) @ downward_grasp_pose()
+        for i, visual in enumerate(visuals):
+            path = f"{FRAMES_PATH}/hands/{name}/{i}"
+            meshcat.SetObject(path, visual.shape, visual.color)
+            X_WV = hand.X_AH(X_WG) @ visual.X_HV
+            meshcat.SetTransform(path, RigidTransform(X_WV))
+        _draw_object(meshcat, f"{FRAMES_PATH}/objects/{name}", hand, X_WG)
+        X_WF = X_WG @ group[0].X_GF(gripper)
+        draw_triad(meshcat, f"{FRAMES_PATH}/G/{name}", X_WG, OWN_TRIAD)
+        draw_triad(meshcat, f"{FRAMES_PATH}/F/{name}", X_WF, FORMAT_TRIAD)
+        _write_letters(meshcat, f"{FRAMES_PATH}/labels/{name}", X_WF)
+        _write_label_facing_camera(
+            meshcat,
+            f"{FRAMES_PATH}/labels/{name}/caption",
+            caption,
+            pose_in_picture_plane(u, v + sheet.foot),
+        )
+    _aim_at_bounds(meshcat, sheet.bounds())
+    return (
+        LegendEntry(
+            "F, the frame of the format: thick, with letters", "#1f52cc", (f"{FRAMES_PATH}/F",)
+        ),
+        LegendEntry("G, the frame of burg_drake: thin", "#8a99c0", (f"{FRAMES_PATH}/G",)),
+        LegendEntry("hand", "#c9ced4", (f"{FRAMES_PATH}/hands",)),
+        LegendEntry("object", "#edc26b", (f"{FRAMES_PATH}/objects",)),
+        LegendEntry("names", "#34393f", (f"{FRAMES_PATH}/labels",)),
+    )
+
+
+def downward_grasp_pose() -> Array:
+    """(4, 4) pose, but for the place, of G in the world: approaching along -z."""
+    hand_yaw = np.deg2rad(-28.0)  # Radians. No axis of G points at the camera.
+    return make_pose(rot_z(hand_yaw) @ np.diag([1.0, -1.0, -1.0]))
+
+
+def pose_in_picture_plane(u: float, v: float) -> Array:
+    """(4, 4) the world's axes at a point of the plane through W that the camera faces.
+
+    Args:
+        u, v: to the right and up in the picture [m].
+    """
+    return make_pose(p_AB=u * R_WC[:, 0] - v * R_WC[:, 1])
+
+
+def _fit_grid(count: int, lower: Array, upper: Array, caption: float) -> FrameGrid:
+    """As many columns and rows as let the camera come nearest.
+
+    Args:
+        count: of hands.
+        lower, upper: (2,) bounds of a hand in the picture, around G [m].
+        caption: width of the widest [m].
+    """
+    foot = float(lower[1]) - FrameCell.caption_lines * FrameCell.caption_height
+    width = max(float(upper[0] - lower[0]), caption) + FrameCell.gap
+    height = float(upper[1]) - foot + FrameCell.gap
+    grids = [(columns, -(-count // columns)) for columns in range(1, count + 1)]
+    columns, rows = min(grids, key=lambda g: max(g[0] * width / VIEW_ASPECT, g[1] * height))
+    return FrameGrid(columns, rows, width, height, foot, float(upper[1]))
+
+
+def _hand_bounds(visuals: Sequence[HandVisual], hand: Hand) -> tuple[Array, Array]:
+    """Corners (2,) in the picture [m] of a hand with the longest axes, G in the middle."""
+    X_WH = hand.X_AH(downward_grasp_pose())
+    points = [transform_points(X_WH @ v.X_HV, v.corners) for v in visuals]
+    margin = max(
+        OWN_TRIAD.length + 0.5 * FrameCell.caption_height,
+        FORMAT_TRIAD.length + FrameCell.letter_height,
+    )
+    seen = np.vstack([*points, [[0.0, 0.0, -margin]]]) @ R_WC[:, :2] * (1.0, -1.0)
+    lower, upper = seen.min(axis=0), seen.max(axis=0)
+    half = max(-lower[0], upper[0])
+    return np.array([-half, lower[1]]), np.array([half, upper[1]])
+
+
+def _format_caption(formats: Sequence[GraspFormat], gripper: Gripper) -> tuple[Mesh, float]:
+    found = convention_of(formats[0], gripper)
+    lines = (
+        ", ".join(format.name for format in formats),
+        f"approach {found.approach}, closing {found.closing}",
+        f"origin: {found.origin}",
+        f"poses in the {found.frame} frame",
+    )
+    return label_mesh(lines, FrameCell.caption_height)
+
+
+def _draw_object(meshcat: Meshcat, path: str, hand: Hand, X_WG: Array) -> None:
+    object_color = Rgba(0.93, 0.70, 0.25, 0.5)  # To be seen through, too.
+    size_shares = (0.34, 0.24, 0.40)  # Of the hand's opening.
+    x, y, z = hand.opening[1] * np.array(size_shares)
+    meshcat.SetObject(path, Box(x, y, z), object_color)
+    X_GO = make_pose(p_AB=(0.0, 0.0, 0.25 * z))
+    meshcat.SetTransform(path, RigidTransform(X_WG @ X_GO))
+
+
+def _write_letters(meshcat: Meshcat, path: str, X_WF: Array) -> None:
+    """x, y, z beyond the tips of a frame's axes."""
+    for k, letter in enumerate("xyz"):
+        middle = X_WF[:3, 3] + (FORMAT_TRIAD.length + 0.5 * FrameCell.letter_height) * X_WF[:3, k]
+        foot = make_pose(p_AB=middle + 0.4 * FrameCell.letter_height * R_WC[:, 1])
+        _write_label_facing_camera(
+            meshcat, f"{path}/{letter}", label_mesh((letter,), FrameCell.letter_height), foot
+        )
+
+
+def _write_label_facing_camera(
+    meshcat: Meshcat, path: str, label: tuple[Mesh, float], X_WL: Array
+) -> None:
+    """Puts the middle of a text's foot at a place (4, 4), to be read by the camera."""
+    text, width = label
+    X_LT = make_pose(R_WC @ np.diag([1.0, -1.0, -1.0]), -0.5 * width * R_WC[:, 0])
+    meshcat.SetObject(path, text)
+    meshcat.SetTransform(path, RigidTransform(X_WL @ X_LT))
+
+
+def _aim_at_bounds(meshcat: Meshcat, bounds: Array) -> None:
+    """Fits corners (2, 2) of the picture into the view."""
+    corners = np.array(
+        [pose_in_picture_plane(u, v)[:3, 3] for u in bounds[:, 0] for v in bounds[:, 1]]
+    )
+    aim_at(meshcat, corners, R_WC[:, 2], field_of_view_deg=GALLERY_FIELD_OF_VIEW_DEG)

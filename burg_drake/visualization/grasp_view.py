@@ -1,0 +1,380 @@
+"""Grasps in Meshcat and in drawings: groups of one colour, gripper glyphs as one mesh, and their legend."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydrake.geometry import Meshcat
+
+from burg_drake.core import (
+    CATEGORY_COLORS,
+    DIMENSIONLESS,
+    TEXT_UNIT,
+    Array,
+    GraspSet,
+    InvalidInputError,
+    Outcome,
+    Rgba,
+    describe_column,
+    transform_points,
+)
+from burg_drake.visualization.colors import (
+    COLOR_BINS,
+    OTHERS_COLOR,
+    OUTCOME_GROUPS,
+    UNJUDGED_GROUP,
+    UNKNOWN_COLOR,
+    ColorScale,
+    color_scale,
+    hex_color,
+    outcome_group,
+)
+from burg_drake.visualization.legend import ColorBar, LegendEntry
+from burg_drake.visualization.meshcat_drawing import draw_flat_triangles
+from burg_drake.visualization.object_drawing import FlatView, path_data
+
+
+@dataclass(frozen=True, eq=False)
+class GraspGroup:
+    """Grasps that are drawn as one mesh.
+
+    Attributes:
+        key: tells the group from the others; part of its path in Meshcat.
+        label: for legends; groups of the same label are one line there.
+        rgba: colour.
+        members: (M,) indices of the grasps.
+    """
+
+    key: str
+    label: str
+    rgba: Rgba
+    members: NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class NumberGroups:
+    """Grasps by a number.
+
+    Attributes:
+        scale: which colours the numbers have.
+        bins: (N,) bin of each grasp; -1 where the number is not known.
+        beyond: how many numbers are below and above the scale.
+        groups: of the bins that are not empty, lowest first, then of what is not known.
+    """
+
+    scale: ColorScale
+    bins: NDArray[np.int64]
+    beyond: tuple[int, int]
+    groups: tuple[GraspGroup, ...]
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """(BINS,) number of grasps in each bin."""
+        return np.bincount(self.bins[self.bins >= 0], minlength=COLOR_BINS)
+
+
+def group_by_number(values: ArrayLike, limits: tuple[float, float] | None = None) -> NumberGroups:
+    """Groups grasps by numbers (N,); NaN where one is not known.
+
+    Args:
+        values: (N,).
+        limits: ends of the colour scale; they follow from the values if None.
+
+    Raises:
+        InvalidInputError: the limits do not rise.
+    """
+    numbers = np.asarray(values, dtype=float)
+    scale = color_scale(numbers, limits)
+    bins = scale.bins(numbers)
+    colors = scale.colors()
+    groups = [
+        GraspGroup(bin_key(k), "", (*colors[k].tolist(), 1.0), np.flatnonzero(bins == k))
+        for k in np.unique(bins[bins >= 0]).tolist()
+    ]
+    if (bins < 0).any():
+        groups.append(GraspGroup("unknown", "not known", UNKNOWN_COLOR, np.flatnonzero(bins < 0)))
+    return NumberGroups(scale, bins, scale.beyond(numbers), tuple(groups))
+
+
+def bin_key(bin: int) -> str:
+    """The key of a bin's group."""
+    return f"{bin:02d}"
+
+
+def group_by_name(names: Sequence[str]) -> tuple[GraspGroup, ...]:
+    """Groups grasps by names (N,), the most frequent first; empty ones are not known.
+
+    Names that are outcomes, all of them, get the colours of outcomes.
+    """
+    texts = np.asarray(names, dtype=str)
+    counts = Counter(texts[texts != ""].tolist())
+    if counts and set(counts) <= {outcome.value for outcome in Outcome}:
+        return group_by_outcome([Outcome(text) if text else None for text in texts.tolist()])
+    ranked = sorted(counts, key=lambda name: (-counts[name], name))
+    own = ranked[: len(CATEGORY_COLORS)]
+    groups = [
+        GraspGroup(f"name_{k}", name, rgba, np.flatnonzero(texts == name))
+        for k, (name, rgba) in enumerate(zip(own, CATEGORY_COLORS, strict=False))
+    ]
+    rest = ranked[len(own) :]
+    if rest:
+        label = f"{len(rest)} other{'' if len(rest) == 1 else 's'}"
+        groups.append(
+            GraspGroup("others", label, OTHERS_COLOR, np.flatnonzero(np.isin(texts, rest)))
+        )
+    if (texts == "").any():
+        groups.append(
+            GraspGroup("unknown", "not known", UNKNOWN_COLOR, np.flatnonzero(texts == ""))
+        )
+    return tuple(groups)
+
+
+def group_by_outcome(outcomes: Sequence[Outcome | None]) -> tuple[GraspGroup, ...]:
+    """Groups grasps by outcomes (N,), best first; None for grasps that nobody judged."""
+    index: dict[Outcome | None, list[int]] = {}
+    for i, outcome in enumerate(outcomes):
+        index.setdefault(outcome, []).append(i)
+    order = [outcome for group in OUTCOME_GROUPS for outcome in group.outcomes]
+    return tuple(
+        GraspGroup(
+            outcome or "not_judged",
+            outcome_group(outcome).name,
+            outcome_group(outcome).rgba,
+            np.array(index[outcome], dtype=np.int64),
+        )
+        for outcome in (*order, None)
+        if outcome in index
+    )
+
+
+def single_group(count: int) -> tuple[GraspGroup, ...]:
+    """All grasps in one group."""
+    return (GraspGroup("all", "grasps", UNJUDGED_GROUP.rgba, np.arange(count)),) if count else ()
+
+
+FINGER_LENGTH = 0.045
+"""Length of a glyph's fingers, from its palm to the origin of the grasp frame, in metres."""
+STEM_LENGTH = 0.03
+"""Length of the stem behind a glyph's palm, in metres."""
+BAR_RADIUS = 0.0013
+"""Circumradius of a glyph's three-sided bars, in metres."""
+
+GRASPS_PATH = "/drake/grasps"
+
+
+def draw_grasps(
+    meshcat: Meshcat, X_WG: ArrayLike, width: ArrayLike, groups: Iterable[GraspGroup]
+) -> None:
+    """Draws grasps in groups of one colour each, in the place of those drawn before.
+
+    Args:
+        meshcat: where to draw, below `/drake/grasps`, one path a group.
+        X_WG: (N, 4, 4) grasps in the world.
+        width: (N,) distance between the pads [m]; finite.
+        groups: with indices of the grasps; those that are in none are not drawn.
+
+    Raises:
+        InvalidInputError: the lengths differ, or a width is not known.
+    """
+    faint_radius = 0.0008  # Metres.
+    poses = np.asarray(X_WG, dtype=float).reshape(-1, 4, 4)
+    widths = np.asarray(width, dtype=float)
+    if widths.shape != (len(poses),) or not np.isfinite(widths).all():
+        known = np.count_nonzero(np.isfinite(widths))
+        raise InvalidInputError(f"{known} known widths for {len(poses)} grasps; give one each")
+    meshcat.Delete(GRASPS_PATH)
+    for group in groups:
+        radius = BAR_RADIUS if group.rgba[3] == 1.0 else faint_radius
+        vertices, faces = grasp_triangles(poses[group.members], widths[group.members], radius)
+        draw_flat_triangles(meshcat, grasp_path(group.key), vertices, faces, group.rgba)
+
+
+def grasp_path(key: str) -> str:
+    """Where in Meshcat's tree the group of grasps with a key is."""
+    return f"{GRASPS_PATH}/{key}"
+
+
+def grasp_triangles(
+    X_WG: Array, width: Array, radius: float = BAR_RADIUS
+) -> tuple[Array, NDArray[np.int32]]:
+    """Glyphs of many grasps as one mesh.
+
+    Args:
+        X_WG: (N, 4, 4) grasps.
+        width: (N,) distance between the fingers [m].
+        radius: of the bars [m].
+
+    Returns:
+        Vertices (3, V) in the world [m] and triangles (3, F).
+    """
+    start, end = _glyph_segments(width)
+    vertices, faces = _bar_triangles(start.reshape(-1, 3), end.reshape(-1, 3), radius)
+    p_WV = transform_points(X_WG, vertices.reshape(len(X_WG), -1, 3))
+    return np.asfortranarray(p_WV.reshape(-1, 3).T), np.asfortranarray(faces.T)
+
+
+def _glyph_segments(width: Array) -> tuple[Array, Array]:
+    """Starts and ends (N, 4, 3) in G of the glyph's strokes: two fingers, palm, stem."""
+    half = width[:, None] / 2
+    x = np.concatenate([half, -half, half, 0 * half], axis=1)
+    x_end = np.concatenate([half, -half, -half, 0 * half], axis=1)
+    palm = -FINGER_LENGTH
+    z = np.broadcast_to([0.0, 0.0, palm, palm], x.shape)
+    z_end = np.broadcast_to([palm, palm, palm, palm - STEM_LENGTH], x.shape)
+    y = np.zeros_like(x)
+    return np.stack([x, y, z], axis=-1), np.stack([x_end, y, z_end], axis=-1)
+
+
+def _bar_triangles(start: Array, end: Array, radius: float) -> tuple[Array, NDArray[np.int32]]:
+    """Three-sided bars (M, 6, 3) between points (M, 3) of planes y = const, and triangles."""
+    along = end - start
+    along = along / np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-12)
+    u = np.broadcast_to([0.0, 1.0, 0.0], along.shape)
+    v = np.cross(along, u)
+    angle = 2 * np.pi * np.arange(3) / 3
+    ring = radius * (
+        np.cos(angle)[:, None] * u[:, None, :] + np.sin(angle)[:, None] * v[:, None, :]
+    )
+    vertices = np.concatenate([start[:, None] + ring, end[:, None] + ring], axis=1)
+    sides = [(i, (i + 1) % 3, 3 + i) for i in range(3)]
+    sides += [((i + 1) % 3, 3 + (i + 1) % 3, 3 + i) for i in range(3)]
+    template = np.array([*sides, (0, 2, 1), (3, 4, 5)], dtype=np.int32)
+    first = 6 * np.arange(len(start), dtype=np.int32)
+    return vertices, (first[:, None, None] + template).reshape(-1, 3)
+
+
+def color_grasps_by(
+    grasps: GraspSet, column: str | None = None, limits: Sequence[float] | None = None
+) -> tuple[tuple[GraspGroup, ...], list[ColorBar | LegendEntry]]:
+    """Colours for grasps, and what they stand for.
+
+    Args:
+        grasps: (N,).
+        column: one of the set's; None for the outcome, else the score, whatever there is.
+        limits: lower and upper end of the colours of numbers; they follow from these if None.
+
+    Returns:
+        The grasps in groups of one colour each, and the legend.
+
+    Raises:
+        UnknownNameError: there is no such column; the message names the nearest.
+        InvalidInputError: the limits do not rise, or are given for a column of names.
+    """
+    name = column or default_color_column(grasps)
+    values = None if name is None else grasps.column(name)
+    if name is not None and values is not None and values.dtype.kind in "fiu":
+        numbers = group_by_number(values, None if limits is None else (limits[0], limits[1]))
+        return numbers.groups, number_legend(column_title(name), numbers)
+    if limits is not None:
+        what = "all grasps have one colour" if name is None else f"column {name!r} has names"
+        raise InvalidInputError(f"a range of colours is for numbers; {what}")
+    if values is None:
+        groups = single_group(len(grasps))
+    else:
+        truths = values.dtype.kind == "b"
+        groups = group_by_name((np.where(values, "yes", "no") if truths else values).tolist())
+    return groups, [*grasp_group_entries(groups)]
+
+
+def default_color_column(grasps: GraspSet) -> str | None:
+    """What grasps are best coloured by; None where nothing is known of them."""
+    if "outcome" in grasps.columns:
+        return "outcome"
+    return "score" if np.isfinite(grasps.score).any() else None
+
+
+def column_title(name: str) -> str:
+    """A column's name for people, with its unit if that is known."""
+    column = describe_column(name)
+    if column is None or column.unit in (TEXT_UNIT, DIMENSIONLESS):
+        return name
+    return f"{name} [{column.unit.replace('m2', 'm²')}]"
+
+
+def grasp_group_entries(groups: Iterable[GraspGroup]) -> list[LegendEntry]:
+    """A switch for each label, with the number of grasps."""
+    by_label: dict[str, list[GraspGroup]] = {}
+    for group in groups:
+        by_label.setdefault(group.label, []).append(group)
+    return [
+        LegendEntry(
+            f"{label} ({sum(len(g.members) for g in members)})",
+            hex_color(members[0].rgba[:3]),
+            tuple(grasp_path(g.key) for g in members),
+        )
+        for label, members in by_label.items()
+    ]
+
+
+def number_legend(title: str, grouped: NumberGroups) -> list[ColorBar | LegendEntry]:
+    """The colour bar of a number, and a switch for the grasps where it is not known.
+
+    Args:
+        title: what the number is.
+        grouped: the grasps by it.
+    """
+    below, above = grouped.beyond
+    notes = [f"{count} {side} the range" for count, side in ((below, "below"), (above, "above"))]
+    bar = ColorBar(
+        title=title,
+        colors=tuple(hex_color(color) for color in grouped.scale.colors()),
+        counts=tuple(int(count) for count in grouped.counts),
+        ticks=_bar_ticks(grouped.scale, grouped.beyond),
+        paths=tuple(grasp_path(bin_key(k)) for k in range(COLOR_BINS)),
+        note=", ".join(n for n, count in zip(notes, grouped.beyond, strict=True) if count),
+    )
+    return [bar, *grasp_group_entries(g for g in grouped.groups if g.key == "unknown")]
+
+
+def _bar_ticks(scale: ColorScale, beyond: tuple[int, int]) -> tuple[tuple[float, str], ...]:
+    """Both ends of a bar, and the round numbers between them."""
+    min_distance = 0.08  # From the bar's ends, as a share of it.
+    span = scale.upper - scale.lower
+    inner = [(t, (t - scale.lower) / span) for t in scale.ticks()]
+    ticks = [
+        (place, _tick_text(t, span))
+        for t, place in inner
+        if min_distance < place < 1 - min_distance
+    ]
+    ends = [_tick_text(scale.lower, span), _tick_text(scale.upper, span)]
+    if beyond[0]:
+        ends[0] = f"≤ {ends[0]}"
+    if beyond[1]:
+        ends[1] = f"≥ {ends[1]}"
+    return ((0.0, ends[0]), *ticks, (1.0, ends[1]))
+
+
+def _tick_text(value: float, span: float) -> str:
+    """A number with as many digits as tell it from others on a bar that is `span` long."""
+    if abs(value) < 1e-9 * span:
+        return "0"
+    digits = max(4, int(np.ceil(np.log10(abs(value) / span))) + 2)
+    return f"{value:.{min(digits, 15)}g}"
+
+
+def grasp_corners(X_WG: Array, width: Array) -> Array:
+    """(N, 6, 3) corners of grasps in the world [m]: tip, knuckle, knuckle and tip of the fork, then
+    both ends of the stem.
+
+    Args:
+        X_WG: (N, 4, 4) grasps.
+        width: (N,) distance between the fingers [m].
+    """
+    half = np.asarray(width, dtype=float)[:, None] / 2.0
+    x = half * np.array([1.0, 1.0, -1.0, -1.0, 0.0, 0.0])
+    palm, stem = -FINGER_LENGTH, -FINGER_LENGTH - STEM_LENGTH
+    z = np.broadcast_to([0.0, palm, palm, 0.0, palm, stem], x.shape)
+    p_GQ = np.stack([x, np.zeros_like(x), z], axis=-1)
+    return transform_points(np.asarray(X_WG).reshape(-1, 4, 4), p_GQ)
+
+
+def grasp_strokes(corners: Array, view: FlatView) -> list[str]:
+    """The `d` of one path a grasp, from `grasp_corners` (N, 6, 3)."""
+    return [
+        path_data(fork, closed=False) + path_data(stem, closed=False)
+        for fork, stem in ((places[:4], places[4:]) for places in view.places(corners))
+    ]

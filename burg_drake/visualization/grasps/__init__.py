@@ -1,8 +1,0 @@
-"""Grasps drawn in groups of one colour each.
-
-Read `groups` and `mesh` first.
-"""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,179 @@
+"""The visual geometry of an open hand, and a gripper in Meshcat that moves from grasp to grasp."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydrake.geometry import (
+    Box,
+    Capsule,
+    Convex,
+    Cylinder,
+    Ellipsoid,
+    Mesh,
+    Meshcat,
+    Rgba,
+    Shape,
+    Sphere,
+)
+from pydrake.math import RigidTransform
+from pydrake.planning import RobotDiagramBuilder
+
+from burg_drake.core import NO_PACKAGES, Array, Packages, make_pose
+from burg_drake.station import Hand, add_hand
+from burg_drake.visualization.gltf import gltf_mesh
+
+
+@dataclass(frozen=True, eq=False)
+class HandVisual:
+    """A visual geometry of a hand.
+
+    Attributes:
+        shape: for Meshcat.
+        model: the shape as the hand's model has it, for renderers.
+        color: of shapes that have none of their own.
+        X_HV: (4, 4) where it is on the open hand.
+        slide: (3,) how far it moves in H for each metre by which the hand closes.
+        corners: (N, 3) that its bounds follow from, in its own frame V [m].
+    """
+
+    shape: Shape
+    model: Shape
+    color: Rgba
+    X_HV: Array
+    slide: Array
+    corners: Array
+
+
+def hand_visuals(
+    hand: Hand, model: Path, *, opacity: float = 1.0, packages: Packages = NO_PACKAGES
+) -> tuple[HandVisual, ...]:
+    """The visual geometries of an open hand.
+
+    Args:
+        hand: the document.
+        model: the model file.
+        opacity: 0 to 1.
+        packages: what a station says of packages.
+
+    Raises:
+        InvalidInputError: the model cannot be loaded.
+    """
+    default_color = (0.8, 0.8, 0.8, 1.0)
+    builder = RobotDiagramBuilder()
+    plant = builder.plant()
+    added = add_hand(builder, hand, model, packages)
+    plant.WeldFrames(plant.world_frame(), added.body.body_frame(), RigidTransform())
+    plant.Finalize()
+    for finger, joint in zip(hand.fingers, added.joints, strict=True):
+        joint.set_default_translation(finger.open)
+    diagram = builder.Build()
+    context, closed = (
+        plant.GetMyMutableContextFromRoot(diagram.CreateDefaultContext()) for _ in range(2)
+    )
+    for finger, joint in zip(hand.fingers, added.joints, strict=True):
+        joint.set_translation(closed, finger.closed)
+    stroke = hand.opening[1] - hand.opening[0]
+    inspector = diagram.scene_graph().model_inspector()
+    visuals = []
+    for index in plant.GetBodyIndices(added.instance):
+        body = plant.get_body(index)
+        X_HB = plant.EvalBodyPoseInWorld(context, body).GetAsMatrix4()
+        p_HB_closed = plant.EvalBodyPoseInWorld(closed, body).translation()
+        slide = np.round((p_HB_closed - X_HB[:3, 3]) / stroke, 9)
+        for geometry in plant.GetVisualGeometriesForBody(body):
+            shape = inspector.GetShape(geometry)
+            given = inspector.GetIllustrationProperties(geometry).GetPropertyOrDefault(
+                "phong", "diffuse", Rgba(*default_color)
+            )
+            color = Rgba(given.r(), given.g(), given.b(), opacity * given.a())
+            X_HV = X_HB @ inspector.GetPoseInFrame(geometry).GetAsMatrix4()
+            drawn = _meshcat_shape(shape, opacity)
+            visuals.append(HandVisual(drawn, shape, color, X_HV, slide, _shape_corners(shape)))
+    return tuple(visuals)
+
+
+def _meshcat_shape(shape: Shape, opacity: float) -> Shape:
+    """A visual as Meshcat gets it; of the colours of meshes only those of .obj become fainter."""
+    if isinstance(shape, Mesh) and shape.source().is_path():
+        path = Path(shape.source().path())
+        if path.suffix.lower() == ".obj" and np.array_equal(shape.scale3(), np.ones(3)):
+            return gltf_mesh(path, opacity=opacity)
+    return shape
+
+
+def _shape_corners(shape: Shape) -> Array:
+    """Points (N, 3) around a shape, tightly [m]."""
+    if isinstance(shape, Mesh | Convex):
+        hull = shape.GetConvexHull()
+        return np.array([hull.vertex(k) for k in range(hull.num_vertices())])
+    sizes: dict[type[Shape], Callable[[Any], tuple[float, ...]]] = {
+        Box: lambda s: (s.width(), s.depth(), s.height()),
+        Sphere: lambda s: 3 * (2 * s.radius(),),
+        Cylinder: lambda s: (2 * s.radius(), 2 * s.radius(), s.length()),
+        Capsule: lambda s: (2 * s.radius(), 2 * s.radius(), s.length() + 2 * s.radius()),
+        Ellipsoid: lambda s: (2 * s.a(), 2 * s.b(), 2 * s.c()),
+    }
+    size = sizes[type(shape)](shape) if type(shape) in sizes else (0.0, 0.0, 0.0)
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+    return signs * np.array(size) / 2.0
+
+
+GRIPPER_PATH = "/drake/gripper"
+
+
+class GripperView:
+    """A gripper that is hidden until it is put somewhere.
+
+    Args:
+        meshcat: where to draw it.
+        hand: the document.
+        model: the model file.
+        packages: what a station says of packages.
+
+    Attributes:
+        hand: the document.
+        slides: by Meshcat path, how far (3,) that part moves in H for each metre by which the hand
+            closes.
+        shown: whether it is in the view.
+
+    Raises:
+        InvalidInputError: the model cannot be loaded.
+    """
+
+    def __init__(
+        self, meshcat: Meshcat, hand: Hand, model: Path, packages: Packages = NO_PACKAGES
+    ) -> None:
+        self.hand = hand
+        self.slides: dict[str, Array] = {}
+        self._meshcat = meshcat
+        paths: dict[tuple[float, ...], str] = {}
+        for k, visual in enumerate(hand_visuals(hand, model, packages=packages)):
+            part = paths.setdefault(tuple(visual.slide), f"{GRIPPER_PATH}/{len(paths)}")
+            self.slides[part] = visual.slide
+            meshcat.SetObject(f"{part}/{k}", visual.shape, visual.color)
+            meshcat.SetTransform(f"{part}/{k}", RigidTransform(visual.X_HV))
+        self.hide()
+
+    def hide(self) -> None:
+        """Takes it out of the view."""
+        self._meshcat.SetProperty(GRIPPER_PATH, "visible", False)
+        self.shown = False
+
+    def put(self, X_WG: Array, width: float) -> None:
+        """Shows it at a grasp (4, 4) with so much between its pads [m], as far as it can."""
+        self._meshcat.SetTransform(GRIPPER_PATH, RigidTransform(self.hand.X_AH(X_WG)))
+        for path, slide in self.slides.items():
+            shift = self.closed_by(width) * slide
+            self._meshcat.SetTransform(path, RigidTransform(make_pose(p_AB=shift)))
+        self._meshcat.SetProperty(GRIPPER_PATH, "visible", True)
+        self.shown = True
+
+    def closed_by(self, width: float) -> float:
+        """How far the open hand closes to a width [m]."""
+        low, high = self.hand.opening
+        return high - float(np.clip(width, low, high))

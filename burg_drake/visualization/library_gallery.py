@@ -1,0 +1,438 @@
+"""An object library in Meshcat: visual mesh, convex pieces, contact geometry, stable poses, grasps."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import Box, Mesh, Meshcat, Rgba
+from pydrake.math import RigidTransform, RotationMatrix
+
+from burg_drake.core import Array, GraspSet, InvalidInputError, distinct_colors, make_pose, rot_z
+from burg_drake.geometry import hull_mesh
+from burg_drake.objects import ObjectEntry, ObjectLibrary
+from burg_drake.visualization.contact_sheet import mass_text, percent_text
+from burg_drake.visualization.gallery_layout import (
+    GALLERY_ELEVATION,
+    GalleryItem,
+    GalleryLayout,
+    GalleryRow,
+    PlacedGalleryRow,
+    layout_gallery,
+)
+from burg_drake.visualization.gltf import gltf_mesh, label_mesh
+from burg_drake.visualization.grasp_view import grasp_triangles
+from burg_drake.visualization.hydroelastic_mesh import (
+    HIGH_PRESSURE_COLOR,
+    HydroelasticMesh,
+    cut_open,
+    hydroelastic_meshes,
+    pressure_colors,
+)
+from burg_drake.visualization.legend import LegendEntry
+from burg_drake.visualization.meshcat_drawing import aim_at
+from burg_drake.visualization.object_drawing import best_yaw, camera_rotation, upright_rotation
+from burg_drake.visualization.thumbnails import explosion_offsets
+
+GALLERY_PATH = "/drake/library"  # Path of the gallery in Meshcat's tree.
+GALLERY_COLUMNS = ("visual", "pieces", "contact")
+"""Columns of the gallery, as they are called in Meshcat's tree."""
+
+
+class GalleryText:
+    """Gallery text."""
+
+    line_height = 0.22  # Apparent height of a line, as a share of the gallery's unit.
+    # Length of text on the floor over its apparent height.
+    stretch = 1.0 / float(np.sin(GALLERY_ELEVATION))
+    caption_scale = 0.85  # Size of captions relative to labels.
+
+
+SLAB_HEIGHT = 0.002
+"""Thickness of floors and of the tiles on which objects stand, in metres."""
+
+
+@dataclass(frozen=True)
+class GalleryObject:
+    """One object, ready to be placed.
+
+    Attributes:
+        name: of the object.
+        R_WO: (3, 3) how it stands in the columns.
+        R_WO_poses: the same for each stable pose.
+        visual: as it looks, in O.
+        pieces: vertices (N, 3), moved apart, and faces (F, 3) of each piece, in O [m].
+        contact: what hydroelastic contact sees, in O.
+        label: the text at its row's start.
+        captions: the texts in front of its things.
+        row: sizes of all that.
+    """
+
+    name: str
+    R_WO: Array
+    R_WO_poses: tuple[Array, ...]
+    visual: Mesh
+    pieces: tuple[tuple[Array, NDArray[np.int64]], ...]
+    contact: tuple[HydroelasticMesh, ...]
+    label: Mesh
+    captions: tuple[tuple[Mesh, float], ...]
+    row: GalleryRow
+
+
+def prepare_object(
+    library: ObjectLibrary, name: str, contact: tuple[HydroelasticMesh, ...], unit: float
+) -> GalleryObject:
+    explosion = 0.25  # Share of each piece's distance from the middle by which it is moved outward.
+    entry = library.entry(name)
+    camera = camera_rotation(GALLERY_ELEVATION)
+    meshes = [library.mesh(piece) for piece in entry.pieces]
+    hulls = [np.asarray(mesh.vertices) for mesh in meshes]
+    corners = np.vstack([*hulls, hull_mesh(library.surface(name).vertices).vertices])
+
+    def turned(R: Array) -> Array:
+        return rot_z(best_yaw(corners @ R.T, camera)) @ R
+
+    R_WO = turned(upright_rotation(entry))
+    poses = [turned(pose.X_SO.matrix()[:3, :3]) for pose in entry.stable_poses]
+    apart = [h + o for h, o in zip(hulls, explosion_offsets(hulls, explosion), strict=True)]
+    touching = np.vstack([m.vertices for m in contact]) if contact else corners
+    things = [corners @ R_WO.T, np.vstack(apart) @ R_WO.T, touching @ R_WO.T]
+    things += [corners @ R.T for R in poses]
+    label, label_width = label_mesh(
+        _object_description(name, entry), GalleryText.line_height * unit, GalleryText.stretch
+    )
+    size = GalleryText.caption_scale * GalleryText.line_height * unit
+    captions = [
+        label_mesh((text,), size, GalleryText.stretch) for text in _object_captions(entry, contact)
+    ]
+    items = [
+        GalleryItem(points.min(axis=0), points.max(axis=0), width)
+        for points, (_, width) in zip(things, captions, strict=True)
+    ]
+    return GalleryObject(
+        name=name,
+        R_WO=R_WO,
+        R_WO_poses=tuple(poses),
+        visual=gltf_mesh(library.path(entry.mesh)),
+        pieces=tuple((v, np.asarray(m.faces)) for v, m in zip(apart, meshes, strict=True)),
+        contact=contact,
+        label=label,
+        captions=tuple(captions),
+        row=GalleryRow(label_width, items[: len(GALLERY_COLUMNS)], items[len(GALLERY_COLUMNS) :]),
+    )
+
+
+def _object_description(name: str, entry: ObjectEntry) -> tuple[str, ...]:
+    size = " x ".join(f"{1e3 * (b - a):.0f}" for a, b in zip(entry.lower, entry.upper, strict=True))
+    about = "" if entry.mass_properties.source == "given" else "~"
+    return name, f"{size} mm", f"{about}{mass_text(entry.mass)}, friction {entry.friction:g}"
+
+
+def _object_captions(entry: ObjectEntry, contact: tuple[HydroelasticMesh, ...]) -> list[str]:
+    count = len(entry.pieces)
+    texts = ["visual", f"{count} piece{'' if count == 1 else 's'}"]
+    texts.append(_contact_caption(entry) if contact else "point contact")
+    for pose in entry.stable_poses:
+        texts.append(percent_text(pose.probability) + (", rolls" if pose.rolls else ""))
+    return texts
+
+
+def _contact_caption(entry: ObjectEntry) -> str:
+    if entry.contact.primitive is not None:
+        return entry.contact.primitive.shape
+    return {
+        "surface": "rigid surface to pads",
+        "pieces": "rigid pieces",
+        "compliant_pieces": "compliant pieces",
+        "mesh": "rigid mesh",
+    }.get(entry.contact.kind, entry.contact.kind)
+
+
+def draw_object(
+    meshcat: Meshcat, shown: GalleryObject, placed: PlacedGalleryRow, unit: float
+) -> None:
+    tile_color = Rgba(0.70, 0.75, 0.79, 1.0)
+    margin_share = 0.04  # Of the gallery's unit.
+    name = shown.name
+    write_label(meshcat, f"{GALLERY_PATH}/labels/{name}", shown.label, placed.p_WL)
+    poses = [f"poses/{name}/{k}" for k in range(len(shown.R_WO_poses))]
+    homes = [
+        f"{GALLERY_PATH}/{home}" for home in (*(f"{c}/{name}" for c in GALLERY_COLUMNS), *poses)
+    ]
+    for k, (home, p_WI) in enumerate(zip(homes, placed.p_WI, strict=True)):
+        resting = k - len(GALLERY_COLUMNS)
+        R_WO = shown.R_WO if resting < 0 else shown.R_WO_poses[resting]
+        lift = np.zeros(3)
+        if home == f"{GALLERY_PATH}/pieces/{name}":
+            _draw_pieces(meshcat, f"{home}/object", shown.pieces)
+        elif home == f"{GALLERY_PATH}/contact/{name}":
+            _draw_contact(meshcat, f"{home}/object", shown.contact, R_WO)
+        else:
+            meshcat.SetObject(f"{home}/object", shown.visual)
+        if resting >= 0:
+            item, margin = shown.row.rest[resting], margin_share * unit
+            bounds = np.array([item.lower[:2] - margin, item.upper[:2] + margin]) + p_WI[:2]
+            draw_slab(meshcat, f"{home}/ground", bounds, 0.0, tile_color)
+            lift[2] = SLAB_HEIGHT
+        X_WO = RigidTransform(RotationMatrix(R_WO), p_WI + lift)
+        meshcat.SetTransform(f"{home}/object", X_WO)
+        caption, width = shown.captions[k]
+        write_label(
+            meshcat, f"{home}/caption", caption, placed.captions[k] - (width / 2.0, 0.0, 0.0)
+        )
+
+
+def _draw_pieces(
+    meshcat: Meshcat, path: str, pieces: tuple[tuple[Array, NDArray[np.int64]], ...]
+) -> None:
+    colors = distinct_colors(len(pieces))
+    for i, ((vertices, faces), color) in enumerate(zip(pieces, colors, strict=True)):
+        meshcat.SetTriangleMesh(
+            f"{path}/{i:03d}", vertices.T, faces.T.astype(np.int32), Rgba(*color)
+        )
+
+
+def _draw_contact(
+    meshcat: Meshcat, path: str, meshes: tuple[HydroelasticMesh, ...], R_WO: Array
+) -> None:
+    """Rigid surfaces with the edges of their triangles; compliant bodies cut open in front."""
+    surface_color = Rgba(0.72, 0.79, 0.85, 1.0)
+    edge_color = Rgba(0.70, 0.76, 0.82, 1.0)
+    max_triangles = 5000  # Finer surfaces are drawn without edges.
+    rigid = [mesh for mesh in meshes if not mesh.compliant]
+    if rigid:
+        vertices, faces, _ = _join_meshes([(m.vertices, m.faces, m.pressure) for m in rigid])
+        meshcat.SetTriangleMesh(f"{path}/surface", vertices, faces, surface_color)
+        if faces.shape[1] <= max_triangles:
+            meshcat.SetTriangleMesh(f"{path}/edges", vertices, faces, edge_color, wireframe=True)
+    compliant = [mesh for mesh in meshes if mesh.compliant]
+    if compliant:
+        corners = np.vstack([mesh.vertices for mesh in compliant])
+        middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
+        normal = R_WO.T @ _cut_normal(corners @ R_WO.T)
+        cut = [cut_open(mesh, middle, normal) for mesh in compliant]
+        vertices, faces, pressure = _join_meshes(cut)
+        colors = np.asfortranarray(pressure_colors(pressure).T)
+        meshcat.SetTriangleColorMesh(f"{path}/field", vertices, faces, colors)
+
+
+def _cut_normal(points: Array) -> Array:
+    """Normal (3,) of the cut through points (N, 3) of which the camera sees more: front or top."""
+    _, depth, height = np.ptp(points, axis=0)
+    front = height * np.cos(GALLERY_ELEVATION) > depth * np.sin(GALLERY_ELEVATION)
+    return np.array([0.0, -1.0, 0.0] if front else [0.0, 0.0, 1.0])
+
+
+def _join_meshes(
+    meshes: Sequence[tuple[Array, NDArray[np.int64], Array]],
+) -> tuple[Array, NDArray[np.int32], Array]:
+    """Several meshes as one for Meshcat: vertices (3, V), faces (3, F), values (V,)."""
+    first = np.cumsum([0, *(len(vertices) for vertices, _, _ in meshes)])
+    faces = [f + start for (_, f, _), start in zip(meshes, first, strict=False)]
+    return (
+        np.asfortranarray(np.vstack([vertices for vertices, _, _ in meshes]).T),
+        np.asfortranarray(np.vstack(faces).T.astype(np.int32)),
+        np.concatenate([values for _, _, values in meshes]),
+    )
+
+
+def write_label(meshcat: Meshcat, path: str, text: Mesh, p_WL: Array) -> None:
+    """Puts a text's left foot at `p_WL` (3,) on the floor [m]."""
+    text_lift = 1e-3  # Metres above the floor, against flicker.
+    meshcat.SetObject(path, text)
+    meshcat.SetTransform(path, RigidTransform(p_WL + np.array([0.0, 0.0, text_lift])))
+
+
+def draw_slab(meshcat: Meshcat, path: str, bounds: Array, bottom: float, color: Rgba) -> None:
+    """A slab between corners (2, 2) in x and y, `SLAB_HEIGHT` high."""
+    (x0, y0), (x1, y1) = bounds
+    meshcat.SetObject(path, Box(x1 - x0, y1 - y0, SLAB_HEIGHT), color)
+    middle = [(x0 + x1) / 2.0, (y0 + y1) / 2.0, bottom + SLAB_HEIGHT / 2.0]
+    meshcat.SetTransform(path, RigidTransform(middle))
+
+
+GALLERY_FLOOR_COLOR = Rgba(0.90, 0.91, 0.92, 1.0)
+GALLERY_FIELD_OF_VIEW_DEG = 22.0
+"""Vertical angle of view: little perspective, so that rows at the back are not small."""
+
+
+def show_library(
+    library: ObjectLibrary, meshcat: Meshcat, names: Iterable[str] | None = None
+) -> tuple[LegendEntry, ...]:
+    """Shows a row for each object: its looks, its convex pieces, what contact sees, stable poses.
+
+    All is below `/drake/library`: `labels/NAME`, `visual/NAME`, `pieces/NAME/000`, `contact/NAME`
+    and `poses/NAME/0`.
+
+    Args:
+        library: what to show.
+        meshcat: where; what it showed below that path before is removed.
+        names: of objects, in this order; all if None.
+
+    Returns:
+        Switches for the columns, to be given to `save_html`.
+
+    Raises:
+        UnknownNameError: no such object, or one of its files is missing.
+        InvalidInputError: no objects, or Drake cannot load one.
+    """
+    chosen = list(library.objects if names is None else names)
+    if not chosen:
+        raise InvalidInputError(f"library {library.root} has no objects to show")
+    meshcat.Delete(GALLERY_PATH)
+    entries = [library.entry(name) for name in chosen]
+    unit = float(np.median([np.max(np.subtract(e.upper, e.lower)) for e in entries]))
+    contact = hydroelastic_meshes(library, chosen)
+    objects = [prepare_object(library, name, contact[name], unit) for name in chosen]
+    layout = layout_gallery(
+        [e.row for e in objects], unit, GalleryText.stretch * GalleryText.line_height * unit
+    )
+    for item, placed in zip(objects, layout.rows, strict=True):
+        draw_object(meshcat, item, placed, unit)
+    for k, bank in enumerate(layout.banks):
+        draw_slab(meshcat, f"{GALLERY_PATH}/floor/{k}", bank, -SLAB_HEIGHT, GALLERY_FLOOR_COLOR)
+    aim_at_gallery(meshcat, layout)
+    return _gallery_legend(objects)
+
+
+def aim_at_gallery(meshcat: Meshcat, layout: GalleryLayout) -> None:
+    """Aims camera and lamp at a gallery, whose middle is the origin."""
+    # Intensities. That of the lamp holds at 1 m.
+    lights = {
+        "AmbientLight": 0.55,
+        "FillLight": 0.0,
+        "PointLightNegativeX": 0.0,
+        "PointLightPositiveX": 0.0,
+        "SpotLight": 2.9,
+    }
+    lamp_offset = np.array([-1.1, -1.2, 2.4])  # Position of the lamp, in radii of the gallery.
+    # Half the lamp's cone, in radians: just covers the gallery, for sharp shadows.
+    cone_angle = 0.45
+    min_radius = 0.3  # Metres. The lamp's shadow starts at 0.5 m.
+    forward = camera_rotation(GALLERY_ELEVATION)[:, 2]
+    aim_at(meshcat, layout.corners(), forward, field_of_view_deg=GALLERY_FIELD_OF_VIEW_DEG)
+    radius = max(min_radius, float(np.linalg.norm(layout.corners()[:, :2], axis=1).max()))
+    p_WL = radius * lamp_offset
+    for light, intensity in lights.items():
+        power = intensity * float(p_WL @ p_WL) if light == "SpotLight" else intensity
+        meshcat.SetProperty(f"/Lights/{light}", "visible", intensity > 0.0)
+        meshcat.SetProperty(f"/Lights/{light}/<object>", "intensity", power)
+    lamp = "/Lights/SpotLight/<object>"
+    meshcat.SetProperty(lamp, "position", p_WL.tolist())
+    meshcat.SetProperty(lamp, "angle", cone_angle)
+
+
+def _gallery_legend(objects: Sequence[GalleryObject]) -> tuple[LegendEntry, ...]:
+    compliant = any(mesh.compliant for e in objects for mesh in e.contact)
+    contact = "pressure field, cut open" if compliant else "contact surfaces as Drake has them"
+    red = "#" + "".join(f"{round(255 * c):02x}" for c in HIGH_PRESSURE_COLOR)
+    return (
+        LegendEntry("visual mesh", "#f2f2f2", (f"{GALLERY_PATH}/visual",)),
+        LegendEntry("convex pieces, moved apart", "#4a90c0", (f"{GALLERY_PATH}/pieces",)),
+        LegendEntry(contact, red if compliant else "#9eadba", (f"{GALLERY_PATH}/contact",)),
+        LegendEntry("stable poses, with probability", "#d6dee3", (f"{GALLERY_PATH}/poses",)),
+        LegendEntry(
+            "names, sizes, masses (~ from density)", "#40454d", (f"{GALLERY_PATH}/labels",)
+        ),
+    )
+
+
+@dataclass(frozen=True)
+class ObjectWithGrasps:
+    """An object that is to be placed.
+
+    Attributes:
+        name: of the object.
+        R_WO: (3, 3) how it stands.
+        item: room for it and its grasps.
+        caption: what is written in front of it, and how wide that is [m].
+    """
+
+    name: str
+    R_WO: Array
+    item: GalleryItem
+    caption: tuple[Mesh, float]
+
+
+def show_objects_for_grasps(
+    library: ObjectLibrary, grasps: GraspSet, width: Array, meshcat: Meshcat
+) -> Array:
+    """Shows the objects of grasps in rows and aims the camera; the grasps are left to draw.
+
+    Args:
+        library: of the objects.
+        grasps: at least one.
+        width: (N,) at which they will be drawn [m].
+        meshcat: where, below `/drake/library`; what was there before is removed.
+
+    Returns:
+        `X_WG` (N, 4, 4) of the grasps.
+
+    Raises:
+        UnknownNameError: no such object, or its mesh is missing.
+    """
+    meshcat.Delete(GALLERY_PATH)
+    counts = Counter(grasps.object.tolist())
+    entries = [library.entry(name) for name in counts]
+    unit = float(np.median([np.max(np.subtract(e.upper, e.lower)) for e in entries]))
+    stands = [_prepare_object_with_grasps(library, name, grasps, width, unit) for name in counts]
+    layout, rows = _layout_rows(stands, unit)
+    X_WO = {}
+    for members, row in zip(rows, layout.rows, strict=True):
+        for stand, p_WO, p_WL in zip(members, row.p_WI, row.captions, strict=True):
+            X_WO[stand.name] = make_pose(stand.R_WO, p_WO)
+            path, (label, label_width) = f"{GALLERY_PATH}/visual/{stand.name}", stand.caption
+            meshcat.SetObject(path, gltf_mesh(library.path(library.entry(stand.name).mesh)))
+            meshcat.SetTransform(path, RigidTransform(X_WO[stand.name]))
+            left = p_WL - (label_width / 2.0, 0.0, 0.0)
+            write_label(meshcat, f"{GALLERY_PATH}/labels/{stand.name}", label, left)
+    for k, bank in enumerate(layout.banks):
+        draw_slab(meshcat, f"{GALLERY_PATH}/floor/{k}", bank, -SLAB_HEIGHT, GALLERY_FLOOR_COLOR)
+    aim_at_gallery(meshcat, layout)
+    return np.stack([X_WO[name] for name in grasps.object.tolist()]) @ grasps.X_OG
+
+
+def _prepare_object_with_grasps(
+    library: ObjectLibrary, name: str, grasps: GraspSet, width: Array, unit: float
+) -> ObjectWithGrasps:
+    corners = np.asarray(hull_mesh(library.surface(name).vertices).vertices)
+    R_WO = upright_rotation(library.entry(name))
+    R_WO = rot_z(best_yaw(corners @ R_WO.T, camera_rotation(GALLERY_ELEVATION))) @ R_WO
+    own = grasps.object == name
+    drawn, _ = grasp_triangles(grasps.X_OG[own], width[own])
+    points = np.vstack([corners, drawn.T]) @ R_WO.T
+    count = int(own.sum())
+    text = (name, f"{count} grasp{'' if count == 1 else 's'}")
+    caption = label_mesh(
+        text, GalleryText.caption_scale * GalleryText.line_height * unit, GalleryText.stretch
+    )
+    return ObjectWithGrasps(
+        name, R_WO, GalleryItem(points.min(axis=0), points.max(axis=0), caption[1]), caption
+    )
+
+
+def _layout_rows(
+    stands: list[ObjectWithGrasps], unit: float
+) -> tuple[GalleryLayout, list[list[ObjectWithGrasps]]]:
+    """As many rows, one behind the other, as let the camera come nearest."""
+    line_scale = 1.0  # Two lines of caption fit into the space of one label.
+    layouts = []
+    for count in range(1, len(stands) + 1):
+        size = -(-len(stands) // count)
+        rows = [stands[k : k + size] for k in range(0, len(stands), size)]
+        items = [GalleryRow(0.0, (), [stand.item for stand in row]) for row in rows]
+        layouts.append(
+            (
+                layout_gallery(
+                    items,
+                    unit,
+                    line_scale * GalleryText.stretch * GalleryText.line_height * unit,
+                    1,
+                ),
+                rows,
+            )
+        )
+    return min(layouts, key=lambda layout: layout[0].distance())

@@ -1,0 +1,181 @@
+"""Drawing in Meshcat: the camera's aim, flat triangles, text, and frames as three arrows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydrake.geometry import Cylinder, Meshcat, MeshcatCone, Rgba, Sphere
+from pydrake.math import RigidTransform
+
+from burg_drake.core import Array, make_pose
+from burg_drake.visualization import colors
+from burg_drake.visualization.colors import linear_light
+from burg_drake.visualization.object_drawing import fit_camera
+
+VIEW_ASPECT = 1.2
+"""Width over height of the narrowest supported view: a window of 1280 x 800 less a panel."""
+
+
+def aim_at(
+    meshcat: Meshcat,
+    p_WQ: ArrayLike,
+    forward: ArrayLike,
+    *,
+    field_of_view_deg: float = 45.0,
+) -> Array:
+    """Looks from as near as lets all points be in view; the eye turns about their middle.
+
+    Args:
+        meshcat: whose camera to set.
+        p_WQ: (N, 3) points [m].
+        forward: (3,) direction in the world in which to look; not vertical.
+        field_of_view_deg: vertical angle of view.
+
+    Returns:
+        (3, 3) `R_WC` of the camera: x to the right, y down, z forward.
+    """
+    filled_share = 0.94  # Of the view.
+    points = np.asarray(p_WQ, dtype=float).reshape(-1, 3)
+    R_WC = camera_rotation_along(forward)
+    vertical = np.tan(np.deg2rad(field_of_view_deg) / 2.0)
+    p_WC = fit_camera(points, R_WC, filled_share * vertical * np.array([VIEW_ASPECT, 1.0]))
+    along = (points - p_WC) @ R_WC[:, 2]
+    meshcat.SetProperty("/Cameras/default/rotated/<object>", "fov", field_of_view_deg)
+    meshcat.SetCameraPose(p_WC, p_WC + R_WC[:, 2] * (along.min() + along.max()) / 2.0)
+    return R_WC
+
+
+def camera_rotation_along(forward: ArrayLike) -> Array:
+    """(3, 3) `R_WC` of an upright camera that looks in a direction (3,), which is not vertical."""
+    z = np.asarray(forward, dtype=float)
+    z = z / np.linalg.norm(z)
+    x = np.cross(z, [0.0, 0.0, 1.0])
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z], axis=-1)
+
+
+def draw_flat_triangles(
+    meshcat: Meshcat, path: str, vertices: Array, faces: NDArray[np.int32], rgba: colors.Rgba
+) -> None:
+    """Draws triangles in one colour, without shading and shadow.
+
+    The material is black but for its own glow, and three.js' tone curve, which would brighten it,
+    is off: the pixels have the colour as it was given.
+
+    Args:
+        meshcat: where to draw.
+        path: in its tree.
+        vertices: (3, V) [m].
+        faces: (3, F) triangles, seen from both sides.
+        rgba: colour (sRGB) and opacity.
+    """
+    meshcat.SetTriangleMesh(path, vertices, faces, Rgba(0.0, 0.0, 0.0, rgba[3]))
+    object_path = f"{path}/<object>"
+    for channel, value in zip("rgb", linear_light(rgba[:3]).tolist(), strict=True):
+        meshcat.SetProperty(object_path, f"material.emissive.{channel}", value)
+        meshcat.SetProperty(object_path, f"material.specular.{channel}", 0.0)
+    meshcat.SetProperty(object_path, "material.toneMapped", False)
+    meshcat.SetProperty(object_path, "castShadow", False)
+
+
+def text_triangles(text: str, height: float) -> tuple[Array, NDArray[np.int32]]:
+    """Text in the plane z = 0, reading along +x, with the baseline's middle at the origin.
+
+    Args:
+        text: one line; characters outside ASCII become question marks.
+        height: of a capital letter [m].
+
+    Returns:
+        Vertices (3, N) [m] and triangles (3, M), seen from +z.
+    """
+    capital = np.flatnonzero(_render_text("H").any(axis=1))
+    baseline, pixel = capital[-1] + 1, height / len(capital)
+    image = _render_text(text)
+    rows, starts, ends = _pixel_runs(image)
+    x0, x1 = (pixel * (edge - image.shape[1] / 2) for edge in (starts, ends))
+    y1 = pixel * (baseline - rows)
+    y0 = y1 - pixel
+    corners = np.stack([np.stack(c) for c in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))], axis=-1)
+    vertices = np.zeros((3, corners.shape[1] * 4))
+    vertices[:2] = corners.reshape(2, -1)
+    first = 4 * np.arange(corners.shape[1], dtype=np.int32)
+    faces = np.stack([[first, first + 1, first + 2], [first, first + 2, first + 3]], axis=-1)
+    return vertices, faces.reshape(3, -1)
+
+
+def _render_text(text: str) -> NDArray[np.bool_]:
+    """The ink of a line of text; the baseline is in the same row whatever the text."""
+    font = cv2.FONT_HERSHEY_DUPLEX
+    font_scale = 1.6
+    stroke = 2  # Pixels.
+    margin = 8  # Pixels.
+    (width, _), _ = cv2.getTextSize(text, font, font_scale, stroke)
+    (_, ascent), descent = cv2.getTextSize("Hgy", font, font_scale, stroke)
+    image = np.zeros((ascent + descent + 2 * margin, width + 2 * margin), dtype=np.uint8)
+    cv2.putText(image, text, (margin, margin + ascent), font, font_scale, 255, stroke)
+    return image > 127
+
+
+def _pixel_runs(image: NDArray[np.bool_]) -> tuple[NDArray[np.int64], ...]:
+    """Row, first column and end column of each horizontal run of set pixels."""
+    padded = np.zeros((image.shape[0], image.shape[1] + 2), dtype=np.int8)
+    padded[:, 1:-1] = image
+    change = np.diff(padded, axis=1)
+    rows, starts = np.nonzero(change == 1)
+    _, ends = np.nonzero(change == -1)
+    return rows, starts, ends
+
+
+AXIS_COLORS = (Rgba(0.84, 0.15, 0.12), Rgba(0.13, 0.60, 0.20), Rgba(0.12, 0.32, 0.80))
+"""Colours of the x, y and z axes."""
+R_FA = (
+    np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]),
+    np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
+    np.eye(3),
+)
+"""Rotations (3, 3) of frames A whose z axis is x, y and z of F."""
+
+
+@dataclass(frozen=True)
+class TriadStyle:
+    """How a frame is drawn.
+
+    Attributes:
+        length: of an axis, with its head [m].
+        radius: of an axis [m].
+        head: length of its arrow head [m].
+    """
+
+    length: float
+    radius: float
+    head: float
+
+
+def draw_triad(meshcat: Meshcat, path: str, X_WF: Array, style: TriadStyle) -> None:
+    """Draws a frame.
+
+    Args:
+        meshcat: where to draw.
+        path: gets the frame's pose; below it are `x`, `y`, `z`, each with `shaft` and `head`, whose
+            own frame is at the tip, and `origin`.
+        X_WF: (4, 4) the frame.
+        style: sizes.
+    """
+    origin_color = Rgba(0.2, 0.2, 0.2)
+    head_scale = 2.4  # Radius over that of an axis.
+    origin_scale = 1.6  # Radius over that of an axis.
+    shaft = style.length - style.head
+    radius = head_scale * style.radius
+    X_AH = make_pose(np.diag([1.0, -1.0, -1.0]), (0.0, 0.0, style.length))
+    meshcat.SetTransform(path, RigidTransform(X_WF))
+    for name, R, color in zip("xyz", R_FA, AXIS_COLORS, strict=True):
+        axis = f"{path}/{name}"
+        meshcat.SetTransform(axis, RigidTransform(make_pose(R)))
+        meshcat.SetObject(f"{axis}/shaft", Cylinder(style.radius, shaft), color)
+        meshcat.SetTransform(f"{axis}/shaft", RigidTransform([0.0, 0.0, shaft / 2.0]))
+        meshcat.SetObject(f"{axis}/head", MeshcatCone(style.head, radius, radius), color)
+        meshcat.SetTransform(f"{axis}/head", RigidTransform(X_AH))
+    meshcat.SetObject(f"{path}/origin", Sphere(origin_scale * style.radius), origin_color)

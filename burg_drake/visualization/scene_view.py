@@ -1,0 +1,172 @@
+"""A scene on its station in Meshcat: objects with their names, board, table, robot."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydrake.geometry import Meshcat, MeshcatParams, Rgba
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.systems.framework import Context
+
+from burg_drake.core import Array, InvalidInputError, transform_points
+from burg_drake.scene import Scene, placed_vertices
+from burg_drake.station import Robot, Station, StationDiagram, build_station_diagram
+from burg_drake.visualization.meshcat_drawing import aim_at, text_triangles
+
+
+def open_meshcat(port: int | None = None) -> Meshcat:
+    """A Meshcat server with a quiet page: light background, no grid, no axes.
+
+    Args:
+        port: where to listen on localhost; the first free one from 7000 if None.
+
+    Raises:
+        InvalidInputError: the port is taken.
+    """
+    sky_color = (0.93, 0.95, 0.97)
+    floor_color = (0.76, 0.79, 0.82)
+    # Intensities: soft light, and one lamp that casts shadows.
+    lights = {
+        "AmbientLight": 1.3,
+        "FillLight": 0.5,
+        "PointLightNegativeX": 9.0,
+        "PointLightPositiveX": 9.0,
+        "SpotLight": 22.0,
+    }
+    # Settings of three.js, for a sharp shadow without stripes.
+    shadow = {"mapSize.width": 2048.0, "mapSize.height": 2048.0, "normalBias": 0.004, "radius": 3.0}
+    try:
+        meshcat = Meshcat(MeshcatParams(host="localhost", port=port, show_stats_plot=False))
+    except RuntimeError as error:
+        raise InvalidInputError(f"cannot listen on port {port}: {error}; choose another") from error
+    meshcat.SetProperty("/Grid", "visible", False)
+    meshcat.SetProperty("/Axes", "visible", False)
+    meshcat.SetProperty("/Background/<object>", "top_color", list(sky_color))
+    meshcat.SetProperty("/Background/<object>", "bottom_color", list(floor_color))
+    for light, intensity in lights.items():
+        meshcat.SetProperty(f"/Lights/{light}", "visible", intensity > 0.0)
+        meshcat.SetProperty(f"/Lights/{light}/<object>", "intensity", intensity)
+    lamp = "/Lights/SpotLight/<object>"
+    meshcat.SetProperty(lamp, "castShadow", True)
+    for key, value in shadow.items():
+        meshcat.SetProperty(lamp, f"shadow.{key}", value)
+    return meshcat
+
+
+def show_scene(
+    scene: Scene,
+    station: Station,
+    meshcat: Meshcat,
+    *,
+    robot: Robot = "arm",
+    labels: bool = True,
+) -> StationDiagram:
+    """Shows a scene as its document places it, the robot at home, and aims the camera.
+
+    Args:
+        scene: what stands on the board.
+        station: where.
+        meshcat: where to show it.
+        robot: as for `build_station_diagram`.
+        labels: write the instances' names on the board.
+
+    Returns:
+        The diagram that was shown.
+    """
+    station_diagram = build_station_diagram(scene, station, robot=robot, meshcat=meshcat)
+    context = station_diagram.diagram.CreateDefaultContext()
+    station_diagram.diagram.ForcedPublish(context)
+    draw_board(scene, station, meshcat, labels=labels)
+    shown = robot_points(station_diagram, context)
+    aim_camera(scene, station, meshcat, robot=robot, also=shown)
+    return station_diagram
+
+
+def draw_board(scene: Scene, station: Station, meshcat: Meshcat, *, labels: bool = True) -> None:
+    """Draws the outline of the board and, beside each object, the name of the instance.
+
+    With an arm the names read from the side across from it, where the camera is; without one
+    they read from the board's lower edge.
+    """
+    line_color = Rgba(0.25, 0.27, 0.30, 1.0)
+    label_height = 0.011  # Metres, of capital letters.
+    label_gap = 0.012  # Metres between an object's footprint and its name.
+    label_lift = 1e-3  # Metres above the board, against flicker.
+    labels_path = "/drake/labels"
+    X_WS = station.document.X_WS.matrix()
+    (x, y), z = scene.board.size, label_lift
+    corners = transform_points(X_WS, [[0, 0, z], [x, 0, z], [x, y, z], [0, y, z], [0, 0, z]]).T
+    meshcat.SetLine("/drake/board", np.asfortranarray(corners), 2.0, line_color)
+    meshcat.Delete(labels_path)
+    across = station.document.arm is not None
+    for name in scene.instances if labels else ():
+        points = placed_vertices(scene, name)
+        lower, upper = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+        below = label_gap + label_height
+        p_SL = np.array([(lower[0] + upper[0]) / 2, lower[1] - below, label_lift])
+        if across:
+            p_SL[1] = upper[1] + below
+        X_SL = RigidTransform(RotationMatrix.MakeZRotation(np.pi if across else 0.0), p_SL)
+        vertices, faces = text_triangles(name, label_height)
+        path = f"{labels_path}/{name}"
+        meshcat.SetTriangleMesh(path, vertices, faces, line_color)
+        meshcat.SetTransform(path, RigidTransform(X_WS) @ X_SL)
+
+
+def aim_camera(
+    scene: Scene,
+    station: Station,
+    meshcat: Meshcat,
+    *,
+    robot: Robot = "arm",
+    also: Array | None = None,
+) -> Array:
+    """Looks at the board: across it towards the arm if there is one, else from its lower edge.
+
+    Args:
+        scene: what stands on the board; all of it will be in view.
+        station: where.
+        meshcat: whose camera to set.
+        robot: as for `build_station_diagram`.
+        also: (N, 3) points in the world that will be in view, too [m].
+
+    Returns:
+        (3, 3) `R_WC`.
+    """
+    eye_across_arm = (1.05, 1.63, 0.72)  # Direction in S from the board to the eye.
+    eye_at_board = (0.3, -0.95, 0.74)  # Direction in S from the board to the eye.
+    across = robot == "arm" and station.document.arm is not None
+    p_SC = np.array(eye_across_arm if across else eye_at_board)
+    if not across and station.document.arm is not None:  # the names read from the other side
+        p_SC[:2] *= -1.0
+    forward = -station.document.X_WS.matrix()[:3, :3] @ p_SC
+    points = [scene_points(scene, station)] + ([] if also is None else [also])
+    return aim_at(meshcat, np.vstack(points), forward)
+
+
+def scene_points(scene: Scene, station: Station) -> Array:
+    """(N, 3) corners of the board and of boxes around all free objects, in the world [m]."""
+    x, y = scene.board.size
+    points = [np.array([[0, 0, 0], [x, 0, 0], [x, y, 0], [0, y, 0]], dtype=float)]
+    for name in scene.instances:
+        vertices = placed_vertices(scene, name)
+        points.append(box_corners(vertices.min(axis=0), vertices.max(axis=0)))
+    return transform_points(station.document.X_WS.matrix(), np.vstack(points))
+
+
+def box_corners(lower: ArrayLike, upper: ArrayLike) -> Array:
+    """(8, 3) corners of the box between two points (3,)."""
+    sides = np.stack([np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)], axis=1)
+    return np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 3)
+
+
+def robot_points(built: StationDiagram, context: Context) -> Array:
+    """(N, 3) corners of boxes around the robot's bodies in a context of the diagram [m]."""
+    body_radius = 0.09  # Metres, about, of a robot's body around its origin.
+    plant_context = built.plant.GetMyContextFromRoot(context)
+    origins = [
+        built.plant.EvalBodyPoseInWorld(plant_context, built.plant.get_body(body)).translation()
+        for body in built.robot_bodies
+    ]
+    boxes = [box_corners(p - body_radius, p + body_radius) for p in origins]
+    return np.vstack(boxes) if boxes else np.empty((0, 3))
